@@ -1,0 +1,14 @@
+#include "core/base/check.h"
+
+#include <cstdio>
+#include <cstdlib>
+
+namespace locus::internal {
+
+void check_failed(const char* file, int line, const char* what, const std::string& operands) {
+  std::fprintf(stderr, "%s:%d: check failed: %s%s%s\n", file, line, what, operands.empty() ? "" : " with ",
+               operands.c_str());
+  std::abort();
+}
+
+}  // namespace locus::internal

@@ -1,0 +1,45 @@
+// Checks of what the program itself promises. A failed check is a bug in locus, never a user's mistake: it prints both
+// operands and the place, then aborts. Operating errors are absl::Status instead. LOCUS_DCHECK* vanish in release
+// builds.
+#ifndef LOCUS_CORE_BASE_CHECK_H_
+#define LOCUS_CORE_BASE_CHECK_H_
+
+#include <sstream>
+#include <string>
+
+namespace locus::internal {
+
+[[noreturn]] void check_failed(const char* file, int line, const char* what, const std::string& operands);
+
+template <class A, class B>
+[[noreturn]] void check_failed_op(const char* file, int line, const char* what, const A& a, const B& b) {
+  std::ostringstream operands;
+  operands << a << " and " << b;
+  check_failed(file, line, what, operands.str());
+}
+
+}  // namespace locus::internal
+
+#define LOCUS_CHECK(condition) \
+  (static_cast<bool>(condition) ? void(0) : ::locus::internal::check_failed(__FILE__, __LINE__, #condition, ""))
+#define LOCUS_CHECK_OP_(a, op, b)                                                                              \
+  do {                                                                                                         \
+    const auto& locus_check_a = (a);                                                                           \
+    const auto& locus_check_b = (b);                                                                           \
+    if (!(locus_check_a op locus_check_b))                                                                     \
+      ::locus::internal::check_failed_op(__FILE__, __LINE__, #a " " #op " " #b, locus_check_a, locus_check_b); \
+  } while (false)
+#define LOCUS_CHECK_EQ(a, b) LOCUS_CHECK_OP_(a, ==, b)
+#define LOCUS_CHECK_NE(a, b) LOCUS_CHECK_OP_(a, !=, b)
+#define LOCUS_CHECK_LE(a, b) LOCUS_CHECK_OP_(a, <=, b)
+#define LOCUS_CHECK_LT(a, b) LOCUS_CHECK_OP_(a, <, b)
+
+#ifdef NDEBUG
+#define LOCUS_DCHECK(condition) \
+  do {                          \
+  } while (false && (condition))
+#else
+#define LOCUS_DCHECK(condition) LOCUS_CHECK(condition)
+#endif
+
+#endif  // LOCUS_CORE_BASE_CHECK_H_

@@ -1,0 +1,55 @@
+// Every maximum in one place. A refusal names the limit by the name given here and `locus limits` lists them. Relations
+// between maxima are asserted below; server configuration may lower some, never raise one above these.
+#ifndef LOCUS_CORE_BASE_LIMITS_H_
+#define LOCUS_CORE_BASE_LIMITS_H_
+
+#include <cstddef>
+#include <cstdint>
+
+namespace locus::limits {
+
+inline constexpr double kMaxCoordinate = 1e9;            // |x| of any position or frame, and of any extent
+inline constexpr double kMaxQuaternionDeviation = 1e-3;  // of |q| from 1
+
+inline constexpr uint32_t kMaxScenes = 1024;
+inline constexpr uint32_t kMaxMeshes = 65536;
+inline constexpr uint32_t kMaxNameLength = 63;  // scenes; also the characters of a mesh name
+inline constexpr uint32_t kMaxLabels = 16;
+inline constexpr uint32_t kMaxLabelLength = 256;
+inline constexpr uint32_t kMaxMeshParts = 65536;
+inline constexpr uint32_t kMaxMeshVertices = 1u << 28;
+inline constexpr uint32_t kMaxMeshTriangles = 1u << 27;
+inline constexpr uint32_t kMaxInstances = 1u << 20;  // per scene
+inline constexpr uint32_t kMaxObjects = 1u << 24;    // per scene
+inline constexpr uint32_t kMaxPendingChanges = 64;   // static changes waiting per scene
+
+inline constexpr uint32_t kMaxUpdateItems = 1u << 20;   // per batch
+inline constexpr uint32_t kMaxListedItemErrors = 1000;  // all are counted
+inline constexpr uint32_t kMaxWriters = 4096;           // remembered per scene, for retry safety
+
+inline constexpr uint32_t kMaxBlocks = 256;                // per query batch
+inline constexpr uint32_t kMaxQueries = 65536;             // per query batch, all blocks together
+inline constexpr uint32_t kMaxIgnoredIds = 64;             // per block
+inline constexpr uint32_t kDefaultMaxResults = 1024;       // per query
+inline constexpr uint32_t kMaxMaxResults = 1u << 20;       // per query
+inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;  // clients refuse 4 MiB by default
+inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
+
+inline constexpr uint32_t kRecentRevisions = 64;       // kept for `exactly` views ...
+inline constexpr uint64_t kRecentItems = 1u << 20;     // ... while they replaced at most this many objects
+inline constexpr uint32_t kDefaultWaitMs = 1000;       // at_least without a deadline
+inline constexpr uint32_t kTestsBetweenChecks = 4096;  // primitive tests between two looks at the deadline
+
+inline constexpr uint32_t kReceiveBytes = 32u << 20;  // one message
+inline constexpr uint32_t kMaxStreams = 1024;         // open update and query streams
+inline constexpr uint32_t kMaxPageSize = 1000;        // scenes or meshes a page
+
+static_assert(kMaxBlocks <= kMaxQueries);
+static_assert(kDefaultMaxResults <= kMaxMaxResults);
+static_assert(kDefaultReplyBytes < 4u << 20, "clients refuse messages over 4 MiB by default");
+static_assert(kDefaultReplyBytes <= kMaxReplyBytes);
+static_assert(uint64_t{kMaxMeshTriangles} * 3 < uint64_t{1} << 32, "index positions fit 32 bits");
+
+}  // namespace locus::limits
+
+#endif  // LOCUS_CORE_BASE_LIMITS_H_

@@ -1,0 +1,94 @@
+#include "core/base/refusal.h"
+
+#include <array>
+#include <vector>
+
+#include "absl/strings/cord.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+
+namespace locus {
+namespace {
+
+constexpr absl::string_view kPayloadType = "locus/refusal";
+// Fields of a payload are separated by a character that no field path or limit name contains.
+constexpr char kSeparator = '\x1f';
+constexpr size_t kFieldCount = 7;
+
+constexpr std::array<absl::string_view, 16> kReasonNames = {
+    "UNSPECIFIED",  "NOT_FINITE",      "UNKNOWN_ID", "DUPLICATE_ID", "COLUMN_LENGTH",  "LIMIT",
+    "OUT_OF_RANGE", "SCENE_RESTARTED", "NOT_SERVED", "NOT_FOUND",    "ALREADY_EXISTS", "DRAINING",
+    "MALFORMED",    "BATCH_GAP",       "IN_USE",     "HASH_MISMATCH"};
+
+// Whole numbers without an exponent, as limits are.
+std::string number(double value) {
+  constexpr double kExactIntegers = 9007199254740992.0;
+  if (value >= -kExactIntegers && value <= kExactIntegers && value == static_cast<double>(static_cast<int64_t>(value)))
+    return absl::StrCat(static_cast<int64_t>(value));
+  return absl::StrCat(value);
+}
+
+std::string place(const Refusal& refusal) {
+  if (refusal.field.empty()) return "";
+  if (!refusal.index) return absl::StrCat(refusal.field, ": ");
+  return absl::StrCat(refusal.field, "[", *refusal.index, "]: ");
+}
+
+}  // namespace
+
+absl::string_view reason_name(Reason reason) {
+  const auto number = static_cast<size_t>(reason);
+  return number < kReasonNames.size() ? kReasonNames[number] : "UNKNOWN_REASON";
+}
+
+absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal) {
+  absl::Status status(code, absl::StrCat(place(refusal), message));
+  const std::string index = refusal.index ? absl::StrCat(*refusal.index) : "";
+  const std::string separator(1, kSeparator);
+  status.SetPayload(kPayloadType, absl::Cord(absl::StrCat(static_cast<int>(refusal.reason), separator, refusal.field,
+                                                          separator, index, separator, refusal.limit, separator) +
+                                             absl::StrCat(number(refusal.limit_value), separator, number(refusal.asked),
+                                                          separator, refusal.retry_after_ms)));
+  return status;
+}
+
+absl::Status refuse_argument(Reason reason, absl::string_view field, std::optional<uint32_t> index,
+                             absl::string_view message) {
+  Refusal refusal;
+  refusal.reason = reason;
+  refusal.field = std::string(field);
+  refusal.index = index;
+  return refuse(absl::StatusCode::kInvalidArgument, message, refusal);
+}
+
+absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked) {
+  Refusal refusal;
+  refusal.reason = Reason::kLimit;
+  refusal.field = std::string(field);
+  refusal.limit = std::string(limit);
+  refusal.limit_value = limit_value;
+  refusal.asked = asked;
+  return refuse(absl::StatusCode::kResourceExhausted,
+                absl::StrCat("limit ", limit, " is ", number(limit_value), ", asked for ", number(asked)), refusal);
+}
+
+std::optional<Refusal> refusal_of(const absl::Status& status) {
+  const absl::optional<absl::Cord> payload = status.GetPayload(kPayloadType);
+  if (!payload) return std::nullopt;
+  const std::vector<std::string> fields = absl::StrSplit(std::string(*payload), kSeparator);
+  if (fields.size() != kFieldCount) return std::nullopt;
+  Refusal refusal;
+  int reason = 0;
+  uint32_t index = 0;
+  if (absl::SimpleAtoi(fields[0], &reason)) refusal.reason = static_cast<Reason>(reason);
+  refusal.field = fields[1];
+  if (absl::SimpleAtoi(fields[2], &index)) refusal.index = index;
+  refusal.limit = fields[3];
+  if (!absl::SimpleAtod(fields[4], &refusal.limit_value)) refusal.limit_value = 0;
+  if (!absl::SimpleAtod(fields[5], &refusal.asked)) refusal.asked = 0;
+  if (!absl::SimpleAtoi(fields[6], &refusal.retry_after_ms)) refusal.retry_after_ms = 0;
+  return refusal;
+}
+
+}  // namespace locus

@@ -1,0 +1,86 @@
+// An axis-aligned bounding box, closed: touching counts. Plain data; `empty()` boxes contain nothing and are the
+// neutral element of merge().
+#ifndef LOCUS_CORE_GEOMETRY_AABB_H_
+#define LOCUS_CORE_GEOMETRY_AABB_H_
+
+#include <limits>
+
+#include "core/geometry/vec3.h"
+
+namespace locus {
+
+template <class S>
+struct Aabb {
+  static constexpr S kInfinity = std::numeric_limits<S>::infinity();
+
+  Vec3<S> min{kInfinity, kInfinity, kInfinity};
+  Vec3<S> max{-kInfinity, -kInfinity, -kInfinity};
+
+  constexpr bool empty() const { return !(min.x <= max.x && min.y <= max.y && min.z <= max.z); }
+  constexpr Vec3<S> extent() const { return max - min; }
+  friend constexpr bool operator==(const Aabb&, const Aabb&) = default;
+};
+
+using Aabbf = Aabb<float>;
+using Aabbd = Aabb<double>;
+
+template <class S>
+constexpr Aabb<S> merge(const Aabb<S>& a, const Aabb<S>& b) {
+  return {min(a.min, b.min), max(a.max, b.max)};
+}
+
+template <class S>
+constexpr Aabb<S> merge(const Aabb<S>& a, Vec3<S> point) {
+  return {min(a.min, point), max(a.max, point)};
+}
+
+template <class S>
+constexpr bool overlaps(const Aabb<S>& a, const Aabb<S>& b) {
+  return a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.y <= b.max.y && b.min.y <= a.max.y && a.min.z <= b.max.z &&
+         b.min.z <= a.max.z;
+}
+
+template <class S>
+constexpr bool contains(const Aabb<S>& outer, const Aabb<S>& inner) {
+  return outer.min.x <= inner.min.x && outer.min.y <= inner.min.y && outer.min.z <= inner.min.z &&
+         inner.max.x <= outer.max.x && inner.max.y <= outer.max.y && inner.max.z <= outer.max.z;
+}
+
+template <class S>
+constexpr bool contains(const Aabb<S>& box, Vec3<S> point) {
+  return contains(box, Aabb<S>{point, point});
+}
+
+// Half the surface area: what the surface area heuristic compares. 0 for an empty box.
+template <class S>
+constexpr S half_area(const Aabb<S>& box) {
+  if (box.empty()) return S{0};
+  const Vec3<S> e = box.extent();
+  return e.x * e.y + e.y * e.z + e.z * e.x;
+}
+
+// The largest |coordinate| of any point of the box. A superset never has a smaller one.
+template <class S>
+S magnitude(const Aabb<S>& box) {
+  return std::max(max_component(abs(box.min)), max_component(abs(box.max)));
+}
+
+// Squared distance from `point` to the box, 0 inside. Every step rounds monotonically, so a superset box is never
+// farther.
+template <class S>
+constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
+  const Vec3<S> gap = max(max(box.min - point, point - box.max), Vec3<S>{});
+  return squared_length(gap);
+}
+
+template <class S>
+Aabb<S> grown(const Aabb<S>& box, S by) {
+  const Vec3<S> margin{by, by, by};
+  return {box.min - margin, box.max + margin};
+}
+
+constexpr Aabbd to_double(const Aabbf& box) { return {to_double(box.min), to_double(box.max)}; }
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_AABB_H_

@@ -1,0 +1,76 @@
+// What an index must know of the values it holds: the chapter's trait, as a C++20 concept. Values need no base class
+// and no member: specialise PrimitiveTraits for a type of yours or of somebody else's, and every structure under
+// core/index holds it. A missing member is one error that names the concept's line for it.
+//
+//   Scalar     float or double: the type of bounds and distances
+//   RayQuery   a ray made ready: slabs() for culling, to_scaled(t) from distances to the slabs' unit, rounded up
+//   BallQuery, BoxQuery
+//   id         identity: lower wins a tie, remove() finds by it; unique within one index
+//   bounds     axis-aligned bounds; every test below includes them, so culling by any superset changes no verdict
+//   position   where a grid files the value: any point within the bounds, fixed for the value
+//   ray        distance >= 0 of the first hit, whatever ray's own end
+//   ball, box  closed solids share a point
+//
+// Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (PrimitiveKeyTrait and kin).
+#ifndef LOCUS_CORE_GEOMETRY_PRIMITIVE_TRAITS_H_
+#define LOCUS_CORE_GEOMETRY_PRIMITIVE_TRAITS_H_
+
+#include <concepts>
+#include <cstdint>
+#include <optional>
+
+#include "core/geometry/ray_triangle.h"
+#include "core/geometry/shape.h"
+#include "core/geometry/triangle_overlap.h"
+
+namespace locus {
+
+template <class Value>
+struct PrimitiveTraits;
+
+template <class Value>
+using ScalarOf = typename PrimitiveTraits<Value>::Scalar;
+
+// Enough to be held and culled.
+template <class Value>
+concept Bounded = requires(const Value& value) {
+  requires std::floating_point<ScalarOf<Value>>;
+  { PrimitiveTraits<Value>::id(value) } -> std::same_as<uint64_t>;
+  { PrimitiveTraits<Value>::bounds(value) } -> std::same_as<Aabb<ScalarOf<Value>>>;
+  { PrimitiveTraits<Value>::position(value) } -> std::same_as<Vec3<ScalarOf<Value>>>;
+};
+
+// Enough to be asked.
+template <class Value>
+concept Primitive = Bounded<Value> &&
+    requires(const Value& value, const typename PrimitiveTraits<Value>::RayQuery& ray,
+             const typename PrimitiveTraits<Value>::BallQuery& ball,
+             const typename PrimitiveTraits<Value>::BoxQuery& box, ScalarOf<Value> distance) {
+  { ray.slabs() } -> std::same_as<const SlabRay<ScalarOf<Value>>&>;
+  { ray.to_scaled(distance) } -> std::same_as<ScalarOf<Value>>;
+  { PrimitiveTraits<Value>::ray(value, ray) } -> std::same_as<std::optional<ScalarOf<Value>>>;
+  { PrimitiveTraits<Value>::ball(value, ball) } -> std::same_as<bool>;
+  { PrimitiveTraits<Value>::box(value, box) } -> std::same_as<bool>;
+};
+
+template <>
+struct PrimitiveTraits<Triangle> {
+  using Scalar = float;
+  using RayQuery = TriangleRay;
+  using BallQuery = Ballf;
+  using BoxQuery = Obbf;
+
+  static uint64_t id(const Triangle& triangle) { return triangle.number; }
+  static Aabbf bounds(const Triangle& triangle) { return bounds_of(triangle); }
+  static Vec3f position(const Triangle& triangle) { return triangle.a; }
+  static std::optional<float> ray(const Triangle& triangle, const TriangleRay& ray) {
+    const std::optional<TriangleHit> hit = ray.hit(triangle);
+    return hit ? std::optional<float>(ray.from_scaled(hit->t)) : std::nullopt;
+  }
+  static bool ball(const Triangle& triangle, const Ballf& ball) { return ball_overlaps(ball, triangle); }
+  static bool box(const Triangle& triangle, const Obbf& box) { return box_overlaps(box, triangle); }
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_PRIMITIVE_TRAITS_H_

@@ -1,0 +1,54 @@
+// Ray against triangle, watertight: a ray from inside a closed mesh always hits. The triangle is sheared so that the
+// ray becomes the z axis of a new frame; three edge functions, each two products and one difference, are then exactly
+// antisymmetric in their two vertices, so that a shared edge has no gap whatever the rounding.
+// Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013.
+#ifndef LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
+#define LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
+
+#include <optional>
+
+#include "core/geometry/ray.h"
+#include "core/geometry/triangle.h"
+
+namespace locus {
+
+struct TriangleHit {
+  float t;
+  float u, v;  // weights of the second and the third vertex
+};
+
+// A ray in mesh axes, ready for slab and triangle tests in float. The direction is scaled by a power of two so that its
+// largest component lies in [0.5, 1): no later product over- or underflows; t here counts in the scaled direction.
+// Immutable; cheap to copy.
+class TriangleRay {
+ public:
+  // `origin` and `direction` in mesh axes, still double; each component is rounded to float once.
+  TriangleRay(Vec3d origin, Vec3d direction, Cull cull = Cull::kNone);
+
+  const SlabRay<float>& slabs() const { return slabs_; }
+  Cull cull() const { return cull_; }
+
+  // t in units of the given direction, from and to t in units of the scaled one. Rounding is monotone; from_scaled()
+  // never gives more than the largest finite float for a finite t; to_scaled() rounds up, so that a limit given to a
+  // culling test never excludes what from_scaled() would have rounded down to it.
+  float from_scaled(float t) const;
+  float to_scaled(float t) const;
+
+  // The verdict, a pure function of ray and triangle: the watertight test accepts with t >= 0 (scaled units), and so
+  // does the slab test of the triangle's own box; t is clamped to the box's interval, so that no tree can prune what a
+  // list reports. Exactly edge-on and zero-area triangles are never hit.
+  std::optional<TriangleHit> hit(const Triangle& triangle) const;
+
+ private:
+  std::optional<TriangleHit> edge_test(const Triangle& triangle) const;
+
+  SlabRay<float> slabs_;
+  int exponent_;  // given direction = scaled direction * 2^exponent
+  Cull cull_;
+  int axis_x_, axis_y_, axis_z_;
+  float shear_x_, shear_y_, shear_z_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_

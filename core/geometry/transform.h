@@ -1,0 +1,30 @@
+// How an instance stands in the world: world = translation + scale * (rotation * mesh). Queries go to mesh axes in
+// double; kernels then round once. Immutable after construction.
+#ifndef LOCUS_CORE_GEOMETRY_TRANSFORM_H_
+#define LOCUS_CORE_GEOMETRY_TRANSFORM_H_
+
+#include "core/geometry/aabb.h"
+#include "core/geometry/rotation.h"
+
+namespace locus {
+
+struct Transform {
+  Vec3d translation;
+  Quaternion quaternion;  // unit
+  float scale = 1;        // > 0
+  Rotation rotation;      // of quaternion
+
+  Vec3d point_to_mesh(Vec3d world) const { return direction_to_mesh(world - translation); }
+  Vec3d direction_to_mesh(Vec3d world) const { return rotation.to_local(world) * (1.0 / scale); }
+  Vec3d point_to_world(Vec3d mesh) const { return translation + rotation.to_world(mesh) * double{scale}; }
+};
+
+Transform make_transform(Vec3d translation, const Quaternion& quaternion, float scale);
+
+// World bounds of a box given in mesh axes. Grown by 2^-40 of the magnitudes involved, which covers the rounding of
+// this function, so that bounds of a part always lie within the bounds of the whole up to that margin.
+Aabbd bounds_to_world(const Transform& transform, const Aabbf& mesh_box);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_TRANSFORM_H_

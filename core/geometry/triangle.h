@@ -1,0 +1,28 @@
+// A mesh triangle: three float vertices in mesh axes and its number, the position in the uploaded index list. Stored as
+// three vertices, never as a vertex and two edges: neighbours must see the very same floats or rays slip between them.
+#ifndef LOCUS_CORE_GEOMETRY_TRIANGLE_H_
+#define LOCUS_CORE_GEOMETRY_TRIANGLE_H_
+
+#include <cstdint>
+
+#include "core/geometry/aabb.h"
+
+namespace locus {
+
+struct Triangle {
+  Vec3f a, b, c;
+  uint32_t number = 0;
+
+  friend constexpr bool operator==(const Triangle&, const Triangle&) = default;
+};
+
+constexpr Aabbf bounds_of(const Triangle& t) { return {min(min(t.a, t.b), t.c), max(max(t.a, t.b), t.c)}; }
+
+// Counter-clockwise normal, not normalised, in double from the stored floats. Zero for a triangle without area.
+constexpr Vec3d area_normal(const Triangle& t) {
+  return cross(to_double(t.b) - to_double(t.a), to_double(t.c) - to_double(t.a));
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_TRIANGLE_H_
