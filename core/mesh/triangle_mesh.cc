@@ -1,0 +1,91 @@
+#include "core/mesh/triangle_mesh.h"
+
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+#include "core/base/refusal.h"
+
+namespace locus {
+namespace {
+
+absl::Status check_counts(const std::vector<float>& vertices, const std::vector<uint32_t>& indices,
+                          const std::vector<MeshPart>& parts) {
+  if (vertices.size() % 3 != 0)
+    return refuse_argument(Reason::kColumnLength, "vertices", {},
+                           absl::StrCat("holds ", vertices.size(), " numbers; give x, y, z for each vertex"));
+  if (indices.size() % 3 != 0)
+    return refuse_argument(Reason::kColumnLength, "indices", {},
+                           absl::StrCat("holds ", indices.size(), " numbers; give three for each triangle"));
+  if (vertices.empty() || indices.empty())
+    return refuse_argument(Reason::kColumnLength, vertices.empty() ? "vertices" : "indices", {},
+                           "a mesh needs at least one triangle");
+  if (vertices.size() / 3 > limits::kMaxMeshVertices)
+    return refuse_limit("vertices", "mesh_vertices", limits::kMaxMeshVertices,
+                        static_cast<double>(vertices.size() / 3));
+  if (indices.size() / 3 > limits::kMaxMeshTriangles)
+    return refuse_limit("indices", "mesh_triangles", limits::kMaxMeshTriangles,
+                        static_cast<double>(indices.size() / 3));
+  if (parts.size() > limits::kMaxMeshParts)
+    return refuse_limit("parts", "mesh_parts", limits::kMaxMeshParts, static_cast<double>(parts.size()));
+  return absl::OkStatus();
+}
+
+absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles) {
+  for (size_t i = 0; i < parts.size(); ++i) {
+    const auto index = static_cast<uint32_t>(i);
+    if (parts[i].name.size() > limits::kMaxLabelLength)
+      return refuse_limit(absl::StrCat("parts[", i, "].name"), "label_length", limits::kMaxLabelLength,
+                          static_cast<double>(parts[i].name.size()));
+    if (parts[i].first_triangle >= triangles || (i > 0 && parts[i].first_triangle <= parts[i - 1].first_triangle))
+      return refuse_argument(Reason::kOutOfRange, "parts", index, "first triangles must ascend and lie in the mesh");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status check_values(const std::vector<float>& vertices, const std::vector<uint32_t>& indices) {
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    const auto vertex = static_cast<uint32_t>(i / 3);
+    if (!std::isfinite(vertices[i]))
+      return refuse_argument(Reason::kNotFinite, "vertices", vertex, "coordinates must be finite numbers");
+    if (std::abs(vertices[i]) > limits::kMaxCoordinate)
+      return refuse_argument(Reason::kOutOfRange, "vertices", vertex, "coordinates must lie within +-1e9");
+  }
+  const size_t vertex_count = vertices.size() / 3;
+  for (size_t i = 0; i < indices.size(); ++i)
+    if (indices[i] >= vertex_count)
+      return refuse_argument(Reason::kOutOfRange, "indices", static_cast<uint32_t>(i),
+                             absl::StrCat("vertex ", indices[i], " of ", vertex_count, " does not exist"));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<TriangleMesh> TriangleMesh::create(std::vector<float> vertices, std::vector<uint32_t> indices,
+                                                  std::vector<MeshPart> parts) {
+  if (absl::Status status = check_counts(vertices, indices, parts); !status.ok()) return status;
+  if (absl::Status status = check_values(vertices, indices); !status.ok()) return status;
+  if (absl::Status status = check_parts(parts, indices.size() / 3); !status.ok()) return status;
+  TriangleMesh mesh;
+  mesh.vertices_ = std::move(vertices);
+  mesh.indices_ = std::move(indices);
+  mesh.parts_ = std::move(parts);
+  for (uint32_t number = 0; number < mesh.triangle_count(); ++number) {
+    const Triangle triangle = mesh.triangle(number);
+    mesh.bounds_ = merge(mesh.bounds_, bounds_of(triangle));
+    if (area_normal(triangle) == Vec3d{}) ++mesh.zero_area_count_;
+  }
+  return mesh;
+}
+
+Triangle TriangleMesh::triangle(uint32_t number) const {
+  const auto vertex = [this](uint32_t index) {
+    const float* p = &vertices_[size_t{3} * index];
+    return Vec3f{p[0], p[1], p[2]};
+  };
+  const uint32_t* corner = &indices_[size_t{3} * number];
+  return {vertex(corner[0]), vertex(corner[1]), vertex(corner[2]), number};
+}
+
+}  // namespace locus

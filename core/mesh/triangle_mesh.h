@@ -1,0 +1,50 @@
+// An uploaded triangle mesh, validated once and owned: finite vertices within the world, indices within the vertices,
+// at least one triangle. Immutable after creation; safe to share between threads.
+#ifndef LOCUS_CORE_MESH_TRIANGLE_MESH_H_
+#define LOCUS_CORE_MESH_TRIANGLE_MESH_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/geometry/triangle.h"
+
+namespace locus {
+
+// A named run of triangles, up to the next part's first.
+struct MeshPart {
+  std::string name;
+  uint32_t first_triangle = 0;
+};
+
+class TriangleMesh {
+ public:
+  // `vertices` holds 3V coordinates, `indices` 3T vertex numbers. Refuses with INVALID_ARGUMENT naming `vertices` or
+  // `indices` and the position in it, or with the limit that was passed.
+  static absl::StatusOr<TriangleMesh> create(std::vector<float> vertices, std::vector<uint32_t> indices,
+                                             std::vector<MeshPart> parts);
+
+  uint32_t triangle_count() const { return static_cast<uint32_t>(indices_.size() / 3); }
+  // Triangles that no ray can hit; they keep their numbers.
+  uint32_t zero_area_count() const { return zero_area_count_; }
+  const Aabbf& bounds() const { return bounds_; }
+  const std::vector<float>& vertices() const { return vertices_; }
+  const std::vector<uint32_t>& indices() const { return indices_; }
+  const std::vector<MeshPart>& parts() const { return parts_; }
+  Triangle triangle(uint32_t number) const;
+  uint64_t bytes() const { return vertices_.size() * sizeof(float) + indices_.size() * sizeof(uint32_t); }
+
+ private:
+  TriangleMesh() = default;
+
+  std::vector<float> vertices_;
+  std::vector<uint32_t> indices_;
+  std::vector<MeshPart> parts_;
+  Aabbf bounds_;
+  uint32_t zero_area_count_ = 0;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_MESH_TRIANGLE_MESH_H_

@@ -1,0 +1,107 @@
+// A batch of queries as borrowed columns: a list of blocks, each of one kind. The columns live as long as the call that
+// takes them. A column has N entries, one for all, or none for the default in brackets; N comes from the block's first.
+#ifndef LOCUS_CORE_QUERY_QUERY_BATCH_H_
+#define LOCUS_CORE_QUERY_QUERY_BATCH_H_
+
+#include <initializer_list>
+#include <variant>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/types/span.h"
+#include "core/base/ids.h"
+#include "core/base/limits.h"
+#include "core/geometry/ray.h"
+
+namespace locus {
+
+enum class Source : uint8_t { kBoth, kStatic, kDynamic };
+enum class Precision : uint8_t { kExact, kConservative };
+enum class RayMode : uint8_t { kFirst, kAny, kAll };
+enum class StaticDetail : uint8_t { kInstances, kTriangles, kTrianglesSorted };
+
+// Wanted result columns, a set of bits. Numbers equal those of the protocol's Column.
+enum class Column : uint8_t {
+  kT = 1,
+  kId = 2,
+  kTriangle = 3,
+  kUv = 4,
+  kNormal = 5,
+  kPoint = 6,
+  kGroup = 7,
+  kTag = 8,
+  kLayers = 9,
+  kPose = 10,
+};
+
+class ColumnSet {
+ public:
+  constexpr ColumnSet() = default;
+  constexpr ColumnSet(std::initializer_list<Column> columns) {
+    for (const Column column : columns) add(column);
+  }
+  constexpr void add(Column column) { bits_ |= 1u << static_cast<unsigned>(column); }
+  constexpr bool has(Column column) const { return (bits_ >> static_cast<unsigned>(column) & 1u) != 0; }
+  constexpr bool empty() const { return bits_ == 0; }
+
+ private:
+  uint32_t bits_ = 0;
+};
+
+struct RayColumns {
+  absl::Span<const float> origins;     // 3N, relative to the frame
+  absl::Span<const float> directions;  // 3N or 3, not zero
+  absl::Span<const float> t_max;       // [+inf], >= 0
+  RayMode mode = RayMode::kFirst;
+  Cull cull = Cull::kNone;
+  Inside inside = Inside::kSolid;
+};
+
+struct BallColumns {
+  absl::Span<const float> centers;  // 3N
+  absl::Span<const float> radii;    // N or 1, >= 0
+  StaticDetail detail = StaticDetail::kInstances;
+};
+
+struct BoxColumns {
+  absl::Span<const float> centers;       // 3N
+  absl::Span<const float> half_extents;  // 3N or 3, >= 0
+  absl::Span<const float> rotations;     // [identity], 4N or 4: x y z w
+  StaticDetail detail = StaticDetail::kInstances;
+};
+
+// Either ids (one row each) or groups (counts and rows).
+struct LookupColumns {
+  absl::Span<const uint64_t> ids;
+  absl::Span<const uint64_t> groups;
+};
+
+struct QueryBlock {
+  Vec3d frame;
+  Source source = Source::kBoth;
+  Precision precision = Precision::kExact;
+  ColumnSet columns;                         // [T, ID, TRIANGLE for rays; ID for the rest]
+  absl::Span<const uint32_t> masks;          // [all]
+  absl::Span<const uint64_t> ignore_groups;  // [0 = none]
+  absl::Span<const uint64_t> ignore_ids;     // for the whole block
+  uint32_t max_results = 0;                  // [limits::kDefaultMaxResults]
+  Id after_id = kNoId;                       // overlaps: only ids above it
+  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns> kind;
+};
+
+struct QueryBatch {
+  std::vector<QueryBlock> blocks;
+  uint64_t max_work = 0;         // primitive tests for the whole batch [no limit]
+  uint32_t max_reply_bytes = 0;  // [limits::kDefaultReplyBytes]
+};
+
+// Number of queries of a block.
+size_t query_count(const QueryBlock& block);
+
+// The whole check of untrusted columns: lengths, limits and every value. INVALID_ARGUMENT (or RESOURCE_EXHAUSTED for a
+// limit) naming the field as blocks[2].rays.directions and the query within it.
+absl::Status check_batch(const QueryBatch& batch);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_QUERY_BATCH_H_

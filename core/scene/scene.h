@@ -1,0 +1,100 @@
+// A named world: its current snapshot, its one writer at a time, and whoever waits for a revision.
+//
+// Threads: every member may be called from any thread. apply() and change_instances() are serialised inside; latest()
+// and view() never wait for a writer: they take a lock only to copy a pointer, and the writer holds that lock only to
+// swap it. Invariant: revisions of one epoch are published in order, each after it is complete; nothing published
+// changes.
+#ifndef LOCUS_CORE_SCENE_SCENE_H_
+#define LOCUS_CORE_SCENE_SCENE_H_
+
+#include <chrono>
+#include <deque>
+#include <map>
+#include <string>
+
+#include "core/base/mutex.h"
+#include "core/scene/scene_snapshot.h"
+#include "core/scene/scene_writer.h"
+#include "core/scene/update_batch.h"
+
+namespace locus {
+
+struct SceneSpec {
+  std::map<std::string, std::string> labels;
+  Winding winding = Winding::kCounterClockwise;
+};
+
+// Which revision a caller wants. Epoch 0 is not checked.
+struct View {
+  enum class Kind : uint8_t { kLatest, kAtLeast, kExactly };
+  Kind kind = Kind::kLatest;
+  uint64_t revision = 0;
+  uint64_t epoch = 0;
+};
+
+struct InstanceChange {
+  std::vector<Id> placed;
+  uint64_t revision = 0;
+  uint64_t epoch = 0;
+};
+
+struct SceneStatus {
+  uint64_t memory_bytes = 0;
+  uint32_t pending_changes = 0;
+  std::string last_build_error;
+};
+
+class Scene {
+ public:
+  // `epoch` is not 0 and never used before for this name. `statics` may be shared with another scene.
+  Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics);
+
+  const std::string& name() const { return name_; }
+  const SceneSpec& spec() const { return spec_; }
+
+  // One batch, one revision (none if it changes nothing). Refuses by check_form(), by writer and batch numbers
+  // (BATCH_GAP), by `all_or_nothing`, or NOT_FOUND once the scene is closed; then nothing has changed.
+  absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+
+  // Removes and places instances as one revision; builds outside the writer's lock, one change at a time.
+  absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+
+  SnapshotPtr latest() const LOCUS_EXCLUDES(mutex_);
+
+  // The snapshot a view names; at_least waits until `deadline`. FAILED_PRECONDITION SCENE_RESTARTED for another epoch,
+  // OUT_OF_RANGE for `exactly` outside the recent revisions, DEADLINE_EXCEEDED, or NOT_FOUND once the scene is closed.
+  absl::StatusOr<SnapshotPtr> view(const View& view, std::chrono::steady_clock::time_point deadline) const
+      LOCUS_EXCLUDES(mutex_);
+
+  // The scene was deleted: wakes all who wait, refuses all that comes.
+  void close() LOCUS_EXCLUDES(mutex_);
+
+  SceneStatus status() const LOCUS_EXCLUDES(mutex_);
+
+ private:
+  void publish(SnapshotPtr snapshot, uint64_t replaced_items) LOCUS_EXCLUDES(mutex_);
+  absl::Status closed_status() const;
+  absl::StatusOr<SnapshotPtr> recent(uint64_t revision) const LOCUS_REQUIRES(mutex_);
+
+  const std::string name_;
+  const SceneSpec spec_;
+  Mutex change_mutex_;  // one static change at a time; taken before writer_mutex_
+  Mutex writer_mutex_;  // taken before mutex_
+  SceneWriter writer_ LOCUS_GUARDED_BY(writer_mutex_);
+  mutable Mutex mutex_;
+  mutable ConditionVariable published_;
+  SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
+  struct Recent {
+    SnapshotPtr snapshot;
+    uint64_t replaced_items;
+  };
+  std::deque<Recent> recent_ LOCUS_GUARDED_BY(mutex_);  // oldest first, latest_ last
+  uint64_t recent_items_ LOCUS_GUARDED_BY(mutex_) = 0;
+  uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
+  std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
+  bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_SCENE_H_

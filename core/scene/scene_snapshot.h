@@ -1,0 +1,31 @@
+// Everything a scene is at one revision. Immutable, shared: whoever holds it sees that revision for as long as it is
+// held, whatever the writer does meanwhile.
+#ifndef LOCUS_CORE_SCENE_SCENE_SNAPSHOT_H_
+#define LOCUS_CORE_SCENE_SCENE_SNAPSHOT_H_
+
+#include <memory>
+
+#include "core/base/persistent_map.h"
+#include "core/index/hash_grid/hash_grid.h"
+#include "core/scene/object.h"
+#include "core/scene/static_set.h"
+
+namespace locus {
+
+enum class Winding : uint8_t { kCounterClockwise, kClockwise };
+
+struct SceneSnapshot {
+  uint64_t epoch = 0;     // names one unbroken history of revisions
+  uint64_t revision = 0;  // +1 for each applied batch or static change
+  uint64_t tick = 0;      // the caller's time step
+  Winding winding = Winding::kCounterClockwise;
+  std::shared_ptr<const StaticSet> statics;
+  HashGrid<Object> grid;
+  PersistentMap<Id, Object> objects;  // the same objects, by id
+};
+
+using SnapshotPtr = std::shared_ptr<const SceneSnapshot>;
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_SCENE_SNAPSHOT_H_

@@ -1,0 +1,70 @@
+// Applies update batches to a scene's working state and freezes a snapshot for each revision. Knows no locks and no
+// readers: Scene gives it exclusive use.
+#ifndef LOCUS_CORE_SCENE_SCENE_WRITER_H_
+#define LOCUS_CORE_SCENE_SCENE_WRITER_H_
+
+#include <cstdint>
+#include <memory>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/statusor.h"
+#include "core/scene/scene_snapshot.h"
+#include "core/scene/update_batch.h"
+
+namespace locus {
+
+// What each known writer sent last, so that a batch sent twice is applied once. Bounded: the writer heard longest ago
+// is forgotten first, and its next batch is refused rather than risked.
+class WriterTable {
+ public:
+  // Nothing if the batch is new and next in order; the old ack (or one marked duplicate) if it was applied before;
+  // FAILED_PRECONDITION BATCH_GAP if a batch before it is missing.
+  absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
+  void record(uint64_t writer, uint64_t batch, const UpdateAck& ack);
+
+ private:
+  struct Last {
+    uint64_t batch = 0;
+    uint64_t heard = 0;
+    UpdateAck ack;
+  };
+  absl::flat_hash_map<uint64_t, Last> writers_;
+  uint64_t clock_ = 0;
+};
+
+class SceneWriter {
+ public:
+  SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics);
+
+  struct Applied {
+    UpdateAck ack;
+    SnapshotPtr snapshot;         // null when nothing changed
+    uint64_t replaced_items = 0;  // objects the revision before holds that this one does not
+  };
+  // `batch` has passed check_form(). Item errors are in the ack; with all_or_nothing any of them refuses the batch.
+  absl::StatusOr<Applied> apply(const UpdateBatch& batch);
+
+  // The next revision with other statics.
+  SnapshotPtr replace_statics(std::shared_ptr<const StaticSet> statics);
+
+  // The revision reached so far.
+  SnapshotPtr freeze();
+
+  bool is_object(Id id) const { return objects_.find(id) != nullptr; }
+  const StaticSet& statics() const { return *statics_; }
+  std::shared_ptr<const StaticSet> shared_statics() const { return statics_; }
+
+ private:
+  uint64_t epoch_;
+  uint64_t revision_ = 0;
+  uint64_t tick_ = 0;
+  Winding winding_;
+  std::shared_ptr<const StaticSet> statics_;
+  HashGrid<Object> grid_;
+  PersistentMap<Id, Object> objects_;
+  WriterTable writers_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_SCENE_WRITER_H_
