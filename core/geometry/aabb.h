@@ -79,7 +79,10 @@ Aabb<S> grown(const Aabb<S>& box, S by) {
   return {box.min - margin, box.max + margin};
 }
 
-constexpr Aabbd to_double(const Aabbf& box) { return {to_double(box.min), to_double(box.max)}; }
+template <class S>
+constexpr Aabbd to_double(const Aabb<S>& box) {
+  return {to_double(box.min), to_double(box.max)};
+}
 
 }  // namespace locus
 

@@ -32,6 +32,7 @@ struct Rotation {
   // Entrywise absolute value times `half`: half extents of the axis-aligned bounds of a turned box.
   Vec3d extent_to_world(Vec3d half) const;
   Vec3d extent_to_local(Vec3d half) const;
+  friend constexpr bool operator==(const Rotation&, const Rotation&) = default;
 };
 
 // Normalises in double first; the identity quaternion gives the exact identity.

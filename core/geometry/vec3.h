@@ -65,6 +65,7 @@ bool is_finite(Vec3<S> a) {
 }
 
 constexpr Vec3d to_double(Vec3f a) { return {a.x, a.y, a.z}; }
+constexpr Vec3d to_double(Vec3d a) { return a; }
 constexpr Vec3f to_float(Vec3d a) {
   return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
 }

@@ -1,0 +1,157 @@
+#include "core/geometry/shape.h"
+
+#include "core/base/planted_bug.h"
+#include "core/geometry/obb_obb.h"
+#include "core/geometry/ray_ball.h"
+#include "core/geometry/ray_capsule.h"
+#include "core/geometry/ray_obb.h"
+#include "core/geometry/segment.h"
+
+namespace locus {
+namespace {
+
+Obbd box_of(const Shape& shape) { return {shape.position, to_double(shape.size), rotation_of(shape.rotation)}; }
+
+Aabbd capsule_bounds(const Shape& shape) {
+  constexpr double kMargin = 0x1p-40;
+  const Vec3d axis = abs(rotation_of(shape.rotation).to_world(to_double(shape.size)));
+  const double margin = kMargin * (max_component(abs(shape.position)) + max_component(axis) + shape.radius);
+  return grown(Aabbd{shape.position - axis, shape.position + axis}, shape.radius + margin);
+}
+
+// A ray's line in a solid's own axes.
+struct LocalRay {
+  Line line;
+  int exponent;       // given direction = line direction * 2^exponent, turned
+  Rotation rotation;  // to world
+};
+
+LocalRay local_ray(const Rayd& ray, const Shape& shape) {
+  LocalRay local;
+  (void)std::frexp(max_component(abs(ray.direction)), &local.exponent);
+  const Vec3d direction = {std::ldexp(ray.direction.x, -local.exponent), std::ldexp(ray.direction.y, -local.exponent),
+                           std::ldexp(ray.direction.z, -local.exponent)};
+  if (shape.kind != ShapeKind::kBall) local.rotation = rotation_of(shape.rotation);
+  local.line = {local.rotation.to_local(ray.origin - shape.position), local.rotation.to_local(direction)};
+  return local;
+}
+
+bool contains(const Shape& shape, Vec3d local) {
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+      return false;
+    case ShapeKind::kBall:
+      return ball_contains(shape.radius, local);
+    case ShapeKind::kBox:
+      return box_contains(to_double(shape.size), local);
+    case ShapeKind::kCapsule:
+      return capsule_contains(to_double(shape.size), shape.radius, local);
+  }
+  return false;
+}
+
+std::optional<Chord> chord_of(const Shape& shape, const Line& line) {
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+      return std::nullopt;
+    case ShapeKind::kBall:
+      return chord_of_ball(line, shape.radius);
+    case ShapeKind::kBox:
+      return chord_of_box(line, to_double(shape.size));
+    case ShapeKind::kCapsule:
+      return chord_of_capsule(line, to_double(shape.size), shape.radius);
+  }
+  return std::nullopt;
+}
+
+ShapeHit hit_at(const LocalRay& local, double t, Vec3d normal) {
+  if (normal == Vec3d{}) normal = -local.line.direction;
+  return {std::ldexp(std::max(t, 0.0), -local.exponent), normalized(local.rotation.to_world(normal))};
+}
+
+// The verdict of the solid alone.
+std::optional<ShapeHit> solid_hit(const ObjectRay& ray, const Shape& shape) {
+  const LocalRay local = local_ray(ray.ray(), shape);
+  const bool inside = contains(shape, local.line.origin);
+  if (inside && ray.inside() == Inside::kSkip) return std::nullopt;
+  if (inside && ray.inside() == Inside::kSolid) return ShapeHit{0, Vec3d{} - normalized(ray.ray().direction)};
+  const std::optional<Chord> chord = chord_of(shape, local.line);
+  // On the surface, within rounding, a line may have no chord: such a ray leaves at once.
+  if (inside) return chord ? hit_at(local, chord->far, chord->far_normal) : hit_at(local, 0, local.line.origin);
+  if (!chord || chord->far < 0) return std::nullopt;
+  return hit_at(local, chord->near, chord->near_normal);
+}
+
+double squared_distance_to_box(Vec3d point, Vec3d half) { return squared_distance(point, Aabbd{-half, half}); }
+
+double squared_distance_to_shape(Vec3d point, const Shape& shape) {
+  const Vec3d offset = point - shape.position;
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+    case ShapeKind::kBall:
+      return squared_length(offset);
+    case ShapeKind::kBox:
+      return squared_distance_to_box(rotation_of(shape.rotation).to_local(offset), to_double(shape.size));
+    case ShapeKind::kCapsule:
+      return squared_distance_to_segment(rotation_of(shape.rotation).to_local(offset), to_double(shape.size));
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+// What a ball or capsule adds around its centre or inner segment.
+double rounding_radius(const Shape& shape) {
+  return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule ? shape.radius : 0;
+}
+
+}  // namespace
+
+Aabbd bounds_of(const Shape& shape) {
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+      return {shape.position, shape.position};
+    case ShapeKind::kBall:
+      return bounds_of(Balld{shape.position, shape.radius});
+    case ShapeKind::kBox:
+      return bounds_of(box_of(shape));
+    case ShapeKind::kCapsule:
+      return capsule_bounds(shape);
+  }
+  return {};
+}
+
+std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape) {
+  if (shape.kind == ShapeKind::kPoint) return std::nullopt;
+  const Interval<double> own = ray.slabs().interval(bounds_of(shape));
+  if (!(own.near <= own.far) || own.far < 0) return std::nullopt;
+  std::optional<ShapeHit> hit = solid_hit(ray, shape);
+  if (hit) hit->t = std::max(std::min(std::max(hit->t, own.near), own.far), 0.0);
+  return hit;
+}
+
+bool ball_overlaps(const Balld& ball, const Shape& shape) {
+  if (!reaches(ball, bounds_of(shape))) return false;
+  const double reach = ball.radius + rounding_radius(shape);
+  const double distance = squared_distance_to_shape(ball.center, shape);
+  return planted(PlantedBug::kStrictTie) ? distance < reach * reach : distance <= reach * reach;
+}
+
+bool box_overlaps(const Obbd& box, const Shape& shape) {
+  if (!overlaps(bounds_of(box), bounds_of(shape))) return false;
+  const Vec3d offset = box.rotation.to_local(shape.position - box.center);
+  const double rr = double{shape.radius} * shape.radius;
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+      return box_contains(box.half, offset);
+    case ShapeKind::kBall:
+      return squared_distance_to_box(offset, box.half) <= rr;
+    case ShapeKind::kBox:
+      return boxes_overlap(box, box_of(shape));
+    case ShapeKind::kCapsule: {
+      const Vec3d half_axis = rotation_of(shape.rotation).to_world(to_double(shape.size));
+      return squared_distance_segment_box(offset, box.rotation.to_local(half_axis), box.half) <= rr;
+    }
+  }
+  return false;
+}
+
+}  // namespace locus
