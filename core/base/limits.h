@@ -23,6 +23,10 @@ inline constexpr uint32_t kMaxInstances = 1u << 20;  // per scene
 inline constexpr uint32_t kMaxObjects = 1u << 24;    // per scene
 inline constexpr uint32_t kMaxPendingChanges = 64;   // static changes waiting per scene
 
+inline constexpr uint32_t kMaxBvhValues = kMaxMeshTriangles;
+inline constexpr uint32_t kMaxBvhDepth = 64;  // levels of nodes, on any input: sizes the stack of a visit
+inline constexpr uint32_t kMaxBvhBins = 64;
+
 inline constexpr uint32_t kMaxUpdateItems = 1u << 20;   // per batch
 inline constexpr uint32_t kMaxListedItemErrors = 1000;  // all are counted
 inline constexpr uint32_t kMaxWriters = 4096;           // remembered per scene, for retry safety
@@ -48,6 +52,7 @@ static_assert(kMaxBlocks <= kMaxQueries);
 static_assert(kDefaultMaxResults <= kMaxMaxResults);
 static_assert(kDefaultReplyBytes < 4u << 20, "clients refuse messages over 4 MiB by default");
 static_assert(kDefaultReplyBytes <= kMaxReplyBytes);
+static_assert(kMaxInstances <= kMaxBvhValues);
 static_assert(uint64_t{kMaxMeshTriangles} * 3 < uint64_t{1} << 32, "index positions fit 32 bits");
 
 }  // namespace locus::limits

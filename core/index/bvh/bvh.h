@@ -1,0 +1,180 @@
+// The bounding volume hierarchy for what does not move: a tree of boxes, eight children a node, up to eight values a
+// leaf, built once by the surface area heuristic. Serves the triangles of a mesh and the instances of a scene.
+//
+// Threads: immutable after build(); every member may run concurrently.
+// Invariants: a node's box contains the bounds of every value below it, so that the slab test, which is monotone, never
+// culls what a list would report; depth is at most limits::kMaxBvhDepth, which sizes the fixed stack of a visit; values
+// lie in depth-first order.
+// Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008 (wide
+// nodes).
+#ifndef LOCUS_CORE_INDEX_BVH_BVH_H_
+#define LOCUS_CORE_INDEX_BVH_BVH_H_
+
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+#include "core/base/limits.h"
+#include "core/base/planted_bug.h"
+#include "core/index/bvh/bvh_build.h"
+#include "core/index/spatial_index.h"
+
+namespace locus {
+
+template <Bounded V>
+class Bvh {
+  using Traits = PrimitiveTraits<V>;
+  using S = ScalarOf<V>;
+
+ public:
+  using Value = V;
+
+  // An empty tree.
+  Bvh() = default;
+
+  // Ids must be unique. No values is legal. Errors: as build_bvh_layout(); `values` of an error is the value's index.
+  static absl::StatusOr<Bvh> build(std::vector<V> values, const BvhOptions& options = {}) {
+    std::vector<Aabb<S>> boxes;
+    boxes.reserve(values.size());
+    for (const V& value : values) boxes.push_back(Traits::bounds(value));
+    absl::StatusOr<BvhLayout<S>> layout = build_bvh_layout<S>(boxes, options);
+    if (!layout.ok()) return layout.status();
+    return Bvh(*std::move(layout), std::move(values));
+  }
+
+  size_t size() const { return values_.size(); }
+  // In depth-first order: the storage order, fixed by input and options.
+  absl::Span<const V> values() const { return values_; }
+  // Of all values; empty for none.
+  const Aabb<S>& bounds() const { return bounds_; }
+  uint32_t depth() const { return depth_; }
+  size_t node_count() const { return nodes_.size(); }
+  size_t bytes() const { return nodes_.size() * sizeof(BvhNode<S>) + values_.size() * sizeof(V); }
+
+  // What an average ray that meets the tree's bounds costs: nodes and leaves it opens, by the ratio of surface areas. 0
+  // for an empty tree. O(nodes).
+  double sah_cost() const;
+
+  // Near to far by the boxes of nodes. Allocates nothing.
+  template <RayVisitor<V> Visitor>
+  void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
+
+  // In storage order; hands over only values whose own bounds overlap. Allocates nothing.
+  template <RegionVisitor<V> Visitor>
+  void visit_region(Visitor& visitor, Work& work) const;
+
+ private:
+  struct Pending {
+    BvhChild child;
+    S near;
+  };
+  // Each level leaves at most all but one of its children waiting.
+  static constexpr size_t kStackSize = size_t{limits::kMaxBvhDepth} * (kBvhWidth - 1) + 1;
+
+  Bvh(BvhLayout<S> layout, std::vector<V> values)
+      : nodes_(std::move(layout.nodes)),
+        bounds_(layout.bounds),
+        magnitude_(values.empty() ? S{0} : magnitude(layout.bounds)),
+        depth_(layout.depth) {
+    values_.reserve(values.size());
+    for (const uint32_t index : layout.order) values_.push_back(std::move(values[index]));
+  }
+
+  // Boxes that start exactly at the limit are wanted: a lower id may wait there.
+  static bool beyond(S near, S limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
+
+  Interval<S> node_interval(const SlabRay<S>& slabs, const Aabb<S>& box) const {
+    Interval<S> result = slabs.interval(box, magnitude_);
+    if (planted(PlantedBug::kUnpaddedNear))
+      result.near = SlabRay<S>(Ray<S>{slabs.origin(), slabs.direction()}, 0).interval(box).near;
+    return result;
+  }
+
+  // Puts the children the ray may hit on the stack, farthest first. Returns the new top.
+  Pending* push_hit(const BvhNode<S>& node, const SlabRay<S>& slabs, S limit, Pending* top) const;
+
+  std::vector<BvhNode<S>> nodes_;
+  std::vector<V> values_;
+  Aabb<S> bounds_;
+  S magnitude_ = 0;  // one for all boxes of the tree: at least that of each
+  uint32_t depth_ = 0;
+};
+
+template <Bounded V>
+double Bvh<V>::sah_cost() const {
+  if (nodes_.empty()) return 0;
+  const double whole = double{half_area(bounds_)};
+  double sum = 1;
+  for (const BvhNode<S>& node : nodes_) {
+    for (uint32_t slot = 0; slot < node.child_count; ++slot)
+      sum += whole > 0 ? double{half_area(node.bounds[slot])} / whole : 1;
+  }
+  return sum;
+}
+
+template <Bounded V>
+typename Bvh<V>::Pending* Bvh<V>::push_hit(const BvhNode<S>& node, const SlabRay<S>& slabs, S limit,
+                                           Pending* top) const {
+  Pending* const base = top;
+  for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+    const Interval<S> interval = node_interval(slabs, node.bounds[slot]);
+    if (interval.near > interval.far || interval.far < 0 || beyond(interval.near, limit)) continue;
+    Pending* place = top++;
+    for (; place > base && place[-1].near < interval.near; --place) *place = place[-1];
+    *place = {node.children[slot], interval.near};
+  }
+  return top;
+}
+
+template <Bounded V>
+template <RayVisitor<V> Visitor>
+void Bvh<V>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const {
+  if (nodes_.empty()) return;
+  Pending stack[kStackSize];
+  Pending* top = stack;
+  *top++ = {{0, 0}, -std::numeric_limits<S>::infinity()};
+  while (top != stack) {
+    const Pending now = *--top;
+    // The limit may have fallen since the push.
+    if (beyond(now.near, visitor.limit())) continue;
+    if (!now.child.is_leaf()) {
+      ++work.nodes;
+      top = push_hit(nodes_[now.child.first], slabs, visitor.limit(), top);
+      continue;
+    }
+    for (const V& value : values().subspan(now.child.first, now.child.count)) {
+      ++work.tests;
+      if (!visitor.visit(value)) return;
+    }
+  }
+}
+
+template <Bounded V>
+template <RegionVisitor<V> Visitor>
+void Bvh<V>::visit_region(Visitor& visitor, Work& work) const {
+  if (nodes_.empty()) return;
+  BvhChild stack[kStackSize];
+  BvhChild* top = stack;
+  *top++ = {0, 0};
+  while (top != stack) {
+    const BvhChild now = *--top;
+    if (!now.is_leaf()) {
+      ++work.nodes;
+      const BvhNode<S>& node = nodes_[now.first];
+      for (uint32_t slot = node.child_count; slot-- > 0;) {
+        if (visitor.overlaps(node.bounds[slot])) *top++ = node.children[slot];
+      }
+      continue;
+    }
+    for (const V& value : values().subspan(now.first, now.count)) {
+      if (!visitor.overlaps(Traits::bounds(value))) continue;
+      ++work.tests;
+      if (!visitor.visit(value)) return;
+    }
+  }
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_BVH_H_

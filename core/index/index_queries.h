@@ -1,0 +1,133 @@
+// The questions an index answers, written once for every structure: rays (first, any, all) and overlaps of balls and
+// boxes, exact by the values' own predicates or conservative by their bounds. Results are appended to what a vector
+// holds, never written over it; overlap results come in the structure's order. Answers are the same for all structures.
+//
+// A ray's end is the `distance` given here; the ray's own t_max plays no part. Distances are in units of the ray's
+// direction. `work`, where given, is added to. Cost: that of the structure's visit. Threads: as the index.
+// Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query interface).
+#ifndef LOCUS_CORE_INDEX_INDEX_QUERIES_H_
+#define LOCUS_CORE_INDEX_INDEX_QUERIES_H_
+
+#include <cstddef>
+#include <vector>
+
+#include "core/index/collectors.h"
+
+namespace locus {
+
+template <class Index>
+using RayQueryOf = typename PrimitiveTraits<typename Index::Value>::RayQuery;
+template <class Index>
+using BallQueryOf = typename PrimitiveTraits<typename Index::Value>::BallQuery;
+template <class Index>
+using BoxQueryOf = typename PrimitiveTraits<typename Index::Value>::BoxQuery;
+
+namespace internal {
+// Counts into the caller's counter or, without one, into its own.
+class WorkSink {
+ public:
+  explicit WorkSink(Work* work) : work_(work != nullptr ? *work : own_) {}
+  Work& get() { return work_; }
+
+ private:
+  Work own_;
+  Work& work_;
+};
+
+template <class Value, class Index, class Region, class Test>
+void collect_region(const Index& index, const Region& region, Test test, std::vector<Value>& result, Work* work) {
+  WorkSink sink(work);
+  RegionCollector<Value, Region, Test> collector(region, test, result);
+  index.visit_region(collector, sink.get());
+}
+
+inline constexpr auto kBoundsDecide = [](const auto&) { return true; };
+}  // namespace internal
+
+// First hit among several indices of one value type, in distance and out: a hit at r < distance (strictly) sets `value`
+// and `distance` and returns true; otherwise both stay untouched. Every index is asked, with what the ones before it
+// found as the limit; at equal r the lower id wins, also across indices. (Joining two first_ray() by || would skip the
+// second index, which may hold the nearer hit.)
+template <class V, SpatialIndex... Indices>
+bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, ScalarOf<V>& distance, Work* work,
+                  const Indices&... indices) {
+  internal::WorkSink sink(work);
+  NearestVisitor<V> nearest(ray, distance);
+  (indices.visit_ray(ray.slabs(), nearest, sink.get()), ...);
+  if (nearest.best() == nullptr) return false;
+  value = *nearest.best();
+  distance = nearest.distance();
+  return true;
+}
+
+// As above for one index.
+template <SpatialIndex Index>
+bool first_ray(const Index& index, const RayQueryOf<Index>& ray, typename Index::Value& value,
+               ScalarOf<typename Index::Value>& distance, Work* work = nullptr) {
+  return first_ray_of(ray, value, distance, work, index);
+}
+
+// Whether there is a hit at r < distance.
+template <SpatialIndex Index>
+bool any_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
+             Work* work = nullptr) {
+  internal::WorkSink sink(work);
+  AnyHitVisitor<typename Index::Value> any(ray, distance);
+  index.visit_ray(ray.slabs(), any, sink.get());
+  return any.found();
+}
+
+// Appends the hits at r < distance sorted by (r, id), only the first `max_hits` of them.
+template <SpatialIndex Index>
+void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
+              size_t max_hits, std::vector<RayHit<typename Index::Value>>& result, Work* work = nullptr) {
+  internal::WorkSink sink(work);
+  NearestFewVisitor<typename Index::Value> few(ray, distance, max_hits, result);
+  index.visit_ray(ray.slabs(), few, sink.get());
+  few.finish();
+}
+
+// Appends the values whose bounds the ray meets at r <= distance: a superset of what all_rays() hits.
+template <SpatialIndex Index>
+void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
+                      std::vector<typename Index::Value>& result, Work* work = nullptr) {
+  internal::WorkSink sink(work);
+  BoundsOnRayVisitor<typename Index::Value> on_ray(ray, distance, result);
+  index.visit_ray(ray.slabs(), on_ray, sink.get());
+}
+
+// Appends the values that share a point with the ball.
+template <SpatialIndex Index>
+void ball_overlap(const Index& index, const BallQueryOf<Index>& ball, std::vector<typename Index::Value>& result,
+                  Work* work = nullptr) {
+  using Value = typename Index::Value;
+  const auto exact = [&ball](const Value& value) { return PrimitiveTraits<Value>::ball(value, ball); };
+  internal::collect_region(index, BallRegion(ball), exact, result, work);
+}
+
+// Appends the values whose bounds share a point with the ball: a superset of ball_overlap().
+template <SpatialIndex Index>
+void conservative_ball(const Index& index, const BallQueryOf<Index>& ball, std::vector<typename Index::Value>& result,
+                       Work* work = nullptr) {
+  internal::collect_region(index, BallRegion(ball), internal::kBoundsDecide, result, work);
+}
+
+// Appends the values that share a point with the box, which may be turned.
+template <SpatialIndex Index>
+void box_overlap(const Index& index, const BoxQueryOf<Index>& box, std::vector<typename Index::Value>& result,
+                 Work* work = nullptr) {
+  using Value = typename Index::Value;
+  const auto exact = [&box](const Value& value) { return PrimitiveTraits<Value>::box(value, box); };
+  internal::collect_region(index, BoxRegion(box), exact, result, work);
+}
+
+// Appends the values whose bounds overlap the axis-aligned bounds of the box: a superset of box_overlap().
+template <SpatialIndex Index>
+void conservative_box(const Index& index, const BoxQueryOf<Index>& box, std::vector<typename Index::Value>& result,
+                      Work* work = nullptr) {
+  internal::collect_region(index, BoxRegion(box), internal::kBoundsDecide, result, work);
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_INDEX_QUERIES_H_

@@ -1,0 +1,80 @@
+// The list: an array that culls nothing and hands every value to the visitor. It is the oracle that every other
+// structure is compared with, and the fastest structure for a handful of values.
+//
+// Threads: const members may run concurrently; insert and remove need exclusive use.
+// Invariant: slots_ maps each id in the list to the position of its value, and nothing else.
+// Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (List).
+#ifndef LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
+#define LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/types/span.h"
+#include "core/base/check.h"
+#include "core/index/spatial_index.h"
+
+namespace locus {
+
+template <Bounded V>
+class ListIndex {
+  using Traits = PrimitiveTraits<V>;
+  using S = ScalarOf<V>;
+
+ public:
+  using Value = V;
+
+  // Amortised O(1). The id must not be in the list.
+  void insert(const V& value) {
+    const bool added = slots_.try_emplace(Traits::id(value), values_.size()).second;
+    LOCUS_CHECK(added);
+    values_.push_back(value);
+  }
+
+  // False, and no change, when no value has the id of `value`. O(1): the last value takes the free place, so order is
+  // not kept.
+  bool remove(const V& value) {
+    const auto found = slots_.find(Traits::id(value));
+    if (found == slots_.end()) return false;
+    const size_t slot = found->second;
+    slots_.erase(found);
+    if (slot + 1 != values_.size()) {
+      values_[slot] = std::move(values_.back());
+      slots_[Traits::id(values_[slot])] = slot;
+    }
+    values_.pop_back();
+    return true;
+  }
+
+  bool contains(const V& value) const { return slots_.contains(Traits::id(value)); }
+  size_t size() const { return values_.size(); }
+  absl::Span<const V> values() const { return values_; }
+
+  template <RayVisitor<V> Visitor>
+  void visit_ray(const SlabRay<S>&, Visitor& visitor, Work& work) const {
+    visit_all(visitor, work);
+  }
+
+  template <RegionVisitor<V> Visitor>
+  void visit_region(Visitor& visitor, Work& work) const {
+    visit_all(visitor, work);
+  }
+
+ private:
+  template <class Visitor>
+  void visit_all(Visitor& visitor, Work& work) const {
+    for (const V& value : values_) {
+      ++work.tests;
+      if (!visitor.visit(value)) return;
+    }
+  }
+
+  std::vector<V> values_;
+  absl::flat_hash_map<uint64_t, size_t> slots_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
