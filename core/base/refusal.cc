@@ -35,6 +35,19 @@ std::string place(const Refusal& refusal) {
   return absl::StrCat(refusal.field, "[", *refusal.index, "]: ");
 }
 
+absl::Status over_limit(absl::StatusCode code, absl::string_view field, absl::string_view limit, double limit_value,
+                        double asked, uint32_t retry_after_ms) {
+  Refusal refusal;
+  refusal.reason = Reason::kLimit;
+  refusal.field = std::string(field);
+  refusal.limit = std::string(limit);
+  refusal.limit_value = limit_value;
+  refusal.asked = asked;
+  refusal.retry_after_ms = retry_after_ms;
+  return refuse(code, absl::StrCat("limit ", limit, " is ", number(limit_value), ", asked for ", number(asked)),
+                refusal);
+}
+
 }  // namespace
 
 absl::string_view reason_name(Reason reason) {
@@ -63,14 +76,12 @@ absl::Status refuse_argument(Reason reason, absl::string_view field, std::option
 }
 
 absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked) {
-  Refusal refusal;
-  refusal.reason = Reason::kLimit;
-  refusal.field = std::string(field);
-  refusal.limit = std::string(limit);
-  refusal.limit_value = limit_value;
-  refusal.asked = asked;
-  return refuse(absl::StatusCode::kResourceExhausted,
-                absl::StrCat("limit ", limit, " is ", number(limit_value), ", asked for ", number(asked)), refusal);
+  return over_limit(absl::StatusCode::kInvalidArgument, field, limit, limit_value, asked, 0);
+}
+
+absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
+                         uint32_t retry_after_ms) {
+  return over_limit(absl::StatusCode::kResourceExhausted, field, limit, limit_value, asked, retry_after_ms);
 }
 
 std::optional<Refusal> refusal_of(const absl::Status& status) {

@@ -54,8 +54,13 @@ absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refu
 absl::Status refuse_argument(Reason reason, absl::string_view field, std::optional<uint32_t> index,
                              absl::string_view message);
 
-// RESOURCE_EXHAUSTED naming the limit, its value and what was asked.
+// A request that is over a limit all by itself: INVALID_ARGUMENT naming the limit, its value and what was asked.
 absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked);
+
+// The server or scene is full now: RESOURCE_EXHAUSTED naming the limit. The same request may pass once something is
+// freed; `retry_after_ms` is 0 where waiting alone frees nothing.
+absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
+                         uint32_t retry_after_ms);
 
 // What refuse() attached; nothing for a status made without it.
 std::optional<Refusal> refusal_of(const absl::Status& status);
