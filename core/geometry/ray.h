@@ -6,9 +6,10 @@
 //
 // Every rounding step is monotone in the box, so a superset of a box never has a larger near or a smaller far: a
 // verdict that includes the slab test of the primitive's own box can be culled by any box around it and never changes.
-// The two pads cover the rounding of the primitive tests and of the way into mesh axes. A direction component of zero
-// is replaced by 1e-18 of the largest one, which no distance within the world makes visible behind the pad. Source: Kay
-// and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs); Ize, Robust BVH Ray Traversal, 2013 (padding).
+// The pads cover the rounding of the slab test itself, of a ray to float and of the way into mesh axes. A direction
+// component of zero is replaced by 1e-18 of the largest one, which no distance within the world makes visible behind
+// the pad. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs); Ize, Robust BVH Ray Traversal, 2013
+// (padding).
 #ifndef LOCUS_CORE_GEOMETRY_RAY_H_
 #define LOCUS_CORE_GEOMETRY_RAY_H_
 
@@ -45,7 +46,7 @@ struct Interval {
 };
 
 // Pads of the slab test, relative to the magnitudes of origin and box.
-inline constexpr double kTrianglePad = 0x1p-21;  // float triangle test: about eight roundings of 2^-24
+inline constexpr double kTrianglePad = 0x1p-21;  // float slabs: about eight roundings of 2^-24
 inline constexpr double kInstancePad = 0x1p-20;  // the way into mesh axes and one rounding to float, any rotation
 inline constexpr double kObjectPad = 0x1p-40;    // double predicates of moving objects
 

@@ -12,13 +12,11 @@ int exponent_of(Vec3d direction) {
   return exponent;
 }
 
-Rayf scaled_ray(Vec3d origin, Vec3d direction, int exponent) {
-  const Vec3d scaled = {std::ldexp(direction.x, -exponent), std::ldexp(direction.y, -exponent),
-                        std::ldexp(direction.z, -exponent)};
-  return {to_float(origin), to_float(scaled)};
+Vec3d scaled(Vec3d direction, int exponent) {
+  return {std::ldexp(direction.x, -exponent), std::ldexp(direction.y, -exponent), std::ldexp(direction.z, -exponent)};
 }
 
-bool culled(Cull cull, float determinant) {
+bool culled(Cull cull, double determinant) {
   if (cull == Cull::kNone) return false;
   const bool front = determinant > 0;
   return cull == Cull::kBack ? !front : front;
@@ -27,19 +25,17 @@ bool culled(Cull cull, float determinant) {
 }  // namespace
 
 TriangleRay::TriangleRay(Vec3d origin, Vec3d direction, Cull cull)
-    : slabs_(scaled_ray(origin, direction, exponent_of(direction)), kTrianglePad),
-      exponent_(exponent_of(direction)),
+    : exponent_(exponent_of(direction)),
+      origin_(origin),
+      direction_(scaled(direction, exponent_)),
+      slabs_({to_float(origin_), to_float(direction_)}, kTrianglePad),
       cull_(cull) {
-  const Vec3f d = slabs_.direction();
-  const Vec3f size = abs(d);
+  const Vec3d size = abs(direction_);
   axis_z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   axis_x_ = (axis_z_ + 1) % 3;
   axis_y_ = (axis_z_ + 2) % 3;
   // Keeps the winding: seen along the ray, x to y always turns the same way.
-  if (d[axis_z_] < 0) std::swap(axis_x_, axis_y_);
-  shear_x_ = d[axis_x_] / d[axis_z_];
-  shear_y_ = d[axis_y_] / d[axis_z_];
-  shear_z_ = 1.0f / d[axis_z_];
+  if (direction_[axis_z_] < 0) std::swap(axis_x_, axis_y_);
 }
 
 float TriangleRay::from_scaled(float t) const {
@@ -59,29 +55,33 @@ float TriangleRay::to_scaled(float t) const {
 }
 
 std::optional<TriangleHit> TriangleRay::edge_test(const Triangle& triangle) const {
-  const Vec3f a = triangle.a - slabs_.origin();
-  const Vec3f b = triangle.b - slabs_.origin();
-  const Vec3f c = triangle.c - slabs_.origin();
-  const float ax = a[axis_x_] - shear_x_ * a[axis_z_], ay = a[axis_y_] - shear_y_ * a[axis_z_];
-  const float bx = b[axis_x_] - shear_x_ * b[axis_z_], by = b[axis_y_] - shear_y_ * b[axis_z_];
-  const float cx = c[axis_x_] - shear_x_ * c[axis_z_], cy = c[axis_y_] - shear_y_ * c[axis_z_];
-  const float weight_a = cx * by - cy * bx;
-  const float weight_b = ax * cy - ay * cx;
-  const float weight_c = bx * ay - by * ax;
+  const Vec3d a = to_double(triangle.a) - origin_;
+  const Vec3d b = to_double(triangle.b) - origin_;
+  const Vec3d c = to_double(triangle.c) - origin_;
+  const double dx = direction_[axis_x_], dy = direction_[axis_y_], dz = direction_[axis_z_];
+  const double ax = a[axis_x_] * dz - a[axis_z_] * dx, ay = a[axis_y_] * dz - a[axis_z_] * dy;
+  const double bx = b[axis_x_] * dz - b[axis_z_] * dx, by = b[axis_y_] * dz - b[axis_z_] * dy;
+  const double cx = c[axis_x_] * dz - c[axis_z_] * dx, cy = c[axis_y_] * dz - c[axis_z_] * dy;
+  const double weight_a = cx * by - cy * bx;
+  const double weight_b = ax * cy - ay * cx;
+  const double weight_c = bx * ay - by * ax;
   const bool any_negative = weight_a < 0 || weight_b < 0 || weight_c < 0;
   const bool any_positive = weight_a > 0 || weight_b > 0 || weight_c > 0;
   if (any_negative && any_positive) return std::nullopt;
-  const float determinant = weight_a + weight_b + weight_c;
+  const double determinant = weight_a + weight_b + weight_c;
   if (determinant == 0) return std::nullopt;
   if (culled(cull_, determinant)) return std::nullopt;
-  const float depth =
-      weight_a * (shear_z_ * a[axis_z_]) + weight_b * (shear_z_ * b[axis_z_]) + weight_c * (shear_z_ * c[axis_z_]);
-  return TriangleHit{depth / determinant, weight_b / determinant, weight_c / determinant};
+  const double depth = weight_a * a[axis_z_] + weight_b * b[axis_z_] + weight_c * c[axis_z_];
+  const double t = depth / (determinant * dz);
+  if (!(t >= 0)) return std::nullopt;
+  // The sum turns -0 into 0, so that equal answers have equal bytes.
+  return TriangleHit{static_cast<float>(t) + 0.0f, static_cast<float>(weight_b / determinant),
+                     static_cast<float>(weight_c / determinant)};
 }
 
 std::optional<TriangleHit> TriangleRay::hit(const Triangle& triangle) const {
   std::optional<TriangleHit> result = edge_test(triangle);
-  if (!result || !(result->t >= 0)) return std::nullopt;
+  if (!result) return std::nullopt;
   const Interval<float> own = slabs_.interval(bounds_of(triangle));
   if (!(own.near <= own.far) || own.far < 0) return std::nullopt;
   result->t = std::min(std::max(result->t, own.near), own.far);
