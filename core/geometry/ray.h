@@ -70,12 +70,15 @@ class SlabRay {
   const Vec3<S>& origin() const { return origin_; }
   const Vec3<S>& direction() const { return direction_; }
 
+  // How far outside a box of that magnitude a ray may pass and still meet it here.
+  S margin(S box_magnitude) const { return pad_ * (magnitude_ + box_magnitude); }
+
   // The box's own interval.
   Interval<S> interval(const Aabb<S>& box) const { return interval(box, locus::magnitude(box)); }
 
   // As above with a magnitude of at least the box's: one for a whole tree, say. The interval can only grow by it.
   Interval<S> interval(const Aabb<S>& box, S box_magnitude) const {
-    const S margin = pad_ * (magnitude_ + box_magnitude);
+    const S margin = this->margin(box_magnitude);
     Interval<S> result{-std::numeric_limits<S>::infinity(), std::numeric_limits<S>::infinity()};
     for (int axis = 0; axis < 3; ++axis) {
       const S rd = reciprocal_[axis];

@@ -1,0 +1,116 @@
+// How the hash grid names places: cells with an edge of 2^exponent, numbered by 64-bit integers per axis, and bricks of
+// 4x4x4 cells. Plain functions without state. Cell edges are powers of two, so that a coordinate scales exactly; every
+// index here is monotone in its coordinate.
+#ifndef LOCUS_CORE_INDEX_HASH_GRID_CELL_KEY_H_
+#define LOCUS_CORE_INDEX_HASH_GRID_CELL_KEY_H_
+
+#include <algorithm>
+#include <cmath>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/base/planted_bug.h"
+#include "core/geometry/aabb.h"
+
+namespace locus::internal {
+
+inline constexpr int kMinCellExponent = -20;      // of the base level, about a micrometre where the unit is a metre
+inline constexpr int kMaxBaseExponent = 31;       // of the base level: one cell holds the world
+inline constexpr int kMaxCellExponent = 40;       // of any level; larger values are filed there too
+inline constexpr int kBrickBits = 2;              // a brick is 2^kBrickBits cells wide
+inline constexpr double kMaxCellIndex = 0x1p+62;  // far beyond the world; keeps every cast defined
+
+// A cell or a brick of one level.
+struct GridKey {
+  int64_t x = 0, y = 0, z = 0;
+
+  int64_t operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+  int64_t& operator[](int axis) { return axis == 0 ? x : axis == 1 ? y : z; }
+  friend constexpr auto operator<=>(const GridKey&, const GridKey&) = default;
+};
+
+// The same in every process, so that visiting order and work counters are too.
+struct GridKeyHash {
+  static constexpr uint64_t mix(uint64_t h) {
+    h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9u;
+    h = (h ^ (h >> 27)) * 0x94D049BB133111EBu;
+    return h ^ (h >> 31);
+  }
+  size_t operator()(const GridKey& key) const {
+    return mix(mix(mix(static_cast<uint64_t>(key.x)) + static_cast<uint64_t>(key.y)) + static_cast<uint64_t>(key.z));
+  }
+};
+
+inline int64_t to_cell_index(double scaled) {
+  return static_cast<int64_t>(std::clamp(scaled, -kMaxCellIndex, kMaxCellIndex));
+}
+
+// The inverse of a cell's edge, exactly: what the functions below take.
+inline double cells_per_unit(int exponent) { return std::ldexp(1.0, -exponent); }
+
+// The cell that holds `coordinate` on one axis.
+inline int64_t cell_index(double coordinate, double per_unit) {
+  return to_cell_index(std::floor(coordinate * per_unit));
+}
+inline int64_t brick_index(double coordinate, double per_unit) {
+  return cell_index(coordinate, per_unit) >> kBrickBits;
+}
+
+// The cell under which a value at `position` is filed.
+inline GridKey cell_of(Vec3d position, double per_unit) {
+  GridKey cell;
+  for (int axis = 0; axis < 3; ++axis) {
+    cell[axis] = planted(PlantedBug::kUnsignedCellIndex) ? to_cell_index(position[axis] * per_unit)
+                                                         : cell_index(position[axis], per_unit);
+  }
+  return cell;
+}
+
+inline GridKey brick_of(const GridKey& cell) {
+  return {cell.x >> kBrickBits, cell.y >> kBrickBits, cell.z >> kBrickBits};
+}
+
+// The number of a cell within its brick, 0 to 63, z most significant.
+inline int number_in_brick(const GridKey& cell) {
+  constexpr int64_t kMask = (int64_t{1} << kBrickBits) - 1;
+  return static_cast<int>((cell.x & kMask) | (cell.y & kMask) << kBrickBits | (cell.z & kMask) << (2 * kBrickBits));
+}
+
+// Smallest e with 2^e >= `length`, within [lowest, highest].
+inline int exponent_covering(double length, int lowest, int highest) {
+  if (!(length > 0)) return lowest;
+  int exponent = 0;
+  const double mantissa = std::frexp(length, &exponent);  // in [0.5, 1)
+  return std::clamp(mantissa == 0.5 ? exponent - 1 : exponent, lowest, highest);
+}
+
+// How far a value with `bounds` extends from its position, at most, along any axis.
+inline double reach_of(const Aabbd& bounds, Vec3d position) {
+  return std::max(max_component(position - bounds.min), max_component(bounds.max - position));
+}
+
+// Bricks from `lo` to `hi`, both included.
+struct BrickRange {
+  GridKey lo, hi;
+
+  bool empty() const { return lo.x > hi.x || lo.y > hi.y || lo.z > hi.z; }
+  double count() const {  // in double, since it may exceed 64 bits
+    return (static_cast<double>(hi.x - lo.x) + 1) * (static_cast<double>(hi.y - lo.y) + 1) *
+           (static_cast<double>(hi.z - lo.z) + 1);
+  }
+};
+
+// Bricks of one level that hold every position within `box`, which is not empty.
+inline BrickRange bricks_within(const Aabbd& box, double per_unit) {
+  BrickRange range;
+  for (int axis = 0; axis < 3; ++axis) {
+    range.lo[axis] = brick_index(box.min[axis], per_unit);
+    range.hi[axis] = brick_index(box.max[axis], per_unit);
+  }
+  return range;
+}
+
+}  // namespace locus::internal
+
+#endif  // LOCUS_CORE_INDEX_HASH_GRID_CELL_KEY_H_

@@ -1,0 +1,49 @@
+#include "core/index/hash_grid/cell_size.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "core/base/check.h"
+#include "core/index/hash_grid/cell_key.h"
+
+namespace locus::internal {
+namespace {
+
+double median_diameter(absl::Span<const SampledValue> sample) {
+  std::vector<double> diameters;
+  diameters.reserve(sample.size());
+  for (const SampledValue& value : sample) diameters.push_back(value.diameter);
+  const auto middle = diameters.begin() + static_cast<std::ptrdiff_t>(diameters.size() / 2);
+  std::nth_element(diameters.begin(), middle, diameters.end());
+  return *middle;
+}
+
+// Expected number of other values in the cell of a random value. A pair of the sample stands for the pairs of the
+// population, so the estimate is not biased by the sample's size.
+double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
+  if (sample.size() < 2) return 0;
+  std::vector<GridKey> cells;
+  cells.reserve(sample.size());
+  for (const SampledValue& value : sample) cells.push_back(cell_of(value.position, cells_per_unit(exponent)));
+  std::sort(cells.begin(), cells.end());
+  double pairs = 0;
+  for (size_t begin = 0, end = 0; begin < cells.size(); begin = end) {
+    while (end < cells.size() && cells[end] == cells[begin]) ++end;
+    pairs += static_cast<double>(end - begin) * static_cast<double>(end - begin - 1);
+  }
+  const double share = pairs / (static_cast<double>(sample.size()) * static_cast<double>(sample.size() - 1));
+  return share * static_cast<double>(population - 1);
+}
+
+}  // namespace
+
+int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population) {
+  LOCUS_CHECK(!sample.empty() && population >= sample.size());
+  int exponent = exponent_covering(median_diameter(sample), kMinCellExponent, kMaxBaseExponent);
+  const double allowed =
+      std::max(kMaxMeanPerCell, mean_others_per_cell(sample, population, exponent) + kMeanPerCellMargin);
+  while (exponent < kMaxBaseExponent && mean_others_per_cell(sample, population, exponent + 1) <= allowed) ++exponent;
+  return exponent;
+}
+
+}  // namespace locus::internal

@@ -1,0 +1,29 @@
+// The choice of the grid's base cell size from a sample of what it holds. It decides cost only, never an answer.
+#ifndef LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_
+#define LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_
+
+#include <cstddef>
+
+#include "absl/types/span.h"
+#include "core/geometry/vec3.h"
+
+namespace locus::internal {
+
+inline constexpr size_t kCellSizeSample = 4096;   // values looked at for one choice, about
+inline constexpr double kMaxMeanPerCell = 24;     // values that share the cell of a random value, at most ...
+inline constexpr double kMeanPerCellMargin = 12;  // ... or so many more than at the smallest sensible cell
+
+struct SampledValue {
+  Vec3d position;
+  double diameter = 0;
+};
+
+// The exponent of the largest cell edge, at least the median diameter, at which a random value shares its cell with at
+// most kMaxMeanPerCell others on average, estimated for `population` values of which `sample` is an even selection.
+// Values that no cell size separates do not count against larger cells. `sample` is not empty. Cost: at most about
+// fifty sorts of the sample. Pure.
+int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
+
+}  // namespace locus::internal
+
+#endif  // LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_

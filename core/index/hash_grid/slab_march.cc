@@ -1,0 +1,66 @@
+#include "core/index/hash_grid/slab_march.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace locus::internal {
+namespace {
+
+// Covers the rounding of a dozen operations on numbers not much greater than the magnitude it is multiplied by.
+constexpr double kRounding = 0x1p-44;
+
+int dominant_axis(Vec3d direction) {
+  const Vec3d length = abs(direction);
+  if (length.x >= length.y && length.x >= length.z) return 0;
+  return length.y >= length.z ? 1 : 2;
+}
+
+}  // namespace
+
+SlabMarch::SlabMarch(const SlabRay<double>& ray, const LevelExtent& level, double limit)
+    : origin_(ray.origin()),
+      direction_(ray.direction()),
+      bounds_(level.bounds),
+      per_unit_(level.cells_per_unit),
+      slab_edge_((1 << kBrickBits) / level.cells_per_unit),
+      axis_(dominant_axis(ray.direction())) {
+  const Interval<double> part = ray.interval(bounds_);
+  if (part.near > part.far || part.far < 0 || part.near > limit) return;
+  part_ = {part.near, part.far};
+  const double size = magnitude(bounds_);
+  margin_ =
+      level.reach + 2 * ray.margin(size) + kRounding * (max_component(abs(origin_)) + size + level.reach + slab_edge_);
+  const Vec3d enter = point_at(std::max(part.near, 0.0));
+  const Vec3d leave = point_at(std::min(part.far, std::max(limit, 0.0)));
+  bricks_ = std::numeric_limits<double>::infinity();
+  if (!is_finite(enter) || !is_finite(leave) || !std::isfinite(margin_)) return;
+  step_ = direction_[axis_] < 0 ? -1 : 1;
+  const auto index_at = [this](double x) {
+    return brick_index(std::clamp(x, bounds_.min[axis_], bounds_.max[axis_]), per_unit_);
+  };
+  first_ = index_at(enter[axis_] - margin_ * static_cast<double>(step_));
+  slabs_ = (index_at(leave[axis_] + margin_ * static_cast<double>(step_)) - first_) * step_ + 1;
+  const Vec3d way = abs(leave - enter);
+  bricks_ = static_cast<double>(slabs_) + (way.x + way.y + way.z - way[axis_]) / slab_edge_;
+}
+
+SlabMarch::Slab SlabMarch::slab(int64_t n, double limit) const {
+  const double index = static_cast<double>(first_ + n * step_);
+  const double low = index * slab_edge_ - margin_, high = (index + 1) * slab_edge_ + margin_;
+  const double o = origin_[axis_], d = direction_[axis_];
+  const double enter = ((step_ > 0 ? low : high) - o) / d, leave = ((step_ > 0 ? high : low) - o) / d;
+  Slab slab{std::max(enter, part_.near), {{0, 0, 0}, {-1, -1, -1}}};
+  const double t0 = std::max({enter, part_.near, 0.0});
+  const double t1 = std::min({leave, part_.far, std::max(limit, 0.0)});
+  if (t0 > t1) return slab;
+  const Vec3d a = point_at(t0), b = point_at(t1);
+  Aabbd positions = grown(Aabbd{min(a, b), max(a, b)}, margin_);
+  positions = {max(positions.min, bounds_.min), min(positions.max, bounds_.max)};
+  if (positions.empty()) return slab;
+  slab.bricks = bricks_within(positions, per_unit_);
+  slab.bricks.lo[axis_] = slab.bricks.hi[axis_] = first_ + n * step_;
+  return slab;
+}
+
+}  // namespace locus::internal
