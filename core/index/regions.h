@@ -13,11 +13,6 @@
 namespace locus {
 
 namespace internal {
-constexpr Vec3d widened(Vec3f a) { return to_double(a); }
-constexpr Vec3d widened(Vec3d a) { return a; }
-constexpr Aabbd widened(const Aabbf& a) { return to_double(a); }
-constexpr Aabbd widened(const Aabbd& a) { return a; }
-
 // The smallest box of S that contains `box`.
 template <std::floating_point S>
 Aabb<S> rounded_outward(const Aabbd& box) {
@@ -32,27 +27,19 @@ Aabb<S> rounded_outward(const Aabbd& box) {
 }
 }  // namespace internal
 
-// What a ball reaches: boxes whose squared distance from the centre, in double, is at most the squared radius. Every
-// step rounds monotonically, so the region reaches every superset of a box that it reaches.
+// What a ball reaches, by reaches().
 template <std::floating_point S>
 class BallRegion {
  public:
   explicit BallRegion(const Ball<S>& ball)
-      : center_(internal::widened(ball.center)), squared_radius_(double{ball.radius} * double{ball.radius}) {
-    // The squared distance may round down to a touch where centre plus radius rounds short of the box, or vanish.
-    const double radius = double{ball.radius};
-    const double margin = 0x1p-50 * (max_component(abs(center_)) + radius) + 0x1p-500;
-    bounds_ = internal::rounded_outward<S>(grown(Aabbd{center_, center_}, radius + margin));
-  }
+      // Squares of gaps below 2^-537 vanish, so such gaps are reached by a ball of radius zero.
+      : ball_(ball), bounds_(internal::rounded_outward<S>(grown(to_double(bounds_of(ball)), 0x1p-530))) {}
 
   const Aabb<S>& bounds() const { return bounds_; }
-  bool overlaps(const Aabb<S>& box) const {
-    return squared_distance(center_, internal::widened(box)) <= squared_radius_;
-  }
+  bool overlaps(const Aabb<S>& box) const { return reaches(ball_, box); }
 
  private:
-  Vec3d center_;
-  double squared_radius_;
+  Ball<S> ball_;
   Aabb<S> bounds_;
 };
 
@@ -63,7 +50,7 @@ class BoxRegion {
   explicit BoxRegion(const Obb<S>& box) : exact_(bounds_of(box)), bounds_(internal::rounded_outward<S>(exact_)) {}
 
   const Aabb<S>& bounds() const { return bounds_; }
-  bool overlaps(const Aabb<S>& box) const { return locus::overlaps(exact_, internal::widened(box)); }
+  bool overlaps(const Aabb<S>& box) const { return locus::overlaps(exact_, to_double(box)); }
 
  private:
   Aabbd exact_;

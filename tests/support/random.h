@@ -2,7 +2,10 @@
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_H_
 
+#include <cmath>
 #include <cstdint>
+#include <iterator>
+#include <utility>
 
 #include "core/geometry/rotation.h"
 
@@ -41,6 +44,15 @@ class Random {
       const double length = squared_length(v);
       if (length > 1e-4 && length <= 1) return locus::normalized(v);
     }
+  }
+  // Of an array or vector that is not empty.
+  template <class Range>
+  const auto& pick(const Range& from) {
+    return from[below(std::size(from))];
+  }
+  template <class Range>
+  void shuffle(Range& items) {
+    for (size_t i = std::size(items); i > 1; --i) std::swap(items[i - 1], items[below(i)]);
   }
   Quaternion rotation() {
     for (;;) {

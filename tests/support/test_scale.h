@@ -1,0 +1,19 @@
+// How much of a long random test to run: all of it, or a part under sanitizers, which slow everything down.
+#ifndef LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
+#define LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
+
+#include <cstdint>
+
+namespace locus::test {
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr uint64_t kSlowdown = 10;
+#else
+inline constexpr uint64_t kSlowdown = 1;
+#endif
+
+constexpr uint64_t scaled_count(uint64_t count) { return (count + kSlowdown - 1) / kSlowdown; }
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
