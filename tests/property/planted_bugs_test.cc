@@ -1,0 +1,49 @@
+// Proves that the suite catches known bugs: each is planted in turn into a library built for it, and the very
+// comparisons that the random tests expect to find nothing must find something. A new bug needs a name in
+// core/base/planted_bug.h, a place in the code, and a row below.
+#include <gtest/gtest.h>
+
+#include "core/base/planted_bug.h"
+#include "tests/support/scene_search.h"
+
+namespace locus::test {
+namespace {
+
+// Answers what differs first, empty for nothing.
+using Comparison = std::string (*)();
+
+std::string compare_trees_with_list() {
+  const uint64_t count = scaled_count(1'200);
+  return search_all_scenes<Triangle>(count, count, tree_difference<Triangle>);
+}
+
+struct Trial {
+  const char* name;
+  PlantedBug bug;
+  Comparison comparison;
+};
+
+constexpr Trial kTrials[] = {
+    {"TreeWithUnpaddedNear", PlantedBug::kUnpaddedNear, compare_trees_with_list},
+    {"TreeWithStrictTie", PlantedBug::kStrictTie, compare_trees_with_list},
+};
+
+class PlantedBugTest : public ::testing::TestWithParam<Trial> {
+ protected:
+  void TearDown() override { planted_bug = PlantedBug::kNone; }
+};
+
+TEST_P(PlantedBugTest, IsCaught) {
+  planted_bug = GetParam().bug;
+  const std::string difference = GetParam().comparison();
+  EXPECT_NE(difference, "");
+  RecordProperty("difference", difference);
+}
+
+TEST_P(PlantedBugTest, NothingIsFoundWithoutIt) { EXPECT_EQ(GetParam().comparison(), ""); }
+
+INSTANTIATE_TEST_SUITE_P(Known, PlantedBugTest, ::testing::ValuesIn(kTrials),
+                         [](const auto& trial) { return trial.param.name; });
+
+}  // namespace
+}  // namespace locus::test

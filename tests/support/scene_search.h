@@ -1,0 +1,52 @@
+// Searches many seeded scenes for one on which a comparison finds a difference. The random tests expect none; the tests
+// of planted bugs expect one.
+#ifndef LOCUS_TESTS_SUPPORT_SCENE_SEARCH_H_
+#define LOCUS_TESTS_SUPPORT_SCENE_SEARCH_H_
+
+#include <string>
+
+#include "core/index/bvh/bvh.h"
+#include "tests/support/adversarial_scenes.h"
+#include "tests/support/index_judge.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+
+// The first scene of seeds 0 to count - 1 on which `difference` is not empty, and what it says; empty when there is
+// none. `draw` makes the sketch of a seed, `difference` takes a TestScene<V>.
+template <Primitive V, class Draw, class Difference>
+std::string search_scenes(uint64_t count, const Draw& draw, const Difference& difference) {
+  for (uint64_t seed = 0; seed < count; ++seed) {
+    Random random(seed);
+    const TestScene<V> scene = make_scene<V>(draw(seed, random), random);
+    if (const std::string what = difference(scene); !what.empty()) return "seed " + std::to_string(seed) + ", " + what;
+  }
+  return "";
+}
+
+// Ordinary scenes first, then those of the families that are known for trouble.
+template <Primitive V, class Difference>
+std::string search_all_scenes(uint64_t random_count, uint64_t adversarial_count, const Difference& difference) {
+  const auto draw_random = [](uint64_t, Random& random) { return random_scene(random); };
+  const std::string what = search_scenes<V>(random_count, draw_random, difference);
+  return what.empty() ? search_scenes<V>(adversarial_count, adversarial_scene, difference) : what;
+}
+
+// What differs first between the list and trees built with many bins, few and two.
+template <Primitive V>
+std::string tree_difference(const TestScene<V>& scene) {
+  const auto list = make_list(scene.values);
+  for (const int bins : {32, 4, 2}) {
+    BvhOptions options;
+    options.bins = bins;
+    const absl::StatusOr<Bvh<V>> tree = Bvh<V>::build(scene.values, options);
+    if (!tree.ok()) return tree.status().ToString();
+    const std::string what = IndexJudge(*tree, list).difference(scene);
+    if (!what.empty()) return std::to_string(bins) + " bins, " + what;
+  }
+  return "";
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_SCENE_SEARCH_H_
