@@ -46,7 +46,12 @@ inline constexpr uint32_t kTestsBetweenChecks = 4096;  // primitive tests betwee
 
 inline constexpr uint32_t kReceiveBytes = 32u << 20;  // one message
 inline constexpr uint32_t kMaxStreams = 1024;         // open update and query streams
-inline constexpr uint32_t kMaxPageSize = 1000;        // scenes or meshes a page
+inline constexpr uint32_t kMaxCalls = 256;            // calls in work at once, streams apart
+inline constexpr uint32_t kMaxThreads = 256;          // that work on one batch
+inline constexpr uint32_t kMaxWaitingBatches = 1024;  // that wait for a helping thread; more work alone
+inline constexpr uint32_t kMaxDrainGraceS = 3600;     // for calls in work when the server is told to end
+inline constexpr uint32_t kMaxListenAddresses = 16;
+inline constexpr uint32_t kMaxPageSize = 1000;  // scenes or meshes a page
 
 static_assert(kMaxBlocks <= kMaxQueries);
 static_assert(kDefaultMaxResults <= kMaxMaxResults);

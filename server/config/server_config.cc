@@ -1,0 +1,193 @@
+#include "server/config/server_config.h"
+
+#include <sched.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "server/config/listen_address.h"
+#include "server/config/version.h"
+
+namespace locus::server {
+namespace {
+
+constexpr const char* kDescription =
+    "locusd hosts scenes of static meshes and moving objects, and answers exact batched\n"
+    "ray, ball and box queries over gRPC (locus.v1) while updates stream in.\n"
+    "Scenes live in memory: they are gone when the daemon ends.";
+
+constexpr const char* kFooter = R"(Every option can also be set by the environment or by the file that --config
+names: --drain-grace-s 5, LOCUS_DRAIN_GRACE_S=5 and the line `drain-grace-s = 5`
+mean the same. A flag wins over the environment, which wins over the file.
+
+Examples:
+  locusd                                      serve this machine on 127.0.0.1:7575
+  locusd --listen unix:/run/locus/locus.sock  serve this machine over a unix socket
+  locusd --listen 127.0.0.1:0 --port-file p   take a free port and write it to the file p
+  locusd --config /etc/locus/locusd.conf --log-format json
+
+Try it: locus health; locus limits; locus scene create demo
+It ends on SIGTERM or SIGINT once calls in work are done, with exit code 0; a
+second signal ends it at once.)";
+
+// The options as CLI11 sees them, writing to `config`. CLI11 keeps pointers into it.
+void add_options(CLI::App& app, ServerConfig& config) {
+  app.add_option("--listen", config.listen, "Address to listen on: host:port, [v6]:port or unix:/path; repeatable")
+      ->delimiter(',')
+      ->expected(1, static_cast<int>(limits::kMaxListenAddresses))
+      ->take_all()
+      ->capture_default_str();
+  app.add_option("--port-file", config.port_file, "File to write the first TCP port to once the daemon answers");
+  app.add_option("--threads", config.threads, "Threads that may work on one batch; 0 = the cores it may use")
+      ->check(CLI::Range(0u, limits::kMaxThreads))
+      ->capture_default_str();
+  const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
+                                                  {"info", LogLevel::kInfo},
+                                                  {"warning", LogLevel::kWarning},
+                                                  {"error", LogLevel::kError}};
+  app.add_option("--log-level", config.log_level, "debug, info, warning or error")
+      ->transform(CLI::CheckedTransformer(levels).description(""))
+      ->default_str("info");
+  const std::map<std::string, LogFormat> formats = {{"text", LogFormat::kText}, {"json", LogFormat::kJson}};
+  app.add_option("--log-format", config.log_format, "text, or json: one object a line")
+      ->transform(CLI::CheckedTransformer(formats).description(""))
+      ->default_str("text");
+  const auto add_limit = [&app](const char* name, uint32_t& value, const char* what) {
+    app.add_option(name, value, what)->check(CLI::Range(1u, value))->capture_default_str();
+  };
+  add_limit("--max-receive-bytes", config.max_receive_bytes, "Largest message that is received");
+  add_limit("--max-scenes", config.max_scenes, "Most scenes");
+  add_limit("--max-meshes", config.max_meshes, "Most meshes");
+  add_limit("--max-streams", config.max_streams, "Most open update and query streams");
+  add_limit("--max-calls", config.max_calls, "Most calls in work at once, streams apart");
+  app.add_option("--drain-grace-s", config.drain_grace_s, "Seconds that calls in work may take after SIGTERM")
+      ->check(CLI::Range(0u, limits::kMaxDrainGraceS))
+      ->capture_default_str();
+  app.add_flag("--insecure", config.insecure, "Listen beyond this machine without encryption or passwords");
+}
+
+void describe(CLI::App& app) {
+  app.name("locusd");
+  app.description(kDescription);
+  app.footer(kFooter);
+  app.set_version_flag("--version", absl::StrCat("locusd ", kVersion));
+  app.allow_config_extras(CLI::config_extras_mode::error);
+}
+
+std::string variable_of(const std::string& option) {
+  return absl::StrCat("LOCUS_", absl::AsciiStrToUpper(absl::StrReplaceAll(option, {{"-", "_"}})));
+}
+
+// CLI11 takes its arguments last first.
+void parse(CLI::App& app, std::vector<std::string> arguments) {
+  std::reverse(arguments.begin(), arguments.end());
+  app.parse(std::move(arguments));
+}
+
+// CLI11 lets a file win over the environment. So a first pass over the flags alone finds the options that no flag sets,
+// and those that the environment sets are added as flags; the file then fills what is still open.
+std::vector<std::string> with_environment(const std::vector<std::string>& arguments, const Environment& environment) {
+  ServerConfig ignored;
+  std::string ignored_file;
+  CLI::App app;
+  describe(app);
+  add_options(app, ignored);
+  app.add_option("--config", ignored_file);
+  parse(app, arguments);
+  std::vector<std::string> all = arguments;
+  for (const CLI::Option* option : std::as_const(app).get_options()) {
+    if (option->count() > 0 || option->get_lnames().empty() || !option->get_configurable()) continue;
+    const std::string& name = option->get_lnames().front();
+    const std::optional<std::string> value = environment(variable_of(name));
+    if (value && !value->empty()) all.push_back(absl::StrCat("--", name, "=", *value));
+  }
+  return all;
+}
+
+uint32_t usable_cores() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  const int count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 0;
+  const uint32_t cores = count > 0 ? static_cast<uint32_t>(count) : std::max(1u, std::thread::hardware_concurrency());
+  return std::min(cores, limits::kMaxThreads);
+}
+
+Invocation mistake(absl::string_view message) {
+  Invocation invocation;
+  invocation.exit_code = 2;
+  invocation.text = absl::StrCat("locusd: ", message, "\nRun `locusd --help` for the options.\n");
+  return invocation;
+}
+
+// May throw CLI11's errors.
+Invocation parse_all(const std::vector<std::string>& arguments, const Environment& environment) {
+  Invocation invocation;
+  ServerConfig config;
+  CLI::App app;
+  describe(app);
+  add_options(app, config);
+  app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
+  parse(app, with_environment(arguments, environment));
+  if (const absl::Status status = check_config(config); !status.ok()) return mistake(status.message());
+  if (config.threads == 0) config.threads = usable_cores();
+  invocation.config = std::move(config);
+  return invocation;
+}
+
+Invocation help() {
+  ServerConfig config;
+  CLI::App app;
+  describe(app);
+  add_options(app, config);
+  app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
+  Invocation invocation;
+  invocation.text = app.help();
+  return invocation;
+}
+
+}  // namespace
+
+std::optional<std::string> process_environment(const std::string& name) {
+  const char* value = std::getenv(name.c_str());
+  if (value == nullptr) return std::nullopt;
+  return std::string(value);
+}
+
+Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment) {
+  try {
+    return parse_all(arguments, environment);
+  } catch (const CLI::CallForHelp&) {
+    return help();
+  } catch (const CLI::CallForVersion& version) {
+    Invocation invocation;
+    invocation.text = absl::StrCat(version.what(), "\n");
+    return invocation;
+  } catch (const CLI::Error& error) {
+    return mistake(error.what());
+  }
+}
+
+absl::Status check_config(const ServerConfig& config) {
+  if (config.listen.empty()) return absl::InvalidArgumentError("no address to listen on; give --listen");
+  if (config.listen.size() > limits::kMaxListenAddresses)
+    return absl::InvalidArgumentError(absl::StrCat("more than ", limits::kMaxListenAddresses, " listen addresses"));
+  for (const std::string& text : config.listen) {
+    const absl::StatusOr<ListenAddress> address = parse_listen_address(text);
+    if (!address.ok()) return address.status();
+    if (address->local || config.insecure) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        "`", text, "` can be reached from other machines, but this build has neither encryption nor passwords: anyone ",
+        "there could read and change every scene. Either listen on 127.0.0.1, [::1] or a unix socket and put a proxy ",
+        "with TLS in front, or, where every machine in reach is trusted, say so with --insecure or LOCUS_INSECURE=1"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace locus::server

@@ -1,0 +1,79 @@
+// What an operator can choose: each option with its meaning, its default and when to change it. Three places set an
+// option, the first that does wins: a flag (--drain-grace-s 5), an environment variable (LOCUS_DRAIN_GRACE_S=5), a line
+// of the file that --config names (drain-grace-s = 5). Plain data, fixed once the daemon runs.
+#ifndef LOCUS_SERVER_CONFIG_SERVER_CONFIG_H_
+#define LOCUS_SERVER_CONFIG_SERVER_CONFIG_H_
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/base/limits.h"
+
+namespace locus::server {
+
+enum class LogLevel : uint8_t { kDebug, kInfo, kWarning, kError };
+enum class LogFormat : uint8_t { kText, kJson };
+
+struct ServerConfig {
+  // Where to listen; more than one address is fine. `host:port`, `[v6]:port` or `unix:/path`; port 0 takes a free one.
+  // Change it to serve other machines, which also needs `insecure`.
+  std::vector<std::string> listen = {"127.0.0.1:7575"};
+
+  // Written with the first TCP address's port once the daemon answers, whole or not at all; empty = not written. For
+  // scripts that start the daemon on port 0.
+  std::string port_file;
+
+  // Threads that may work on one query batch, the caller's own included; 0 = the cores this process may use. Answers do
+  // not depend on it. Lower it to leave cores to others.
+  uint32_t threads = 0;
+
+  // What is logged to standard error. `debug` adds a line for each refused call.
+  LogLevel log_level = LogLevel::kInfo;
+
+  // `json` writes one object a line, for collectors.
+  LogFormat log_format = LogFormat::kText;
+
+  // Limits that may be lowered, never raised; a refusal names them. Lower them where memory is short or callers are
+  // many.
+  uint32_t max_receive_bytes = limits::kReceiveBytes;  // one message
+  uint32_t max_scenes = limits::kMaxScenes;
+  uint32_t max_meshes = limits::kMaxMeshes;
+  uint32_t max_streams = limits::kMaxStreams;  // open update and query streams; each costs a thread
+  uint32_t max_calls = limits::kMaxCalls;      // calls in work at once, streams apart
+
+  // Seconds that calls in work may take to finish after SIGTERM. Raise it where batches run long; keep it below what
+  // the service manager waits before it kills.
+  uint32_t drain_grace_s = 10;
+
+  // True listens beyond this machine although nothing is encrypted and nobody is asked for a password. Only behind a
+  // proxy or in a network where every machine is trusted.
+  bool insecure = false;
+};
+
+// One environment variable; nothing where it is not set.
+using Environment = std::function<std::optional<std::string>(const std::string&)>;
+
+// Reads the process's own environment.
+std::optional<std::string> process_environment(const std::string& name);
+
+// What a command line asks for: to run with `config`, or, without one, to print `text` and end with `exit_code` (0
+// after --help and --version, 2 after a mistake, which `text` explains).
+struct Invocation {
+  std::optional<ServerConfig> config;
+  int exit_code = 0;
+  std::string text;
+};
+
+// `arguments` without the program's name. Never ends the process. The config is checked and `threads` is filled in.
+Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment);
+
+// INVALID_ARGUMENT where an address cannot be listened to, or should not be without `insecure`.
+absl::Status check_config(const ServerConfig& config);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_CONFIG_SERVER_CONFIG_H_

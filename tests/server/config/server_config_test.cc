@@ -1,0 +1,113 @@
+#include "server/config/server_config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <map>
+
+namespace locus::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class ServerConfigTest : public testing::Test {
+ protected:
+  ~ServerConfigTest() override { std::remove(file_.c_str()); }
+
+  Invocation read(const std::vector<std::string>& arguments) {
+    return read_invocation(arguments, [this](const std::string& name) -> std::optional<std::string> {
+      const auto variable = environment_.find(name);
+      return variable == environment_.end() ? std::nullopt : std::optional<std::string>(variable->second);
+    });
+  }
+
+  void write_file(const std::string& text) { std::ofstream(file_) << text; }
+
+  std::map<std::string, std::string> environment_;
+  std::string file_ =
+      testing::TempDir() + "locusd_" + testing::UnitTest::GetInstance()->current_test_info()->name() + ".conf";
+};
+
+TEST_F(ServerConfigTest, NothingGivenMeansTheDefaults) {
+  const Invocation invocation = read({});
+  ASSERT_TRUE(invocation.config.has_value()) << invocation.text;
+  EXPECT_THAT(invocation.config->listen, ElementsAre("127.0.0.1:7575"));
+  EXPECT_EQ(invocation.config->drain_grace_s, 10u);
+  EXPECT_GE(invocation.config->threads, 1u);
+  EXPECT_EQ(invocation.config->log_level, LogLevel::kInfo);
+  EXPECT_FALSE(invocation.config->insecure);
+}
+
+TEST_F(ServerConfigTest, AFlagWinsOverTheEnvironmentWhichWinsOverTheFile) {
+  write_file("# limits\nmax-scenes = 1\nmax-streams = 1\nmax-calls = 1\nlog-format = json\n");
+  environment_ = {{"LOCUS_CONFIG", file_}, {"LOCUS_MAX_SCENES", "2"}, {"LOCUS_MAX_STREAMS", "2"}};
+  const Invocation invocation = read({"--max-scenes", "3"});
+  ASSERT_TRUE(invocation.config.has_value()) << invocation.text;
+  EXPECT_EQ(invocation.config->max_scenes, 3u);
+  EXPECT_EQ(invocation.config->max_streams, 2u);
+  EXPECT_EQ(invocation.config->max_calls, 1u);
+  EXPECT_EQ(invocation.config->log_format, LogFormat::kJson);
+}
+
+TEST_F(ServerConfigTest, ListenFlagsReplaceThoseOfTheEnvironment) {
+  environment_ = {{"LOCUS_LISTEN", "127.0.0.1:1,unix:/tmp/a.sock"}};
+  EXPECT_THAT(read({}).config->listen, ElementsAre("127.0.0.1:1", "unix:/tmp/a.sock"));
+  EXPECT_THAT(read({"--listen", "127.0.0.1:2", "--listen", "127.0.0.1:3"}).config->listen,
+              ElementsAre("127.0.0.1:2", "127.0.0.1:3"));
+}
+
+TEST_F(ServerConfigTest, TheFileMayListAddresses) {
+  write_file("listen = 127.0.0.1:1, unix:/tmp/a.sock\n");
+  const Invocation invocation = read({"--config", file_});
+  ASSERT_TRUE(invocation.config.has_value()) << invocation.text;
+  EXPECT_THAT(invocation.config->listen, ElementsAre("127.0.0.1:1", "unix:/tmp/a.sock"));
+}
+
+TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
+  write_file("no-such-option = 1\n");
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--max-scenes", "0"}, "--max-scenes"}, {{"--max-scenes", "1000000"}, "--max-scenes"},
+      {{"--threads", "many"}, "--threads"},    {{"--log-level", "loud"}, "--log-level"},
+      {{"--listen", "nowhere"}, "nowhere"},    {{"--no-such-option"}, "--no-such-option"},
+      {{"--config", file_}, "no-such-option"}, {{"--config", "/no/such/file"}, "/no/such/file"},
+  };
+  for (const auto& [arguments, named] : cases) {
+    const Invocation invocation = read(arguments);
+    EXPECT_FALSE(invocation.config.has_value()) << named;
+    EXPECT_EQ(invocation.exit_code, 2) << named;
+    EXPECT_THAT(invocation.text, HasSubstr(named));
+    EXPECT_THAT(invocation.text, HasSubstr("--help"));
+  }
+}
+
+TEST_F(ServerConfigTest, ListeningBeyondTheMachineNeedsASecondWord) {
+  const Invocation refused = read({"--listen", "0.0.0.0:7575"});
+  EXPECT_FALSE(refused.config.has_value());
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.text, HasSubstr("0.0.0.0:7575"));
+  EXPECT_THAT(refused.text, HasSubstr("127.0.0.1"));
+  EXPECT_THAT(refused.text, HasSubstr("--insecure"));
+  EXPECT_THAT(refused.text, HasSubstr("LOCUS_INSECURE=1"));
+  EXPECT_TRUE(read({"--listen", "0.0.0.0:7575", "--insecure"}).config.has_value());
+  environment_ = {{"LOCUS_INSECURE", "1"}};
+  EXPECT_TRUE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
+  environment_ = {{"LOCUS_INSECURE", "0"}};
+  EXPECT_FALSE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
+}
+
+TEST_F(ServerConfigTest, HelpExplainsWithExamplesAndEndsWithZero) {
+  const Invocation help = read({"--help"});
+  EXPECT_FALSE(help.config.has_value());
+  EXPECT_EQ(help.exit_code, 0);
+  for (const char* part : {"Examples:", "--listen", "--port-file", "LOCUS_DRAIN_GRACE_S", "--config", "memory"})
+    EXPECT_THAT(help.text, HasSubstr(part));
+  const Invocation version = read({"--version"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_EQ(version.text, "locusd " LOCUS_VERSION "\n");
+}
+
+}  // namespace
+}  // namespace locus::server

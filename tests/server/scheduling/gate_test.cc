@@ -1,0 +1,56 @@
+#include "server/scheduling/gate.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+namespace locus::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+TEST(GateTest, NoMorePassesThanMayBeInside) {
+  Gate gate(2);
+  const Gate::Pass first = gate.enter();
+  {
+    const Gate::Pass second = gate.enter();
+    EXPECT_TRUE(second);
+    EXPECT_FALSE(gate.enter());
+    EXPECT_EQ(gate.used(), 2u);
+  }
+  EXPECT_EQ(gate.used(), 1u);
+  EXPECT_TRUE(gate.enter());
+}
+
+TEST(GateTest, WaitingEndsWhenTheLastLeaves) {
+  Gate gate(4);
+  Gate::Pass pass = gate.enter();
+  EXPECT_FALSE(gate.wait_until_empty(Clock::now()));
+  std::thread leaver([moved = std::move(pass)]() mutable { Gate::Pass gone = std::move(moved); });
+  EXPECT_TRUE(gate.wait_until_empty(Clock::now() + std::chrono::minutes(1)));
+  leaver.join();
+}
+
+TEST(GateTest, ManyThreadsNeverExceedTheMaximum) {
+  Gate gate(3);
+  std::atomic<int> inside{0};
+  std::atomic<bool> exceeded{false};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i)
+    threads.emplace_back([&] {
+      for (int round = 0; round < 500; ++round) {
+        const Gate::Pass pass = gate.enter();
+        if (!pass) continue;
+        if (++inside > 3) exceeded = true;
+        --inside;
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_FALSE(exceeded.load());
+  EXPECT_EQ(gate.used(), 0u);
+}
+
+}  // namespace
+}  // namespace locus::server
