@@ -1,0 +1,100 @@
+// Families of scenes built to break grids in particular, beside those of adversarial_scenes.h: values that sit on cell
+// borders of every level, on both sides of zero, at the world's edge, or that outgrow all cells.
+#ifndef LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
+#define LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
+
+#include "core/base/limits.h"
+#include "tests/support/adversarial_scenes.h"
+
+namespace locus::test {
+
+// Rays from lattice planes in all 26 directions, from places in `sketch` and without end.
+inline void add_lattice_rays(SceneSketch& sketch, double step, Random& random) {
+  for (const Vec3d direction : lattice_directions()) {
+    sketch.rays.push_back({notable_point(sketch, random) - direction * (step * random.whole(0, 3)), direction});
+  }
+}
+
+// One value, or a few, larger than the world of all others.
+inline SceneSketch giants_among_small(Random& random) {
+  SceneSketch sketch{"giants among small ones", {}, {}, {}, {}};
+  for (int i = 0; i < 40; ++i) {
+    const double size = i < random.whole(1, 3) ? random.magnitude(10, 29) : 0.5;
+    sketch.placements.push_back({random.vector(100), random.positive_vector(size), random.rotation()});
+  }
+  add_queries(sketch, 8, 20, random);
+  add_lattice_rays(sketch, 8, random);
+  return sketch;
+}
+
+// Points, and shapes that are none but have no extent, exactly on borders of cells of several sizes.
+inline SceneSketch points_on_borders(Random& random) {
+  SceneSketch sketch{"points on borders", {}, {}, {}, {}};
+  const double step = std::exp2(random.whole(-3, 6));
+  for (int i = 0; i < 40; ++i) sketch.placements.push_back({random.whole_vector(5) * step, {}, {}});
+  for (int i = 0; i < 16; ++i) {
+    const Vec3d center = random.whole_vector(5) * step;
+    sketch.balls.push_back({center, step * random.whole(0, 3)});
+    const Vec3d half = random.whole_vector(3);
+    sketch.boxes.push_back({center, abs(half) * step, {}});
+  }
+  add_lattice_rays(sketch, step, random);
+  return sketch;
+}
+
+// Diameters that are exactly the edge of a level's cell, or a rounding beyond, on the borders of that level.
+inline SceneSketch sizes_between_levels(Random& random) {
+  SceneSketch sketch{"sizes between levels", {}, {}, {}, {}};
+  for (int i = 0; i < 40; ++i) {
+    const double edge = std::exp2(random.whole(-4, 8));
+    const double half = edge / 2 * (random.chance(0.5) ? 1 : 1 + 0x1p-22);
+    sketch.placements.push_back({random.whole_vector(4) * edge, {half, half, half}, {}});
+  }
+  add_queries(sketch, 6, random.magnitude(-4, 8), random);
+  add_lattice_rays(sketch, random.magnitude(-4, 8), random);
+  return sketch;
+}
+
+// Less than a cell on both sides of zero, where indices that truncate would fall together.
+inline SceneSketch around_zero(Random& random) {
+  SceneSketch sketch{"around zero", {}, {}, {}, {}};
+  const double size = random.magnitude(-10, 3);
+  for (int i = 0; i < 40; ++i) {
+    const Vec3d half = random.chance(0.5) ? Vec3d{} : random.positive_vector(size / 20);
+    sketch.placements.push_back({random.vector(size), half, {}});
+  }
+  for (int i = 0; i < 24; ++i) {
+    const Vec3d at = random.vector(size);
+    sketch.rays.push_back({at * 3, at * -1});
+    sketch.balls.push_back({at, size / 10});
+    sketch.boxes.push_back({at, random.positive_vector(size / 5), {}});
+  }
+  return sketch;
+}
+
+// At the corners of the world, with rays across it.
+inline SceneSketch world_edges(Random& random) {
+  constexpr double kEdge = limits::kMaxCoordinate;
+  SceneSketch sketch{"world edges", {}, {}, {}, {}};
+  for (int i = 0; i < 40; ++i) {
+    const Vec3d corner = random.whole_vector(1) * kEdge;
+    const Vec3d inward = random.positive_vector(random.chance(0.5) ? 10 : 1e4);
+    Vec3d center = corner;
+    for (int axis = 0; axis < 3; ++axis) center[axis] -= std::copysign(inward[axis], corner[axis]);
+    sketch.placements.push_back({center, random.positive_vector(random.chance(0.8) ? 5 : 1e6), {}});
+  }
+  add_queries(sketch, 12, random.chance(0.5) ? 10 : 1e9, random);
+  add_lattice_rays(sketch, 1e8, random);
+  return sketch;
+}
+
+inline constexpr SceneFamily kGridFamilies[] = {giants_among_small, points_on_borders, sizes_between_levels,
+                                                around_zero, world_edges};
+
+inline SceneSketch grid_scene(uint64_t seed, Random& random) {
+  return kGridFamilies[seed % std::size(kGridFamilies)](random);
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
