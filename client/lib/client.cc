@@ -1,0 +1,213 @@
+#include "client/lib/client.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "client/lib/call_metadata.h"
+#include "client/lib/connection.h"
+#include "client/lib/health_check.h"
+#include "client/lib/mesh_upload.h"
+#include "client/lib/retry.h"
+#include "client/lib/status.h"
+#include "grpcpp/channel.h"
+#include "locus/v1/query_service.grpc.pb.h"
+#include "locus/v1/scene_service.grpc.pb.h"
+#include "locus/v1/server_service.grpc.pb.h"
+#include "locus/v1/update_service.grpc.pb.h"
+
+namespace locus::client {
+namespace {
+
+enum class Repeat { kNever, kWhenUnavailable };
+
+// A call's frame: when it must be over, whether it may be repeated, which scene it is about.
+struct CallPlan {
+  absl::Duration deadline;
+  RetryPolicy retry;
+  Repeat repeat = Repeat::kNever;
+  absl::string_view scene = {};
+};
+
+template <class Stub, class Request, class Response>
+absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& request,
+                              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  const absl::Time deadline = absl::Now() + plan.deadline;
+  Response response;
+  const auto attempt = [&] {
+    grpc::ClientContext context;
+    context.set_deadline(absl::ToChronoTime(deadline));
+    add_scene(context, plan.scene);
+    response.Clear();
+    return to_absl_status((stub.*method)(&context, request, &response));
+  };
+  const absl::Status status = plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt);
+  if (!status.ok()) return status;
+  return response;
+}
+
+}  // namespace
+
+struct Client::Connection {
+  std::string address;
+  ClientOptions options;
+  std::shared_ptr<grpc::Channel> channel;
+  std::unique_ptr<v1::ServerService::StubInterface> servers;
+  std::unique_ptr<v1::SceneService::StubInterface> scenes;
+  std::unique_ptr<v1::UpdateService::StubInterface> updates;
+  std::unique_ptr<v1::QueryService::StubInterface> queries;
+
+  CallPlan once(absl::string_view scene = {}) const { return {options.deadline, options.retry, Repeat::kNever, scene}; }
+  CallPlan repeatable(absl::string_view scene = {}) const {
+    return {options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+  }
+};
+
+Client::Client(std::unique_ptr<Connection> connection) : connection_(std::move(connection)) {}
+Client::~Client() = default;
+
+absl::StatusOr<std::unique_ptr<Client>> Client::connect(absl::string_view address, const ClientOptions& options) {
+  const absl::StatusOr<std::string> target = target_of(address);
+  if (!target.ok()) return target.status();
+  std::shared_ptr<grpc::Channel> channel = open_channel(*target, options);
+  const absl::Status connected = await_connection(*channel, *target, options);
+  if (!connected.ok()) return connected;
+  auto connection = std::make_unique<Connection>(
+      Connection{*target, options, channel, v1::ServerService::NewStub(channel), v1::SceneService::NewStub(channel),
+                 v1::UpdateService::NewStub(channel), v1::QueryService::NewStub(channel)});
+  return std::unique_ptr<Client>(new Client(std::move(connection)));
+}
+
+const std::string& Client::address() const { return connection_->address; }
+
+absl::StatusOr<v1::GetServerResponse> Client::get_server() const {
+  return call(*connection_->servers, connection_->repeatable(), v1::GetServerRequest(),
+              &v1::ServerService::StubInterface::GetServer);
+}
+
+absl::StatusOr<Health> Client::health(absl::string_view service) const {
+  const absl::Time deadline = absl::Now() + connection_->options.deadline;
+  absl::StatusOr<Health> health = Health::kUnknown;
+  with_retries(connection_->options.retry, deadline, [&] {
+    health = check_health(connection_->channel, service, deadline);
+    return health.status();
+  }).IgnoreError();
+  return health;
+}
+
+absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {
+  absl::StatusOr<v1::CreateSceneResponse> response = call(*connection_->scenes, connection_->once(request.name()),
+                                                          request, &v1::SceneService::StubInterface::CreateScene);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_scene());
+}
+
+absl::StatusOr<v1::Scene> Client::get_scene(absl::string_view name) const {
+  v1::GetSceneRequest request;
+  request.set_name(std::string(name));
+  absl::StatusOr<v1::GetSceneResponse> response =
+      call(*connection_->scenes, connection_->repeatable(name), request, &v1::SceneService::StubInterface::GetScene);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_scene());
+}
+
+absl::StatusOr<std::vector<v1::Scene>> Client::list_scenes(const std::map<std::string, std::string>& labels) const {
+  v1::ListScenesRequest request;
+  request.mutable_labels()->insert(labels.begin(), labels.end());
+  std::vector<v1::Scene> scenes;
+  do {
+    absl::StatusOr<v1::ListScenesResponse> page =
+        call(*connection_->scenes, connection_->repeatable(), request, &v1::SceneService::StubInterface::ListScenes);
+    if (!page.ok()) return page.status();
+    for (v1::Scene& scene : *page->mutable_scenes()) scenes.push_back(std::move(scene));
+    request.set_page_token(page->next_page_token());
+  } while (!request.page_token().empty());
+  return scenes;
+}
+
+absl::Status Client::delete_scene(const v1::DeleteSceneRequest& request) const {
+  return call(*connection_->scenes, connection_->once(request.name()), request,
+              &v1::SceneService::StubInterface::DeleteScene)
+      .status();
+}
+
+absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& mesh,
+                                                           const UploadProgress& progress) const {
+  return locus::client::upload_mesh(*connection_->scenes, mesh, absl::Now() + connection_->options.long_deadline,
+                                    progress);
+}
+
+absl::StatusOr<std::vector<v1::Mesh>> Client::list_meshes() const {
+  v1::ListMeshesRequest request;
+  std::vector<v1::Mesh> meshes;
+  do {
+    absl::StatusOr<v1::ListMeshesResponse> page =
+        call(*connection_->scenes, connection_->repeatable(), request, &v1::SceneService::StubInterface::ListMeshes);
+    if (!page.ok()) return page.status();
+    for (v1::Mesh& mesh : *page->mutable_meshes()) meshes.push_back(std::move(mesh));
+    request.set_page_token(page->next_page_token());
+  } while (!request.page_token().empty());
+  return meshes;
+}
+
+absl::Status Client::delete_mesh(absl::string_view name) const {
+  v1::DeleteMeshRequest request;
+  request.set_mesh(std::string(name));
+  return call(*connection_->scenes, connection_->once(), request, &v1::SceneService::StubInterface::DeleteMesh)
+      .status();
+}
+
+absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::ChangeInstancesRequest& request) const {
+  CallPlan plan = connection_->once(request.scene());
+  plan.deadline = connection_->options.long_deadline;
+  return call(*connection_->scenes, plan, request, &v1::SceneService::StubInterface::ChangeInstances);
+}
+
+absl::Status Client::dump(const v1::DumpSceneRequest& request,
+                          const std::function<absl::Status(const v1::DumpSceneResponse&)>& piece) const {
+  grpc::ClientContext context;
+  context.set_deadline(absl::ToChronoTime(absl::Now() + connection_->options.long_deadline));
+  add_scene(context, request.scene());
+  const auto reader = connection_->scenes->DumpScene(&context, request);
+  v1::DumpSceneResponse response;
+  absl::Status taken;
+  while (taken.ok() && reader->Read(&response)) taken = piece(response);
+  if (!taken.ok()) context.TryCancel();
+  const absl::Status end = to_absl_status(reader->Finish());
+  return taken.ok() ? end : taken;
+}
+
+absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateBatch batch) const {
+  const bool once_only = batch.writer() != 0 && batch.batch() != 0;
+  v1::ApplyUpdatesRequest request;
+  request.set_scene(std::string(scene));
+  *request.mutable_batch() = std::move(batch);
+  absl::StatusOr<v1::ApplyUpdatesResponse> response =
+      call(*connection_->updates, once_only ? connection_->repeatable(scene) : connection_->once(scene), request,
+           &v1::UpdateService::StubInterface::ApplyUpdates);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_ack());
+}
+
+absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::QueryBatch batch) const {
+  v1::QueryRequest request;
+  request.set_scene(std::string(scene));
+  *request.mutable_batch() = std::move(batch);
+  absl::StatusOr<v1::QueryResponse> response =
+      call(*connection_->queries, connection_->repeatable(scene), request, &v1::QueryService::StubInterface::Query);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_result());
+}
+
+std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {
+  return std::make_unique<UpdateStream>(connection_->channel, std::string(scene), options);
+}
+
+std::unique_ptr<QueryStream> Client::query_stream(absl::string_view scene, const QueryStreamOptions& options) const {
+  return std::make_unique<QueryStream>(connection_->channel, std::string(scene), options);
+}
+
+}  // namespace locus::client

@@ -1,0 +1,20 @@
+// The streaming half of Client::upload_mesh. Internal to the library.
+#ifndef LOCUS_CLIENT_LIB_MESH_UPLOAD_H_
+#define LOCUS_CLIENT_LIB_MESH_UPLOAD_H_
+
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "client/lib/client.h"
+#include "client/lib/mesh.h"
+#include "locus/v1/scene_service.grpc.pb.h"
+
+namespace locus::client {
+
+// See Client::upload_mesh. The first message says what comes and holds no columns, so that a server which knows the
+// bytes can answer before any of them is sent.
+absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterface& stub, const MeshColumns& mesh,
+                                                   absl::Time deadline, const UploadProgress& progress);
+
+}  // namespace locus::client
+
+#endif  // LOCUS_CLIENT_LIB_MESH_UPLOAD_H_

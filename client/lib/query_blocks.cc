@@ -1,0 +1,107 @@
+#include "client/lib/query_blocks.h"
+
+namespace locus::client {
+namespace {
+
+template <class T>
+void append(google::protobuf::RepeatedField<T>& column, absl::Span<const T> values) {
+  column.Add(values.begin(), values.end());
+}
+
+}  // namespace
+
+RayBlock& RayBlock::mode(v1::RayMode mode) {
+  rays_->set_mode(mode);
+  return *this;
+}
+
+RayBlock& RayBlock::cull(v1::Cull cull) {
+  rays_->set_cull(cull);
+  return *this;
+}
+
+RayBlock& RayBlock::inside(v1::Inside inside) {
+  rays_->set_inside(inside);
+  return *this;
+}
+
+RayBlock& RayBlock::ray(const Float3& origin, const Float3& direction, float t_max, const Filter& filter) {
+  const int rows_before = rays_->origins_size() / 3;
+  append_triple(*rays_->mutable_origins(), origin);
+  append_triple(*rays_->mutable_directions(), direction);
+  append_row(*rays_->mutable_t_max(), rows_before, t_max, std::numeric_limits<float>::infinity());
+  filter_row(rows_before, filter);
+  return *this;
+}
+
+RayBlock& RayBlock::rays(absl::Span<const float> origins, absl::Span<const float> directions) {
+  append(*rays_->mutable_origins(), origins);
+  append(*rays_->mutable_directions(), directions);
+  return *this;
+}
+
+RayBlock& RayBlock::t_max(absl::Span<const float> t_max) {
+  assign(*rays_->mutable_t_max(), t_max);
+  return *this;
+}
+
+BallBlock& BallBlock::detail(v1::StaticDetail detail) {
+  balls_->set_detail(detail);
+  return *this;
+}
+
+BallBlock& BallBlock::ball(const Float3& center, float radius, const Filter& filter) {
+  filter_row(balls_->centers_size() / 3, filter);
+  append_triple(*balls_->mutable_centers(), center);
+  balls_->add_radii(radius);
+  return *this;
+}
+
+BallBlock& BallBlock::balls(absl::Span<const float> centers, absl::Span<const float> radii) {
+  append(*balls_->mutable_centers(), centers);
+  append(*balls_->mutable_radii(), radii);
+  return *this;
+}
+
+BoxBlock& BoxBlock::detail(v1::StaticDetail detail) {
+  boxes_->set_detail(detail);
+  return *this;
+}
+
+BoxBlock& BoxBlock::box(const Float3& center, const Float3& half_extents, const Rotation& rotation,
+                        const Filter& filter) {
+  const int rows_before = boxes_->centers_size() / 3;
+  append_triple(*boxes_->mutable_centers(), center);
+  append_triple(*boxes_->mutable_half_extents(), half_extents);
+  append_rotation_row(*boxes_->mutable_rotations(), rows_before, rotation);
+  filter_row(rows_before, filter);
+  return *this;
+}
+
+BoxBlock& BoxBlock::boxes(absl::Span<const float> centers, absl::Span<const float> half_extents) {
+  append(*boxes_->mutable_centers(), centers);
+  append(*boxes_->mutable_half_extents(), half_extents);
+  return *this;
+}
+
+BoxBlock& BoxBlock::rotations(absl::Span<const float> rotations) {
+  assign(*boxes_->mutable_rotations(), rotations);
+  return *this;
+}
+
+LookupBlock& LookupBlock::id(uint64_t id) {
+  lookup_->add_ids(id);
+  return *this;
+}
+
+LookupBlock& LookupBlock::ids(absl::Span<const uint64_t> ids) {
+  append(*lookup_->mutable_ids(), ids);
+  return *this;
+}
+
+LookupBlock& LookupBlock::group(uint64_t group) {
+  lookup_->add_groups(group);
+  return *this;
+}
+
+}  // namespace locus::client

@@ -1,0 +1,155 @@
+// One block of a query batch, written in columns: rays, balls, boxes or a lookup, with the settings all kinds share.
+// Got from QueryBuilder, and valid until its build(). Nothing is checked here: the server refuses a wrong batch whole,
+// naming block, column and index. Not thread-safe.
+//
+// A per-query column (t_max, masks, ignored groups, rotations) is either filled row by row, or set as a whole: N
+// entries, one for all, or none. Do not mix the two ways in one column of a block.
+#ifndef LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
+#define LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
+
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+
+#include "absl/types/span.h"
+#include "client/lib/columns.h"
+#include "client/lib/values.h"
+#include "locus/v1/query_service.pb.h"
+
+namespace locus::client {
+
+inline constexpr uint32_t kEveryMask = 0xFFFFFFFFu;
+
+// What one query finds and passes over.
+struct Filter {
+  uint32_t mask = kEveryMask;  // found iff (layers & mask) != 0
+  uint64_t ignore_group = 0;   // 0 = nobody
+};
+
+// Settings of every kind of block. Each call returns the block, so that calls chain.
+template <class Derived>
+class BlockBuilder {
+ public:
+  // Added to every position of the block; positions in its result are relative to it.
+  Derived& frame(const Double3& origin) {
+    v1::Vec3d& frame = *block_->mutable_frame();
+    frame.set_x(origin.x);
+    frame.set_y(origin.y);
+    frame.set_z(origin.z);
+    return derived();
+  }
+  Derived& source(v1::Source source) {
+    block_->set_source(source);
+    return derived();
+  }
+  Derived& precision(v1::Precision precision) {
+    block_->set_precision(precision);
+    return derived();
+  }
+  Derived& columns(std::initializer_list<v1::Column> columns) {
+    block_->clear_columns();
+    for (const v1::Column column : columns) block_->add_columns(column);
+    return derived();
+  }
+  Derived& masks(absl::Span<const uint32_t> masks) {
+    assign(*block_->mutable_masks(), masks);
+    return derived();
+  }
+  Derived& ignore_groups(absl::Span<const uint64_t> groups) {
+    assign(*block_->mutable_ignore_groups(), groups);
+    return derived();
+  }
+  // For the whole block, at most 64.
+  Derived& ignore_ids(absl::Span<const uint64_t> ids) {
+    assign(*block_->mutable_ignore_ids(), ids);
+    return derived();
+  }
+  // Most rows a query; 0 = 1,024.
+  Derived& max_results(uint32_t rows) {
+    block_->set_max_results(rows);
+    return derived();
+  }
+  // Only rows with a higher id: goes on after a cut.
+  Derived& after_id(uint64_t id) {
+    block_->set_after_id(id);
+    return derived();
+  }
+
+ protected:
+  explicit BlockBuilder(v1::QueryBlock& block) : block_(&block) {}
+
+  void filter_row(int rows_before, const Filter& filter) {
+    append_row<uint32_t>(*block_->mutable_masks(), rows_before, filter.mask, kEveryMask);
+    append_row<uint64_t>(*block_->mutable_ignore_groups(), rows_before, filter.ignore_group, 0);
+  }
+
+  v1::QueryBlock* block_;
+
+ private:
+  Derived& derived() { return static_cast<Derived&>(*this); }
+};
+
+class RayBlock : public BlockBuilder<RayBlock> {
+ public:
+  explicit RayBlock(v1::QueryBlock& block) : BlockBuilder(block), rays_(block.mutable_rays()) {}
+
+  RayBlock& mode(v1::RayMode mode);
+  RayBlock& cull(v1::Cull cull);
+  RayBlock& inside(v1::Inside inside);
+  // One ray. t counts in the direction's length, which may be any but zero.
+  RayBlock& ray(const Float3& origin, const Float3& direction, float t_max = std::numeric_limits<float>::infinity(),
+                const Filter& filter = {});
+  // Appends N rays: 3N floats each.
+  RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
+  // Whole column: N entries or one for all.
+  RayBlock& t_max(absl::Span<const float> t_max);
+
+ private:
+  v1::Rays* rays_;
+};
+
+class BallBlock : public BlockBuilder<BallBlock> {
+ public:
+  explicit BallBlock(v1::QueryBlock& block) : BlockBuilder(block), balls_(block.mutable_balls()) {}
+
+  BallBlock& detail(v1::StaticDetail detail);
+  BallBlock& ball(const Float3& center, float radius, const Filter& filter = {});
+  // Appends N centres (3N floats) and their radii: N, or, in the only call for the block, one for all.
+  BallBlock& balls(absl::Span<const float> centers, absl::Span<const float> radii);
+
+ private:
+  v1::Balls* balls_;
+};
+
+class BoxBlock : public BlockBuilder<BoxBlock> {
+ public:
+  explicit BoxBlock(v1::QueryBlock& block) : BlockBuilder(block), boxes_(block.mutable_boxes()) {}
+
+  BoxBlock& detail(v1::StaticDetail detail);
+  BoxBlock& box(const Float3& center, const Float3& half_extents, const Rotation& rotation = {},
+                const Filter& filter = {});
+  // Appends N centres and their half extents: 3N floats, or, in the only call for the block, one triple for all.
+  BoxBlock& boxes(absl::Span<const float> centers, absl::Span<const float> half_extents);
+  // Whole column: 4N floats or one quaternion for all.
+  BoxBlock& rotations(absl::Span<const float> rotations);
+
+ private:
+  v1::Boxes* boxes_;
+};
+
+// Either ids, one row each in their order, or groups, never both in one block.
+class LookupBlock : public BlockBuilder<LookupBlock> {
+ public:
+  explicit LookupBlock(v1::QueryBlock& block) : BlockBuilder(block), lookup_(block.mutable_lookup()) {}
+
+  LookupBlock& id(uint64_t id);
+  LookupBlock& ids(absl::Span<const uint64_t> ids);
+  LookupBlock& group(uint64_t group);
+
+ private:
+  v1::Lookup* lookup_;
+};
+
+}  // namespace locus::client
+
+#endif  // LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_

@@ -1,0 +1,198 @@
+#include "client/lib/update_builder.h"
+
+#include <utility>
+
+#include "client/lib/columns.h"
+
+namespace locus::client {
+namespace {
+
+template <class Message>
+void append_position(Message& message, const Position& position) {
+  const Double3& value = position.value;
+  if (position.absolute) return append_triple(*message.mutable_positions_f64(), value);
+  append_triple(*message.mutable_positions(),
+                {static_cast<float>(value.x), static_cast<float>(value.y), static_cast<float>(value.z)});
+}
+
+bool continues(const v1::Move& last, bool absolute, bool rotated, MoveKind kind) {
+  return (last.positions_f64_size() > 0) == absolute && (last.rotations_size() > 0) == rotated &&
+         last.teleport() == (kind == MoveKind::kTeleport);
+}
+
+bool continues(const v1::Relabel& last, const Relabeling& labels) {
+  return (last.layers_size() > 0) == labels.layers.has_value() &&
+         (last.groups_size() > 0) == labels.group.has_value() && (last.tags_size() > 0) == labels.tag.has_value();
+}
+
+}  // namespace
+
+UpdateBuilder& UpdateBuilder::frame(const Double3& origin) {
+  v1::Vec3d& frame = *batch_.mutable_frame();
+  frame.set_x(origin.x);
+  frame.set_y(origin.y);
+  frame.set_z(origin.z);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::tick(uint64_t tick) {
+  batch_.set_tick(tick);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::upsert() {
+  batch_.set_upsert(true);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::all_or_nothing() {
+  batch_.set_all_or_nothing(true);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::restart_ticks() {
+  batch_.set_restart_ticks(true);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::clear() {
+  batch_.set_clear(true);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::remove(uint64_t id) {
+  batch_.add_remove_ids(id);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::remove(absl::Span<const uint64_t> ids) {
+  batch_.mutable_remove_ids()->Add(ids.begin(), ids.end());
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::remove_group(uint64_t group) {
+  batch_.add_remove_groups(group);
+  return *this;
+}
+
+v1::Insert& UpdateBuilder::add_row(Form form, uint64_t id, const Position& position, const Rotation& rotation,
+                                   const Labels& labels) {
+  const size_t slot = static_cast<size_t>(form) * 2 + (position.absolute ? 1 : 0);
+  if (row_inserts_[slot] < 0) {
+    row_inserts_[slot] = batch_.inserts_size();
+    batch_.add_inserts();
+  }
+  v1::Insert& insert = *batch_.mutable_inserts(row_inserts_[slot]);
+  const int rows_before = insert.ids_size();
+  insert.add_ids(id);
+  append_position(insert, position);
+  append_rotation_row(*insert.mutable_rotations(), rows_before, rotation);
+  append_row<uint32_t>(*insert.mutable_layers(), rows_before, labels.layers, Labels{}.layers);
+  append_row<uint64_t>(*insert.mutable_groups(), rows_before, labels.group, 0);
+  append_row<uint64_t>(*insert.mutable_tags(), rows_before, labels.tag, 0);
+  return insert;
+}
+
+UpdateBuilder& UpdateBuilder::insert_point(uint64_t id, const Position& position, const Labels& labels) {
+  add_row(Form::kPoint, id, position, {}, labels).mutable_point();
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::insert_ball(uint64_t id, const Position& position, float radius, const Labels& labels) {
+  add_row(Form::kBall, id, position, {}, labels).mutable_ball()->add_radii(radius);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::insert_box(uint64_t id, const Position& position, const Float3& half_extents,
+                                         const Rotation& rotation, const Labels& labels) {
+  v1::Box& box = *add_row(Form::kBox, id, position, rotation, labels).mutable_box();
+  append_triple(*box.mutable_half_extents(), half_extents);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::insert_capsule(uint64_t id, const Position& position, const Float3& half_axis,
+                                             float radius, const Rotation& rotation, const Labels& labels) {
+  v1::Capsule& capsule = *add_row(Form::kCapsule, id, position, rotation, labels).mutable_capsule();
+  append_triple(*capsule.mutable_half_axes(), half_axis);
+  capsule.add_radii(radius);
+  return *this;
+}
+
+v1::Insert& UpdateBuilder::add_columns(const InsertColumns& columns) {
+  v1::Insert& insert = *batch_.add_inserts();
+  assign(*insert.mutable_ids(), columns.ids);
+  assign(*insert.mutable_positions(), columns.positions);
+  assign(*insert.mutable_positions_f64(), columns.positions_f64);
+  assign(*insert.mutable_rotations(), columns.rotations);
+  assign(*insert.mutable_layers(), columns.layers);
+  assign(*insert.mutable_groups(), columns.groups);
+  assign(*insert.mutable_tags(), columns.tags);
+  return insert;
+}
+
+UpdateBuilder& UpdateBuilder::insert_points(const InsertColumns& columns) {
+  add_columns(columns).mutable_point();
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::insert_balls(const InsertColumns& columns, absl::Span<const float> radii) {
+  assign(*add_columns(columns).mutable_ball()->mutable_radii(), radii);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::insert_boxes(const InsertColumns& columns, absl::Span<const float> half_extents) {
+  assign(*add_columns(columns).mutable_box()->mutable_half_extents(), half_extents);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::insert_capsules(const InsertColumns& columns, absl::Span<const float> half_axes,
+                                              absl::Span<const float> radii) {
+  v1::Capsule& capsule = *add_columns(columns).mutable_capsule();
+  assign(*capsule.mutable_half_axes(), half_axes);
+  assign(*capsule.mutable_radii(), radii);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation,
+                                   MoveKind kind) {
+  const int entries = batch_.moves_size();
+  const bool same =
+      move_takes_rows_ && continues(batch_.moves(entries - 1), position.absolute, rotation.has_value(), kind);
+  v1::Move& move = same ? *batch_.mutable_moves(entries - 1) : *batch_.add_moves();
+  move.add_ids(id);
+  append_position(move, position);
+  if (rotation) append_rotation(*move.mutable_rotations(), *rotation);
+  move.set_teleport(kind == MoveKind::kTeleport);
+  move_takes_rows_ = true;
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::moves(const MoveColumns& columns, MoveKind kind) {
+  v1::Move& move = *batch_.add_moves();
+  assign(*move.mutable_ids(), columns.ids);
+  assign(*move.mutable_positions(), columns.positions);
+  assign(*move.mutable_positions_f64(), columns.positions_f64);
+  assign(*move.mutable_rotations(), columns.rotations);
+  move.set_teleport(kind == MoveKind::kTeleport);
+  move_takes_rows_ = false;
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::relabel(uint64_t id, const Relabeling& labels) {
+  const int entries = batch_.relabels_size();
+  const bool same = entries > 0 && continues(batch_.relabels(entries - 1), labels);
+  v1::Relabel& relabel = same ? *batch_.mutable_relabels(entries - 1) : *batch_.add_relabels();
+  relabel.add_ids(id);
+  if (labels.layers) relabel.add_layers(*labels.layers);
+  if (labels.group) relabel.add_groups(*labels.group);
+  if (labels.tag) relabel.add_tags(*labels.tag);
+  return *this;
+}
+
+v1::UpdateBatch UpdateBuilder::build() {
+  row_inserts_.fill(-1);
+  move_takes_rows_ = false;
+  return std::exchange(batch_, v1::UpdateBatch());
+}
+
+}  // namespace locus::client

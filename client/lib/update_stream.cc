@@ -1,0 +1,110 @@
+#include "client/lib/update_stream.h"
+
+#include <mutex>
+#include <random>
+#include <utility>
+
+#include "client/lib/pipelined_stream.h"
+#include "client/lib/status.h"
+#include "locus/v1/update_service.grpc.pb.h"
+
+namespace locus::client {
+namespace {
+
+using Stream = PipelinedStream<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse, v1::UpdateAck>;
+
+uint64_t random_writer() {
+  std::random_device device;
+  uint64_t writer = 0;
+  while (writer == 0) writer = (uint64_t{device()} << 32) | device();
+  return writer;
+}
+
+// A refusal with a reason left the writer's number unused. A gap means that the server does not know the writer as it
+// should, and an error without a reason leaves open whether the number was used: going on could lose a batch silently.
+bool number_is_free(const absl::Status& failure) {
+  const std::optional<v1::Error> error = error_of(failure);
+  return error && error->reason() != v1::REASON_UNSPECIFIED && error->reason() != v1::REASON_BATCH_GAP;
+}
+
+}  // namespace
+
+class UpdateStream::Impl final : public Stream::Kind {
+ public:
+  Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const UpdateStreamOptions& options)
+      : stub_(v1::UpdateService::NewStub(std::move(channel))),
+        writer_(options.writer != 0 ? options.writer : random_writer()),
+        next_batch_(options.next_batch),
+        stream_(*this, std::move(scene), options.max_in_flight, options.reconnect) {}
+
+  Stream& stream() { return stream_; }
+  uint64_t writer() const { return writer_; }
+  std::optional<Revision> last_ack() const {
+    std::lock_guard lock(ack_mutex_);
+    return last_ack_;
+  }
+
+  void start_call(grpc::ClientContext* context, Stream::Reactor* reactor) override {
+    stub_->async()->StreamUpdates(context, reactor);
+  }
+
+  void number(v1::StreamUpdatesRequest& request) override {
+    request.set_sequence(++sequence_);
+    request.mutable_batch()->set_writer(writer_);
+    request.mutable_batch()->set_batch(next_batch_++);
+  }
+
+  absl::StatusOr<v1::UpdateAck> outcome_of(v1::StreamUpdatesResponse& response) override {
+    if (response.has_ack()) return std::move(*response.mutable_ack());
+    if (response.has_error()) return to_absl_status(response.error());
+    return absl::DataLossError("the server answered a batch with neither an ack nor an error");
+  }
+
+  absl::Status answered(const absl::StatusOr<v1::UpdateAck>& outcome, Stream::Items& items, size_t position) override {
+    if (outcome.ok()) {
+      std::lock_guard lock(ack_mutex_);
+      last_ack_ = Revision{outcome->epoch(), outcome->revision()};
+      return absl::OkStatus();
+    }
+    if (!number_is_free(outcome.status())) return outcome.status();
+    next_batch_ -= items.size() - position + 1;
+    for (size_t behind = position; behind < items.size(); ++behind) {
+      items[behind].request = std::make_shared<v1::StreamUpdatesRequest>(*items[behind].request);
+      items[behind].written = false;
+      number(*items[behind].request);
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  const std::unique_ptr<v1::UpdateService::StubInterface> stub_;
+  const uint64_t writer_;
+  uint64_t next_batch_;    // guarded by the stream's lock
+  uint64_t sequence_ = 0;  // guarded by the stream's lock
+  mutable std::mutex ack_mutex_;
+  std::optional<Revision> last_ack_;  // guarded by ack_mutex_
+  Stream stream_;                     // last: its thread uses everything above
+};
+
+UpdateStream::UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene,
+                           const UpdateStreamOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(channel), std::move(scene), options)) {}
+
+UpdateStream::~UpdateStream() = default;
+
+absl::Status UpdateStream::send(v1::UpdateBatch batch, AckCallback on_ack) {
+  v1::StreamUpdatesRequest request;
+  *request.mutable_batch() = std::move(batch);
+  return impl_->stream().send(std::move(request), std::move(on_ack));
+}
+
+std::future<absl::StatusOr<v1::UpdateAck>> UpdateStream::send(v1::UpdateBatch batch) {
+  return send_for_future<v1::UpdateAck>([&](AckCallback done) { return send(std::move(batch), std::move(done)); });
+}
+
+absl::Status UpdateStream::flush() { return impl_->stream().flush(); }
+absl::Status UpdateStream::close() { return impl_->stream().close(); }
+std::optional<Revision> UpdateStream::last_ack() const { return impl_->last_ack(); }
+uint64_t UpdateStream::writer() const { return impl_->writer(); }
+
+}  // namespace locus::client
