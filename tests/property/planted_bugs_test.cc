@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/planted_bug.h"
+#include "tests/support/grid_comparison.h"
 #include "tests/support/scene_search.h"
 
 namespace locus::test {
@@ -17,6 +18,14 @@ std::string compare_trees_with_list() {
   return search_all_scenes<Triangle>(count, count, tree_difference<Triangle>);
 }
 
+std::string compare_grids_with_list() {
+  return search_grid_scenes(scaled_count(400), any_adversarial_scene, grid_difference);
+}
+
+std::string compare_moving_grids_with_list() {
+  return search_grid_scenes(scaled_count(40), any_adversarial_scene, moving_grid_difference);
+}
+
 struct Trial {
   const char* name;
   PlantedBug bug;
@@ -26,6 +35,9 @@ struct Trial {
 constexpr Trial kTrials[] = {
     {"TreeWithUnpaddedNear", PlantedBug::kUnpaddedNear, compare_trees_with_list},
     {"TreeWithStrictTie", PlantedBug::kStrictTie, compare_trees_with_list},
+    {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
+    {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
+    {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},
 };
 
 class PlantedBugTest : public ::testing::TestWithParam<Trial> {

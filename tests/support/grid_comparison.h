@@ -1,0 +1,143 @@
+// Compares hash grids with the list, for the random tests, which expect no difference, and for the tests of planted
+// bugs, which expect one. Every function draws from the given generator only.
+#ifndef LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
+#define LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/index/hash_grid/hash_grid.h"
+#include "tests/support/grid_scenes.h"
+#include "tests/support/index_judge.h"
+
+namespace locus::test {
+
+using ObjectGrid = HashGrid<Object>;
+using ObjectList = ListIndex<Object>;
+using ObjectScene = TestScene<Object>;
+
+inline HashGridOptions random_grid_options(Random& random) {
+  HashGridOptions options;
+  options.cell_size = random.magnitude(-6, 12);
+  if (random.chance(0.3)) options.first_choice = 1 + random.below(20);
+  return options;
+}
+
+// The same values filed in one batch at the given cell size, and one by one at another.
+inline std::string grid_difference(const ObjectScene& scene, Random& random) {
+  const ObjectList list = make_list(scene.values);
+  ObjectGrid bulk(random_grid_options(random));
+  bulk.apply({}, scene.values);
+  if (std::string what = IndexJudge(bulk, list).difference(scene); !what.empty()) return "in one batch: " + what;
+  ObjectGrid single(random_grid_options(random));
+  for (const Object& object : scene.values) single.insert(object);
+  if (std::string what = IndexJudge(single, list).difference(scene); !what.empty()) return "one by one: " + what;
+  return "";
+}
+
+// Puts each object where another one is, so that it fits the queries of the scene, or a little beside.
+inline Object moved(const Object& object, const std::vector<Object>& objects, Random& random) {
+  Object result = object;
+  result.shape.position = random.pick(objects).shape.position;
+  if (random.chance(0.5)) result.shape.position[static_cast<int>(random.below(3))] *= random.between(0.5, 1);
+  if (random.chance(0.2)) result.shape = random.pick(objects).shape;
+  return result;
+}
+
+// Random batches of inserts, moves and removes with the list in lockstep; snapshots kept along the way must go on to
+// answer as the list did when they were taken.
+class GridLockstep {
+ public:
+  GridLockstep(const ObjectScene& scene, Random& random)
+      : scene_(scene), random_(random), grid_(random_grid_options(random)) {}
+
+  std::string run(int batches) {
+    std::vector<std::pair<ObjectGrid, ObjectList>> kept;
+    for (int batch = 0; batch < batches; ++batch) {
+      if (random_.chance(0.3)) kept.emplace_back(grid_.snapshot(), list_);
+      apply_batch();
+      if (std::string what = difference(grid_, list_); !what.empty()) return "batch " + std::to_string(batch) + what;
+    }
+    for (const auto& [grid, list] : kept) {
+      if (std::string what = difference(grid, list); !what.empty()) return "a snapshot" + what;
+    }
+    return "";
+  }
+
+ private:
+  static std::string difference(const ObjectGrid& grid, const ObjectList& list, const ObjectScene& scene) {
+    const std::string what = IndexJudge(grid, list).difference(scene);
+    if (!what.empty()) return ": " + what;
+    size_t present = 0;
+    for (const Object& object : list.values()) present += grid.contains(object);
+    return present == list.size() ? "" : ": an object is not where contains() looks";
+  }
+  std::string difference(const ObjectGrid& grid, const ObjectList& list) const {
+    return difference(grid, list, scene_);
+  }
+
+  void apply_batch() {
+    std::vector<Object> removed, inserted;
+    for (const Object& object : scene_.values) {
+      const Object* here = find(object.id);
+      const double choice = random_.unit();
+      if (here == nullptr) {
+        if (choice < 0.4) inserted.push_back(object);
+        continue;
+      }
+      if (choice < 0.4) removed.push_back(*here);
+      if (choice < 0.25) inserted.push_back(moved(*here, scene_.values, random_));
+    }
+    random_.shuffle(inserted);
+    for (const Object& object : removed) list_.remove(object);
+    for (const Object& object : inserted) list_.insert(object);
+    if (random_.chance(0.5)) {
+      grid_.apply(removed, inserted);
+      return;
+    }
+    for (const Object& object : removed) LOCUS_CHECK(grid_.remove(object));
+    for (const Object& object : inserted) grid_.insert(object);
+  }
+
+  const Object* find(Id id) const {
+    for (const Object& object : list_.values()) {
+      if (object.id == id) return &object;
+    }
+    return nullptr;
+  }
+
+  const ObjectScene& scene_;
+  Random& random_;
+  ObjectGrid grid_;
+  ObjectList list_;
+};
+
+// A grid that lives through a dozen batches over a scene of one of all families.
+inline std::string moving_grid_difference(const ObjectScene& scene, Random& random) {
+  ObjectScene shorter = scene;
+  while (shorter.rays.size() > 12) shorter.rays.pop_back();
+  return GridLockstep(shorter, random).run(12);
+}
+
+// The first scene of seeds 0 to count - 1 that draw(seed, random) makes on which compare(scene, random) is not empty,
+// and what it says; empty when there is none.
+template <class Draw, class Compare>
+std::string search_grid_scenes(uint64_t count, const Draw& draw, const Compare& compare) {
+  for (uint64_t seed = 0; seed < count; ++seed) {
+    Random random(seed);
+    const ObjectScene scene = make_scene<Object>(draw(seed, random), random);
+    const std::string what = compare(scene, random);
+    if (!what.empty()) return "seed " + std::to_string(seed) + ", " + what;
+  }
+  return "";
+}
+
+// Families of both kinds in turn.
+inline SceneSketch any_adversarial_scene(uint64_t seed, Random& random) {
+  return seed % 2 == 0 ? adversarial_scene(seed / 2, random) : grid_scene(seed / 2, random);
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
