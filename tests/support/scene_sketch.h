@@ -56,6 +56,15 @@ inline void append_wall(std::vector<Triangle>& triangles, const Placement& place
   append_quad(triangles, at(-u - v), at(u - v), at(u + v), at(v - u));
 }
 
+inline void append_closed_box(std::vector<Triangle>& triangles, const Placement& placement) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3d side;
+    side[axis] = placement.half[axis];
+    append_wall(triangles, placement, side, axis);
+    append_wall(triangles, placement, -side, axis);
+  }
+}
+
 // Flat placements become rectangles of two triangles, or triangles without area; solid ones a closed box or a single
 // triangle within it.
 inline void append_triangles(std::vector<Triangle>& triangles, const Placement& placement, Random& random) {
@@ -63,12 +72,7 @@ inline void append_triangles(std::vector<Triangle>& triangles, const Placement& 
   if (h.x == 0 || h.y == 0 || h.z == 0) {
     append_wall(triangles, placement, {}, h.x == 0 ? 0 : h.y == 0 ? 1 : 2);
   } else if (random.chance(0.3)) {
-    for (int axis = 0; axis < 3; ++axis) {
-      Vec3d side;
-      side[axis] = h[axis];
-      append_wall(triangles, placement, side, axis);
-      append_wall(triangles, placement, -side, axis);
-    }
+    append_closed_box(triangles, placement);
   } else {
     const auto corner = [&] {
       const Vec3d local = {random.between(-h.x, h.x), random.between(-h.y, h.y), random.between(-h.z, h.z)};

@@ -202,12 +202,17 @@ class Opened {
   absl::Span<const uint32_t> nodes() const { return {nodes_.data(), size_}; }
 
  private:
+  // Among equal areas the fuller one, so that coincident boxes give a balanced tree.
+  static bool worth_more(const BinaryNode<S>& a, const BinaryNode<S>& b) {
+    const S area_a = half_area(a.bounds), area_b = half_area(b.bounds);
+    return area_a != area_b ? area_a > area_b : a.count > b.count;
+  }
+
   bool open_largest() {
     size_t largest = size_;
     for (size_t i = 0; i < size_; ++i) {
       if (tree_[nodes_[i]].left == 0) continue;
-      if (largest == size_ || half_area(tree_[nodes_[i]].bounds) > half_area(tree_[nodes_[largest]].bounds))
-        largest = i;
+      if (largest == size_ || worth_more(tree_[nodes_[i]], tree_[nodes_[largest]])) largest = i;
     }
     if (largest == size_) return false;
     const BinaryNode<S>& node = tree_[nodes_[largest]];

@@ -1,0 +1,252 @@
+#include "core/index/index_queries.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/index/bvh/bvh.h"
+#include "core/index/list/list_index.h"
+#include "core/scene/object.h"
+#include "tests/support/random.h"
+
+namespace locus::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::UnorderedElementsAre;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// A ball around (x, 0, 0): rays along the x axis from the origin hit it at x - radius.
+Object ball_at(Id id, double x, float radius = 1) {
+  Object object;
+  object.id = id;
+  object.shape.kind = ShapeKind::kBall;
+  object.shape.position = {x, 0, 0};
+  object.shape.radius = radius;
+  return object;
+}
+
+ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
+
+// Every query must do the same for every structure.
+template <class Index>
+class IndexQueriesTest : public ::testing::Test {
+ protected:
+  static Index make(const std::vector<Object>& objects) {
+    if constexpr (MutableSpatialIndex<Index>) {
+      Index index;
+      for (const Object& object : objects) index.insert(object);
+      return index;
+    } else {
+      return *Index::build(objects);
+    }
+  }
+};
+
+using Structures = ::testing::Types<ListIndex<Object>, Bvh<Object>>;
+TYPED_TEST_SUITE(IndexQueriesTest, Structures);
+
+std::vector<Id> ids_of(const std::vector<Object>& objects) {
+  std::vector<Id> ids;
+  for (const Object& object : objects) ids.push_back(object.id);
+  return ids;
+}
+
+std::vector<Id> ids_of(const std::vector<RayHit<Object>>& hits) {
+  std::vector<Id> ids;
+  for (const RayHit<Object>& hit : hits) ids.push_back(hit.value.id);
+  return ids;
+}
+
+TYPED_TEST(IndexQueriesTest, FirstRayWithoutAHitTouchesNeitherValueNorDistance) {
+  const auto index = this->make({ball_at(1, -10)});
+  Object value = ball_at(77, 0);
+  double distance = 100;
+  EXPECT_FALSE(first_ray(index, along_x(), value, distance));
+  EXPECT_EQ(value, ball_at(77, 0));
+  EXPECT_EQ(distance, 100);
+}
+
+TYPED_TEST(IndexQueriesTest, FirstRayWithANearerHitSetsValueAndDistance) {
+  const auto index = this->make({ball_at(1, 30), ball_at(2, 10), ball_at(3, 20)});
+  Object value = ball_at(77, 0);
+  double distance = 100;
+  EXPECT_TRUE(first_ray(index, along_x(), value, distance));
+  EXPECT_EQ(value, ball_at(2, 10));
+  EXPECT_EQ(distance, 9);
+}
+
+TYPED_TEST(IndexQueriesTest, FirstRayWithAHitAtOrBeyondTheDistanceTouchesNeither) {
+  const auto index = this->make({ball_at(1, 10)});
+  for (const double limit : {9.0, 8.0, 0.0}) {
+    Object value = ball_at(77, 0);
+    double distance = limit;
+    EXPECT_FALSE(first_ray(index, along_x(), value, distance)) << limit;
+    EXPECT_EQ(value, ball_at(77, 0));
+    EXPECT_EQ(distance, limit);
+  }
+}
+
+TYPED_TEST(IndexQueriesTest, FirstRayAcceptsAHitJustBeforeTheDistance) {
+  const auto index = this->make({ball_at(1, 10)});
+  Object value;
+  double distance = std::nextafter(9.0, kInfinity);
+  EXPECT_TRUE(first_ray(index, along_x(), value, distance));
+  EXPECT_EQ(distance, 9);
+}
+
+TYPED_TEST(IndexQueriesTest, TheLowerIdWinsATie) {
+  std::vector<Object> objects;
+  for (const Id id : {40, 12, 7, 33, 21, 8, 9, 10, 11, 13, 14, 15}) objects.push_back(ball_at(id, 10));
+  const auto index = this->make(objects);
+  Object value;
+  double distance = kInfinity;
+  EXPECT_TRUE(first_ray(index, along_x(), value, distance));
+  EXPECT_EQ(value.id, 7u);
+}
+
+TYPED_TEST(IndexQueriesTest, AnyRayIsStrictAtTheDistance) {
+  const auto index = this->make({ball_at(1, 10), ball_at(2, 50)});
+  EXPECT_FALSE(any_ray(index, along_x(), 9));
+  EXPECT_TRUE(any_ray(index, along_x(), std::nextafter(9.0, kInfinity)));
+  EXPECT_FALSE(any_ray(this->make({}), along_x(), kInfinity));
+}
+
+TYPED_TEST(IndexQueriesTest, AllRaysSortByDistanceThenId) {
+  const auto index = this->make({ball_at(9, 30), ball_at(2, 10), ball_at(5, 20), ball_at(1, 30), ball_at(8, 10)});
+  std::vector<RayHit<Object>> hits;
+  all_rays(index, along_x(), kInfinity, 100, hits);
+  EXPECT_THAT(ids_of(hits), ElementsAre(2, 8, 5, 1, 9));
+  EXPECT_EQ(hits[2].distance, 19);
+}
+
+TYPED_TEST(IndexQueriesTest, AllRaysKeepTheNearest) {
+  const auto index = this->make({ball_at(9, 30), ball_at(2, 10), ball_at(5, 20), ball_at(1, 30), ball_at(8, 10)});
+  for (size_t max_hits = 0; max_hits <= 5; ++max_hits) {
+    std::vector<RayHit<Object>> hits;
+    all_rays(index, along_x(), kInfinity, max_hits, hits);
+    const std::vector<Id> expected = {2, 8, 5, 1, 9};
+    EXPECT_EQ(ids_of(hits), std::vector<Id>(expected.begin(), expected.begin() + static_cast<ptrdiff_t>(max_hits)));
+  }
+}
+
+TYPED_TEST(IndexQueriesTest, AllRaysAreStrictAtTheDistance) {
+  const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
+  std::vector<RayHit<Object>> hits;
+  all_rays(index, along_x(), 19, 100, hits);
+  EXPECT_THAT(ids_of(hits), ElementsAre(1));
+}
+
+TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
+  const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
+  // Later than every hit of this ray, so that a sort over the whole vector would move it.
+  std::vector<RayHit<Object>> hits = {{1e9, ball_at(77, 0)}};
+  all_rays(index, along_x(), kInfinity, 1, hits);
+  EXPECT_THAT(ids_of(hits), ElementsAre(77, 1));
+  all_rays(index, along_x(), kInfinity, 2, hits);
+  EXPECT_THAT(ids_of(hits), ElementsAre(77, 1, 1, 2));
+
+  std::vector<Object> values = {ball_at(77, 0)};
+  ball_overlap(index, {{10, 0, 0}, 1}, values);
+  box_overlap(index, {{20, 0, 0}, {1, 1, 1}, {}}, values);
+  conservative_ball(index, {{10, 0, 0}, 1}, values);
+  conservative_box(index, {{20, 0, 0}, {1, 1, 1}, {}}, values);
+  conservative_ray(index, along_x(), 15, values);
+  EXPECT_THAT(ids_of(values), ElementsAre(77, 1, 2, 1, 2, 1));
+}
+
+TYPED_TEST(IndexQueriesTest, TouchingCountsAsOverlap) {
+  const auto index = this->make({ball_at(1, 10)});
+  std::vector<Object> values;
+  ball_overlap(index, {{13, 0, 0}, 2}, values);
+  box_overlap(index, {{7, 0, 0}, {2, 0, 0}, {}}, values);
+  EXPECT_THAT(ids_of(values), ElementsAre(1, 1));
+  values.clear();
+  ball_overlap(index, {{13, 0, 0}, 1.999}, values);
+  box_overlap(index, {{7, 0, 0}, {1.999, 0, 0}, {}}, values);
+  EXPECT_THAT(ids_of(values), ElementsAre());
+}
+
+TYPED_TEST(IndexQueriesTest, ConservativeAnswersGoByBounds) {
+  // All three queries meet the ball's box at its corner, where the ball is not.
+  const auto index = this->make({ball_at(1, 0, 10)});
+  const Balld ball{{10, 10, 10}, 1};
+  const Obbd box{{10, 10, 10}, {1, 1, 1}, {}};
+  const ObjectRay ray(Rayd{{9.5, 9.5, -20}, {0, 0, 1}});
+  std::vector<Object> exact, conservative;
+  std::vector<RayHit<Object>> hits;
+  ball_overlap(index, ball, exact);
+  box_overlap(index, box, exact);
+  all_rays(index, ray, kInfinity, 9, hits);
+  EXPECT_TRUE(exact.empty());
+  EXPECT_TRUE(hits.empty());
+  conservative_ball(index, ball, conservative);
+  conservative_box(index, box, conservative);
+  conservative_ray(index, ray, kInfinity, conservative);
+  EXPECT_THAT(ids_of(conservative), ElementsAre(1, 1, 1));
+}
+
+TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
+  const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
+  Work work;
+  work.tests = 100;
+  Object value;
+  double distance = kInfinity;
+  first_ray(index, along_x(), value, distance, &work);
+  EXPECT_EQ(work.tests, 102u);
+  std::vector<Object> values;
+  ball_overlap(index, {{0, 0, 0}, 100}, values, &work);
+  EXPECT_EQ(work.tests, 104u);
+}
+
+// first_ray(statics) || first_ray(dynamics) stops at the static hit. The nearer one may be dynamic.
+TYPED_TEST(IndexQueriesTest, TheNearerHitOfASecondIndexIsNotSkippedAfterAHitInTheFirst) {
+  const auto statics = this->make({ball_at(1, 50)});
+  const auto dynamics = this->make({ball_at(2, 10)});
+  Object trapped;
+  double trapped_distance = kInfinity;
+  const bool hit = first_ray(statics, along_x(), trapped, trapped_distance) ||
+                   first_ray(dynamics, along_x(), trapped, trapped_distance);
+  ASSERT_TRUE(hit);
+  ASSERT_EQ(trapped.id, 1u) << "the trap this test is about";
+
+  Object value;
+  double distance = kInfinity;
+  EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, statics, dynamics));
+  EXPECT_EQ(value.id, 2u);
+  EXPECT_EQ(distance, 9);
+}
+
+TYPED_TEST(IndexQueriesTest, FirstRayOfSeveralIndicesDoesNotDependOnTheirOrder) {
+  const auto far = this->make({ball_at(1, 50), ball_at(9, 20)});
+  const auto near = this->make({ball_at(2, 10)});
+  const auto tied = this->make({ball_at(3, 10), ball_at(4, 11)});
+  const auto none = this->make({});
+  const auto check = [](const auto&... indices) {
+    Object value;
+    double distance = kInfinity;
+    EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, indices...));
+    EXPECT_EQ(value.id, 2u);
+    EXPECT_EQ(distance, 9);
+  };
+  check(far, near, tied, none);
+  check(none, tied, near, far);
+  check(tied, none, far, near);
+}
+
+TEST(IndexQueriesOfTwoStructuresTest, AListAndATreeAnswerTogether) {
+  ListIndex<Object> list;
+  list.insert(ball_at(5, 10));
+  const Bvh<Object> tree = *Bvh<Object>::build({ball_at(4, 10), ball_at(6, 9)});
+  Object value;
+  double distance = kInfinity;
+  EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tree));
+  EXPECT_EQ(value.id, 6u);
+  distance = kInfinity;
+  const Bvh<Object> tied = *Bvh<Object>::build({ball_at(4, 10), ball_at(6, 10)});
+  EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tied));
+  EXPECT_EQ(value.id, 4u);
+}
+
+}  // namespace
+}  // namespace locus::test
