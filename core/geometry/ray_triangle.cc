@@ -69,7 +69,8 @@ std::optional<TriangleHit> TriangleRay::edge_test(const Triangle& triangle) cons
   const bool any_positive = weight_a > 0 || weight_b > 0 || weight_c > 0;
   if (any_negative && any_positive) return std::nullopt;
   const double determinant = weight_a + weight_b + weight_c;
-  if (determinant == 0) return std::nullopt;
+  // Rounding on the way into the projection may open a triangle without area.
+  if (determinant == 0 || area_normal(triangle) == Vec3d{}) return std::nullopt;
   if (culled(cull_, determinant)) return std::nullopt;
   const double depth = weight_a * a[axis_z_] + weight_b * b[axis_z_] + weight_c * c[axis_z_];
   const double t = depth / (determinant * dz);
