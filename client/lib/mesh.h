@@ -16,8 +16,8 @@ using Sha256 = std::array<uint8_t, 32>;
 // Borrowed columns of a mesh.
 struct MeshColumns {
   std::string name;                           // server-wide, 1 to 63 characters
-  absl::Span<const float> vertices;           // x, y, z of each vertex
-  absl::Span<const uint32_t> indices;         // three vertex numbers a triangle
+  absl::Span<const float> vertices = {};      // x, y, z of each vertex
+  absl::Span<const uint32_t> indices = {};    // three vertex numbers a triangle
   absl::Span<const v1::MeshPart> parts = {};  // ascending by first triangle; none = one nameless part
 };
 

@@ -100,7 +100,7 @@ class PipelinedStream {
   absl::Status flush() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return items_.empty() && handing_over_ == 0; });
-    return ended_.value_or(absl::OkStatus());
+    return ended_.value_or(fatal_);
   }
 
   absl::Status close() {

@@ -22,26 +22,26 @@ namespace locus::client {
 // exactly one of the two kinds of positions is given.
 struct InsertColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const float> positions;       // 3N, relative to the frame
-  absl::Span<const double> positions_f64;  // 3N, absolute
-  absl::Span<const float> rotations = {};  // 4N; none = identity
-  absl::Span<const uint32_t> layers = {};  // none = 1
-  absl::Span<const uint64_t> groups = {};  // none = 0
-  absl::Span<const uint64_t> tags = {};    // none = 0
+  absl::Span<const float> positions = {};       // 3N, relative to the frame
+  absl::Span<const double> positions_f64 = {};  // 3N, absolute
+  absl::Span<const float> rotations = {};       // 4N; none = identity
+  absl::Span<const uint32_t> layers = {};       // none = 1
+  absl::Span<const uint64_t> groups = {};       // none = 0
+  absl::Span<const uint64_t> tags = {};         // none = 0
 };
 
 struct MoveColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const float> positions;       // 3N, relative to the frame
-  absl::Span<const double> positions_f64;  // 3N, absolute
-  absl::Span<const float> rotations = {};  // 4N; none = kept
+  absl::Span<const float> positions = {};       // 3N, relative to the frame
+  absl::Span<const double> positions_f64 = {};  // 3N, absolute
+  absl::Span<const float> rotations = {};       // 4N; none = kept
 };
 
 // New labels of one object; what is absent is kept.
 struct Relabeling {
-  std::optional<uint32_t> layers;
-  std::optional<uint64_t> group;
-  std::optional<uint64_t> tag;
+  std::optional<uint32_t> layers = std::nullopt;
+  std::optional<uint64_t> group = std::nullopt;
+  std::optional<uint64_t> tag = std::nullopt;
 };
 
 // Whether a move is a jump, so that questions about the past do not place the object in between.

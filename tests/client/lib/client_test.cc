@@ -1,0 +1,212 @@
+#include "client/lib/client.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/lib/query_builder.h"
+#include "client/lib/status.h"
+#include "tests/client/lib/fake_server.h"
+
+namespace locus::client {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::FakeServer;
+using ::testing::HasSubstr;
+
+ClientOptions quick() {
+  ClientOptions options;
+  options.retry = {.max_attempts = 4, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(4)};
+  return options;
+}
+
+class ClientTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address(), quick());
+    ASSERT_TRUE(client.ok()) << client.status();
+    client_ = *std::move(client);
+  }
+
+  FakeServer server_;
+  std::unique_ptr<Client> client_;
+};
+
+v1::QueryBatch one_ray() {
+  QueryBuilder builder;
+  builder.rays().ray({0, 0, 0}, {0, 0, 1});
+  return builder.build();
+}
+
+TEST(ConnectTest, WhereNothingListensTheErrorSaysWhereAndWhatToDo) {
+  std::string address;
+  {
+    const FakeServer gone;
+    address = gone.address();
+  }
+  const absl::Status status = Client::connect(address, quick()).status();
+  EXPECT_TRUE(absl::IsUnavailable(status));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("nothing answers at " + address));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("locusd"));
+}
+
+TEST(ConnectTest, WaitingForAServerEndsWithTheTimeout) {
+  ClientOptions options = quick();
+  options.wait_for_server = true;
+  options.connect_timeout = absl::Milliseconds(50);
+  const absl::Status status = Client::connect("unix:/nonexistent/locus.sock", options).status();
+  EXPECT_TRUE(absl::IsUnavailable(status));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("within 50ms"));
+}
+
+TEST(ConnectTest, AnEmptyAddressIsRefusedAtOnce) { EXPECT_TRUE(absl::IsInvalidArgument(Client::connect("").status())); }
+
+TEST_F(ClientTest, QueriesAreRepeatedWhileTheServerIsUnavailable) {
+  server_.queries.failing_calls = 3;
+  const absl::StatusOr<v1::QueryResult> result = client_->query("arena", one_ray());
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->revision(), 1u);
+  EXPECT_EQ(server_.queries.calls, 4);
+  EXPECT_EQ(server_.queries.scene, "arena") << "x-scene";
+}
+
+TEST_F(ClientTest, QueriesGiveUpWhenThePolicyEnds) {
+  server_.queries.failing_calls = 100;
+  EXPECT_TRUE(absl::IsUnavailable(client_->query("arena", one_ray()).status()));
+  EXPECT_EQ(server_.queries.calls, 4);
+}
+
+TEST_F(ClientTest, RefusalsAreNotRepeatedAndKeepTheirFields) {
+  server_.queries.failing_calls = 1;
+  v1::Error error;
+  error.set_reason(v1::REASON_NOT_FINITE);
+  error.set_field("blocks[0].rays.origins");
+  server_.queries.failure = testing::refusal(grpc::StatusCode::INVALID_ARGUMENT, "not finite", error);
+  const absl::Status status = client_->query("arena", one_ray()).status();
+  EXPECT_TRUE(absl::IsInvalidArgument(status));
+  ASSERT_TRUE(error_of(status).has_value());
+  EXPECT_EQ(error_of(status)->field(), "blocks[0].rays.origins");
+  EXPECT_EQ(server_.queries.calls, 1);
+}
+
+TEST_F(ClientTest, ExhaustedWithAHintIsRepeated) {
+  server_.queries.failing_calls = 1;
+  v1::Error error;
+  error.set_reason(v1::REASON_LIMIT);
+  error.set_retry_after_ms(1);
+  server_.queries.failure = testing::refusal(grpc::StatusCode::RESOURCE_EXHAUSTED, "full", error);
+  EXPECT_TRUE(client_->query("arena", one_ray()).ok());
+  EXPECT_EQ(server_.queries.calls, 2);
+}
+
+TEST_F(ClientTest, AnUpdateWithoutWriterIsSentOnce) {
+  server_.updates.failing_calls = 1;
+  EXPECT_TRUE(absl::IsUnavailable(client_->apply("arena", {}).status()));
+  EXPECT_EQ(server_.updates.calls, 1);
+}
+
+TEST_F(ClientTest, AnUpdateWithWriterAndBatchIsRepeated) {
+  server_.updates.failing_calls = 2;
+  v1::UpdateBatch batch;
+  batch.set_writer(77);
+  batch.set_batch(1);
+  batch.set_tick(5);
+  const absl::StatusOr<v1::UpdateAck> ack = client_->apply("arena", batch);
+  ASSERT_TRUE(ack.ok()) << ack.status();
+  EXPECT_EQ(server_.updates.calls, 3);
+  EXPECT_THAT(server_.updates.applied(), ElementsAre(5));
+}
+
+TEST_F(ClientTest, OtherChangesAreNeverRepeated) {
+  server_.scenes.failing_creates = 1;
+  v1::CreateSceneRequest request;
+  request.set_name("arena");
+  EXPECT_TRUE(absl::IsUnavailable(client_->create_scene(request).status()));
+  EXPECT_EQ(server_.scenes.creates, 1);
+}
+
+TEST_F(ClientTest, ASceneIsCreatedFoundListedAndDeleted) {
+  for (const char* name : {"a", "b", "c", "d", "e"}) {
+    v1::CreateSceneRequest request;
+    request.set_name(name);
+    ASSERT_TRUE(client_->create_scene(request).ok());
+  }
+  EXPECT_EQ(client_->get_scene("c")->name(), "c");
+  const absl::StatusOr<std::vector<v1::Scene>> scenes = client_->list_scenes();
+  ASSERT_TRUE(scenes.ok());
+  ASSERT_EQ(scenes->size(), 5u) << "three pages";
+  EXPECT_EQ(scenes->back().name(), "e");
+  v1::DeleteSceneRequest gone;
+  gone.set_name("c");
+  EXPECT_TRUE(client_->delete_scene(gone).ok());
+  EXPECT_TRUE(absl::IsNotFound(client_->get_scene("c").status()));
+}
+
+TEST_F(ClientTest, ASceneNameThatIsIllegalInMetadataReachesTheServerAndIsRefusedThere) {
+  EXPECT_TRUE(absl::IsNotFound(client_->get_scene("no\nsuch\x01name").status()));
+}
+
+TEST_F(ClientTest, HealthIsServingAndAnUnknownServiceIsNotFound) {
+  const absl::StatusOr<Health> health = client_->health();
+  ASSERT_TRUE(health.ok()) << health.status();
+  EXPECT_EQ(*health, Health::kServing);
+  EXPECT_TRUE(absl::IsNotFound(client_->health("no.such.Service").status()));
+}
+
+TEST_F(ClientTest, AServerThatIsGoneIsUnavailable) {
+  server_.stop();
+  EXPECT_TRUE(absl::IsUnavailable(client_->get_server().status()));
+}
+
+TEST_F(ClientTest, ADumpEndsEarlyWithTheReadersError) {
+  int pieces = 0;
+  v1::DumpSceneRequest request;
+  request.set_scene("arena");
+  EXPECT_TRUE(client_
+                  ->dump(request,
+                         [&](const v1::DumpSceneResponse&) {
+                           ++pieces;
+                           return absl::OkStatus();
+                         })
+                  .ok());
+  EXPECT_EQ(pieces, 3);
+  EXPECT_EQ(client_->dump(request, [](const v1::DumpSceneResponse&) { return absl::AbortedError("enough"); }),
+            absl::AbortedError("enough"));
+}
+
+TEST_F(ClientTest, AMeshArrivesWholeInMessagesOfAtMostOneMebibyte) {
+  std::vector<float> vertices(900'000);
+  for (size_t i = 0; i < vertices.size(); ++i) vertices[i] = static_cast<float>(i);
+  std::vector<uint32_t> indices(600'000);
+  for (size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<uint32_t>(i % 300'000);
+  uint64_t reported = 0;
+  const absl::StatusOr<v1::UploadMeshResponse> uploaded = client_->upload_mesh(
+      {.name = "level", .vertices = vertices, .indices = indices}, [&](uint64_t sent, uint64_t) { reported = sent; });
+  ASSERT_TRUE(uploaded.ok()) << uploaded.status();
+  EXPECT_FALSE(uploaded->already_known());
+  EXPECT_EQ(server_.scenes.vertices, vertices);
+  EXPECT_EQ(server_.scenes.indices, indices);
+  EXPECT_LE(server_.scenes.largest_message, size_t{1} << 20);
+  EXPECT_EQ(reported, (vertices.size() + indices.size()) * 4);
+}
+
+TEST_F(ClientTest, AKnownMeshIsNotSentAgain) {
+  const std::vector<float> vertices(30'000'000, 1.0f);
+  const std::vector<uint32_t> indices = {0, 1, 2};
+  const Sha256 hash = mesh_sha256(vertices, indices);
+  server_.scenes.known_hashes.insert(std::string(hash.begin(), hash.end()));
+  uint64_t sent = 0;
+  const absl::StatusOr<v1::UploadMeshResponse> uploaded = client_->upload_mesh(
+      {.name = "level", .vertices = vertices, .indices = indices}, [&](uint64_t bytes, uint64_t) { sent = bytes; });
+  ASSERT_TRUE(uploaded.ok()) << uploaded.status();
+  EXPECT_TRUE(uploaded->already_known());
+  EXPECT_LT(sent, vertices.size() * 4) << "the upload goes on although the server has answered";
+}
+
+TEST_F(ClientTest, AMeshOfBrokenTriplesIsNotSent) {
+  const std::vector<float> vertices(10);
+  EXPECT_TRUE(absl::IsInvalidArgument(client_->upload_mesh({.name = "level", .vertices = vertices}).status()));
+}
+
+}  // namespace
+}  // namespace locus::client

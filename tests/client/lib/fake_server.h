@@ -1,0 +1,396 @@
+// A small server of the real protocol inside the test's process, with planned misbehaviour: for tests of the client
+// library and the command line. Handlers run on gRPC's threads; the plan is set before the first call, or through
+// the locked setters.
+#ifndef LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
+#define LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "locus/v1/query_service.grpc.pb.h"
+#include "locus/v1/scene_service.grpc.pb.h"
+#include "locus/v1/server_service.grpc.pb.h"
+#include "locus/v1/update_service.grpc.pb.h"
+
+namespace locus::client::testing {
+
+// A refusal as the server sends it, details and all.
+inline grpc::Status refusal(grpc::StatusCode code, const std::string& message, const v1::Error& fields) {
+  v1::Error error = fields;
+  error.set_code(code);
+  error.set_message(message);
+  v1::Status status;
+  status.set_code(code);
+  status.set_message(message);
+  status.add_details()->PackFrom(error);
+  return grpc::Status(code, message, status.SerializeAsString());
+}
+
+inline std::string metadata_of(const grpc::ServerContext& context, const std::string& key) {
+  const auto found = context.client_metadata().find(key);
+  return found == context.client_metadata().end() ? "" : std::string(found->second.data(), found->second.size());
+}
+
+// Applies batches by the protocol's rule of writers, and breaks streams where told.
+class FakeUpdates final : public v1::UpdateService::Service {
+ public:
+  // Every how many messages of a stream it breaks, and whether the message before the break is applied without ack.
+  struct Breaks {
+    int after_messages = 0;  // 0 = never
+    int times = 0;           // how many streams break in all
+    bool apply_last = false;
+    grpc::Status status{grpc::StatusCode::UNAVAILABLE, "planned"};
+  };
+
+  grpc::Status ApplyUpdates(grpc::ServerContext* context, const v1::ApplyUpdatesRequest* request,
+                            v1::ApplyUpdatesResponse* response) override {
+    std::lock_guard lock(mutex_);
+    ++calls;
+    scenes.push_back(metadata_of(*context, "x-scene"));
+    if (failing_calls > 0) {
+      --failing_calls;
+      return {grpc::StatusCode::UNAVAILABLE, "planned"};
+    }
+    v1::StreamUpdatesResponse answer = apply(request->batch());
+    if (answer.has_error()) {
+      return refusal(static_cast<grpc::StatusCode>(answer.error().code()), answer.error().message(), answer.error());
+    }
+    *response->mutable_ack() = answer.ack();
+    return grpc::Status::OK;
+  }
+
+  grpc::Status StreamUpdates(
+      grpc::ServerContext* context,
+      grpc::ServerReaderWriter<v1::StreamUpdatesResponse, v1::StreamUpdatesRequest>* stream) override {
+    v1::StreamUpdatesRequest request;
+    int messages = 0;
+    {
+      std::lock_guard lock(mutex_);
+      ++streams;
+      scenes.push_back(metadata_of(*context, "x-scene"));
+    }
+    while (stream->Read(&request)) {
+      std::unique_lock lock(mutex_);
+      if (breaks.times > 0 && ++messages == breaks.after_messages) {
+        --breaks.times;
+        if (breaks.apply_last) apply(request.batch());
+        return breaks.status;
+      }
+      v1::StreamUpdatesResponse answer = apply(request.batch());
+      answer.set_sequence(request.sequence());
+      lock.unlock();
+      if (!stream->Write(answer)) break;
+    }
+    return grpc::Status::OK;
+  }
+
+  // Ticks of the batches that were applied, in order: tests give each batch its own.
+  std::vector<uint64_t> applied() const {
+    std::lock_guard lock(mutex_);
+    return applied_;
+  }
+
+  // Forgets every writer, as a server does that lost its memory.
+  void forget_writers() {
+    std::lock_guard lock(mutex_);
+    next_.clear();
+  }
+
+  Breaks breaks;
+  std::set<uint64_t> refused_ticks;  // batches of these ticks are refused
+  int failing_calls = 0;
+  int calls = 0;
+  int streams = 0;
+  int duplicates = 0;
+  int gaps = 0;
+  std::vector<std::string> scenes;  // x-scene of each call
+  // What an ack lists as refused items.
+  std::vector<v1::ItemError> item_errors;
+  v1::UpdateBatch last_batch;
+
+ private:
+  v1::StreamUpdatesResponse apply(const v1::UpdateBatch& batch) {
+    v1::StreamUpdatesResponse response;
+    uint64_t& next = next_.try_emplace(batch.writer(), 1).first->second;
+    if (batch.writer() != 0 && batch.batch() > next) {
+      ++gaps;
+      set_error(response, grpc::StatusCode::FAILED_PRECONDITION, v1::REASON_BATCH_GAP);
+      response.mutable_error()->set_limit_value(static_cast<double>(next));
+      return response;
+    }
+    if (refused_ticks.count(batch.tick()) > 0) {
+      set_error(response, grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_COLUMN_LENGTH);
+      return response;
+    }
+    v1::UpdateAck& ack = *response.mutable_ack();
+    ack.set_epoch(9);
+    if (batch.writer() != 0 && batch.batch() < next) {
+      ++duplicates;
+      ack.set_duplicate(true);
+    } else {
+      ++next;
+      applied_.push_back(batch.tick());
+      last_batch = batch;
+    }
+    ack.set_revision(applied_.size());
+    ack.set_applied(1);
+    ack.set_refused(static_cast<uint32_t>(item_errors.size()));
+    ack.mutable_errors()->Add(item_errors.begin(), item_errors.end());
+    return response;
+  }
+
+  static void set_error(v1::StreamUpdatesResponse& response, grpc::StatusCode code, v1::Reason reason) {
+    response.mutable_error()->set_code(code);
+    response.mutable_error()->set_message("planned refusal");
+    response.mutable_error()->set_reason(reason);
+  }
+
+  mutable std::mutex mutex_;
+  std::map<uint64_t, uint64_t> next_;
+  std::vector<uint64_t> applied_;
+};
+
+// Answers every query by `answer`.
+class FakeQueries final : public v1::QueryService::Service {
+ public:
+  grpc::Status Query(grpc::ServerContext* context, const v1::QueryRequest* request,
+                     v1::QueryResponse* response) override {
+    std::lock_guard lock(mutex_);
+    ++calls;
+    scene = metadata_of(*context, "x-scene");
+    last_batch = request->batch();
+    if (failing_calls > 0) {
+      --failing_calls;
+      return failure;
+    }
+    return answer(*request, *response->mutable_result());
+  }
+
+  // Holds back the answers of each pair of messages until both are there, then sends them in the wrong order.
+  grpc::Status StreamQueries(
+      grpc::ServerContext*,
+      grpc::ServerReaderWriter<v1::StreamQueriesResponse, v1::StreamQueriesRequest>* stream) override {
+    v1::StreamQueriesRequest request;
+    std::vector<v1::StreamQueriesResponse> held;
+    while (stream->Read(&request)) {
+      {
+        std::lock_guard lock(mutex_);
+        ++calls;
+        if (failing_calls > 0 && calls > 1) {
+          --failing_calls;
+          return failure;
+        }
+      }
+      v1::StreamQueriesResponse response;
+      response.set_sequence(request.sequence());
+      if (request.batch().max_work() == kRefusedWork) {
+        response.mutable_error()->set_code(grpc::StatusCode::INVALID_ARGUMENT);
+        response.mutable_error()->set_reason(v1::REASON_NOT_FINITE);
+      } else {
+        response.mutable_result()->set_revision(request.batch().max_work());
+      }
+      held.push_back(response);
+      if (held.size() < 2) continue;
+      stream->Write(held[1]);
+      stream->Write(held[0]);
+      held.clear();
+    }
+    for (const v1::StreamQueriesResponse& response : held) stream->Write(response);
+    return grpc::Status::OK;
+  }
+
+  static constexpr uint64_t kRefusedWork = 666;
+
+  std::function<grpc::Status(const v1::QueryRequest&, v1::QueryResult&)> answer = [](const v1::QueryRequest&,
+                                                                                     v1::QueryResult& result) {
+    result.set_revision(1);
+    return grpc::Status::OK;
+  };
+  int failing_calls = 0;
+  grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
+  int calls = 0;
+  std::string scene;
+  v1::QueryBatch last_batch;
+
+ private:
+  std::mutex mutex_;
+};
+
+// Keeps scenes by name and meshes by hash.
+class FakeScenes final : public v1::SceneService::Service {
+ public:
+  grpc::Status CreateScene(grpc::ServerContext*, const v1::CreateSceneRequest* request,
+                           v1::CreateSceneResponse* response) override {
+    std::lock_guard lock(mutex_);
+    ++creates;
+    if (failing_creates > 0) {
+      --failing_creates;
+      return {grpc::StatusCode::UNAVAILABLE, "planned"};
+    }
+    v1::Scene& scene = scenes[request->name()];
+    if (!scene.name().empty() && !request->if_absent()) {
+      return refusal(grpc::StatusCode::ALREADY_EXISTS, "there is a scene of that name", {});
+    }
+    scene.set_name(request->name());
+    *scene.mutable_spec() = request->spec();
+    scene.set_state(v1::SCENE_STATE_READY);
+    scene.set_epoch(uint64_t{1} << 63);
+    *response->mutable_scene() = scene;
+    return grpc::Status::OK;
+  }
+
+  grpc::Status GetScene(grpc::ServerContext*, const v1::GetSceneRequest* request,
+                        v1::GetSceneResponse* response) override {
+    std::lock_guard lock(mutex_);
+    const auto found = scenes.find(request->name());
+    if (found == scenes.end()) return missing(request->name());
+    *response->mutable_scene() = found->second;
+    return grpc::Status::OK;
+  }
+
+  // Pages of two.
+  grpc::Status ListScenes(grpc::ServerContext*, const v1::ListScenesRequest* request,
+                          v1::ListScenesResponse* response) override {
+    std::lock_guard lock(mutex_);
+    auto scene = scenes.upper_bound(request->page_token());
+    for (; scene != scenes.end() && response->scenes_size() < 2; ++scene) *response->add_scenes() = scene->second;
+    if (scene != scenes.end()) response->set_next_page_token(response->scenes().rbegin()->name());
+    return grpc::Status::OK;
+  }
+
+  grpc::Status DeleteScene(grpc::ServerContext*, const v1::DeleteSceneRequest* request,
+                           v1::DeleteSceneResponse*) override {
+    std::lock_guard lock(mutex_);
+    if (denied) return {grpc::StatusCode::PERMISSION_DENIED, "planned"};
+    if (scenes.erase(request->name()) == 0 && !request->if_present()) return missing(request->name());
+    return grpc::Status::OK;
+  }
+
+  grpc::Status UploadMesh(grpc::ServerContext*, grpc::ServerReader<v1::UploadMeshRequest>* reader,
+                          v1::UploadMeshResponse* response) override {
+    v1::UploadMeshRequest first;
+    if (!reader->Read(&first)) return {grpc::StatusCode::INVALID_ARGUMENT, "nothing came"};
+    std::lock_guard lock(mutex_);
+    response->mutable_mesh()->set_name(first.mesh());
+    response->mutable_mesh()->set_sha256(first.sha256());
+    response->mutable_mesh()->set_triangles(first.triangle_count());
+    if (known_hashes.count(first.sha256()) > 0) {
+      response->set_already_known(true);
+      return grpc::Status::OK;
+    }
+    v1::UploadMeshRequest message;
+    vertices.clear();
+    indices.clear();
+    largest_message = first.ByteSizeLong();
+    while (reader->Read(&message)) {
+      largest_message = std::max(largest_message, message.ByteSizeLong());
+      vertices.insert(vertices.end(), message.vertices().begin(), message.vertices().end());
+      indices.insert(indices.end(), message.indices().begin(), message.indices().end());
+    }
+    known_hashes.insert(first.sha256());
+    return grpc::Status::OK;
+  }
+
+  grpc::Status ChangeInstances(grpc::ServerContext*, const v1::ChangeInstancesRequest* request,
+                               v1::ChangeInstancesResponse* response) override {
+    std::lock_guard lock(mutex_);
+    last_change = *request;
+    for (int i = 0; i < request->place_size(); ++i) response->add_ids((uint64_t{1} << 63) + static_cast<uint64_t>(i));
+    response->set_revision(1);
+    return grpc::Status::OK;
+  }
+
+  grpc::Status DumpScene(grpc::ServerContext*, const v1::DumpSceneRequest*,
+                         grpc::ServerWriter<v1::DumpSceneResponse>* writer) override {
+    v1::DumpSceneResponse piece;
+    for (uint64_t revision = 1; revision <= 3; ++revision) {
+      piece.set_revision(revision);
+      writer->Write(piece);
+    }
+    return grpc::Status::OK;
+  }
+
+  static grpc::Status missing(const std::string& name) {
+    v1::Error error;
+    error.set_reason(v1::REASON_NOT_FOUND);
+    error.set_field("name");
+    return refusal(grpc::StatusCode::NOT_FOUND, "no scene is named " + name, error);
+  }
+
+  std::map<std::string, v1::Scene> scenes;
+  std::set<std::string> known_hashes;
+  std::vector<float> vertices;
+  std::vector<uint32_t> indices;
+  size_t largest_message = 0;
+  v1::ChangeInstancesRequest last_change;
+  int creates = 0;
+  int failing_creates = 0;
+  bool denied = false;
+
+ private:
+  std::mutex mutex_;
+};
+
+class FakeServerService final : public v1::ServerService::Service {
+ public:
+  grpc::Status GetServer(grpc::ServerContext*, const v1::GetServerRequest*, v1::GetServerResponse* response) override {
+    response->set_version("1.2.3");
+    response->set_instruction_set("scalar");
+    response->add_features("rays");
+    v1::Limit& limit = *response->add_limits();
+    limit.set_name("max_scenes");
+    limit.set_value(1024);
+    limit.set_used(2);
+    return grpc::Status::OK;
+  }
+};
+
+// All of them on a loopback port of the kernel's choice.
+class FakeServer {
+ public:
+  FakeServer() {
+    grpc::EnableDefaultHealthCheckService(true);
+    start("127.0.0.1:0");
+  }
+  ~FakeServer() { stop(); }
+
+  std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+
+  void stop() {
+    if (server_) server_->Shutdown(std::chrono::system_clock::now());
+    server_.reset();
+  }
+  // On the same port, with the same state.
+  void restart() { start(address()); }
+
+  FakeUpdates updates;
+  FakeQueries queries;
+  FakeScenes scenes;
+  FakeServerService servers;
+
+ private:
+  void start(const std::string& address) {
+    grpc::ServerBuilder builder;
+    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port_);
+    builder.RegisterService(&updates);
+    builder.RegisterService(&queries);
+    builder.RegisterService(&scenes);
+    builder.RegisterService(&servers);
+    server_ = builder.BuildAndStart();
+  }
+
+  int port_ = 0;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace locus::client::testing
+
+#endif  // LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_

@@ -1,0 +1,102 @@
+#include "client/lib/query_builder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace locus::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+TEST(QueryBuilderTest, RaysByRowFillColumnsOnlyWhereRowsDiffer) {
+  QueryBuilder builder;
+  builder.rays()
+      .mode(v1::RAY_MODE_ALL)
+      .cull(v1::CULL_BACK)
+      .inside(v1::INSIDE_SKIP)
+      .ray({0, 1, 0}, {0, 0, -1})
+      .ray({1, 1, 0}, {0, 0, -2}, 50, {.mask = 6, .ignore_group = 3})
+      .ray({2, 1, 0}, {0, 0, -3});
+  const v1::QueryBlock block = builder.build().blocks(0);
+  EXPECT_THAT(block.rays().origins(), ElementsAre(0, 1, 0, 1, 1, 0, 2, 1, 0));
+  EXPECT_THAT(block.rays().directions(), ElementsAre(0, 0, -1, 0, 0, -2, 0, 0, -3));
+  EXPECT_THAT(block.rays().t_max(), ElementsAre(kInfinity, 50, kInfinity));
+  EXPECT_THAT(block.masks(), ElementsAre(kEveryMask, 6, kEveryMask));
+  EXPECT_THAT(block.ignore_groups(), ElementsAre(0, 3, 0));
+  EXPECT_EQ(block.rays().mode(), v1::RAY_MODE_ALL);
+  EXPECT_EQ(block.rays().cull(), v1::CULL_BACK);
+  EXPECT_EQ(block.rays().inside(), v1::INSIDE_SKIP);
+}
+
+TEST(QueryBuilderTest, DefaultsLeaveNoColumn) {
+  QueryBuilder builder;
+  builder.rays().ray({0, 1, 0}, {0, 0, -1});
+  const v1::QueryBlock block = builder.build().blocks(0);
+  EXPECT_THAT(block.rays().t_max(), IsEmpty());
+  EXPECT_THAT(block.masks(), IsEmpty());
+  EXPECT_THAT(block.ignore_groups(), IsEmpty());
+}
+
+TEST(QueryBuilderTest, WholeSpansAppend) {
+  const std::vector<float> origins = {0, 0, 0, 1, 1, 1};
+  const std::vector<float> directions = {0, 0, 1};
+  const std::vector<float> t_max = {9};
+  const std::vector<uint32_t> masks = {1, 2};
+  const std::vector<uint64_t> ignored = {5, 6};
+  QueryBuilder builder;
+  builder.rays().rays(origins, directions).t_max(t_max).masks(masks).ignore_ids(ignored).ignore_groups({{7}});
+  const v1::QueryBlock block = builder.build().blocks(0);
+  EXPECT_THAT(block.rays().origins(), ElementsAre(0, 0, 0, 1, 1, 1));
+  EXPECT_THAT(block.rays().directions(), ElementsAre(0, 0, 1));
+  EXPECT_THAT(block.rays().t_max(), ElementsAre(9));
+  EXPECT_THAT(block.masks(), ElementsAre(1, 2));
+  EXPECT_THAT(block.ignore_ids(), ElementsAre(5, 6));
+  EXPECT_THAT(block.ignore_groups(), ElementsAre(7));
+}
+
+TEST(QueryBuilderTest, BlocksComeInTheOrderOpenedWithTheirOwnSettings) {
+  QueryBuilder builder;
+  BallBlock balls = builder.balls();
+  BoxBlock boxes = builder.boxes();
+  builder.lookup().id(7).ids({{8, 9}});
+  builder.lookup().group(3);
+  balls.frame({1e6, 0, 0}).source(v1::SOURCE_DYNAMIC).precision(v1::PRECISION_CONSERVATIVE).max_results(5).after_id(2);
+  balls.detail(v1::STATIC_DETAIL_TRIANGLES).ball({1, 2, 3}, 4).ball({5, 6, 7}, 8, {.mask = 1});
+  boxes.columns({v1::COLUMN_ID, v1::COLUMN_TAG}).box({1, 2, 3}, {4, 5, 6}).box({0, 0, 0}, {1, 1, 1}, {0, 0, 1, 0});
+  const v1::QueryBatch batch = builder.build();
+  ASSERT_EQ(batch.blocks_size(), 4);
+  EXPECT_EQ(batch.blocks(0).frame().x(), 1e6);
+  EXPECT_EQ(batch.blocks(0).source(), v1::SOURCE_DYNAMIC);
+  EXPECT_EQ(batch.blocks(0).precision(), v1::PRECISION_CONSERVATIVE);
+  EXPECT_EQ(batch.blocks(0).max_results(), 5u);
+  EXPECT_EQ(batch.blocks(0).after_id(), 2u);
+  EXPECT_EQ(batch.blocks(0).balls().detail(), v1::STATIC_DETAIL_TRIANGLES);
+  EXPECT_THAT(batch.blocks(0).balls().centers(), ElementsAre(1, 2, 3, 5, 6, 7));
+  EXPECT_THAT(batch.blocks(0).balls().radii(), ElementsAre(4, 8));
+  EXPECT_THAT(batch.blocks(0).masks(), ElementsAre(kEveryMask, 1));
+  EXPECT_THAT(batch.blocks(1).columns(), ElementsAre(v1::COLUMN_ID, v1::COLUMN_TAG));
+  EXPECT_THAT(batch.blocks(1).boxes().half_extents(), ElementsAre(4, 5, 6, 1, 1, 1));
+  EXPECT_THAT(batch.blocks(1).boxes().rotations(), ElementsAre(0, 0, 0, 1, 0, 0, 1, 0));
+  EXPECT_THAT(batch.blocks(2).lookup().ids(), ElementsAre(7, 8, 9));
+  EXPECT_THAT(batch.blocks(3).lookup().groups(), ElementsAre(3));
+}
+
+TEST(QueryBuilderTest, ViewsNameEpochAndRevision) {
+  QueryBuilder builder;
+  const v1::QueryBatch later = builder.at_least({4, 12}).max_work(3).explain().max_reply_bytes(5).build();
+  EXPECT_EQ(later.view().at_least(), 12u);
+  EXPECT_EQ(later.view().epoch(), 4u);
+  EXPECT_EQ(later.max_work(), 3u);
+  EXPECT_TRUE(later.explain());
+  EXPECT_EQ(later.max_reply_bytes(), 5u);
+  EXPECT_EQ(builder.exactly({4, 13}).build().view().exactly(), 13u);
+  EXPECT_FALSE(builder.build().has_view());
+}
+
+}  // namespace
+}  // namespace locus::client

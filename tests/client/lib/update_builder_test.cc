@@ -1,0 +1,143 @@
+#include "client/lib/update_builder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace locus::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+TEST(UpdateBuilderTest, RowsOfOneShapeShareOneInsertInTheOrderAdded) {
+  const v1::UpdateBatch batch = UpdateBuilder()
+                                    .insert_ball(7, Float3{1, 2, 3}, 0.5f)
+                                    .insert_box(9, Float3{0, 0, 0}, {1, 2, 3})
+                                    .insert_ball(8, Float3{4, 5, 6}, 0.25f)
+                                    .build();
+  ASSERT_EQ(batch.inserts_size(), 2);
+  EXPECT_THAT(batch.inserts(0).ids(), ElementsAre(7, 8));
+  EXPECT_THAT(batch.inserts(0).positions(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(batch.inserts(0).ball().radii(), ElementsAre(0.5f, 0.25f));
+  EXPECT_THAT(batch.inserts(1).box().half_extents(), ElementsAre(1, 2, 3));
+}
+
+TEST(UpdateBuilderTest, ColumnsOfDefaultsStayEmpty) {
+  const v1::UpdateBatch batch = UpdateBuilder().insert_box(9, Float3{0, 0, 0}, {1, 1, 1}).build();
+  const v1::Insert& insert = batch.inserts(0);
+  EXPECT_THAT(insert.rotations(), IsEmpty());
+  EXPECT_THAT(insert.layers(), IsEmpty());
+  EXPECT_THAT(insert.groups(), IsEmpty());
+  EXPECT_THAT(insert.tags(), IsEmpty());
+}
+
+TEST(UpdateBuilderTest, AColumnThatStartsLateIsFilledWithDefaultsBefore) {
+  const v1::UpdateBatch batch =
+      UpdateBuilder()
+          .insert_box(1, Float3{}, {1, 1, 1})
+          .insert_box(2, Float3{}, {1, 1, 1}, {0, 0, 1, 0}, {.layers = 6, .group = 3, .tag = 4})
+          .insert_box(3, Float3{}, {1, 1, 1})
+          .build();
+  const v1::Insert& insert = batch.inserts(0);
+  EXPECT_THAT(insert.rotations(), ElementsAre(0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1));
+  EXPECT_THAT(insert.layers(), ElementsAre(1, 6, 1));
+  EXPECT_THAT(insert.groups(), ElementsAre(0, 3, 0));
+  EXPECT_THAT(insert.tags(), ElementsAre(0, 4, 0));
+}
+
+TEST(UpdateBuilderTest, AbsolutePositionsGoIntoTheirOwnInsertInDouble) {
+  const v1::UpdateBatch batch =
+      UpdateBuilder().insert_point(1, Float3{1, 1, 1}).insert_point(2, Double3{0.1, 1e9, 3}).build();
+  ASSERT_EQ(batch.inserts_size(), 2);
+  EXPECT_TRUE(batch.inserts(1).has_point());
+  EXPECT_THAT(batch.inserts(1).positions(), IsEmpty());
+  EXPECT_THAT(batch.inserts(1).positions_f64(), ElementsAre(0.1, 1e9, 3));
+}
+
+TEST(UpdateBuilderTest, CapsulesHaveAxisAndRadius) {
+  const v1::UpdateBatch batch = UpdateBuilder().insert_capsule(5, Float3{1, 2, 3}, {0, 0.5f, 0}, 0.25f).build();
+  EXPECT_THAT(batch.inserts(0).capsule().half_axes(), ElementsAre(0, 0.5f, 0));
+  EXPECT_THAT(batch.inserts(0).capsule().radii(), ElementsAre(0.25f));
+}
+
+TEST(UpdateBuilderTest, WholeColumnsAreCopiedAsTheyAre) {
+  const std::vector<uint64_t> ids = {1, 2};
+  const std::vector<float> positions = {1, 2, 3, 4, 5, 6};
+  const std::vector<uint32_t> one_for_all = {4};
+  const std::vector<float> radii = {0.5f};
+  const v1::UpdateBatch batch = UpdateBuilder()
+                                    .insert_ball(9, Float3{}, 1)
+                                    .insert_balls({.ids = ids, .positions = positions, .layers = one_for_all}, radii)
+                                    .insert_ball(10, Float3{}, 1)
+                                    .build();
+  ASSERT_EQ(batch.inserts_size(), 2) << "rows do not mix with columns that may stand for all";
+  EXPECT_THAT(batch.inserts(0).ids(), ElementsAre(9, 10));
+  EXPECT_THAT(batch.inserts(1).ids(), ElementsAre(1, 2));
+  EXPECT_THAT(batch.inserts(1).positions(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(batch.inserts(1).layers(), ElementsAre(4));
+  EXPECT_THAT(batch.inserts(1).ball().radii(), ElementsAre(0.5f));
+}
+
+TEST(UpdateBuilderTest, MovesKeepTheirOrderAcrossForms) {
+  const v1::UpdateBatch batch = UpdateBuilder()
+                                    .move(1, Float3{1, 0, 0})
+                                    .move(2, Float3{2, 0, 0})
+                                    .move(1, Float3{3, 0, 0}, Rotation{})
+                                    .move(1, Float3{4, 0, 0})
+                                    .move(1, Double3{5, 0, 0})
+                                    .move(1, Double3{6, 0, 0}, std::nullopt, MoveKind::kTeleport)
+                                    .build();
+  ASSERT_EQ(batch.moves_size(), 5);
+  EXPECT_THAT(batch.moves(0).ids(), ElementsAre(1, 2));
+  EXPECT_THAT(batch.moves(0).rotations(), IsEmpty()) << "absent keeps the object's rotation";
+  EXPECT_THAT(batch.moves(1).rotations(), ElementsAre(0, 0, 0, 1));
+  EXPECT_THAT(batch.moves(2).positions(), ElementsAre(4, 0, 0));
+  EXPECT_THAT(batch.moves(3).positions_f64(), ElementsAre(5, 0, 0));
+  EXPECT_TRUE(batch.moves(4).teleport());
+}
+
+TEST(UpdateBuilderTest, RowsNeverExtendAWholeColumnOfMoves) {
+  const std::vector<uint64_t> ids = {1, 2};
+  const std::vector<float> one_for_all = {0, 0, 0};
+  const v1::UpdateBatch batch =
+      UpdateBuilder().moves({.ids = ids, .positions = one_for_all}).move(3, Float3{1, 1, 1}).build();
+  ASSERT_EQ(batch.moves_size(), 2);
+  EXPECT_THAT(batch.moves(0).positions(), ElementsAre(0, 0, 0));
+  EXPECT_THAT(batch.moves(1).ids(), ElementsAre(3));
+}
+
+TEST(UpdateBuilderTest, RelabelsLeaveAbsentColumnsEmpty) {
+  const v1::UpdateBatch batch =
+      UpdateBuilder().relabel(1, {.layers = 0u}).relabel(2, {.layers = 2u}).relabel(3, {.tag = 5u}).build();
+  ASSERT_EQ(batch.relabels_size(), 2);
+  EXPECT_THAT(batch.relabels(0).ids(), ElementsAre(1, 2));
+  EXPECT_THAT(batch.relabels(0).layers(), ElementsAre(0, 2));
+  EXPECT_THAT(batch.relabels(0).groups(), IsEmpty());
+  EXPECT_THAT(batch.relabels(1).tags(), ElementsAre(5));
+}
+
+TEST(UpdateBuilderTest, SettingsAndRemovesLandInTheBatchAndBuildLeavesNothingBehind) {
+  UpdateBuilder builder;
+  const std::vector<uint64_t> more = {2, 3};
+  const v1::UpdateBatch batch = builder.frame({1, 2, 3})
+                                    .tick(0)
+                                    .upsert()
+                                    .all_or_nothing()
+                                    .restart_ticks()
+                                    .clear()
+                                    .remove(1)
+                                    .remove(more)
+                                    .remove_group(8)
+                                    .insert_point(4, Float3{})
+                                    .build();
+  EXPECT_EQ(batch.frame().z(), 3);
+  EXPECT_TRUE(batch.has_tick());
+  EXPECT_TRUE(batch.upsert() && batch.all_or_nothing() && batch.restart_ticks() && batch.clear());
+  EXPECT_THAT(batch.remove_ids(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(batch.remove_groups(), ElementsAre(8));
+  EXPECT_EQ(builder.build().ByteSizeLong(), 0u);
+  EXPECT_EQ(builder.insert_point(4, Float3{}).build().inserts_size(), 1);
+}
+
+}  // namespace
+}  // namespace locus::client

@@ -1,0 +1,233 @@
+#include "client/lib/update_stream.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <thread>
+
+#include "client/lib/client.h"
+#include "client/lib/status.h"
+#include "tests/client/lib/fake_server.h"
+
+namespace locus::client {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using testing::FakeServer;
+
+constexpr RetryPolicy kQuick = {
+    .max_attempts = 20, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(20)};
+
+v1::UpdateBatch batch_of_tick(uint64_t tick) {
+  v1::UpdateBatch batch;
+  batch.set_tick(tick);
+  return batch;
+}
+
+std::vector<uint64_t> one_to(uint64_t last) {
+  std::vector<uint64_t> ticks(last);
+  std::iota(ticks.begin(), ticks.end(), 1);
+  return ticks;
+}
+
+// Outcomes in the order in which they were handed over.
+struct Outcomes {
+  std::mutex mutex;
+  std::vector<uint64_t> ticks;
+  std::vector<absl::StatusCode> codes;
+
+  UpdateStream::AckCallback of(uint64_t tick) {
+    return [this, tick](absl::StatusOr<v1::UpdateAck> ack) {
+      std::lock_guard lock(mutex);
+      ticks.push_back(tick);
+      codes.push_back(ack.status().code());
+    };
+  }
+};
+
+class UpdateStreamTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address());
+    ASSERT_TRUE(client.ok()) << client.status();
+    client_ = *std::move(client);
+  }
+
+  std::unique_ptr<UpdateStream> open(int max_in_flight = 8) {
+    return client_->update_stream("arena", {.max_in_flight = max_in_flight, .reconnect = kQuick});
+  }
+
+  void send_ticks(UpdateStream& stream, uint64_t last, Outcomes& outcomes) {
+    for (uint64_t tick = 1; tick <= last; ++tick) {
+      ASSERT_TRUE(stream.send(batch_of_tick(tick), outcomes.of(tick)).ok());
+    }
+  }
+
+  FakeServer server_;
+  std::unique_ptr<Client> client_;
+};
+
+TEST_F(UpdateStreamTest, BatchesAreAppliedAndAckedInOrder) {
+  const auto stream = open();
+  Outcomes outcomes;
+  send_ticks(*stream, 100, outcomes);
+  ASSERT_TRUE(stream->flush().ok());
+  EXPECT_EQ(server_.updates.applied(), one_to(100));
+  EXPECT_EQ(outcomes.ticks, one_to(100));
+  EXPECT_THAT(outcomes.codes, Each(absl::StatusCode::kOk));
+  EXPECT_EQ(stream->last_ack(), (Revision{9, 100}));
+  EXPECT_EQ(server_.updates.streams, 1);
+  EXPECT_THAT(server_.updates.scenes, ElementsAre("arena")) << "x-scene";
+}
+
+TEST_F(UpdateStreamTest, AfterABreakWhatWasAppliedWithoutAckIsNotAppliedAgain) {
+  server_.updates.breaks = {.after_messages = 3, .times = 5, .apply_last = true};
+  const auto stream = open();
+  Outcomes outcomes;
+  send_ticks(*stream, 50, outcomes);
+  ASSERT_TRUE(stream->flush().ok());
+  EXPECT_EQ(server_.updates.applied(), one_to(50));
+  EXPECT_EQ(outcomes.ticks, one_to(50));
+  EXPECT_THAT(outcomes.codes, Each(absl::StatusCode::kOk));
+  EXPECT_EQ(server_.updates.streams, 6);
+  EXPECT_GE(server_.updates.duplicates, 1);
+}
+
+TEST_F(UpdateStreamTest, AfterABreakWhatWasLostIsSentAgain) {
+  server_.updates.breaks = {.after_messages = 2, .times = 7, .apply_last = false};
+  const auto stream = open();
+  Outcomes outcomes;
+  send_ticks(*stream, 50, outcomes);
+  ASSERT_TRUE(stream->flush().ok());
+  EXPECT_EQ(server_.updates.applied(), one_to(50));
+  EXPECT_EQ(outcomes.ticks, one_to(50));
+}
+
+TEST_F(UpdateStreamTest, AServerThatRestartsWithItsStateGetsTheRest) {
+  const auto stream = open();
+  Outcomes outcomes;
+  send_ticks(*stream, 10, outcomes);
+  server_.stop();
+  std::thread sender([&] {
+    for (uint64_t tick = 11; tick <= 40; ++tick) {
+      EXPECT_TRUE(stream->send(batch_of_tick(tick), outcomes.of(tick)).ok());
+    }
+  });
+  server_.restart();
+  sender.join();
+  ASSERT_TRUE(stream->flush().ok());
+  EXPECT_EQ(server_.updates.applied(), one_to(40));
+  EXPECT_EQ(outcomes.ticks, one_to(40));
+}
+
+TEST_F(UpdateStreamTest, ARefusedBatchCostsOnlyItselfAndTheRestIsRenumbered) {
+  server_.updates.refused_ticks = {1, 5, 6, 20};
+  const auto stream = open();
+  Outcomes outcomes;
+  send_ticks(*stream, 20, outcomes);
+  ASSERT_TRUE(stream->flush().ok());
+  EXPECT_EQ(outcomes.ticks, one_to(20));
+  for (size_t i = 0; i < outcomes.codes.size(); ++i) {
+    const bool refused = server_.updates.refused_ticks.count(outcomes.ticks[i]) > 0;
+    EXPECT_EQ(outcomes.codes[i], refused ? absl::StatusCode::kInvalidArgument : absl::StatusCode::kOk) << i;
+  }
+  std::vector<uint64_t> expected = one_to(20);
+  std::erase_if(expected, [&](uint64_t tick) { return server_.updates.refused_ticks.count(tick) > 0; });
+  EXPECT_EQ(server_.updates.applied(), expected);
+  EXPECT_EQ(server_.updates.streams, 1) << "a refusal does not end the stream";
+}
+
+TEST_F(UpdateStreamTest, RefusalsAndBreaksTogetherStillApplyEachBatchOnce) {
+  server_.updates.refused_ticks = {3, 17, 18, 33};
+  server_.updates.breaks = {.after_messages = 5, .times = 12, .apply_last = true};
+  const auto stream = open();
+  Outcomes outcomes;
+  send_ticks(*stream, 60, outcomes);
+  ASSERT_TRUE(stream->flush().ok());
+  std::vector<uint64_t> expected = one_to(60);
+  std::erase_if(expected, [&](uint64_t tick) { return server_.updates.refused_ticks.count(tick) > 0; });
+  EXPECT_EQ(server_.updates.applied(), expected);
+  EXPECT_EQ(outcomes.ticks, one_to(60));
+}
+
+TEST_F(UpdateStreamTest, AServerThatForgotTheWriterEndsTheStreamInsteadOfLosingBatches) {
+  const auto stream = open();
+  ASSERT_TRUE(stream->send(batch_of_tick(1)).get().ok());
+  server_.updates.forget_writers();
+  const absl::Status status = stream->send(batch_of_tick(2)).get().status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+  ASSERT_TRUE(error_of(status).has_value());
+  EXPECT_EQ(error_of(status)->reason(), v1::REASON_BATCH_GAP);
+  EXPECT_TRUE(absl::IsFailedPrecondition(stream->flush()));
+  EXPECT_TRUE(absl::IsFailedPrecondition(stream->send(batch_of_tick(3)).get().status()));
+  EXPECT_THAT(server_.updates.applied(), ElementsAre(1));
+}
+
+TEST_F(UpdateStreamTest, WhenReconnectingFailsForGoodEveryUnansweredBatchIsTold) {
+  const auto stream =
+      client_->update_stream("arena", {.reconnect = {.max_attempts = 2, .first_backoff = absl::Milliseconds(1)}});
+  server_.stop();
+  std::future<absl::StatusOr<v1::UpdateAck>> first = stream->send(batch_of_tick(1));
+  EXPECT_TRUE(absl::IsUnavailable(first.get().status()));
+  EXPECT_TRUE(absl::IsUnavailable(stream->flush()));
+  EXPECT_TRUE(absl::IsUnavailable(stream->send(batch_of_tick(2)).get().status()));
+}
+
+TEST_F(UpdateStreamTest, ARefusedStreamIsNotTriedAgain) {
+  server_.updates.breaks = {
+      .after_messages = 1, .times = 1, .status = {grpc::StatusCode::PERMISSION_DENIED, "planned"}};
+  const auto stream = open();
+  EXPECT_TRUE(absl::IsPermissionDenied(stream->send(batch_of_tick(1)).get().status()));
+  EXPECT_TRUE(absl::IsPermissionDenied(stream->close()));
+  EXPECT_EQ(server_.updates.streams, 1);
+}
+
+TEST_F(UpdateStreamTest, AtMostTheWindowIsUnderWay) {
+  const auto stream = open(/*max_in_flight=*/1);
+  Outcomes outcomes;
+  send_ticks(*stream, 30, outcomes);
+  ASSERT_TRUE(stream->close().ok());
+  EXPECT_EQ(outcomes.ticks, one_to(30));
+  EXPECT_TRUE(absl::IsFailedPrecondition(stream->send(batch_of_tick(31)).get().status())) << "closed";
+}
+
+TEST_F(UpdateStreamTest, ClosingAnUnusedStreamOpensNoCall) {
+  const auto stream = open();
+  EXPECT_TRUE(stream->close().ok());
+  EXPECT_EQ(server_.updates.streams, 0);
+  EXPECT_FALSE(stream->last_ack().has_value());
+}
+
+TEST_F(UpdateStreamTest, BreakingOffTellsEveryUnansweredBatch) {
+  server_.updates.breaks = {.after_messages = 1, .times = 1'000'000};
+  Outcomes outcomes;
+  {
+    const auto stream = client_->update_stream(
+        "arena", {.reconnect = {.max_attempts = 1'000'000, .first_backoff = absl::Milliseconds(1)}});
+    send_ticks(*stream, 8, outcomes);
+  }
+  EXPECT_EQ(outcomes.ticks, one_to(8));
+  EXPECT_THAT(outcomes.codes, Each(absl::StatusCode::kCancelled));
+}
+
+TEST_F(UpdateStreamTest, SeveralThreadsShareOneStream) {
+  const auto stream = open();
+  Outcomes outcomes;
+  std::vector<std::thread> threads;
+  for (uint64_t first : {1, 101, 201, 301}) {
+    threads.emplace_back([&, first] {
+      for (uint64_t tick = first; tick < first + 50; ++tick) {
+        EXPECT_TRUE(stream->send(batch_of_tick(tick), outcomes.of(tick)).ok());
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  ASSERT_TRUE(stream->flush().ok());
+  EXPECT_EQ(server_.updates.applied().size(), 200u);
+  EXPECT_EQ(outcomes.ticks, server_.updates.applied());
+}
+
+}  // namespace
+}  // namespace locus::client
