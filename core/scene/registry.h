@@ -1,6 +1,7 @@
 // What a server hosts: scenes by name, and meshes by name and by content. Scenes keep the meshes they use alive.
 //
-// Threads: every member may be called from any thread; none waits for a build or a writer.
+// Threads: every member may be called from any thread; none waits for a build or a writer. The registry's lock is taken
+// before a scene's.
 #ifndef LOCUS_CORE_SCENE_REGISTRY_H_
 #define LOCUS_CORE_SCENE_REGISTRY_H_
 
@@ -18,7 +19,7 @@ using MeshPtr = std::shared_ptr<const StaticMesh>;
 
 // Scene names: ^[a-z]([a-z0-9-]{0,61}[a-z0-9])?$. INVALID_ARGUMENT naming `field` otherwise.
 absl::Status check_scene_name(absl::string_view name, absl::string_view field);
-// Mesh names: 1 to 255 printable characters without spaces.
+// Mesh names: 1 to 63 printable characters without spaces.
 absl::Status check_mesh_name(absl::string_view name, absl::string_view field);
 
 class Registry {
@@ -55,7 +56,7 @@ class Registry {
 
  private:
   std::vector<ScenePtr> all_scenes() const LOCUS_EXCLUDES(mutex_);
-  uint32_t count_uses(const std::vector<ScenePtr>& scenes, const StaticMesh* mesh) const;
+  static uint32_t count_uses(const std::vector<ScenePtr>& scenes, const StaticMesh* mesh);
 
   mutable Mutex mutex_;
   std::map<std::string, ScenePtr> scenes_ LOCUS_GUARDED_BY(mutex_);

@@ -74,6 +74,10 @@ class Scene {
  private:
   void publish(SnapshotPtr snapshot, uint64_t replaced_items) LOCUS_EXCLUDES(mutex_);
   absl::Status closed_status() const;
+  absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
+  absl::Status admit_change() LOCUS_EXCLUDES(mutex_);
+  absl::StatusOr<InstanceChange> build_and_publish(const StaticChange& change) LOCUS_REQUIRES(change_mutex_)
+      LOCUS_EXCLUDES(writer_mutex_, mutex_);
   absl::StatusOr<SnapshotPtr> recent(uint64_t revision) const LOCUS_REQUIRES(mutex_);
 
   const std::string name_;

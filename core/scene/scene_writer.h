@@ -5,9 +5,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
+#include "core/scene/batch_application.h"
 #include "core/scene/scene_snapshot.h"
 #include "core/scene/update_batch.h"
 
@@ -48,13 +50,17 @@ class SceneWriter {
   SnapshotPtr replace_statics(std::shared_ptr<const StaticSet> statics);
 
   // The revision reached so far.
-  SnapshotPtr freeze();
+  const SnapshotPtr& published() const { return published_; }
 
   bool is_object(Id id) const { return objects_.find(id) != nullptr; }
-  const StaticSet& statics() const { return *statics_; }
-  std::shared_ptr<const StaticSet> shared_statics() const { return statics_; }
+  const std::shared_ptr<const StaticSet>& statics() const { return statics_; }
 
  private:
+  SnapshotPtr freeze();
+  SnapshotPtr next_revision();
+  UpdateAck ack_now() const;
+  void commit(const UpdateBatch& batch, const BatchApplication::Difference& difference, Applied& result);
+
   uint64_t epoch_;
   uint64_t revision_ = 0;
   uint64_t tick_ = 0;
@@ -63,6 +69,7 @@ class SceneWriter {
   HashGrid<Object> grid_;
   PersistentMap<Id, Object> objects_;
   WriterTable writers_;
+  SnapshotPtr published_;
 };
 
 }  // namespace locus

@@ -53,6 +53,8 @@ class StaticSet {
   const Instance* find(Id id) const;
   size_t size() const { return tree_.size(); }
   uint64_t triangle_count() const { return triangle_count_; }
+  // Instances of that mesh.
+  uint32_t uses(const StaticMesh* mesh) const;
   uint64_t bytes() const;
 
  private:
@@ -60,6 +62,7 @@ class StaticSet {
 
   Bvh<Instance> tree_;
   absl::flat_hash_map<Id, uint32_t> positions_;  // into tree_.values()
+  absl::flat_hash_map<const StaticMesh*, uint32_t> uses_;
   uint64_t triangle_count_ = 0;
 };
 

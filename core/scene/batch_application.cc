@@ -1,0 +1,215 @@
+#include "core/scene/batch_application.h"
+
+#include <cmath>
+
+#include "absl/container/flat_hash_set.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/column.h"
+#include "core/base/limits.h"
+
+namespace locus {
+namespace {
+
+// OK is kUnspecified.
+Reason check_numbers(const float* numbers, size_t count, float lowest) {
+  for (size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(numbers[i])) return Reason::kNotFinite;
+    if (numbers[i] < lowest || numbers[i] > limits::kMaxCoordinate) return Reason::kOutOfRange;
+  }
+  return Reason::kUnspecified;
+}
+
+Reason check_position(Vec3d position) {
+  if (!is_finite(position)) return Reason::kNotFinite;
+  return max_component(abs(position)) > limits::kMaxCoordinate ? Reason::kOutOfRange : Reason::kUnspecified;
+}
+
+Reason check_rotation(const Quaternion& rotation) {
+  const double deviation = unit_deviation(rotation);
+  if (!std::isfinite(deviation)) return Reason::kNotFinite;
+  return deviation > limits::kMaxQuaternionDeviation ? Reason::kOutOfRange : Reason::kUnspecified;
+}
+
+Vec3d point(const double* p) { return {p[0], p[1], p[2]}; }
+Vec3f point(const float* p) { return {p[0], p[1], p[2]}; }
+
+template <class Columns>
+void read_labels(const Columns& columns, size_t i, Object& object) {
+  object.layers = ColumnReader<uint32_t>(columns.layers, 1).value(i, object.layers);
+  object.group = ColumnReader<uint64_t>(columns.groups, 1).value(i, object.group);
+  object.tag = ColumnReader<uint64_t>(columns.tags, 1).value(i, object.tag);
+}
+
+}  // namespace
+
+BatchApplication::BatchApplication(const PersistentMap<Id, Object>& objects, const StaticSet& statics,
+                                   const UpdateBatch& batch)
+    : objects_(objects), statics_(statics), batch_(batch), count_(batch.clear ? 0 : objects.size()) {}
+
+void BatchApplication::run() {
+  remove_ids();
+  remove_groups();
+  for (size_t i = 0; i < batch_.inserts.size(); ++i) insert(batch_.inserts[i], absl::StrCat("inserts[", i, "]"));
+  for (size_t i = 0; i < batch_.moves.size(); ++i) move(batch_.moves[i], absl::StrCat("moves[", i, "]"));
+  for (size_t i = 0; i < batch_.relabels.size(); ++i) relabel(batch_.relabels[i], absl::StrCat("relabels[", i, "]"));
+}
+
+const Object* BatchApplication::current(Id id) const {
+  const auto changed = changed_.find(id);
+  if (changed != changed_.end()) return changed->second ? &*changed->second : nullptr;
+  return batch_.clear ? nullptr : objects_.find(id);
+}
+
+void BatchApplication::refuse(std::string field, size_t index, Id id, Reason reason) {
+  ++refused_;
+  if (errors_.size() < limits::kMaxListedItemErrors)
+    errors_.push_back({std::move(field), static_cast<uint32_t>(index), id, reason});
+}
+
+void BatchApplication::remove_ids() {
+  for (size_t i = 0; i < batch_.remove_ids.size(); ++i) {
+    const Id id = batch_.remove_ids[i];
+    if (current(id) == nullptr) {
+      refuse("remove_ids", i, id, Reason::kUnknownId);
+      continue;
+    }
+    changed_[id] = std::nullopt;
+    --count_;
+    ++applied_;
+  }
+}
+
+void BatchApplication::remove_groups() {
+  absl::flat_hash_set<Group> groups;
+  for (size_t i = 0; i < batch_.remove_groups.size(); ++i) {
+    if (batch_.remove_groups[i] == 0) {
+      refuse("remove_groups", i, kNoId, Reason::kOutOfRange);
+      continue;
+    }
+    groups.insert(batch_.remove_groups[i]);
+    ++applied_;
+  }
+  if (groups.empty() || batch_.clear) return;
+  objects_.for_each([&](Id id, const Object& object) {
+    if (!groups.contains(object.group) || current(id) == nullptr) return;
+    changed_[id] = std::nullopt;
+    --count_;
+  });
+}
+
+bool BatchApplication::read_pose(absl::Span<const float> positions, absl::Span<const double> positions_f64,
+                                 absl::Span<const float> rotations, uint32_t index, Id id, const std::string& field,
+                                 Shape& shape) {
+  const bool absolute = !positions_f64.empty();
+  shape.position = absolute ? point(ColumnReader<double>(positions_f64, 3).entry(index))
+                            : batch_.frame + to_double(point(ColumnReader<float>(positions, 3).entry(index)));
+  if (const Reason reason = check_position(shape.position); reason != Reason::kUnspecified) {
+    refuse(field + (absolute ? ".positions_f64" : ".positions"), index, id, reason);
+    return false;
+  }
+  const ColumnReader<float> turns(rotations, 4);
+  if (!turns.given()) return true;
+  const float* q = turns.entry(index);
+  const Quaternion rotation{q[0], q[1], q[2], q[3]};
+  if (const Reason reason = check_rotation(rotation); reason != Reason::kUnspecified) {
+    refuse(field + ".rotations", index, id, reason);
+    return false;
+  }
+  shape.rotation = normalized(rotation);
+  return true;
+}
+
+bool BatchApplication::read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field,
+                                  Shape& shape) {
+  shape.kind = columns.kind;
+  const bool capsule = columns.kind == ShapeKind::kCapsule;
+  if (columns.kind == ShapeKind::kBall || capsule) {
+    shape.radius = ColumnReader<float>(columns.radii, 1).value(index, 0);
+    if (const Reason reason = check_numbers(&shape.radius, 1, 0); reason != Reason::kUnspecified) {
+      refuse(field + (capsule ? ".capsule.radii" : ".ball.radii"), index, id, reason);
+      return false;
+    }
+  }
+  if (columns.kind != ShapeKind::kBox && !capsule) return true;
+  const float* extents = ColumnReader<float>(columns.extents, 3).entry(index);
+  const float lowest = capsule ? -static_cast<float>(limits::kMaxCoordinate) : 0;
+  if (const Reason reason = check_numbers(extents, 3, lowest); reason != Reason::kUnspecified) {
+    refuse(field + (capsule ? ".capsule.half_axes" : ".box.half_extents"), index, id, reason);
+    return false;
+  }
+  shape.size = point(extents);
+  return true;
+}
+
+bool BatchApplication::may_insert(Id id, uint32_t index, const std::string& field) {
+  Reason reason = Reason::kUnspecified;
+  const bool known = current(id) != nullptr;
+  if (id == kNoId) reason = Reason::kOutOfRange;
+  if (statics_.find(id) != nullptr || (known && !batch_.upsert)) reason = Reason::kDuplicateId;
+  if (reason == Reason::kUnspecified && !known && count_ >= limits::kMaxObjects) reason = Reason::kLimit;
+  if (reason != Reason::kUnspecified) refuse(field + ".ids", index, id, reason);
+  return reason == Reason::kUnspecified;
+}
+
+void BatchApplication::insert(const InsertColumns& columns, const std::string& field) {
+  for (uint32_t i = 0; i < columns.ids.size(); ++i) {
+    Object object;
+    object.id = columns.ids[i];
+    if (!may_insert(object.id, i, field)) continue;
+    if (!read_pose(columns.positions, columns.positions_f64, columns.rotations, i, object.id, field, object.shape))
+      continue;
+    if (!read_shape(columns, i, object.id, field, object.shape)) continue;
+    read_labels(columns, i, object);
+    if (current(object.id) == nullptr) ++count_;
+    put(object);
+    ++applied_;
+  }
+}
+
+void BatchApplication::move(const MoveColumns& columns, const std::string& field) {
+  for (uint32_t i = 0; i < columns.ids.size(); ++i) {
+    const Id id = columns.ids[i];
+    const Object* known = current(id);
+    if (known == nullptr) {
+      refuse(field + ".ids", i, id, Reason::kUnknownId);
+      continue;
+    }
+    Object object = *known;
+    if (!read_pose(columns.positions, columns.positions_f64, columns.rotations, i, id, field, object.shape)) continue;
+    put(object);
+    ++applied_;
+  }
+}
+
+void BatchApplication::relabel(const RelabelColumns& columns, const std::string& field) {
+  for (uint32_t i = 0; i < columns.ids.size(); ++i) {
+    const Object* known = current(columns.ids[i]);
+    if (known == nullptr) {
+      refuse(field + ".ids", i, columns.ids[i], Reason::kUnknownId);
+      continue;
+    }
+    Object object = *known;
+    read_labels(columns, i, object);
+    put(object);
+    ++applied_;
+  }
+}
+
+BatchApplication::Difference BatchApplication::difference() const {
+  Difference difference;
+  if (batch_.clear)
+    objects_.for_each([&](Id id, const Object& object) {
+      const auto changed = changed_.find(id);
+      if (changed == changed_.end() || !changed->second || !(*changed->second == object))
+        difference.gone.push_back(object);
+    });
+  for (const auto& [id, object] : changed_) {
+    const Object* before = objects_.find(id);
+    if (before != nullptr && object && *object == *before) continue;
+    if (before != nullptr && !batch_.clear) difference.gone.push_back(*before);
+    if (object) difference.come.push_back(*object);
+  }
+  return difference;
+}
+
+}  // namespace locus

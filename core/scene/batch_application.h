@@ -1,0 +1,65 @@
+// One batch being applied: an overlay of changed objects over the revision before, so that a refused batch leaves no
+// trace and the index hears of each object once.
+#ifndef LOCUS_CORE_SCENE_BATCH_APPLICATION_H_
+#define LOCUS_CORE_SCENE_BATCH_APPLICATION_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "core/base/persistent_map.h"
+#include "core/scene/object.h"
+#include "core/scene/static_set.h"
+#include "core/scene/update_batch.h"
+
+namespace locus {
+
+class BatchApplication {
+ public:
+  // All three are borrowed for the life of this object. `batch` has passed check_form().
+  BatchApplication(const PersistentMap<Id, Object>& objects, const StaticSet& statics, const UpdateBatch& batch);
+
+  // Clear, removes, inserts, moves, relabels: in this order, once.
+  void run();
+
+  uint32_t applied() const { return applied_; }
+  uint32_t refused() const { return refused_; }
+  std::vector<ItemError>& errors() { return errors_; }
+
+  // What run() came to: objects that go, as they were, and objects that come, as they are. A changed object is in both,
+  // one that ended as it began in neither.
+  struct Difference {
+    std::vector<Object> gone;
+    std::vector<Object> come;
+    bool empty() const { return gone.empty() && come.empty(); }
+  };
+  Difference difference() const;
+
+ private:
+  const Object* current(Id id) const;
+  void put(const Object& object) { changed_[object.id] = object; }
+  void refuse(std::string field, size_t index, Id id, Reason reason);
+  void remove_ids();
+  void remove_groups();
+  void insert(const InsertColumns& columns, const std::string& field);
+  bool may_insert(Id id, uint32_t index, const std::string& field);
+  void move(const MoveColumns& columns, const std::string& field);
+  void relabel(const RelabelColumns& columns, const std::string& field);
+  bool read_pose(absl::Span<const float> positions, absl::Span<const double> positions_f64,
+                 absl::Span<const float> rotations, uint32_t index, Id id, const std::string& field, Shape& shape);
+  bool read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field, Shape& shape);
+
+  const PersistentMap<Id, Object>& objects_;
+  const StaticSet& statics_;
+  const UpdateBatch& batch_;
+  size_t count_;                                            // objects there are after what was applied so far
+  absl::flat_hash_map<Id, std::optional<Object>> changed_;  // nothing = removed
+  uint32_t applied_ = 0;
+  uint32_t refused_ = 0;
+  std::vector<ItemError> errors_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_BATCH_APPLICATION_H_

@@ -1,0 +1,123 @@
+#include "core/scene/scene_writer.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+#include "core/base/planted_bug.h"
+#include "core/scene/batch_application.h"
+
+namespace locus {
+namespace {
+
+absl::Status gap(uint64_t expected, uint64_t batch) {
+  Refusal refusal;
+  refusal.reason = Reason::kBatchGap;
+  refusal.field = "batch";
+  refusal.limit_value = static_cast<double>(expected);
+  refusal.asked = static_cast<double>(batch);
+  return refuse(absl::StatusCode::kFailedPrecondition,
+                absl::StrCat("the next batch of this writer is ", expected, ", not ", batch,
+                             expected == 1 ? "; unknown writers start at 1" : "; send what is missing first"),
+                refusal);
+}
+
+}  // namespace
+
+absl::StatusOr<std::optional<UpdateAck>> WriterTable::admit(uint64_t writer, uint64_t batch) const {
+  if (writer == 0) return std::optional<UpdateAck>();
+  const auto known = writers_.find(writer);
+  const uint64_t last = known == writers_.end() ? 0 : known->second.batch;
+  if (batch == last + 1) return std::optional<UpdateAck>();
+  if (batch > last) return gap(last + 1, batch);
+  UpdateAck ack;
+  if (batch == last) ack = known->second.ack;
+  ack.duplicate = true;
+  return std::optional<UpdateAck>(std::move(ack));
+}
+
+void WriterTable::record(uint64_t writer, uint64_t batch, const UpdateAck& ack) {
+  if (writer == 0) return;
+  if (writers_.size() >= limits::kMaxWriters && !writers_.contains(writer)) {
+    const auto oldest = std::min_element(writers_.begin(), writers_.end(),
+                                         [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; });
+    writers_.erase(oldest);
+  }
+  writers_[writer] = {batch, ++clock_, ack};
+}
+
+SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics)
+    : epoch_(epoch), winding_(winding), statics_(std::move(statics)) {
+  published_ = freeze();
+}
+
+SnapshotPtr SceneWriter::freeze() {
+  const bool stale = planted(PlantedBug::kStaleSnapshot) && published_ != nullptr;
+  return std::make_shared<const SceneSnapshot>(SceneSnapshot{
+      epoch_, revision_, tick_, winding_, statics_, stale ? published_->grid : grid_.snapshot(), objects_.snapshot()});
+}
+
+SnapshotPtr SceneWriter::next_revision() {
+  ++revision_;
+  published_ = freeze();
+  return published_;
+}
+
+SnapshotPtr SceneWriter::replace_statics(std::shared_ptr<const StaticSet> statics) {
+  statics_ = std::move(statics);
+  return next_revision();
+}
+
+UpdateAck SceneWriter::ack_now() const {
+  UpdateAck ack;
+  ack.epoch = epoch_;
+  ack.revision = revision_;
+  ack.tick = tick_;
+  return ack;
+}
+
+absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch) {
+  absl::StatusOr<std::optional<UpdateAck>> known = writers_.admit(batch.writer, batch.batch);
+  if (!known.ok()) return known.status();
+  if (*known) {
+    UpdateAck ack = **known;
+    if (ack.epoch == 0) {
+      ack = ack_now();
+      ack.duplicate = true;
+    }
+    return Applied{std::move(ack), nullptr, 0};
+  }
+  BatchApplication application(objects_, *statics_, batch);
+  application.run();
+  Applied result;
+  result.ack.applied = application.applied();
+  result.ack.refused = application.refused();
+  result.ack.errors = std::move(application.errors());
+  if (batch.all_or_nothing && result.ack.refused > 0) {
+    const ItemError& first = result.ack.errors.front();
+    return refuse_argument(first.reason, first.field, first.index,
+                           absl::StrCat(reason_name(first.reason), ", id ", first.id, "; all_or_nothing refuses all ",
+                                        result.ack.refused, " wrong items and the batch with them"));
+  }
+  commit(batch, application.difference(), result);
+  writers_.record(batch.writer, batch.batch, result.ack);
+  return result;
+}
+
+void SceneWriter::commit(const UpdateBatch& batch, const BatchApplication::Difference& difference, Applied& result) {
+  const uint64_t tick = !batch.tick ? tick_ : batch.restart_ticks ? *batch.tick : std::max(tick_, *batch.tick);
+  if (!difference.empty() || tick != tick_) {
+    tick_ = tick;
+    grid_.apply(difference.gone, difference.come);
+    for (const Object& object : difference.gone) objects_.erase(object.id);
+    for (const Object& object : difference.come) objects_.set(object.id, object);
+    result.snapshot = next_revision();
+    result.replaced_items = difference.gone.size();
+  }
+  result.ack.epoch = epoch_;
+  result.ack.revision = revision_;
+  result.ack.tick = tick_;
+}
+
+}  // namespace locus
