@@ -1,0 +1,40 @@
+#include "core/base/check.h"
+
+#include <limits>
+
+#include "gtest/gtest.h"
+
+namespace locus {
+namespace {
+
+TEST(CheckDeathTest, AFailedComparisonPrintsBothOperandsAndThePlace) {
+  const int stored = 3, counted = 4;
+  EXPECT_DEATH(LOCUS_CHECK_EQ(stored, counted), "check_test.cc:[0-9]+: check failed: stored == counted with 3 and 4");
+  EXPECT_DEATH(LOCUS_CHECK_NE(stored, 3), "stored != 3 with 3 and 3");
+  EXPECT_DEATH(LOCUS_CHECK_LE(counted, stored), "counted <= stored with 4 and 3");
+  EXPECT_DEATH(LOCUS_CHECK_LT(stored, stored), "stored < stored with 3 and 3");
+}
+
+TEST(CheckDeathTest, AFailedConditionPrintsItself) {
+  const bool sorted = false;
+  EXPECT_DEATH(LOCUS_CHECK(sorted), "check failed: sorted");
+}
+
+TEST(CheckTest, OperandsAreEvaluatedOnceAndTrueChecksAreSilent) {
+  int calls = 0;
+  const auto next = [&calls] { return ++calls; };
+  LOCUS_CHECK_EQ(next(), 1);
+  LOCUS_CHECK_LT(next(), 3);
+  LOCUS_CHECK(next() == 3);
+  EXPECT_EQ(calls, 3);
+}
+
+// A NaN compares false with everything, so it fails the check that should have kept it out.
+TEST(CheckDeathTest, NanFailsEveryOrder) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_DEATH(LOCUS_CHECK_LE(nan, 1.0), "nan and 1");
+  EXPECT_DEATH(LOCUS_CHECK_LE(1.0, nan), "1 and nan");
+}
+
+}  // namespace
+}  // namespace locus
