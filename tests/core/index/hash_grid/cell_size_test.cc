@@ -1,0 +1,56 @@
+#include "core/index/hash_grid/cell_size.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/index/hash_grid/cell_key.h"
+#include "tests/support/random.h"
+
+namespace locus::internal {
+namespace {
+
+std::vector<SampledValue> spread(size_t count, double half, double diameter) {
+  test::Random random(count);
+  std::vector<SampledValue> values;
+  for (size_t i = 0; i < count; ++i) values.push_back({random.vector(half), diameter});
+  return values;
+}
+
+TEST(CellSizeTest, CoincidentValuesOfAnySizeEndAtASaneChoice) {
+  for (const double diameter : {0.0, 1e-9, 1.0, 1e9, 1e12}) {
+    const std::vector<SampledValue> values(4096, {{5, 5, 5}, diameter});
+    EXPECT_EQ(choose_cell_exponent(values, 1'000'000), kMaxBaseExponent) << diameter;
+  }
+}
+
+TEST(CellSizeTest, OneValueIsEnough) {
+  const std::vector<SampledValue> values(1, {{1, 2, 3}, 0.5});
+  EXPECT_EQ(choose_cell_exponent(values, 1), kMaxBaseExponent);
+}
+
+TEST(CellSizeTest, EvenlySpreadValuesGetUpToAboutTwentyFourCompanions) {
+  for (const size_t population : {4'096u, 100'000u, 1'000'000u}) {
+    const double half = 500;
+    const int exponent = choose_cell_exponent(spread(4096, half, 0.1), population);
+    const double volume = std::exp2(3 * exponent);
+    const double mean = static_cast<double>(population) * volume / (8 * half * half * half);
+    EXPECT_LE(mean, 2 * kMaxMeanPerCell) << population;
+    EXPECT_GE(mean, kMaxMeanPerCell / 16) << population;
+  }
+}
+
+TEST(CellSizeTest, TheCellIsNeverSmallerThanTheMedianDiameter) {
+  EXPECT_GE(choose_cell_exponent(spread(4096, 10, 3), 4096), 2);
+}
+
+TEST(CellSizeTest, AHeapInOnePointDoesNotShrinkTheCellsOfTheOthers) {
+  std::vector<SampledValue> values = spread(2000, 1000, 0);
+  values.insert(values.end(), 2096, {{3, 3, 3}, 0});
+  const int exponent = choose_cell_exponent(values, values.size());
+  EXPECT_GE(exponent, 6);
+  EXPECT_LE(exponent, 9);
+}
+
+}  // namespace
+}  // namespace locus::internal
