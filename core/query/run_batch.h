@@ -45,6 +45,8 @@ struct RunOptions {
   // Asked every limits::kTestsBetweenChecks primitive tests, from any thread: a status that is not OK ends the batch
   // with it. [never ends]
   std::function<absl::Status()> stop;
+  // Test every value instead of asking the structures: for checking them. Same answers, different work.
+  bool brute_force = false;
 };
 
 // `batch` has passed check_batch().

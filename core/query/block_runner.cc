@@ -1,0 +1,77 @@
+#include "core/query/block_runner.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/query/lookup_query.h"
+#include "core/query/ray_query.h"
+
+namespace locus {
+
+BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, uint64_t max_bytes)
+    : task_(task),
+      block_(block),
+      columns_(returned_columns(block)),
+      max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {}
+
+BlockResult BlockRunner::run(size_t begin, size_t end) {
+  if (const auto* lookup = std::get_if<LookupColumns>(&block_.kind); lookup != nullptr && !lookup->groups.empty())
+    groups_ = look_up_groups(task_, lookup->groups, overlap_options(block_, StaticDetail::kInstances));
+  task_.check();
+  for (size_t i = begin; i < end; ++i) {
+    std::visit([&](const auto& kind) { run_query(kind, i); }, block_.kind);
+    if (!task_.ended()) continue;
+    const auto query = static_cast<uint32_t>(i);
+    if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
+  }
+  result_.work = task_.work();
+  return std::move(result_);
+}
+
+void BlockRunner::append_counted(const std::vector<Hit>& rows, bool truncated, size_t i, const RayRequest* request) {
+  const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
+  const Winding winding = task_.snapshot().winding;
+  for (size_t row = 0; row < kept; ++row) {
+    append_row(rows[row], columns_, result_);
+    if (request != nullptr) append_surface(*request, block_.frame, rows[row], winding, columns_, result_);
+  }
+  rows_ += kept;
+  result_.counts.push_back(static_cast<uint32_t>(kept));
+  if (truncated || kept < rows.size()) result_.truncated.push_back(static_cast<uint32_t>(i));
+}
+
+void BlockRunner::run_query(const RayColumns& rays, size_t i) {
+  const Winding winding = task_.snapshot().winding;
+  const RayRequest request = ray_request(block_, rays, winding, i);
+  RayAnswer answer;
+  if (!task_.ended()) answer = run_ray(task_, request, Filter(block_, i));
+  if (rays.mode == RayMode::kAll) return append_counted(answer.hits, answer.truncated, i, &request);
+  if (rays.mode == RayMode::kAny) {
+    result_.hits.push_back(answer.hits.empty() ? '\0' : '\1');
+    return;
+  }
+  const Hit hit = answer.hits.empty() ? Hit{} : answer.hits.front();
+  append_row(hit, columns_, result_);
+  append_surface(request, block_.frame, hit, winding, columns_, result_);
+}
+
+void BlockRunner::run_query(const BallColumns& balls, size_t i) {
+  OverlapAnswer answer;
+  if (!task_.ended())
+    answer = run_ball(task_, ball_of(block_, balls, i), overlap_options(block_, balls.detail), Filter(block_, i));
+  append_counted(answer.rows, answer.truncated, i, nullptr);
+}
+
+void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
+  OverlapAnswer answer;
+  if (!task_.ended())
+    answer = run_box(task_, box_of(block_, boxes, i), overlap_options(block_, boxes.detail), Filter(block_, i));
+  append_counted(answer.rows, answer.truncated, i, nullptr);
+}
+
+void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
+  if (!lookup.groups.empty()) return append_counted(groups_[i].rows, groups_[i].truncated, i, nullptr);
+  append_row(look_up(task_.snapshot(), lookup.ids[i]), columns_, result_);
+}
+
+}  // namespace locus

@@ -1,0 +1,38 @@
+// Runs a run of queries of one block on one thread, into columns of its own.
+#ifndef LOCUS_CORE_QUERY_BLOCK_RUNNER_H_
+#define LOCUS_CORE_QUERY_BLOCK_RUNNER_H_
+
+#include "core/query/overlap_query.h"
+#include "core/query/query_task.h"
+#include "core/query/rows.h"
+
+namespace locus {
+
+class BlockRunner {
+ public:
+  // Rows beyond `max_bytes` of columns are dropped and their queries listed as truncated: nothing behind them would fit
+  // the reply either.
+  BlockRunner(QueryTask& task, const QueryBlock& block, uint64_t max_bytes);
+
+  // Queries begin to end (exclusive), in order. `truncated` counts from 0 at the block's first query.
+  BlockResult run(size_t begin, size_t end);
+
+ private:
+  void run_query(const RayColumns& rays, size_t i);
+  void run_query(const BallColumns& balls, size_t i);
+  void run_query(const BoxColumns& boxes, size_t i);
+  void run_query(const LookupColumns& lookup, size_t i);
+  void append_counted(const std::vector<Hit>& rows, bool truncated, size_t i, const RayRequest* request);
+
+  QueryTask& task_;
+  const QueryBlock& block_;
+  const ColumnSet columns_;
+  const uint64_t max_rows_;
+  uint64_t rows_ = 0;
+  std::vector<OverlapAnswer> groups_;  // answers of a lookup of groups
+  BlockResult result_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_BLOCK_RUNNER_H_

@@ -1,0 +1,34 @@
+// What a query found: one object, one instance, or one triangle of an instance. Plain data that borrows from the
+// snapshot.
+#ifndef LOCUS_CORE_QUERY_HIT_H_
+#define LOCUS_CORE_QUERY_HIT_H_
+
+#include <limits>
+#include <tuple>
+
+#include "core/base/ids.h"
+#include "core/scene/instance.h"
+#include "core/scene/object.h"
+
+namespace locus {
+
+struct Hit {
+  float t = std::numeric_limits<float>::infinity();  // in units of the ray's direction
+  Id id = kNoId;                                     // 0 = a miss
+  uint32_t triangle = kNoTriangle;                   // number in the mesh
+  uint32_t storage = 0;                              // position in the mesh's storage order
+  const Object* object = nullptr;                    // one of the two, or neither for a miss
+  const Instance* instance = nullptr;
+};
+
+inline Hit hit_on(const Object& object, float t) { return {t, object.id, kNoTriangle, 0, &object, nullptr}; }
+inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, 0, nullptr, &instance}; }
+
+// The order of ray hits: nearer first, then lower id, then lower triangle.
+inline bool nearer(const Hit& a, const Hit& b) {
+  return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_HIT_H_

@@ -1,0 +1,243 @@
+#include "core/query/overlap_query.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "core/index/regions.h"
+#include "core/query/placed_triangle.h"
+
+namespace locus {
+namespace {
+
+// A ball or box in world axes, and the same in an instance's mesh axes: what the collecting below needs to know of it.
+struct BallShape {
+  using World = Balld;
+  using Mesh = Ballf;
+  using WorldRegion = BallRegion<double>;
+  using MeshRegion = BallRegion<float>;
+
+  static Ballf to_mesh(const Balld& ball, const Transform& transform) {
+    return {to_float(transform.point_to_mesh(ball.center)), static_cast<float>(ball.radius / transform.scale)};
+  }
+  static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
+  static bool overlaps_bounds(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
+  static bool overlaps_object(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
+  static bool overlaps_triangle(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
+};
+
+struct BoxShape {
+  using World = Obbd;
+  using Mesh = Obbf;
+  using WorldRegion = BoxRegion<double>;
+  using MeshRegion = BoxRegion<float>;
+
+  static Obbf to_mesh(const Obbd& box, const Transform& transform) {
+    return {to_float(transform.point_to_mesh(box.center)), to_float(box.half * (1.0 / transform.scale)),
+            compose(inverse(transform.rotation), box.rotation)};
+  }
+  static double reach(const Obbd& box) { return max_component(abs(box.center)) + max_component(box.half) * 2; }
+  static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
+  static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
+  static bool overlaps_triangle(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
+};
+
+template <class Kind>
+class ObjectRows {
+ public:
+  ObjectRows(QueryTask& task, const typename Kind::World& shape, const OverlapOptions& options, const Filter& filter,
+             LowestRows& rows)
+      : task_(task), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
+
+  Aabbd bounds() const { return region_.bounds(); }
+  bool overlaps(const Aabbd& box) const { return region_.overlaps(box); }
+  bool visit(const Object& object) {
+    if (object.id <= options_.after_id || !filter_.accepts(object)) return true;
+    if (!task_.count_test()) return false;
+    const bool found = options_.precision == Precision::kConservative
+                           ? Kind::overlaps_bounds(shape_, bounds_of(object.shape))
+                           : Kind::overlaps_object(shape_, object.shape);
+    if (found) rows_.offer(hit_on(object, 0));
+    return true;
+  }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::World& shape_;
+  typename Kind::WorldRegion region_;
+  const OverlapOptions& options_;
+  const Filter& filter_;
+  LowestRows& rows_;
+};
+
+// Rows of one instance: itself once, or each of its triangles found.
+class InstanceRows {
+ public:
+  InstanceRows(const Instance& instance, StaticDetail detail, LowestRows& rows)
+      : instance_(instance), detail_(detail), rows_(rows) {}
+
+  // False when the instance needs no more triangles.
+  bool offer(const Triangle& triangle) {
+    Hit row = hit_on(instance_, 0);
+    if (detail_ != StaticDetail::kInstances) {
+      row.triangle = triangle.number;
+      row.storage = static_cast<uint32_t>(&triangle - instance_.mesh->tree().values().data());
+    }
+    rows_.offer(row);
+    return detail_ != StaticDetail::kInstances;
+  }
+
+ private:
+  const Instance& instance_;
+  const StaticDetail detail_;
+  LowestRows& rows_;
+};
+
+template <class Kind>
+class ExactTriangles {
+ public:
+  ExactTriangles(QueryTask& task, const typename Kind::Mesh& shape, InstanceRows rows)
+      : task_(task), shape_(shape), region_(shape), rows_(rows) {}
+
+  Aabbf bounds() const { return region_.bounds(); }
+  bool overlaps(const Aabbf& box) const { return region_.overlaps(box); }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    return !Kind::overlaps_triangle(shape_, triangle) || rows_.offer(triangle);
+  }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::Mesh& shape_;
+  typename Kind::MeshRegion region_;
+  InstanceRows rows_;
+};
+
+template <class Kind>
+class PlacedBounds {
+ public:
+  PlacedBounds(QueryTask& task, const typename Kind::World& shape, const Instance& instance, InstanceRows rows)
+      : task_(task), shape_(shape), region_(shape), placed_(instance, Kind::reach(shape)), rows_(rows) {}
+
+  Aabbf bounds() const { return placed_.everything(); }
+  bool overlaps(const Aabbf& box) const { return region_.overlaps(placed_.bounds_of_box(box)); }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    return !Kind::overlaps_bounds(shape_, placed_.bounds_of_triangle(triangle)) || rows_.offer(triangle);
+  }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::World& shape_;
+  typename Kind::WorldRegion region_;
+  PlacedTriangles placed_;
+  InstanceRows rows_;
+};
+
+template <class Kind>
+class InstanceSearch {
+ public:
+  InstanceSearch(QueryTask& task, const typename Kind::World& shape, const OverlapOptions& options,
+                 const Filter& filter, LowestRows& rows)
+      : task_(task), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
+
+  Aabbd bounds() const { return region_.bounds(); }
+  bool overlaps(const Aabbd& box) const { return region_.overlaps(box); }
+  bool visit(const Instance& instance) {
+    if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
+    // Part of the verdict: the tree over instances may cull by it.
+    if (!region_.overlaps(instance.bounds)) return true;
+    const InstanceRows rows(instance, options_.detail, rows_);
+    if (options_.precision == Precision::kConservative) {
+      PlacedBounds<Kind> visitor(task_, shape_, instance, rows);
+      task_.visit_region(instance.mesh->tree(), visitor);
+    } else {
+      const typename Kind::Mesh shape = Kind::to_mesh(shape_, instance.transform);
+      ExactTriangles<Kind> visitor(task_, shape, rows);
+      task_.visit_region(instance.mesh->tree(), visitor);
+    }
+    return !task_.ended();
+  }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::World& shape_;
+  typename Kind::WorldRegion region_;
+  const OverlapOptions& options_;
+  const Filter& filter_;
+  LowestRows& rows_;
+};
+
+template <class Kind>
+OverlapAnswer run_overlap(QueryTask& task, const typename Kind::World& shape, const OverlapOptions& options,
+                          const Filter& filter) {
+  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
+  if (options.source != Source::kDynamic) {
+    InstanceSearch<Kind> search(task, shape, options, filter, rows);
+    task.visit_region(task.snapshot().statics->tree(), search);
+  }
+  if (options.source != Source::kStatic && !task.ended()) {
+    ObjectRows<Kind> search(task, shape, options, filter, rows);
+    task.visit_region(task.snapshot().grid, search);
+  }
+  return rows.finish();
+}
+
+Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
+
+}  // namespace
+
+bool LowestRows::before(const Hit& a, const Hit& b) const {
+  if (sorted_triangles_) return std::tie(a.id, a.triangle) < std::tie(b.id, b.triangle);
+  return std::tie(a.id, a.storage) < std::tie(b.id, b.storage);
+}
+
+void LowestRows::offer(const Hit& row) {
+  answer_.rows.push_back(row);
+  if (answer_.rows.size() > 2 * max_results_) keep_lowest();
+}
+
+void LowestRows::keep_lowest() {
+  if (answer_.rows.size() <= max_results_) return;
+  const auto end = answer_.rows.begin() + static_cast<std::ptrdiff_t>(max_results_);
+  std::nth_element(answer_.rows.begin(), end, answer_.rows.end(),
+                   [this](const Hit& a, const Hit& b) { return before(a, b); });
+  answer_.rows.erase(end, answer_.rows.end());
+  answer_.truncated = true;
+}
+
+OverlapAnswer LowestRows::finish() {
+  keep_lowest();
+  std::sort(answer_.rows.begin(), answer_.rows.end(), [this](const Hit& a, const Hit& b) { return before(a, b); });
+  return std::move(answer_);
+}
+
+OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
+  const uint32_t max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+  return {block.source, block.precision, detail, max_results, block.after_id};
+}
+
+OverlapAnswer run_ball(QueryTask& task, const Balld& ball, const OverlapOptions& options, const Filter& filter) {
+  return run_overlap<BallShape>(task, ball, options, filter);
+}
+
+OverlapAnswer run_box(QueryTask& task, const Obbd& box, const OverlapOptions& options, const Filter& filter) {
+  return run_overlap<BoxShape>(task, box, options, filter);
+}
+
+Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {
+  return {block.frame + point(ColumnReader<float>(balls.centers, 3).entry(i)),
+          ColumnReader<float>(balls.radii, 1).value(i, 0)};
+}
+
+Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i) {
+  Obbd box{block.frame + point(ColumnReader<float>(boxes.centers, 3).entry(i)),
+           point(ColumnReader<float>(boxes.half_extents, 3).entry(i)),
+           {}};
+  const ColumnReader<float> rotations(boxes.rotations, 4);
+  if (!rotations.given()) return box;
+  const float* q = rotations.entry(i);
+  box.rotation = rotation_of(Quaternion{q[0], q[1], q[2], q[3]});
+  return box;
+}
+
+}  // namespace locus

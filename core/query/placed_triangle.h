@@ -1,0 +1,39 @@
+// World axis-aligned bounds of an instance's triangles: what decides where CONSERVATIVE is asked. Grown by a margin
+// that covers every rounding of the exact tests, the way into mesh axes included, so that EXACT never finds more.
+#ifndef LOCUS_CORE_QUERY_PLACED_TRIANGLE_H_
+#define LOCUS_CORE_QUERY_PLACED_TRIANGLE_H_
+
+#include "core/scene/instance.h"
+
+namespace locus {
+
+class PlacedTriangles {
+ public:
+  // `reach`: the largest coordinate or length of the query that the bounds will be held against; 0 where that test pads
+  // by itself.
+  explicit PlacedTriangles(const Instance& instance, double reach = 0)
+      : instance_(instance), margin_(kMargin * (magnitude(instance.bounds) + reach)) {}
+
+  const Instance& instance() const { return instance_; }
+  Aabbf everything() const { return instance_.mesh->tree().bounds(); }
+
+  Aabbd bounds_of_triangle(const Triangle& triangle) const {
+    Aabbd bounds;
+    for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
+      bounds = merge(bounds, instance_.transform.point_to_world(to_double(vertex)));
+    return grown(bounds, margin_);
+  }
+
+  // Contains bounds_of_triangle() of every triangle within `box`: its margin is twice as wide.
+  Aabbd bounds_of_box(const Aabbf& box) const { return grown(bounds_to_world(instance_.transform, box), 2 * margin_); }
+
+ private:
+  static constexpr double kMargin = 0x1p-21;
+
+  const Instance& instance_;
+  double margin_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_PLACED_TRIANGLE_H_

@@ -1,0 +1,176 @@
+#include "core/query/query_batch.h"
+
+#include <cmath>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/column.h"
+#include "core/base/refusal.h"
+#include "core/geometry/rotation.h"
+#include "core/query/rows.h"
+
+namespace locus {
+namespace {
+
+// Checks of one block; every refusal names the block's field.
+class BlockCheck {
+ public:
+  BlockCheck(const QueryBlock& block, size_t number) : block_(block), field_(absl::StrCat("blocks[", number, "]")) {}
+
+  absl::Status run() {
+    n_ = query_count(block_);
+    if (absl::Status s = check_common(); !s.ok()) return s;
+    if (absl::Status s = check_columns_of_kind(); !s.ok()) return s;
+    return std::visit([this](const auto& kind) { return check_kind(kind); }, block_.kind);
+  }
+
+ private:
+  std::string name(absl::string_view field) const { return absl::StrCat(field_, ".", field); }
+
+  absl::Status check_common() const {
+    if (!is_finite(block_.frame))
+      return refuse_argument(Reason::kNotFinite, name("frame"), {}, "a frame needs finite numbers");
+    if (max_component(abs(block_.frame)) > limits::kMaxCoordinate)
+      return refuse_argument(Reason::kOutOfRange, name("frame"), {}, "frames must lie within +-1e9");
+    if (block_.ignore_ids.size() > limits::kMaxIgnoredIds)
+      return refuse_limit(name("ignore_ids"), "ignored_ids", limits::kMaxIgnoredIds,
+                          static_cast<double>(block_.ignore_ids.size()));
+    if (block_.max_results > limits::kMaxMaxResults)
+      return refuse_limit(name("max_results"), "max_results", limits::kMaxMaxResults, block_.max_results);
+    if (absl::Status s = check_column(block_.masks.size(), 1, n_, ColumnNeed::kOptional, name("masks")); !s.ok())
+      return s;
+    return check_column(block_.ignore_groups.size(), 1, n_, ColumnNeed::kOptional, name("ignore_groups"));
+  }
+
+  absl::Status check_columns_of_kind() const {
+    const ColumnSet served = served_columns(block_);
+    for (int number = 1; number <= static_cast<int>(Column::kPose); ++number)
+      if (const auto column = static_cast<Column>(number); block_.columns.has(column) && !served.has(column))
+        return refuse_argument(Reason::kMalformed, name("columns"), {},
+                               absl::StrCat(column_name(column), " is not a column of this kind of query"));
+    return absl::OkStatus();
+  }
+
+  absl::Status check_length(size_t numbers, size_t width, ColumnNeed need, absl::string_view field) const {
+    return check_column(numbers, width, n_, need, name(field));
+  }
+
+  // Points relative to the frame, all within the world.
+  absl::Status check_points(absl::Span<const float> numbers, absl::string_view field) const {
+    for (size_t i = 0; i < numbers.size(); ++i) {
+      if (!std::isfinite(numbers[i])) return wrong(Reason::kNotFinite, field, i / 3, "needs finite numbers");
+      const double world = block_.frame[static_cast<int>(i % 3)] + double{numbers[i]};
+      if (std::abs(world) > limits::kMaxCoordinate)
+        return wrong(Reason::kOutOfRange, field, i / 3, "must lie within +-1e9 in the world");
+    }
+    return absl::OkStatus();
+  }
+
+  // Finite numbers from 0 to the size of the world.
+  absl::Status check_sizes(absl::Span<const float> numbers, size_t width, absl::string_view field) const {
+    for (size_t i = 0; i < numbers.size(); ++i) {
+      if (!std::isfinite(numbers[i])) return wrong(Reason::kNotFinite, field, i / width, "needs finite numbers");
+      if (numbers[i] < 0 || numbers[i] > limits::kMaxCoordinate)
+        return wrong(Reason::kOutOfRange, field, i / width, "must lie within 0 and 1e9");
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status wrong(Reason reason, absl::string_view field, size_t index, absl::string_view message) const {
+    return refuse_argument(reason, name(field), static_cast<uint32_t>(index), message);
+  }
+
+  absl::Status check_directions(absl::Span<const float> numbers) const {
+    for (size_t i = 0; i + 2 < numbers.size(); i += 3) {
+      const Vec3f direction{numbers[i], numbers[i + 1], numbers[i + 2]};
+      if (!is_finite(direction)) return wrong(Reason::kNotFinite, "rays.directions", i / 3, "needs finite numbers");
+      if (direction == Vec3f{}) return wrong(Reason::kOutOfRange, "rays.directions", i / 3, "must not be zero");
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status check_kind(const RayColumns& rays) const {
+    if (absl::Status s = check_length(rays.origins.size(), 3, ColumnNeed::kEach, "rays.origins"); !s.ok()) return s;
+    if (absl::Status s = check_length(rays.directions.size(), 3, ColumnNeed::kEachOrOne, "rays.directions"); !s.ok())
+      return s;
+    if (absl::Status s = check_length(rays.t_max.size(), 1, ColumnNeed::kOptional, "rays.t_max"); !s.ok()) return s;
+    if (absl::Status s = check_points(rays.origins, "rays.origins"); !s.ok()) return s;
+    for (size_t i = 0; i < rays.t_max.size(); ++i) {
+      if (std::isnan(rays.t_max[i])) return wrong(Reason::kNotFinite, "rays.t_max", i, "must be a number");
+      if (rays.t_max[i] < 0) return wrong(Reason::kOutOfRange, "rays.t_max", i, "must not be negative");
+    }
+    return check_directions(rays.directions);
+  }
+
+  absl::Status check_kind(const BallColumns& balls) const {
+    if (absl::Status s = check_length(balls.centers.size(), 3, ColumnNeed::kEach, "balls.centers"); !s.ok()) return s;
+    if (absl::Status s = check_length(balls.radii.size(), 1, ColumnNeed::kEachOrOne, "balls.radii"); !s.ok()) return s;
+    if (absl::Status s = check_points(balls.centers, "balls.centers"); !s.ok()) return s;
+    return check_sizes(balls.radii, 1, "balls.radii");
+  }
+
+  absl::Status check_kind(const BoxColumns& boxes) const {
+    if (absl::Status s = check_length(boxes.centers.size(), 3, ColumnNeed::kEach, "boxes.centers"); !s.ok()) return s;
+    if (absl::Status s = check_length(boxes.half_extents.size(), 3, ColumnNeed::kEachOrOne, "boxes.half_extents");
+        !s.ok())
+      return s;
+    if (absl::Status s = check_length(boxes.rotations.size(), 4, ColumnNeed::kOptional, "boxes.rotations"); !s.ok())
+      return s;
+    if (absl::Status s = check_points(boxes.centers, "boxes.centers"); !s.ok()) return s;
+    if (absl::Status s = check_sizes(boxes.half_extents, 3, "boxes.half_extents"); !s.ok()) return s;
+    return check_rotations(boxes.rotations);
+  }
+
+  absl::Status check_rotations(absl::Span<const float> numbers) const {
+    for (size_t i = 0; i + 3 < numbers.size(); i += 4) {
+      const double deviation = unit_deviation({numbers[i], numbers[i + 1], numbers[i + 2], numbers[i + 3]});
+      if (!std::isfinite(deviation)) return wrong(Reason::kNotFinite, "boxes.rotations", i / 4, "needs finite numbers");
+      if (deviation > limits::kMaxQuaternionDeviation)
+        return wrong(Reason::kOutOfRange, "boxes.rotations", i / 4, "must be a quaternion (x, y, z, w) of unit length");
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status check_kind(const LookupColumns& lookup) const {
+    if (!lookup.ids.empty() && !lookup.groups.empty())
+      return refuse_argument(Reason::kColumnLength, name("lookup.groups"), {}, "give ids or groups, not both");
+    for (size_t i = 0; i < lookup.ids.size(); ++i)
+      if (lookup.ids[i] == kNoId) return wrong(Reason::kOutOfRange, "lookup.ids", i, "0 is no id");
+    for (size_t i = 0; i < lookup.groups.size(); ++i)
+      if (lookup.groups[i] == 0) return wrong(Reason::kOutOfRange, "lookup.groups", i, "0 is no group");
+    return absl::OkStatus();
+  }
+
+  const QueryBlock& block_;
+  std::string field_;
+  size_t n_ = 0;
+};
+
+struct CountQueries {
+  size_t operator()(const RayColumns& rays) const { return rays.origins.size() / 3; }
+  size_t operator()(const BallColumns& balls) const { return balls.centers.size() / 3; }
+  size_t operator()(const BoxColumns& boxes) const { return boxes.centers.size() / 3; }
+  size_t operator()(const LookupColumns& lookup) const {
+    return lookup.groups.empty() ? lookup.ids.size() : lookup.groups.size();
+  }
+};
+
+}  // namespace
+
+size_t query_count(const QueryBlock& block) { return std::visit(CountQueries(), block.kind); }
+
+absl::Status check_batch(const QueryBatch& batch) {
+  if (batch.blocks.size() > limits::kMaxBlocks)
+    return refuse_limit("blocks", "blocks", limits::kMaxBlocks, static_cast<double>(batch.blocks.size()));
+  size_t queries = 0;
+  for (const QueryBlock& block : batch.blocks) queries += query_count(block);
+  if (queries > limits::kMaxQueries)
+    return refuse_limit("blocks", "queries", limits::kMaxQueries, static_cast<double>(queries));
+  if (batch.max_reply_bytes > limits::kMaxReplyBytes)
+    return refuse_limit("max_reply_bytes", "reply_bytes", limits::kMaxReplyBytes, batch.max_reply_bytes);
+  for (size_t i = 0; i < batch.blocks.size(); ++i)
+    if (absl::Status status = BlockCheck(batch.blocks[i], i).run(); !status.ok()) return status;
+  return check_reply_size(batch);
+}
+
+}  // namespace locus

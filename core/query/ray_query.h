@@ -1,0 +1,44 @@
+// One ray against everything in a snapshot: statics first, whose hit shortens the ray, then moving objects.
+#ifndef LOCUS_CORE_QUERY_RAY_QUERY_H_
+#define LOCUS_CORE_QUERY_RAY_QUERY_H_
+
+#include <vector>
+
+#include "core/query/hit.h"
+#include "core/query/query_task.h"
+
+namespace locus {
+
+struct RayRequest {
+  Vec3d origin;
+  Vec3d direction;
+  float t_max;
+  RayMode mode;
+  Cull cull;  // by the stored winding
+  Inside inside;
+  Source source;
+  Precision precision;
+  uint32_t max_results;  // of kAll
+};
+
+// The request of query `i` of a block of rays. `winding` turns the block's cull into the stored winding's.
+RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i);
+
+struct RayAnswer {
+  std::vector<Hit> hits;   // kFirst and kAny: at most one; kAll: ascending
+  bool truncated = false;  // kAll: there were more
+};
+
+RayAnswer run_ray(QueryTask& task, const RayRequest& request, const Filter& filter);
+
+// Weights of the second and third vertex, and the unit normal to the triangle's front or out of the object, at a hit
+// that run_ray() found with kExact. Recomputed from the stored primitive.
+struct Surface {
+  float u = 0, v = 0;
+  Vec3d normal;
+};
+Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_RAY_QUERY_H_

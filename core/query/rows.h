@@ -1,0 +1,47 @@
+// From hits to result columns: which columns a block returns, how large its rows are, and how they are written.
+#ifndef LOCUS_CORE_QUERY_ROWS_H_
+#define LOCUS_CORE_QUERY_ROWS_H_
+
+#include "absl/strings/string_view.h"
+#include "core/query/hit.h"
+#include "core/query/query_batch.h"
+#include "core/query/ray_query.h"
+#include "core/query/run_batch.h"
+
+namespace locus {
+
+// "T", "ID" and so on.
+absl::string_view column_name(Column column);
+
+// What a block's kind can return, and what it does return: the wanted columns or the kind's default ones.
+ColumnSet served_columns(const QueryBlock& block);
+ColumnSet returned_columns(const QueryBlock& block);
+
+// How a block's answer is laid out. Dense: one row a query, a miss included. Bytes: one byte a query, no rows. Counted:
+// any number of rows a query.
+enum class RowLayout : uint8_t { kDense, kBytes, kCounted };
+RowLayout row_layout(const QueryBlock& block);
+
+// Encoded bytes of one row.
+uint32_t row_bytes(ColumnSet columns);
+
+// Encoded bytes that a batch's answer takes before its first counted row: dense rows, counts, room for lists of cut
+// queries and for field headers.
+uint64_t fixed_reply_bytes(const QueryBatch& batch);
+uint64_t reply_limit(const QueryBatch& batch);
+
+// INVALID_ARGUMENT LIMIT where fixed_reply_bytes() alone is over the batch's limit.
+absl::Status check_reply_size(const QueryBatch& batch);
+
+// Writes the columns of a row that every kind has; a miss where `hit` names nothing.
+void append_row(const Hit& hit, ColumnSet columns, BlockResult& result);
+// Writes what only hits of rays have: uv, normal and point, the latter relative to the frame.
+void append_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, ColumnSet columns,
+                    BlockResult& result);
+
+// Appends the first `rows` rows of `from`; both have the columns `columns`.
+void append_rows(const BlockResult& from, size_t first_row, size_t rows, ColumnSet columns, BlockResult& to);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_ROWS_H_

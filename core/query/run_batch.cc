@@ -1,0 +1,102 @@
+#include "core/query/run_batch.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/query/block_runner.h"
+
+namespace locus {
+namespace {
+
+// Queries that one thread takes at once. A constant, so that pieces do not depend on the number of threads.
+constexpr size_t kPieceQueries = 256;
+
+struct Piece {
+  size_t block;
+  size_t begin, end;
+  BlockResult result;
+};
+
+std::vector<Piece> split(const QueryBatch& batch) {
+  std::vector<Piece> pieces;
+  for (size_t b = 0; b < batch.blocks.size(); ++b) {
+    const size_t n = query_count(batch.blocks[b]);
+    const auto* lookup = std::get_if<LookupColumns>(&batch.blocks[b].kind);
+    // Groups are looked up in one pass over all objects.
+    const size_t step = lookup != nullptr && !lookup->groups.empty() ? n : kPieceQueries;
+    for (size_t begin = 0; begin < n; begin += step) pieces.push_back({b, begin, std::min(n, begin + step), {}});
+  }
+  return pieces;
+}
+
+// Puts pieces together in order and cuts rows where the reply is full.
+class Assembly {
+ public:
+  explicit Assembly(const QueryBatch& batch) : batch_(batch), room_(reply_limit(batch) - fixed_reply_bytes(batch)) {
+    result_.blocks.resize(batch.blocks.size());
+  }
+
+  void add(const Piece& piece) {
+    const QueryBlock& block = batch_.blocks[piece.block];
+    BlockResult& to = result_.blocks[piece.block];
+    const ColumnSet columns = returned_columns(block);
+    if (row_layout(block) == RowLayout::kCounted) {
+      add_counted(piece, columns, to);
+    } else {
+      append_rows(piece.result, 0, row_layout(block) == RowLayout::kDense ? piece.end - piece.begin : 0, columns, to);
+      to.hits += piece.result.hits;
+      to.truncated.insert(to.truncated.end(), piece.result.truncated.begin(), piece.result.truncated.end());
+    }
+    to.work += piece.result.work;
+    result_.work += piece.result.work;
+  }
+
+  BatchResult finish() { return std::move(result_); }
+
+ private:
+  void add_counted(const Piece& piece, ColumnSet columns, BlockResult& to) {
+    const uint32_t bytes = row_bytes(columns);
+    size_t row = 0;
+    auto cut = piece.result.truncated.begin();
+    for (size_t i = 0; i < piece.result.counts.size(); ++i) {
+      const auto query = static_cast<uint32_t>(piece.begin + i);
+      const uint32_t rows = piece.result.counts[i];
+      const auto kept = static_cast<uint32_t>(std::min<uint64_t>(rows, room_ / bytes));
+      append_rows(piece.result, row, kept, columns, to);
+      to.counts.push_back(kept);
+      room_ -= uint64_t{kept} * bytes;
+      row += rows;
+      const bool was_cut = cut != piece.result.truncated.end() && *cut == query;
+      if (was_cut) ++cut;
+      if (was_cut || kept < rows) to.truncated.push_back(query);
+    }
+  }
+
+  const QueryBatch& batch_;
+  uint64_t room_;
+  BatchResult result_;
+};
+
+}  // namespace
+
+absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
+                                      const RunOptions& options) {
+  BatchControl control(batch.max_work, options.stop);
+  std::vector<Piece> pieces = split(batch);
+  const auto run_piece = [&](size_t number) {
+    Piece& piece = pieces[number];
+    QueryTask task(snapshot, control, options.brute_force);
+    piece.result = BlockRunner(task, batch.blocks[piece.block], reply_limit(batch)).run(piece.begin, piece.end);
+  };
+  if (options.parallel_for) {
+    options.parallel_for(pieces.size(), run_piece);
+  } else {
+    for (size_t number = 0; number < pieces.size(); ++number) run_piece(number);
+  }
+  if (control.stopped()) return control.status();
+  Assembly assembly(batch);
+  for (const Piece& piece : pieces) assembly.add(piece);
+  return assembly.finish();
+}
+
+}  // namespace locus
