@@ -18,7 +18,7 @@ Real argmin(const Function& f, Real low, Real high) {
   constexpr Real kGolden = 0.61803398874989484820L;
   Real a = high - kGolden * (high - low), b = low + kGolden * (high - low);
   Real fa = f(a), fb = f(b);
-  for (int step = 0; step < 100; ++step) {
+  for (int step = 0; step < 80; ++step) {
     if (fa <= fb) {
       high = b;
       b = a;
