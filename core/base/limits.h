@@ -28,6 +28,7 @@ inline constexpr uint32_t kMaxBvhDepth = 64;  // levels of nodes, on any input: 
 inline constexpr uint32_t kMaxBvhBins = 64;
 
 inline constexpr uint32_t kMaxUpdateItems = 1u << 20;   // per batch
+inline constexpr uint32_t kMaxUpdateLists = 65536;      // per batch: inserts, moves and relabels, empty ones too
 inline constexpr uint32_t kMaxListedItemErrors = 1000;  // all are counted
 inline constexpr uint32_t kMaxWriters = 4096;           // remembered per scene, for retry safety
 

@@ -48,7 +48,9 @@ class Assembly {
       to.truncated.insert(to.truncated.end(), piece.result.truncated.begin(), piece.result.truncated.end());
     }
     to.work += piece.result.work;
+    to.nanoseconds += piece.result.nanoseconds;
     result_.work += piece.result.work;
+    result_.nanoseconds += piece.result.nanoseconds;
   }
 
   BatchResult finish() { return std::move(result_); }
@@ -85,8 +87,10 @@ absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const Query
   std::vector<Piece> pieces = split(batch);
   const auto run_piece = [&](size_t number) {
     Piece& piece = pieces[number];
+    const uint64_t start = options.clock ? options.clock() : 0;
     QueryTask task(snapshot, control, options.brute_force);
     piece.result = BlockRunner(task, batch.blocks[piece.block], reply_limit(batch)).run(piece.begin, piece.end);
+    if (options.clock) piece.result.nanoseconds = options.clock() - start;
   };
   if (options.parallel_for) {
     options.parallel_for(pieces.size(), run_piece);

@@ -31,11 +31,13 @@ struct BlockResult {
   std::vector<double> positions;  // POSE: 3 a row
   std::vector<float> rotations;   // POSE: 4 a row
   Work work;                      // not part of the answer: depends on the structure
+  uint64_t nanoseconds = 0;       // nor is this: by RunOptions::clock, all threads together
 };
 
 struct BatchResult {
   std::vector<BlockResult> blocks;
   Work work;
+  uint64_t nanoseconds = 0;
 };
 
 struct RunOptions {
@@ -45,6 +47,8 @@ struct RunOptions {
   // Asked every limits::kTestsBetweenChecks primitive tests, from any thread: a status that is not OK ends the batch
   // with it. [never ends]
   std::function<absl::Status()> stop;
+  // Nanoseconds since some moment, asked before and after each piece of work, from any thread. [times are 0]
+  std::function<uint64_t()> clock;
   // Test every value instead of asking the structures: for checking them. Same answers, different work.
   bool brute_force = false;
 };

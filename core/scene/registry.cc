@@ -169,6 +169,8 @@ std::vector<Registry::NamedMesh> Registry::list_meshes(const std::string& after,
   return result;
 }
 
+uint32_t Registry::mesh_uses(const StaticMesh* mesh) const { return count_uses(all_scenes(), mesh); }
+
 size_t Registry::mesh_count() const {
   const MutexLock lock(mutex_);
   return meshes_.size();

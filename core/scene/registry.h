@@ -53,6 +53,8 @@ class Registry {
   };
   std::vector<NamedMesh> list_meshes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
   size_t mesh_count() const LOCUS_EXCLUDES(mutex_);
+  // Instances of `mesh` in all scenes, under whichever of its names it was placed.
+  uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
  private:
   std::vector<ScenePtr> all_scenes() const LOCUS_EXCLUDES(mutex_);

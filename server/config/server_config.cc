@@ -119,6 +119,14 @@ uint32_t usable_cores() {
   return std::min(cores, limits::kMaxThreads);
 }
 
+absl::Status reachable_from_outside(absl::string_view address) {
+  return absl::InvalidArgumentError(absl::StrCat(
+      "`", address,
+      "` can be reached from other machines, but this build has neither encryption nor passwords: anyone ",
+      "there could read and change every scene. Either listen on 127.0.0.1, [::1] or a unix socket and put a proxy ",
+      "with TLS in front, or, where every machine in reach is trusted, say so with --insecure or LOCUS_INSECURE=1"));
+}
+
 Invocation mistake(absl::string_view message) {
   Invocation invocation;
   invocation.exit_code = 2;
@@ -178,15 +186,15 @@ absl::Status check_config(const ServerConfig& config) {
   if (config.listen.empty()) return absl::InvalidArgumentError("no address to listen on; give --listen");
   if (config.listen.size() > limits::kMaxListenAddresses)
     return absl::InvalidArgumentError(absl::StrCat("more than ", limits::kMaxListenAddresses, " listen addresses"));
+  bool tcp = false;
   for (const std::string& text : config.listen) {
     const absl::StatusOr<ListenAddress> address = parse_listen_address(text);
     if (!address.ok()) return address.status();
-    if (address->local || config.insecure) continue;
-    return absl::InvalidArgumentError(absl::StrCat(
-        "`", text, "` can be reached from other machines, but this build has neither encryption nor passwords: anyone ",
-        "there could read and change every scene. Either listen on 127.0.0.1, [::1] or a unix socket and put a proxy ",
-        "with TLS in front, or, where every machine in reach is trusted, say so with --insecure or LOCUS_INSECURE=1"));
+    if (!address->local && !config.insecure) return reachable_from_outside(text);
+    tcp = tcp || address->kind == ListenAddress::Kind::kTcp;
   }
+  if (!config.port_file.empty() && !tcp)
+    return absl::InvalidArgumentError("--port-file needs a TCP address among --listen; a unix socket has no port");
   return absl::OkStatus();
 }
 

@@ -1,6 +1,5 @@
 #include "server/scheduling/change_queue.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "core/base/check.h"
@@ -49,21 +48,17 @@ uint32_t ChangeQueue::pending(uint64_t key) const {
 }
 
 void ChangeQueue::forget(uint64_t key) {
-  std::deque<Job> dropped;  // destroyed after the lock is released: a job may hold anything
   MutexLock lock(mutex_);
   const auto line = lines_.find(key);
   if (line == lines_.end()) return;
-  dropped.swap(line->second.waiting);
-  ready_.erase(std::remove(ready_.begin(), ready_.end(), key), ready_.end());
-  if (line->second.running)
-    line->second.forgotten = true;
-  else
-    lines_.erase(line);
+  line->second.forgotten = true;
+  if (!line->second.running && line->second.waiting.empty()) lines_.erase(line);
 }
 
 void ChangeQueue::run() {
   while (true) {
     uint64_t key = 0;
+    uint64_t number = 0;
     Job job;
     {
       MutexLock lock(mutex_);
@@ -72,11 +67,12 @@ void ChangeQueue::run() {
       key = ready_.front();
       ready_.pop_front();
       Line& line = lines_[key];
+      number = line.last_number - line.waiting.size() + 1;
       job = std::move(line.waiting.front());
       line.waiting.pop_front();
       line.running = true;
     }
-    job();
+    job(number);
     job = nullptr;
     finish(key);
   }

@@ -20,7 +20,7 @@ namespace locus::server {
 
 class ChangeQueue {
  public:
-  using Job = std::function<void()>;
+  using Job = std::function<void(uint64_t number)>;
 
   // Up to `max_waiting` jobs of a key may wait, the running one included.
   ChangeQueue(uint32_t threads, uint32_t max_waiting);
@@ -36,7 +36,7 @@ class ChangeQueue {
   // Jobs of the key that have not ended.
   uint32_t pending(uint64_t key) const LOCUS_EXCLUDES(mutex_);
 
-  // Drops the key's jobs that have not begun, and its count: for keys that never come again.
+  // Drops the key's count once its jobs have ended: for keys that never come again.
   void forget(uint64_t key) LOCUS_EXCLUDES(mutex_);
 
  private:
@@ -44,7 +44,7 @@ class ChangeQueue {
     uint64_t last_number = 0;
     bool running = false;
     bool forgotten = false;
-    std::deque<Job> waiting;
+    std::deque<Job> waiting;  // the last has the number last_number
   };
 
   void run() LOCUS_EXCLUDES(mutex_);

@@ -43,6 +43,13 @@ void ThreadGroup::join_all() {
   join(std::move(ended));
 }
 
+bool ThreadGroup::wait_until_idle(std::chrono::steady_clock::time_point deadline) {
+  MutexLock lock(mutex_);
+  while (!running_.empty())
+    if (!one_ended_.wait_until(mutex_, deadline)) return running_.empty();
+  return true;
+}
+
 void ThreadGroup::join(Threads threads) {
   for (std::thread& thread : threads) thread.join();
 }

@@ -5,6 +5,7 @@
 #ifndef LOCUS_SERVER_SCHEDULING_THREAD_GROUP_H_
 #define LOCUS_SERVER_SCHEDULING_THREAD_GROUP_H_
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <list>
@@ -27,6 +28,9 @@ class ThreadGroup {
 
   // Waits until no task runs. Tasks must have been told to end by other means.
   void join_all() LOCUS_EXCLUDES(mutex_);
+
+  // As join_all(), but false when a task still runs at `deadline`.
+  bool wait_until_idle(std::chrono::steady_clock::time_point deadline) LOCUS_EXCLUDES(mutex_);
 
   size_t running() const LOCUS_EXCLUDES(mutex_);
   size_t max() const { return max_; }

@@ -1,0 +1,108 @@
+// locusd: reads its options, serves, and on SIGTERM or SIGINT drains and ends.
+
+#include <malloc.h>
+#include <pthread.h>
+#include <signal.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "core/base/limits.h"
+#include "server/config/server_config.h"
+#include "server/config/version.h"
+#include "server/observability/log.h"
+#include "server/service/server.h"
+
+namespace locus::server {
+namespace {
+
+constexpr int kEndedAtOnce = 130;
+
+// Messages of megabytes come and go all the time. By default glibc gives their memory back to the kernel each time,
+// which halves throughput.
+void keep_freed_memory() {
+  mallopt(M_MMAP_THRESHOLD, 64 << 20);
+  mallopt(M_TRIM_THRESHOLD, 512 << 20);
+  mallopt(M_TOP_PAD, 16 << 20);
+}
+
+sigset_t ending_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  return signals;
+}
+
+int wait_for_signal(const sigset_t& signals) {
+  int signal = 0;
+  while (sigwait(&signals, &signal) != 0) {
+  }
+  return signal;
+}
+
+// Whole or not at all: a reader never sees half a number.
+bool write_port_file(const std::string& path, uint16_t port) {
+  const std::string temporary = absl::StrCat(path, ".tmp");
+  std::FILE* file = std::fopen(temporary.c_str(), "w");
+  if (file == nullptr) return false;
+  const bool written = std::fprintf(file, "%u\n", static_cast<unsigned>(port)) > 0;
+  const bool closed = std::fclose(file) == 0;
+  return written && closed && std::rename(temporary.c_str(), path.c_str()) == 0;
+}
+
+void log_start(const Server& server, const ServerConfig& config) {
+  log(LogLevel::kInfo, "serving",
+      {{"addresses", absl::StrJoin(server.addresses(), ",")},
+       {"version", kVersion},
+       {"threads", absl::StrCat(config.threads)},
+       {"receive_bytes", absl::StrCat(config.max_receive_bytes)},
+       {"streams", absl::StrCat(config.max_streams)},
+       {"storage", "memory only: scenes are lost at exit"}});
+  if (config.insecure) log(LogLevel::kWarning, "insecure: nothing is encrypted and nobody is asked who they are");
+}
+
+int run(const ServerConfig& config) {
+  start_logging(config.log_level, config.log_format);
+  // A server that does not start says why itself; what gRPC has to say of it helps nobody.
+  capture_grpc_log(LogLevel::kDebug);
+  const sigset_t signals = ending_signals();
+  // Before any other thread starts, so that all of them leave these signals to this one.
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  const absl::StatusOr<std::unique_ptr<Server>> server = Server::start(config);
+  if (!server.ok()) {
+    log(LogLevel::kError, server.status().message());
+    return EXIT_FAILURE;
+  }
+  if (!config.port_file.empty() && !write_port_file(config.port_file, (*server)->port())) {
+    log(LogLevel::kError, "cannot write the port file", {{"path", config.port_file}});
+    return EXIT_FAILURE;
+  }
+  capture_grpc_log(LogLevel::kWarning);
+  log_start(**server, config);
+  const int signal = wait_for_signal(signals);
+  log(LogLevel::kInfo, "draining", {{"signal", strsignal(signal)}, {"grace_s", absl::StrCat(config.drain_grace_s)}});
+  std::thread([signals] {
+    wait_for_signal(signals);
+    std::_Exit(kEndedAtOnce);
+  }).detach();
+  (*server)->drain(std::chrono::seconds(config.drain_grace_s));
+  log(LogLevel::kInfo, "ended");
+  return EXIT_SUCCESS;
+}
+
+}  // namespace
+}  // namespace locus::server
+
+int main(int argc, char** argv) {
+  locus::server::keep_freed_memory();
+  const locus::server::Invocation invocation =
+      locus::server::read_invocation({argv + 1, argv + argc}, locus::server::process_environment);
+  if (invocation.config) return locus::server::run(*invocation.config);
+  std::fputs(invocation.text.c_str(), invocation.exit_code == 0 ? stdout : stderr);
+  return invocation.exit_code;
+}

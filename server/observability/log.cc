@@ -1,0 +1,111 @@
+#include "server/observability/log.h"
+
+#include <grpc/support/log.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <memory>
+
+#include "absl/strings/str_cat.h"
+
+namespace locus::server {
+namespace {
+
+// Longer values are cut: a caller chooses some of them.
+constexpr size_t kMaxValue = 1024;
+
+std::atomic<LogFormat> log_format{LogFormat::kText};
+std::atomic<LogLevel> grpc_errors{LogLevel::kWarning};
+
+spdlog::level::level_enum to_spdlog(LogLevel level) {
+  switch (level) {
+    case LogLevel::kDebug:
+      return spdlog::level::debug;
+    case LogLevel::kInfo:
+      return spdlog::level::info;
+    case LogLevel::kWarning:
+      return spdlog::level::warn;
+    case LogLevel::kError:
+      return spdlog::level::err;
+  }
+  return spdlog::level::err;
+}
+
+spdlog::logger& logger() {
+  static const std::shared_ptr<spdlog::logger> instance = [] {
+    auto made = std::make_shared<spdlog::logger>("locusd", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+    made->set_level(spdlog::level::warn);
+    return made;
+  }();
+  return *instance;
+}
+
+// Both formats quote alike: what JSON needs escaped would also break a line of text.
+void append_escaped(std::string& out, absl::string_view text) {
+  constexpr absl::string_view kHex = "0123456789abcdef";
+  for (const char c : text.substr(0, kMaxValue)) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      absl::StrAppend(&out, "\\", absl::string_view(&c, 1));
+    } else if (byte < 0x20 || byte == 0x7f) {
+      absl::StrAppend(&out, "\\u00", kHex.substr(byte >> 4, 1), kHex.substr(byte & 15, 1));
+    } else {
+      out.push_back(c);
+    }
+  }
+}
+
+std::string json_line(absl::string_view message, std::initializer_list<LogField> fields) {
+  std::string line = "\"message\":\"";
+  append_escaped(line, message);
+  line += '"';
+  for (const LogField& field : fields) {
+    absl::StrAppend(&line, ",\"", field.name, "\":\"");
+    append_escaped(line, field.value);
+    line += '"';
+  }
+  return line;
+}
+
+std::string text_line(absl::string_view message, std::initializer_list<LogField> fields) {
+  std::string line;
+  append_escaped(line, message);
+  for (const LogField& field : fields) {
+    const bool quoted = field.value.empty() || field.value.find(' ') != std::string::npos;
+    absl::StrAppend(&line, " ", field.name, quoted ? "=\"" : "=");
+    append_escaped(line, field.value);
+    if (quoted) line += '"';
+  }
+  return line;
+}
+
+void log_for_grpc(gpr_log_func_args* args) {
+  const LogLevel level = args->severity == GPR_LOG_SEVERITY_ERROR ? grpc_errors.load() : LogLevel::kDebug;
+  log(level, "grpc", {{"text", args->message}});
+}
+
+}  // namespace
+
+void start_logging(LogLevel level, LogFormat format) {
+  log_format = format;
+  logger().set_level(to_spdlog(level));
+  logger().set_pattern(format == LogFormat::kJson ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})"
+                                                  : "%Y-%m-%dT%H:%M:%S.%eZ %l %v",
+                       spdlog::pattern_time_type::utc);
+}
+
+bool logs(LogLevel level) { return logger().should_log(to_spdlog(level)); }
+
+void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields) {
+  if (!logs(level)) return;
+  const std::string line = log_format == LogFormat::kJson ? json_line(message, fields) : text_line(message, fields);
+  logger().log(to_spdlog(level), spdlog::string_view_t(line.data(), line.size()));
+}
+
+void capture_grpc_log(LogLevel errors) {
+  grpc_errors = errors;
+  gpr_set_log_function(&log_for_grpc);
+}
+
+}  // namespace locus::server

@@ -1,0 +1,36 @@
+// What the daemon says on standard error: one line an event, for people or as JSON. The only place that knows the
+// logging library.
+//
+// Threads: start_logging() once, before anything is logged; the rest from any thread. A line is written whole.
+#ifndef LOCUS_SERVER_OBSERVABILITY_LOG_H_
+#define LOCUS_SERVER_OBSERVABILITY_LOG_H_
+
+#include <initializer_list>
+#include <string>
+
+#include "absl/strings/string_view.h"
+#include "server/config/server_config.h"
+
+namespace locus::server {
+
+// A named value of an event. Values are printed as text.
+struct LogField {
+  absl::string_view name;
+  std::string value;
+};
+
+// Without it everything from `warning` on is written as text.
+void start_logging(LogLevel level, LogFormat format);
+
+bool logs(LogLevel level);
+
+// `message` says what happened and is the same for every event of a kind; `fields` say to what. Control characters,
+// which may come from callers, are escaped.
+void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields = {});
+
+// Sends what gRPC itself has to say the same way: its errors at `errors`, all else at debug. May be called again.
+void capture_grpc_log(LogLevel errors);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_OBSERVABILITY_LOG_H_

@@ -1,0 +1,95 @@
+#include "server/service/call.h"
+
+#include <algorithm>
+
+#include "core/base/refusal.h"
+#include "server/observability/log.h"
+#include "server/service/status.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+using std::chrono::system_clock;
+
+constexpr const char* kSceneMetadata = "x-scene";
+constexpr uint32_t kBusyRetryMs = 100;
+// How late a wait for a revision notices that nobody needs it any more.
+constexpr milliseconds kWaitSlice{50};
+constexpr std::chrono::hours kNoDeadline{24 * 365};
+
+SteadyTime to_steady(system_clock::time_point deadline) {
+  const system_clock::time_point now = system_clock::now();
+  if (deadline > now + kNoDeadline) return steady_clock::now() + kNoDeadline;
+  return steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(deadline - now);
+}
+
+}  // namespace
+
+Caller::Caller(const Host& host, const grpc::ServerContextBase& context)
+    : host_(host), context_(context), deadline_(to_steady(context.deadline())) {}
+
+absl::Status Caller::stop() const {
+  if (host_.drain.ended()) return draining();
+  if (steady_clock::now() >= deadline_) return absl::DeadlineExceededError("the call's deadline passed");
+  if (context_.IsCancelled()) return absl::CancelledError("the caller gave up");
+  return absl::OkStatus();
+}
+
+SteadyTime Caller::wait_until(bool stream) const {
+  const SteadyTime now = steady_clock::now();
+  const SteadyTime usual = now + milliseconds(limits::kDefaultWaitMs);
+  const bool without_deadline = deadline_ - now > kNoDeadline / 2;
+  return stream || without_deadline ? std::min(usual, deadline_) : deadline_;
+}
+
+absl::Status Caller::check_scene(const std::string& scene) const {
+  const auto [begin, end] = context_.client_metadata().equal_range(kSceneMetadata);
+  for (auto entry = begin; entry != end; ++entry)
+    if (absl::string_view(entry->second.data(), entry->second.size()) != scene)
+      return refuse_argument(Reason::kMalformed, kSceneMetadata, {},
+                             "the metadata names another scene than the message; send the same name or leave it out");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field) {
+  if (absl::Status status = check_scene_name(name, field); !status.ok()) return status;
+  if (absl::Status status = caller.check_scene(name); !status.ok()) return status;
+  return caller.host().registry.find_scene(name);
+}
+
+absl::StatusOr<SnapshotPtr> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller) {
+  while (true) {
+    const SteadyTime slice = std::min(until, steady_clock::now() + kWaitSlice);
+    absl::StatusOr<SnapshotPtr> snapshot = scene.view(view, slice);
+    if (snapshot.status().code() != absl::StatusCode::kDeadlineExceeded || slice == until) return snapshot;
+    if (absl::Status status = caller.stop(); !status.ok()) return status;
+    if (caller.host().drain.draining()) return draining();
+  }
+}
+
+grpc::Status serve(Host& host, const grpc::ServerContextBase& context, absl::string_view rpc,
+                   const std::function<absl::Status(const Caller&)>& body, WhileDraining while_draining) {
+  const Gate::Pass pass = host.calls.enter();
+  absl::Status status;
+  if (!pass) {
+    status = refuse_full("", "calls", host.calls.max(), host.calls.max() + 1.0, kBusyRetryMs);
+  } else if (host.drain.draining() && while_draining == WhileDraining::kRefuse) {
+    status = draining();
+  } else {
+    status = body(Caller(host, context));
+  }
+  if (!status.ok()) log_refusal(rpc, status);
+  return to_grpc(status);
+}
+
+void log_refusal(absl::string_view rpc, const absl::Status& status) {
+  if (!logs(LogLevel::kDebug)) return;
+  log(LogLevel::kDebug, "refused",
+      {{"rpc", std::string(rpc)},
+       {"code", absl::StatusCodeToString(status.code())},
+       {"text", std::string(status.message())}});
+}
+
+}  // namespace locus::server

@@ -1,0 +1,65 @@
+// One call as the services see it: who calls, for how long, and whether it should still be answered. serve() is the
+// frame around every call that is not a stream: admission, the draining check, the error map and the log.
+//
+// Threads: a Caller may be asked from any thread for as long as the call lasts.
+#ifndef LOCUS_SERVER_SERVICE_CALL_H_
+#define LOCUS_SERVER_SERVICE_CALL_H_
+
+#include <grpcpp/server_context.h>
+
+#include <chrono>
+#include <functional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "core/scene/scene.h"
+#include "server/service/host.h"
+
+namespace locus::server {
+
+using SteadyTime = std::chrono::steady_clock::time_point;
+
+class Caller {
+ public:
+  Caller(const Host& host, const grpc::ServerContextBase& context);
+
+  // OK while the call should go on; else CANCELLED, DEADLINE_EXCEEDED, or DRAINING once the grace is used up.
+  absl::Status stop() const;
+
+  // Far in the future for a call without a deadline.
+  SteadyTime deadline() const { return deadline_; }
+  // How long this call may wait for a revision: until its deadline, or limits::kDefaultWaitMs for a call without one.
+  // On a stream that is the most for each message.
+  SteadyTime wait_until(bool stream) const;
+
+  // MALFORMED where the metadata `x-scene` is there and names another scene.
+  absl::Status check_scene(const std::string& scene) const;
+
+  const Host& host() const { return host_; }
+
+ private:
+  const Host& host_;
+  const grpc::ServerContextBase& context_;
+  SteadyTime deadline_;
+};
+
+// The name and x-scene checks of a call about one scene, and the scene.
+absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field);
+
+// The snapshot that `view` names, waited for until `until`. Wakes up at once when it is published or the scene is
+// deleted, and within a moment when the call ends or the server drains: then UNAVAILABLE, DRAINING.
+absl::StatusOr<SnapshotPtr> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
+
+enum class WhileDraining { kRefuse, kServe };
+
+// Runs `body` and turns what it returns into the call's status.
+grpc::Status serve(Host& host, const grpc::ServerContextBase& context, absl::string_view rpc,
+                   const std::function<absl::Status(const Caller&)>& body,
+                   WhileDraining while_draining = WhileDraining::kRefuse);
+
+// A line at debug for a refused call or message.
+void log_refusal(absl::string_view rpc, const absl::Status& status);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICE_CALL_H_

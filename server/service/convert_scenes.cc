@@ -1,0 +1,121 @@
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+#include "server/service/convert.h"
+#include "server/service/status.h"
+
+namespace locus::server {
+namespace {
+
+// Bounds of everything at one revision. Touches every object, so it is for descriptions only.
+Aabbd bounds_of_all(const SceneSnapshot& snapshot) {
+  Aabbd bounds = snapshot.statics->tree().bounds();
+  snapshot.objects.for_each([&bounds](Id, const Object& object) { bounds = merge(bounds, bounds_of(object.shape)); });
+  return bounds;
+}
+
+v1::SceneSpec to_proto(const SceneSpec& spec) {
+  v1::SceneSpec out;
+  for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
+  out.set_durability(v1::DURABILITY_MEMORY);
+  out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
+  return out;
+}
+
+absl::Status check_served(const v1::SceneSpec& spec) {
+  if (spec.history_ticks() != 0) return not_served("spec.history_ticks");
+  if (spec.history_bytes() != 0) return not_served("spec.history_bytes");
+  if (spec.idle_ttl_s() != 0) return not_served("spec.idle_ttl_s");
+  if (spec.durability() == v1::DURABILITY_LOCAL) return not_served("spec.durability");
+  if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
+  if (!v1::Winding_IsValid(spec.winding())) return unknown_enum("spec.winding", spec.winding());
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+Vec3d to_vec(const v1::Vec3d& vec) { return {vec.x(), vec.y(), vec.z()}; }
+
+v1::Vec3d to_proto(const Vec3d& vec) {
+  v1::Vec3d out;
+  out.set_x(vec.x);
+  out.set_y(vec.y);
+  out.set_z(vec.z);
+  return out;
+}
+
+View to_view(const v1::View& view) {
+  View out;
+  out.epoch = view.epoch();
+  if (view.revision_case() == v1::View::kAtLeast) {
+    out.kind = View::Kind::kAtLeast;
+    out.revision = view.at_least();
+  } else if (view.revision_case() == v1::View::kExactly) {
+    out.kind = View::Kind::kExactly;
+    out.revision = view.exactly();
+  }
+  return out;
+}
+
+absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field) {
+  if (labels.size() > limits::kMaxLabels)
+    return refuse_limit(field, "labels", limits::kMaxLabels, static_cast<double>(labels.size()));
+  for (const auto& [key, value] : labels) {
+    const size_t longest = std::max(key.size(), value.size());
+    if (longest > limits::kMaxLabelLength)
+      return refuse_limit(field, "label_length", limits::kMaxLabelLength, static_cast<double>(longest));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
+  if (absl::Status status = check_served(spec); !status.ok()) return status;
+  if (absl::Status status = check_labels(spec.labels(), "spec.labels"); !status.ok()) return status;
+  SceneSpec out;
+  out.labels.insert(spec.labels().begin(), spec.labels().end());
+  out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
+  return out;
+}
+
+v1::Scene to_proto(const Scene& scene) {
+  const SnapshotPtr snapshot = scene.latest();
+  const SceneStatus status = scene.status();
+  v1::Scene out;
+  out.set_name(scene.name());
+  *out.mutable_spec() = to_proto(scene.spec());
+  out.set_state(status.pending_changes > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
+  out.set_epoch(snapshot->epoch);
+  out.set_revision(snapshot->revision);
+  out.set_tick(snapshot->tick);
+  out.set_oldest_tick(snapshot->tick);
+  out.set_objects(snapshot->objects.size());
+  out.set_instances(snapshot->statics->size());
+  out.set_triangles(snapshot->statics->triangle_count());
+  out.set_memory_bytes(status.memory_bytes);
+  out.set_pending_changes(status.pending_changes);
+  out.set_last_build_error(status.last_build_error);
+  const Aabbd bounds = bounds_of_all(*snapshot);
+  if (!bounds.empty()) {
+    *out.mutable_min() = to_proto(bounds.min);
+    *out.mutable_max() = to_proto(bounds.max);
+  }
+  return out;
+}
+
+v1::Mesh to_proto(const Registry::NamedMesh& mesh) {
+  v1::Mesh out;
+  out.set_name(mesh.name);
+  const Sha256& sha256 = mesh.mesh->sha256();
+  out.set_sha256(sha256.data(), sha256.size());
+  out.set_triangles(mesh.mesh->mesh().triangle_count());
+  out.set_zero_area_triangles(mesh.mesh->mesh().zero_area_count());
+  out.set_bytes(mesh.mesh->bytes());
+  out.set_uses(mesh.uses);
+  for (const MeshPart& part : mesh.mesh->mesh().parts()) {
+    v1::MeshPart* out_part = out.add_parts();
+    out_part->set_name(part.name);
+    out_part->set_first_triangle(part.first_triangle);
+  }
+  return out;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,137 @@
+#include "server/service/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/config/listen_address.h"
+#include "server/service/host.h"
+#include "server/service/listening.h"
+#include "server/service/query_service.h"
+#include "server/service/scene_service.h"
+#include "server/service/server_service.h"
+#include "server/service/update_service.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+using std::chrono::system_clock;
+
+// gRPC's own threads, and calls that are being refused for want of room.
+constexpr int kSpareThreads = 64;
+// For statuses on their way and for health watchers, once no call is in work.
+constexpr milliseconds kLastWords{500};
+
+absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& config) {
+  std::vector<ListenAddress> addresses;
+  for (const std::string& text : config.listen) {
+    absl::StatusOr<ListenAddress> address = parse_listen_address(text);
+    if (!address.ok()) return address.status();
+    if (absl::Status status = check_free(*address); !status.ok())
+      return absl::Status(status.code(), absl::StrCat("cannot listen on ", text, ": ", status.message()));
+    addresses.push_back(*std::move(address));
+  }
+  return addresses;
+}
+
+// Before the first ServerBuilder of the process, once.
+void enable_extras() {
+  static const bool done = [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    return true;
+  }();
+  static_cast<void>(done);
+}
+
+void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
+  grpc::ResourceQuota quota("locusd");
+  const int calls = static_cast<int>(config.max_calls);
+  quota.SetMaxThreads(2 * calls + kSpareThreads);
+  builder.SetResourceQuota(quota);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
+  builder.SetMaxSendMessageSize(-1);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             static_cast<int>(config.max_streams) + calls + kSpareThreads);
+  // Two daemons on one port would share its calls at random; the second is to fail instead.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+}
+
+}  // namespace
+
+struct Server::Parts {
+  explicit Parts(const ServerConfig& config)
+      : host(config), server_service(host), scene_service(host), update_service(host), query_service(host) {}
+
+  std::vector<grpc::Service*> services() { return {&server_service, &scene_service, &update_service, &query_service}; }
+
+  Host host;
+  ServerService server_service;
+  SceneService scene_service;
+  UpdateService update_service;
+  QueryService query_service;
+  std::unique_ptr<grpc::Server> grpc;
+  bool ended = false;
+};
+
+Server::Server(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
+Server::~Server() {
+  if (!parts_->ended) drain(milliseconds(0));
+}
+
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config) {
+  const absl::StatusOr<std::vector<ListenAddress>> addresses = read_addresses(config);
+  if (!addresses.ok()) return addresses.status();
+  enable_extras();
+  auto parts = std::make_unique<Parts>(config);
+  grpc::ServerBuilder builder;
+  set_limits(config, builder);
+  std::vector<int> ports(addresses->size(), 0);
+  for (size_t i = 0; i < addresses->size(); ++i)
+    builder.AddListeningPort(config.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
+  for (grpc::Service* service : parts->services()) builder.RegisterService(service);
+  parts->grpc = builder.BuildAndStart();
+  if (parts->grpc == nullptr) {
+    parts->ended = true;
+    const size_t failed = static_cast<size_t>(std::find(ports.begin(), ports.end(), 0) - ports.begin());
+    if (failed == ports.size()) return absl::InternalError("gRPC could not start the server");
+    return absl::UnavailableError(
+        absl::StrCat("cannot listen on ", config.listen[failed], ": ", why_not((*addresses)[failed])));
+  }
+  std::unique_ptr<Server> server(new Server(std::move(parts)));
+  for (size_t i = 0; i < addresses->size(); ++i) {
+    const auto port = static_cast<uint16_t>(ports[i]);
+    server->addresses_.push_back(to_string((*addresses)[i], port));
+    const bool tcp = (*addresses)[i].kind == ListenAddress::Kind::kTcp;
+    if (tcp && server->port_ == 0) server->port_ = port;
+  }
+  grpc::HealthCheckServiceInterface* health = server->parts_->grpc->GetHealthCheckService();
+  for (const char* name :
+       {"locus.v1.ServerService", "locus.v1.SceneService", "locus.v1.UpdateService", "locus.v1.QueryService"})
+    health->SetServingStatus(name, true);
+  return server;
+}
+
+void Server::drain(milliseconds grace) {
+  const steady_clock::time_point deadline = steady_clock::now() + grace;
+  Host& host = parts_->host;
+  parts_->grpc->GetHealthCheckService()->SetServingStatus(false);
+  host.drain.begin();
+  const bool idle = host.streams.wait_until_idle(deadline) && host.calls.wait_until_empty(deadline);
+  host.drain.end();
+  parts_->grpc->Shutdown(system_clock::now() + (idle ? kLastWords : milliseconds(0)));
+  host.streams.join_all();
+  parts_->grpc->Wait();
+  parts_->ended = true;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,23 @@
+// ServerService: what this server is, what it serves, where its limits are.
+#ifndef LOCUS_SERVER_SERVICE_SERVER_SERVICE_H_
+#define LOCUS_SERVER_SERVICE_SERVER_SERVICE_H_
+
+#include "locus/v1/server_service.grpc.pb.h"
+#include "server/service/host.h"
+
+namespace locus::server {
+
+class ServerService final : public v1::ServerService::Service {
+ public:
+  explicit ServerService(Host& host) : host_(host) {}
+
+  grpc::Status GetServer(grpc::ServerContext* context, const v1::GetServerRequest* request,
+                         v1::GetServerResponse* response) override;
+
+ private:
+  Host& host_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICE_SERVER_SERVICE_H_

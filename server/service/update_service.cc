@@ -1,0 +1,43 @@
+#include "server/service/update_service.h"
+
+#include "server/service/call.h"
+#include "server/service/convert.h"
+#include "server/service/stream_loop.h"
+
+namespace locus::server {
+namespace {
+
+using Stream = BlockingStream<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse>;
+
+absl::Status apply(const Caller& caller, const std::string& name, const v1::UpdateBatch& batch, v1::UpdateAck* out) {
+  const absl::StatusOr<ScenePtr> scene = find_scene(caller, name, "scene");
+  if (!scene.ok()) return scene.status();
+  const absl::StatusOr<UpdateBatch> updates = to_updates(batch);
+  if (!updates.ok()) return updates.status();
+  const absl::StatusOr<UpdateAck> ack = (*scene)->apply(*updates);
+  if (!ack.ok()) return ack.status();
+  *out = to_proto(*ack);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+grpc::Status UpdateService::ApplyUpdates(grpc::ServerContext* context, const v1::ApplyUpdatesRequest* request,
+                                         v1::ApplyUpdatesResponse* response) {
+  return serve(host_, *context, "ApplyUpdates", [&](const Caller& caller) {
+    return apply(caller, request->scene(), request->batch(), response->mutable_ack());
+  });
+}
+
+RawReactor* UpdateService::StreamUpdates(grpc::CallbackServerContext* context) {
+  return Stream::open(host_, [this, context](Stream& stream) {
+    const Caller caller(host_, *context);
+    return answer_all(
+        stream, caller, "StreamUpdates",
+        [&caller](const std::string& scene, const v1::UpdateBatch& batch, v1::StreamUpdatesResponse* response) {
+          return apply(caller, scene, batch, response->mutable_ack());
+        });
+  });
+}
+
+}  // namespace locus::server
