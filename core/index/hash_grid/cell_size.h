@@ -2,10 +2,12 @@
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_
 
+#include <algorithm>
 #include <cstddef>
+#include <vector>
 
 #include "absl/types/span.h"
-#include "core/geometry/vec3.h"
+#include "core/geometry/primitive_traits.h"
 
 namespace locus::internal {
 
@@ -24,6 +26,22 @@ struct SampledValue {
 // fifty sorts of the sample. Pure.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
+// Every value whose turn it is in an even selection of about kCellSizeSample of `population`.
+class EvenSample {
+ public:
+  explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}
+  template <Bounded V>
+  void offer(const V& value) {
+    if (offered_++ % stride_ != 0) return;
+    values_.push_back({PrimitiveTraits<V>::position(value), max_component(PrimitiveTraits<V>::bounds(value).extent())});
+  }
+  absl::Span<const SampledValue> values() const { return values_; }
+
+ private:
+  size_t stride_;
+  size_t offered_ = 0;
+  std::vector<SampledValue> values_;
+};
 }  // namespace locus::internal
 
 #endif  // LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_
