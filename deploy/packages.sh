@@ -1,0 +1,79 @@
+#!/bin/sh
+# Installs the Debian packages that locus needs, as far as they are missing. Safe to run again: with everything there it
+# asks nothing of the network and needs no rights.
+set -eu
+
+usage() {
+  cat <<'TEXT'
+usage: deploy/packages.sh [--list|--check] SET...
+
+sets:
+  build   what configuring and building locusd and locus needs
+  test    what tests/run.sh needs on top of it
+  lint    what tests/run.sh --long needs on top of both
+
+  --list    print the names of the packages and do nothing
+  --check   print the names of the missing packages; exit 1 if there is one
+TEXT
+}
+
+# The compiler and what find_package and pkg-config look for.
+build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
+  libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libssl-dev"
+# binutils gives nm to the house test.
+test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils"
+lint_packages="clang-tidy"
+
+action=install
+packages=
+for argument in "$@"; do
+  case $argument in
+    build) packages="$packages $build_packages" ;;
+    test) packages="$packages $test_packages" ;;
+    lint) packages="$packages $lint_packages" ;;
+    --list) action=list ;;
+    --check) action=check ;;
+    -h | --help) usage; exit 0 ;;
+    *) echo "packages.sh: unknown argument '$argument'" >&2; usage >&2; exit 2 ;;
+  esac
+done
+if [ -z "$packages" ]; then
+  usage >&2
+  exit 2
+fi
+if [ "$action" = list ]; then
+  printf '%s\n' $packages
+  exit 0
+fi
+if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+  echo "packages.sh: this is no Debian system; install the counterparts of:" $packages >&2
+  exit 1
+fi
+
+missing=
+for package in $packages; do
+  status=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
+  case $status in
+    installed*) ;;
+    *) missing="$missing $package" ;;
+  esac
+done
+if [ -z "$missing" ]; then
+  exit 0
+fi
+if [ "$action" = check ]; then
+  printf '%s\n' $missing
+  exit 1
+fi
+
+if [ "$(id -u)" -eq 0 ]; then
+  as_root=
+elif command -v sudo >/dev/null; then
+  as_root=sudo
+else
+  echo "packages.sh: neither root nor sudo is at hand. As root, run: apt-get install --no-install-recommends$missing" >&2
+  exit 1
+fi
+echo "packages.sh: installing$missing"
+$as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q </dev/null
+$as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing </dev/null

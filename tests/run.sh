@@ -1,0 +1,94 @@
+#!/usr/bin/env bash
+# Installs what the tests need, builds, runs every suite and ends with one line: N passed, M failed, K skipped.
+#
+#   ./tests/run.sh                  release (everything), tsan (what has threads), asan (everything but the long ones)
+#   ./tests/run.sh --only asan      one suite: release, tsan or asan
+#   ./tests/run.sh --long           also the tests labelled long and clang-tidy
+#   ./tests/run.sh --jobs 8         compile and test with 8 jobs (default: one a processor)
+#
+# Exits 0 only if nothing failed. A suite that cannot be installed, configured or built counts as one failure.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+exec < /dev/null
+
+suites="release tsan asan"
+long=no
+jobs=$(nproc)
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --only) suites=${2-}; shift ;;
+    --jobs) jobs=${2-}; shift ;;
+    --long) long=yes ;;
+    -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    *) echo "run.sh: unknown option $1; see --help" >&2; exit 2 ;;
+  esac
+  shift || true
+done
+case "$suites" in
+  release | tsan | asan | "release tsan asan") ;;
+  *) echo "run.sh: --only takes release, tsan or asan, not '$suites'" >&2; exit 2 ;;
+esac
+case "$jobs" in
+  "" | 0 | *[!0-9]*) echo "run.sh: --jobs takes a number above zero, not '$jobs'" >&2; exit 2 ;;
+esac
+
+passed=0
+failed=0
+skipped=0
+problems=()
+started=$SECONDS
+
+say() { printf '\n== [%4d s] %s\n' $((SECONDS - started)) "$*"; }
+
+fail() {
+  failed=$((failed + 1))
+  problems+=("$*")
+}
+
+finish() {
+  say "summary"
+  for problem in ${problems[@]+"${problems[@]}"}; do echo "FAILED: $problem"; done
+  echo "$passed passed, $failed failed, $skipped skipped"
+  [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
+  exit
+}
+
+# Adds the results that ctest wrote to the sums.
+count_results() {
+  local suite=$1 kind name
+  while read -r kind name; do
+    case "$kind" in
+      passed) passed=$((passed + 1)) ;;
+      skipped) skipped=$((skipped + 1)) ;;
+      failed) fail "$suite: $name" ;;
+    esac
+  done < <(/usr/bin/python3 tests/house/read_results.py "build/$suite/results.xml" || echo "failed no readable results")
+}
+
+# GCC 12's ThreadSanitizer stops where the kernel randomises addresses over more bits than it knows of.
+steady_addresses=()
+if setarch "$(uname -m)" -R true 2> /dev/null; then steady_addresses=(setarch "$(uname -m)" -R); fi
+
+run_suite() {
+  local suite=$1 wrapper=() labels=(-LE long)
+  if [ "$suite" = tsan ]; then wrapper=(${steady_addresses[@]+"${steady_addresses[@]}"}); fi
+  if [ "$suite" = release ] && [ "$long" = yes ]; then labels=(); fi
+  say "$suite: configure"
+  cmake --preset "$suite" -DLOCUS_TESTS=ON || { fail "$suite: configure"; return; }
+  say "$suite: build"
+  cmake --build --preset "$suite" --parallel "$jobs" || { fail "$suite: build"; return; }
+  say "$suite: test"
+  rm -f "build/$suite/results.xml"
+  ${wrapper[@]+"${wrapper[@]}"} ctest --preset "$suite" ${labels[@]+"${labels[@]}"} --parallel "$jobs" --no-tests=error \
+    --output-junit "$PWD/build/$suite/results.xml" || echo "run.sh: ctest of $suite exited with $?"
+  count_results "$suite"
+}
+
+say "packages"
+sets=(build test)
+if [ "$long" = yes ]; then sets+=(lint); fi
+./deploy/packages.sh "${sets[@]}" || { fail "install packages"; finish; }
+
+export UBSAN_OPTIONS="print_stacktrace=1:${UBSAN_OPTIONS-}"
+for suite in $suites; do run_suite "$suite"; done
+finish
