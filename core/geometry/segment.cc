@@ -1,6 +1,7 @@
 #include "core/geometry/segment.h"
 
 #include <array>
+#include <limits>
 
 namespace locus {
 namespace {
@@ -28,18 +29,23 @@ std::array<double, 8> joints_of(Vec3d center, Vec3d half_axis, Vec3d half) {
   return joints;
 }
 
-// Where the parabola that holds between two joints is least, limited to them.
+// The least value of the parabola that holds between two joints, if it is taken between them, else infinity. It is the
+// distance of a line from a corner, edge or face, judged by a cross product and one division, exact where the result is
+// a small whole number.
 double least_between(double from, double to, Vec3d center, Vec3d half_axis, Vec3d half) {
-  const double middle = 0.5 * (from + to);
-  const Vec3d gap = gap_to_box(center + half_axis * middle, half);
-  double slope = 0, curvature = 0;
+  const Vec3d gap = gap_to_box(center + half_axis * (0.5 * (from + to)), half);
+  Vec3d base, along;  // of the line, in the coordinates that are outside the box
   for (int axis = 0; axis < 3; ++axis) {
     if (gap[axis] == 0) continue;
-    slope += half_axis[axis] * gap[axis];
-    curvature += half_axis[axis] * half_axis[axis];
+    base[axis] = center[axis] - std::copysign(half[axis], gap[axis]);
+    along[axis] = half_axis[axis];
   }
-  if (curvature == 0) return middle;
-  return std::min(std::max(middle - slope / curvature, from), to);
+  const double aa = squared_length(along);
+  if (aa == 0) return squared_length(base);
+  constexpr double kRounding = 1e-14;  // a minimum just at a joint must not fall between two parabolas
+  const double place = -dot(base, along) / aa;
+  if (place < from - kRounding || place > to + kRounding) return std::numeric_limits<double>::infinity();
+  return squared_length(cross(base, along)) / aa;
 }
 
 }  // namespace
@@ -74,12 +80,11 @@ bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half) {
 double squared_distance_segment_box(Vec3d center, Vec3d half_axis, Vec3d half) {
   if (segment_meets_box(center, half_axis, half)) return 0;
   const std::array<double, 8> joints = joints_of(center, half_axis, half);
-  double least = squared_length(gap_to_box(center, half));
+  double least = std::numeric_limits<double>::infinity();
   for (size_t i = 0; i < joints.size(); ++i) {
     least = std::min(least, squared_length(gap_to_box(center + half_axis * joints[i], half)));
     if (i + 1 == joints.size()) break;
-    const double s = least_between(joints[i], joints[i + 1], center, half_axis, half);
-    least = std::min(least, squared_length(gap_to_box(center + half_axis * s, half)));
+    least = std::min(least, least_between(joints[i], joints[i + 1], center, half_axis, half));
   }
   return least;
 }

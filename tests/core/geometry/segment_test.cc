@@ -59,6 +59,18 @@ TEST(SegmentTest, DistanceToTheSegmentIsExactForThreeFourFive) {
   EXPECT_EQ(squared_distance_to_segment({2, 2, 2}, {7, 7, 7}), 0);
 }
 
+// The nearest place on the segment is k / n of it, which is no binary number: the distance must be exact all the same.
+TEST(SegmentTest, DistanceOfAnObliqueSegmentToAnEdgeIsExact) {
+  for (int n = 3; n <= 49; n += 2) {
+    for (int k = 1 - n; k < n; ++k) {
+      const Vec3d half_axis = Vec3d{3, 4, 0} * double(n);
+      const Vec3d beside = Vec3d{-4, 3, 1} + Vec3d{3, 4, 0} * double(k);
+      EXPECT_EQ(squared_distance_segment_box(beside, half_axis, {0, 0, 5}), 25) << k << " of " << n;
+      EXPECT_EQ(squared_distance_segment_box(beside + Vec3d{-2, 2, 0}, half_axis, {2, 2, 5}), 25) << k << " of " << n;
+    }
+  }
+}
+
 TEST(SegmentTest, NearestPointIsOnTheSegment) {
   EXPECT_EQ(nearest_on_segment({5, 1, 2}, {2, 0, 0}), (Vec3d{2, 0, 0}));
   EXPECT_EQ(nearest_on_segment({-5, 1, 2}, {2, 0, 0}), (Vec3d{-2, 0, 0}));
