@@ -15,15 +15,17 @@ BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, uint64_t max_
       max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {}
 
 BlockResult BlockRunner::run(size_t begin, size_t end) {
-  if (const auto* lookup = std::get_if<LookupColumns>(&block_.kind); lookup != nullptr && !lookup->groups.empty())
-    groups_ = look_up_groups(task_, lookup->groups, overlap_options(block_, StaticDetail::kInstances));
   task_.check();
+  const auto* lookup = std::get_if<LookupColumns>(&block_.kind);
+  if (lookup != nullptr && !lookup->groups.empty() && !task_.ended())
+    groups_ = look_up_groups(task_, lookup->groups, overlap_options(block_, StaticDetail::kInstances));
   for (size_t i = begin; i < end; ++i) {
     std::visit([&](const auto& kind) { run_query(kind, i); }, block_.kind);
     if (!task_.ended()) continue;
     const auto query = static_cast<uint32_t>(i);
     if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
   }
+  task_.check();  // books what is not booked yet: many small pieces use up a budget like a large one
   result_.work = task_.work();
   return std::move(result_);
 }
@@ -70,8 +72,9 @@ void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
 }
 
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
-  if (!lookup.groups.empty()) return append_counted(groups_[i].rows, groups_[i].truncated, i, nullptr);
-  append_row(look_up(task_.snapshot(), lookup.ids[i]), columns_, result_);
+  if (lookup.groups.empty()) return append_row(look_up(task_.snapshot(), lookup.ids[i]), columns_, result_);
+  const OverlapAnswer& answer = groups_[lookup.groups[i]];
+  append_counted(answer.rows, answer.truncated, i, nullptr);
 }
 
 }  // namespace locus

@@ -29,7 +29,7 @@ class BlockRunner {
   const ColumnSet columns_;
   const uint64_t max_rows_;
   uint64_t rows_ = 0;
-  std::vector<OverlapAnswer> groups_;  // answers of a lookup of groups
+  absl::flat_hash_map<Group, OverlapAnswer> groups_;  // answers of a lookup of groups
   BlockResult result_;
 };
 

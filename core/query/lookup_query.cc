@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "absl/container/flat_hash_map.h"
-
 namespace locus {
 
 Hit look_up(const SceneSnapshot& snapshot, Id id) {
@@ -12,12 +10,13 @@ Hit look_up(const SceneSnapshot& snapshot, Id id) {
   return {};
 }
 
-std::vector<OverlapAnswer> look_up_groups(QueryTask& task, absl::Span<const uint64_t> groups,
-                                          const OverlapOptions& options) {
+absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, absl::Span<const uint64_t> groups,
+                                                         const OverlapOptions& options) {
   absl::flat_hash_map<Group, LowestRows> rows;
   for (const Group group : groups) rows.emplace(group, LowestRows(options.max_results, false));
   const auto offer = [&](const auto& item) {
-    if (item.id <= options.after_id || !task.count_test()) return;
+    ++task.work().tests;
+    if (!task.count_test() || item.id <= options.after_id) return;
     const auto wanted = rows.find(item.group);
     if (wanted != rows.end()) wanted->second.offer(hit_on(item, 0));
   };
@@ -25,10 +24,7 @@ std::vector<OverlapAnswer> look_up_groups(QueryTask& task, absl::Span<const uint
   task.snapshot().objects.for_each([&](Id, const Object& object) { offer(object); });
   absl::flat_hash_map<Group, OverlapAnswer> answers;
   for (auto& [group, lowest] : rows) answers.emplace(group, lowest.finish());
-  std::vector<OverlapAnswer> result;
-  result.reserve(groups.size());
-  for (const Group group : groups) result.push_back(answers.at(group));
-  return result;
+  return answers;
 }
 
 }  // namespace locus

@@ -2,8 +2,7 @@
 #ifndef LOCUS_CORE_QUERY_LOOKUP_QUERY_H_
 #define LOCUS_CORE_QUERY_LOOKUP_QUERY_H_
 
-#include <vector>
-
+#include "absl/container/flat_hash_map.h"
 #include "core/query/overlap_query.h"
 
 namespace locus {
@@ -11,9 +10,10 @@ namespace locus {
 // t is 0 where something has the id.
 Hit look_up(const SceneSnapshot& snapshot, Id id);
 
-// For each group its objects and instances, ascending by id. O(all objects and instances), once for all groups.
-std::vector<OverlapAnswer> look_up_groups(QueryTask& task, absl::Span<const uint64_t> groups,
-                                          const OverlapOptions& options);
+// For each group its objects and instances, ascending by id; once, however often it is asked. O(all objects and
+// instances) for all groups together.
+absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, absl::Span<const uint64_t> groups,
+                                                         const OverlapOptions& options);
 
 }  // namespace locus
 

@@ -51,8 +51,8 @@ class ObjectRows {
   Aabbd bounds() const { return region_.bounds(); }
   bool overlaps(const Aabbd& box) const { return region_.overlaps(box); }
   bool visit(const Object& object) {
-    if (object.id <= options_.after_id || !filter_.accepts(object)) return true;
     if (!task_.count_test()) return false;
+    if (object.id <= options_.after_id || !filter_.accepts(object)) return true;
     const bool found = options_.precision == Precision::kConservative
                            ? Kind::overlaps_bounds(shape_, bounds_of(object.shape))
                            : Kind::overlaps_object(shape_, object.shape);
@@ -95,20 +95,31 @@ class InstanceRows {
 template <class Kind>
 class ExactTriangles {
  public:
-  ExactTriangles(QueryTask& task, const typename Kind::Mesh& shape, InstanceRows rows)
-      : task_(task), shape_(shape), region_(shape), rows_(rows) {}
+  // `world_shape` is `shape` in world axes.
+  ExactTriangles(QueryTask& task, const typename Kind::Mesh& shape, const typename Kind::World& world_shape,
+                 const Instance& instance, InstanceRows rows)
+      : task_(task),
+        shape_(shape),
+        region_(shape),
+        world_shape_(world_shape),
+        placed_(instance, Kind::reach(world_shape)),
+        rows_(rows) {}
 
   Aabbf bounds() const { return region_.bounds(); }
   bool overlaps(const Aabbf& box) const { return region_.overlaps(box); }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
-    return !Kind::overlaps_triangle(shape_, triangle) || rows_.offer(triangle);
+    const bool found = Kind::overlaps_triangle(shape_, triangle) &&
+                       Kind::overlaps_bounds(world_shape_, placed_.bounds_of_triangle(triangle));
+    return !found || rows_.offer(triangle);
   }
 
  private:
   QueryTask& task_;
   const typename Kind::Mesh& shape_;
   typename Kind::MeshRegion region_;
+  const typename Kind::World& world_shape_;
+  PlacedTriangles placed_;
   InstanceRows rows_;
 };
 
@@ -143,6 +154,7 @@ class InstanceSearch {
   Aabbd bounds() const { return region_.bounds(); }
   bool overlaps(const Aabbd& box) const { return region_.overlaps(box); }
   bool visit(const Instance& instance) {
+    if (!task_.count_test()) return false;
     if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
     // Part of the verdict: the tree over instances may cull by it.
     if (!region_.overlaps(instance.bounds)) return true;
@@ -152,7 +164,7 @@ class InstanceSearch {
       task_.visit_region(instance.mesh->tree(), visitor);
     } else {
       const typename Kind::Mesh shape = Kind::to_mesh(shape_, instance.transform);
-      ExactTriangles<Kind> visitor(task_, shape, rows);
+      ExactTriangles<Kind> visitor(task_, shape, shape_, instance, rows);
       task_.visit_region(instance.mesh->tree(), visitor);
     }
     return !task_.ended();

@@ -1,5 +1,6 @@
-// World axis-aligned bounds of an instance's triangles: what decides where CONSERVATIVE is asked. Grown by a margin
-// that covers every rounding of the exact tests, the way into mesh axes included, so that EXACT never finds more.
+// World axis-aligned bounds of an instance's triangles: what decides where CONSERVATIVE is asked, and part of the
+// verdict where EXACT is, so that EXACT never finds more, not even where rounding is all that is left of a triangle.
+// Grown by a margin that covers every rounding of the exact tests, the way into mesh axes included.
 #ifndef LOCUS_CORE_QUERY_PLACED_TRIANGLE_H_
 #define LOCUS_CORE_QUERY_PLACED_TRIANGLE_H_
 
@@ -12,7 +13,7 @@ class PlacedTriangles {
   // `reach`: the largest coordinate or length of the query that the bounds will be held against; 0 where that test pads
   // by itself.
   explicit PlacedTriangles(const Instance& instance, double reach = 0)
-      : instance_(instance), margin_(kMargin * (magnitude(instance.bounds) + reach)) {}
+      : instance_(instance), margin_(kMargin * (magnitude(instance.bounds) + reach) + kPlacing * lever(instance)) {}
 
   const Instance& instance() const { return instance_; }
   Aabbf everything() const { return instance_.mesh->tree().bounds(); }
@@ -29,6 +30,14 @@ class PlacedTriangles {
 
  private:
   static constexpr double kMargin = 0x1p-21;
+  static constexpr double kPlacing = 0x1p-40;
+
+  // What the way from mesh axes rounds by, in units of double's precision: much, where a translation brings back a mesh
+  // that lies far from its own origin.
+  static double lever(const Instance& instance) {
+    return max_component(abs(instance.transform.translation)) +
+           double{instance.transform.scale} * magnitude(instance.mesh->mesh().bounds());
+  }
 
   const Instance& instance_;
   double margin_;

@@ -132,8 +132,8 @@ class BlockCheck {
   }
 
   absl::Status check_kind(const LookupColumns& lookup) const {
-    if (!lookup.ids.empty() && !lookup.groups.empty())
-      return refuse_argument(Reason::kColumnLength, name("lookup.groups"), {}, "give ids or groups, not both");
+    if (lookup.ids.empty() == lookup.groups.empty())
+      return refuse_argument(Reason::kMalformed, name("lookup"), {}, "give ids or groups, one of them");
     for (size_t i = 0; i < lookup.ids.size(); ++i)
       if (lookup.ids[i] == kNoId) return wrong(Reason::kOutOfRange, "lookup.ids", i, "0 is no id");
     for (size_t i = 0; i < lookup.groups.size(); ++i)

@@ -81,8 +81,8 @@ class ObjectVisitor {
   const SlabRay<double>& slabs() const { return ray_.slabs(); }
   double limit() const { return raised(collector_.limit()); }
   bool visit(const Object& object) {
-    if (!filter_.accepts(object)) return true;
     if (!task_.count_test()) return false;
+    if (!filter_.accepts(object)) return true;
     const std::optional<float> t = test(object);
     return !t || collector_.offer(hit_on(object, *t));
   }
@@ -105,17 +105,20 @@ class ObjectVisitor {
 // Triangles of one instance, exactly.
 class TriangleVisitor {
  public:
-  // `nearest`: no hit lies before it, where the ray enters the instance's bounds.
-  TriangleVisitor(QueryTask& task, const TriangleRay& ray, const Instance& instance, float nearest,
-                  HitCollector& collector)
-      : task_(task), ray_(ray), instance_(instance), nearest_(nearest), collector_(collector) {}
+  // `slabs`: of the same ray in world axes. `nearest`: no hit lies before it, where the ray enters the instance's
+  // bounds.
+  TriangleVisitor(QueryTask& task, const TriangleRay& ray, const SlabRay<double>& slabs, const Instance& instance,
+                  float nearest, HitCollector& collector)
+      : task_(task), ray_(ray), slabs_(slabs), placed_(instance), nearest_(nearest), collector_(collector) {}
 
   float limit() const { return ray_.to_scaled(collector_.limit()); }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
     const std::optional<TriangleHit> found = ray_.hit(triangle);
     if (!found) return true;
-    Hit hit = hit_on(instance_, std::max(ray_.from_scaled(found->t), nearest_));
+    const std::optional<float> entered = entry(slabs_, placed_.bounds_of_triangle(triangle));
+    if (!entered) return true;
+    Hit hit = hit_on(placed_.instance(), std::max(ray_.from_scaled(found->t), std::max(nearest_, *entered)));
     hit.triangle = triangle.number;
     return collector_.offer(hit);
   }
@@ -123,7 +126,8 @@ class TriangleVisitor {
  private:
   QueryTask& task_;
   const TriangleRay& ray_;
-  const Instance& instance_;
+  const SlabRay<double>& slabs_;
+  PlacedTriangles placed_;
   const float nearest_;
   HitCollector& collector_;
 };
@@ -169,6 +173,7 @@ class InstanceVisitor {
   const SlabRay<double>& slabs() const { return slabs_; }
   double limit() const { return raised(collector_.limit()); }
   bool visit(const Instance& instance) {
+    if (!task_.count_test()) return false;
     if (!filter_.accepts(instance)) return true;
     // Part of the verdict, and hits are no nearer: the tree over instances may cull by it.
     const std::optional<float> nearest = entry(slabs_, instance.bounds);
@@ -184,7 +189,7 @@ class InstanceVisitor {
   void visit_triangles(const Instance& instance, float nearest) {
     const TriangleRay ray(instance.transform.point_to_mesh(request_.origin),
                           instance.transform.direction_to_mesh(request_.direction), request_.cull);
-    TriangleVisitor visitor(task_, ray, instance, nearest, collector_);
+    TriangleVisitor visitor(task_, ray, slabs_, instance, nearest, collector_);
     task_.visit_ray(instance.mesh->tree(), ray.slabs(), visitor);
   }
   void visit_bounds(const Instance& instance, float nearest) {

@@ -1,0 +1,46 @@
+// Every column of every answer equals, bit for bit, that of a plain loop over all triangles and objects, and that of
+// the service's own brute force.
+#include <gtest/gtest.h>
+
+#include "tests/support/query_oracle.h"
+#include "tests/support/random_query.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+// What differs first; empty for nothing.
+std::string oracle_difference(const QueryScene& scene, const SceneSnapshot& snapshot) {
+  const QueryBatch batch = batch_of(scene.blocks);
+  if (const absl::Status status = check_batch(batch); !status.ok()) return status.ToString();
+  RunOptions brute_force;
+  brute_force.brute_force = true;
+  const auto got = run_batch(snapshot, batch, {});
+  const auto brute = run_batch(snapshot, batch, brute_force);
+  if (!got.ok() || !brute.ok()) return "a batch was refused";
+  if (std::string what = difference(*got, *brute); !what.empty()) return "brute force: " + what;
+  const QueryOracle oracle(snapshot);
+  for (size_t i = 0; i < batch.blocks.size(); ++i) {
+    const std::string what = difference(got->blocks[i], oracle.answer(batch.blocks[i]));
+    if (!what.empty()) return "oracle: block " + std::to_string(i) + ", " + what;
+  }
+  return "";
+}
+
+template <class Draw>
+void expect_no_difference(uint64_t first, uint64_t count, const Draw& draw) {
+  for (uint64_t seed = first; seed < first + count; ++seed) {
+    Random random(seed);
+    const QueryScene scene = query_scene(draw(seed, random), random);
+    ASSERT_EQ(oracle_difference(scene, *snapshot_of(scene.world)), "") << scene.world.name << ", seed " << seed;
+  }
+}
+
+TEST(QueryEqualsOracleTest, RandomScenesFirstHalf) { expect_no_difference(0, scaled_count(5'000), random_sketch); }
+
+TEST(QueryEqualsOracleTest, RandomScenesSecondHalf) { expect_no_difference(5'000, scaled_count(5'000), random_sketch); }
+
+TEST(QueryEqualsOracleTest, AdversarialScenes) { expect_no_difference(0, scaled_count(1'200), troublesome_sketch); }
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,141 @@
+// A block of queries that owns its columns, and what differs between two results. For tests of queries.
+#ifndef LOCUS_TESTS_SUPPORT_OWNED_BLOCK_H_
+#define LOCUS_TESTS_SUPPORT_OWNED_BLOCK_H_
+
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/check.h"
+#include "core/query/run_batch.h"
+
+namespace locus::test {
+
+// `settings` holds everything but columns; its kind says which of the columns below are meant.
+struct OwnedBlock {
+  QueryBlock settings;
+  std::vector<float> points;  // origins or centres
+  std::vector<float> sizes;   // directions, radii or half extents
+  std::vector<float> extras;  // t_max or rotations
+  std::vector<uint64_t> ids;  // of lookups
+  std::vector<uint64_t> groups;
+  std::vector<uint32_t> masks;
+  std::vector<uint64_t> ignore_groups;
+  std::vector<uint64_t> ignore_ids;
+
+  // Borrows from this.
+  QueryBlock view() const {
+    QueryBlock block = settings;
+    block.masks = masks;
+    block.ignore_groups = ignore_groups;
+    block.ignore_ids = ignore_ids;
+    std::visit([this](auto& kind) { fill(kind); }, block.kind);
+    return block;
+  }
+
+  // Queries begin to end (exclusive) alone. Columns with one entry for all stay as they are.
+  OwnedBlock part(size_t begin, size_t end) const {
+    const size_t n = query_count(view());
+    const auto width_of_sizes = std::holds_alternative<BallColumns>(settings.kind) ? size_t{1} : size_t{3};
+    const auto width_of_extras = std::holds_alternative<BoxColumns>(settings.kind) ? size_t{4} : size_t{1};
+    OwnedBlock part = *this;
+    cut(part.points, 3, n, begin, end);
+    cut(part.sizes, width_of_sizes, n, begin, end);
+    cut(part.extras, width_of_extras, n, begin, end);
+    cut(part.ids, 1, n, begin, end);
+    cut(part.groups, 1, n, begin, end);
+    cut(part.masks, 1, n, begin, end);
+    cut(part.ignore_groups, 1, n, begin, end);
+    return part;
+  }
+
+ private:
+  void fill(RayColumns& rays) const {
+    rays.origins = points;
+    rays.directions = sizes;
+    rays.t_max = extras;
+  }
+  void fill(BallColumns& balls) const {
+    balls.centers = points;
+    balls.radii = sizes;
+  }
+  void fill(BoxColumns& boxes) const {
+    boxes.centers = points;
+    boxes.half_extents = sizes;
+    boxes.rotations = extras;
+  }
+  void fill(LookupColumns& lookup) const {
+    lookup.ids = ids;
+    lookup.groups = groups;
+  }
+  template <class T>
+  static void cut(std::vector<T>& column, size_t width, size_t n, size_t begin, size_t end) {
+    if (column.size() != n * width || n == 1) return;
+    column = std::vector<T>(column.begin() + static_cast<std::ptrdiff_t>(begin * width),
+                            column.begin() + static_cast<std::ptrdiff_t>(end * width));
+  }
+};
+
+// Borrows from `blocks`.
+inline QueryBatch batch_of(const std::vector<OwnedBlock>& blocks) {
+  QueryBatch batch;
+  for (const OwnedBlock& block : blocks) batch.blocks.push_back(block.view());
+  return batch;
+}
+
+// `block` must be right.
+inline BlockResult run_block(const SceneSnapshot& snapshot, const OwnedBlock& block, const RunOptions& options = {}) {
+  QueryBatch batch;
+  batch.blocks = {block.view()};
+  LOCUS_CHECK_EQ(check_batch(batch).ToString(), "OK");
+  auto result = run_batch(snapshot, batch, options);
+  LOCUS_CHECK(result.ok());
+  return std::move(result->blocks[0]);
+}
+
+namespace internal {
+template <class Column>
+std::string column_difference(const char* name, const Column& got, const Column& expected) {
+  const std::string column = std::string(name) + " ";
+  if (got.size() != expected.size())
+    return column + "has " + std::to_string(got.size()) + " numbers, not " + std::to_string(expected.size());
+  for (size_t i = 0; i < got.size(); ++i) {
+    if (std::memcmp(&got[i], &expected[i], sizeof(got[i])) != 0)
+      return column + std::to_string(i) + ": " + std::to_string(got[i]) + ", not " + std::to_string(expected[i]);
+  }
+  return "";
+}
+}  // namespace internal
+
+// The first column, and the first number in it, that differ in any bit; empty when none does. Work apart.
+inline std::string difference(const BlockResult& got, const BlockResult& expected) {
+  using internal::column_difference;
+  for (std::string what :
+       {column_difference("counts", got.counts, expected.counts),
+        column_difference("truncated", got.truncated, expected.truncated),
+        column_difference("hits", got.hits, expected.hits), column_difference("ids", got.ids, expected.ids),
+        column_difference("triangles", got.triangles, expected.triangles), column_difference("t", got.t, expected.t),
+        column_difference("uvs", got.uvs, expected.uvs), column_difference("normals", got.normals, expected.normals),
+        column_difference("points", got.points, expected.points),
+        column_difference("groups", got.groups, expected.groups), column_difference("tags", got.tags, expected.tags),
+        column_difference("layers", got.layers, expected.layers),
+        column_difference("positions", got.positions, expected.positions),
+        column_difference("rotations", got.rotations, expected.rotations)}) {
+    if (!what.empty()) return what;
+  }
+  return "";
+}
+
+inline std::string difference(const BatchResult& got, const BatchResult& expected) {
+  if (got.blocks.size() != expected.blocks.size()) return "another number of blocks";
+  for (size_t i = 0; i < got.blocks.size(); ++i) {
+    const std::string what = difference(got.blocks[i], expected.blocks[i]);
+    if (!what.empty()) return "block " + std::to_string(i) + ", " + what;
+  }
+  return "";
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_OWNED_BLOCK_H_

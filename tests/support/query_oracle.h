@@ -1,0 +1,348 @@
+// Answers blocks of queries the slow and plain way: every object and every triangle, by the geometry's predicates, into
+// one list that is sorted and cut. Shares with core/query the definition of placed bounds and nothing else.
+#ifndef LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
+#define LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include "core/query/placed_triangle.h"
+#include "core/query/run_batch.h"
+
+namespace locus::test {
+
+class QueryOracle {
+ public:
+  explicit QueryOracle(const SceneSnapshot& snapshot) : clockwise_(snapshot.winding == Winding::kClockwise) {
+    for (const Instance& instance : snapshot.statics->tree().values()) {
+      instances_.push_back(&instance);
+      std::vector<uint32_t>& storage = storage_[instance.mesh.get()];
+      if (!storage.empty()) continue;
+      const auto values = instance.mesh->tree().values();
+      storage.resize(values.size());
+      for (uint32_t i = 0; i < values.size(); ++i) storage[values[i].number] = i;
+    }
+    snapshot.objects.for_each([this](Id, const Object& object) { objects_.push_back(&object); });
+  }
+
+  // Knows no limit of the reply's size.
+  BlockResult answer(const QueryBlock& block) const {
+    BlockResult result;
+    std::visit([&](const auto& kind) { answer_kind(block, kind, result); }, block.kind);
+    return result;
+  }
+
+ private:
+  struct Row {
+    float t = 0;
+    Id id = 0;
+    uint32_t triangle = kNoTriangle;
+    uint32_t storage = 0;
+    const Object* object = nullptr;
+    const Instance* instance = nullptr;
+    float u = 0, v = 0;
+    Vec3d normal;
+  };
+  using Rows = std::vector<Row>;
+
+  struct Question {  // of rays
+    Vec3d origin, direction;
+    float t_max;
+    Cull cull;
+    Inside inside;
+    bool conservative;
+  };
+
+  static float entry_of(double near) {
+    return near <= 0 ? 0.0f
+                     : static_cast<float>(std::min(near, static_cast<double>(std::numeric_limits<float>::max())));
+  }
+
+  static std::optional<float> entry_of(const SlabRay<double>& slabs, const Aabbd& bounds) {
+    const Interval<double> own = slabs.interval(bounds);
+    if (own.near <= own.far && own.far >= 0) return entry_of(own.near);
+    return std::nullopt;
+  }
+
+  static Vec3d point(const QueryBlock& block, absl::Span<const float> column, size_t i) {
+    return block.frame + Vec3d{column[3 * i], column[3 * i + 1], column[3 * i + 2]};
+  }
+  template <class T>
+  static T entry_for(absl::Span<const T> column, size_t i, T fallback) {
+    return column.empty() ? fallback : column[column.size() == 1 ? 0 : i];
+  }
+
+  template <class Item>
+  static bool wanted(const QueryBlock& block, size_t i, const Item& item) {
+    const uint32_t mask = entry_for(block.masks, i, 0xFFFFFFFFu);
+    const uint64_t group = entry_for(block.ignore_groups, i, uint64_t{0});
+    for (const uint64_t id : block.ignore_ids)
+      if (id == item.id) return false;
+    return (item.layers & mask) > 0 && (group == 0 || group != item.group);
+  }
+
+  void hits_on(const Instance& instance, const Question& question, Rows& rows) const {
+    const SlabRay<double> slabs(Rayd{question.origin, question.direction}, kInstancePad);
+    const std::optional<float> whole = entry_of(slabs, instance.bounds);
+    if (!whole) return;
+    const Transform& transform = instance.transform;
+    const TriangleRay ray(transform.point_to_mesh(question.origin), transform.direction_to_mesh(question.direction),
+                          question.cull);
+    const PlacedTriangles placed(instance);
+    for (uint32_t number = 0; number < instance.mesh->mesh().triangle_count(); ++number) {
+      const Triangle triangle = instance.mesh->mesh().triangle(number);
+      const std::optional<float> own = entry_of(slabs, placed.bounds_of_triangle(triangle));
+      if (!own) continue;
+      Row row{std::max(*own, *whole), instance.id, number, 0, nullptr, &instance, 0, 0, {}};
+      if (!question.conservative) {
+        const std::optional<TriangleHit> hit = ray.hit(triangle);
+        if (!hit) continue;
+        row.t = std::max(row.t, ray.from_scaled(hit->t));
+        row.u = hit->u;
+        row.v = hit->v;
+        row.normal = normalized(transform.rotation.to_world(area_normal(triangle)));
+        if (clockwise_) row.normal = -row.normal;
+      }
+      rows.push_back(row);
+    }
+  }
+
+  void hit_on(const Object& object, const Question& question, Rows& rows) const {
+    const ObjectRay ray(Rayd{question.origin, question.direction}, question.inside);
+    Row row{0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}};
+    if (question.conservative) {
+      const std::optional<float> t = entry_of(ray.slabs(), bounds_of(object.shape));
+      if (!t) return;
+      row.t = *t;
+    } else {
+      const std::optional<ShapeHit> hit = ray_hit(ray, object.shape);
+      if (!hit) return;
+      row.t = entry_of(hit->t);
+      row.normal = hit->normal;
+    }
+    rows.push_back(row);
+  }
+
+  Question question_of(const QueryBlock& block, const RayColumns& rays, size_t i) const {
+    const size_t d = rays.directions.size() == 3 ? 0 : 3 * i;
+    Question question{point(block, rays.origins, i),
+                      {rays.directions[d], rays.directions[d + 1], rays.directions[d + 2]},
+                      entry_for(rays.t_max, i, std::numeric_limits<float>::infinity()),
+                      rays.cull,
+                      rays.inside,
+                      block.precision == Precision::kConservative};
+    if (clockwise_ && rays.cull == Cull::kBack) question.cull = Cull::kFront;
+    if (clockwise_ && rays.cull == Cull::kFront) question.cull = Cull::kBack;
+    return question;
+  }
+
+  Rows ray_rows(const QueryBlock& block, const Question& question, size_t i) const {
+    Rows rows;
+    if (block.source != Source::kDynamic)
+      for (const Instance* instance : instances_)
+        if (wanted(block, i, *instance)) hits_on(*instance, question, rows);
+    if (block.source != Source::kStatic)
+      for (const Object* object : objects_)
+        if (wanted(block, i, *object)) hit_on(*object, question, rows);
+    std::erase_if(rows, [&](const Row& row) { return row.t > question.t_max; });
+    std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+      return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
+    });
+    return rows;
+  }
+
+  void answer_kind(const QueryBlock& block, const RayColumns& rays, BlockResult& result) const {
+    for (size_t i = 0; i < rays.origins.size() / 3; ++i) {
+      const Question question = question_of(block, rays, i);
+      Rows rows = ray_rows(block, question, i);
+      if (rays.mode == RayMode::kAny) {
+        result.hits.push_back(rows.empty() ? '\0' : '\1');
+        continue;
+      }
+      if (rays.mode == RayMode::kAll) {
+        count(block, rows, i, result);
+      } else {
+        rows.resize(1, Row{std::numeric_limits<float>::infinity(), 0, kNoTriangle, 0, nullptr, nullptr, 0, 0, {}});
+      }
+      for (const Row& row : rows) {
+        write(row, block, result);
+        write_surface(row, block, question, result);
+      }
+    }
+  }
+
+  static bool meets(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
+  static bool meets(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
+  static bool meets(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
+  static bool meets(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
+  static bool meets(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
+  static bool meets(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
+  static Ballf in_mesh(const Balld& ball, const Transform& transform) {
+    return {to_float(transform.point_to_mesh(ball.center)), static_cast<float>(ball.radius / transform.scale)};
+  }
+  static Obbf in_mesh(const Obbd& box, const Transform& transform) {
+    return {to_float(transform.point_to_mesh(box.center)), to_float(box.half * (1.0 / transform.scale)),
+            compose(inverse(transform.rotation), box.rotation)};
+  }
+  static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
+  static double reach(const Obbd& box) { return max_component(abs(box.center)) + 2 * max_component(box.half); }
+
+  template <class Solid>
+  void overlap_rows(const QueryBlock& block, StaticDetail detail, const Solid& solid, const Instance& instance,
+                    Rows& rows) const {
+    if (!meets(solid, instance.bounds)) return;
+    const PlacedTriangles placed(instance, reach(solid));
+    const auto mesh_solid = in_mesh(solid, instance.transform);
+    const std::vector<uint32_t>& storage = storage_.at(instance.mesh.get());
+    for (uint32_t number = 0; number < instance.mesh->mesh().triangle_count(); ++number) {
+      const Triangle triangle = instance.mesh->mesh().triangle(number);
+      if (!meets(solid, placed.bounds_of_triangle(triangle))) continue;
+      if (block.precision == Precision::kExact && !meets(mesh_solid, triangle)) continue;
+      Row row{0, instance.id, kNoTriangle, 0, nullptr, &instance, 0, 0, {}};
+      if (detail != StaticDetail::kInstances) row.triangle = number;
+      if (detail == StaticDetail::kTriangles) row.storage = storage[number];
+      rows.push_back(row);
+      if (detail == StaticDetail::kInstances) return;
+    }
+  }
+
+  template <class Solid>
+  void answer_overlap(const QueryBlock& block, StaticDetail detail, const Solid& solid, size_t i,
+                      BlockResult& result) const {
+    Rows rows;
+    for (const Instance* instance : instances_)
+      if (block.source != Source::kDynamic && instance->id > block.after_id && wanted(block, i, *instance))
+        overlap_rows(block, detail, solid, *instance, rows);
+    for (const Object* object : objects_) {
+      if (block.source == Source::kStatic || object->id <= block.after_id || !wanted(block, i, *object)) continue;
+      if (!meets(solid, bounds_of(object->shape))) continue;
+      if (block.precision == Precision::kExact && !meets(solid, object->shape)) continue;
+      rows.push_back({0, object->id, kNoTriangle, 0, object, nullptr, 0, 0, {}});
+    }
+    std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+      return std::tie(a.id, a.storage, a.triangle) < std::tie(b.id, b.storage, b.triangle);
+    });
+    count(block, rows, i, result);
+    for (const Row& row : rows) write(row, block, result);
+  }
+
+  void answer_kind(const QueryBlock& block, const BallColumns& balls, BlockResult& result) const {
+    for (size_t i = 0; i < balls.centers.size() / 3; ++i) {
+      const Balld ball{point(block, balls.centers, i), entry_for(balls.radii, i, 0.0f)};
+      answer_overlap(block, balls.detail, ball, i, result);
+    }
+  }
+
+  void answer_kind(const QueryBlock& block, const BoxColumns& boxes, BlockResult& result) const {
+    for (size_t i = 0; i < boxes.centers.size() / 3; ++i) {
+      const float* h = &boxes.half_extents[boxes.half_extents.size() == 3 ? 0 : 3 * i];
+      Obbd box{point(block, boxes.centers, i), {h[0], h[1], h[2]}, {}};
+      if (!boxes.rotations.empty()) {
+        const float* q = &boxes.rotations[boxes.rotations.size() == 4 ? 0 : 4 * i];
+        box.rotation = rotation_of({q[0], q[1], q[2], q[3]});
+      }
+      answer_overlap(block, boxes.detail, box, i, result);
+    }
+  }
+
+  void answer_kind(const QueryBlock& block, const LookupColumns& lookup, BlockResult& result) const {
+    const auto rows_of = [&](const auto& wants) {
+      Rows rows;
+      for (const Instance* instance : instances_)
+        if (wants(*instance)) rows.push_back({0, instance->id, kNoTriangle, 0, nullptr, instance, 0, 0, {}});
+      for (const Object* object : objects_)
+        if (wants(*object)) rows.push_back({0, object->id, kNoTriangle, 0, object, nullptr, 0, 0, {}});
+      std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.id < b.id; });
+      return rows;
+    };
+    for (const uint64_t id : lookup.ids) {
+      Rows rows = rows_of([id](const auto& item) { return item.id == id; });
+      rows.resize(1);
+      write(rows[0], block, result);
+    }
+    for (size_t i = 0; i < lookup.groups.size(); ++i) {
+      const uint64_t group = lookup.groups[i];
+      Rows rows = rows_of([&](const auto& item) { return item.group == group && item.id > block.after_id; });
+      count(block, rows, i, result);
+      for (const Row& row : rows) write(row, block, result);
+    }
+  }
+
+  static void count(const QueryBlock& block, Rows& rows, size_t i, BlockResult& result) {
+    const size_t most = block.max_results == 0 ? 1024 : block.max_results;
+    if (rows.size() > most) {
+      rows.resize(most);
+      result.truncated.push_back(static_cast<uint32_t>(i));
+    }
+    result.counts.push_back(static_cast<uint32_t>(rows.size()));
+  }
+
+  struct Defaults {
+    ColumnSet operator()(const RayColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
+    ColumnSet operator()(const BallColumns& balls) const { return of(balls.detail); }
+    ColumnSet operator()(const BoxColumns& boxes) const { return of(boxes.detail); }
+    ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
+    static ColumnSet of(StaticDetail detail) {
+      return detail == StaticDetail::kInstances ? ColumnSet{Column::kId} : ColumnSet{Column::kId, Column::kTriangle};
+    }
+  };
+  static ColumnSet columns_of(const QueryBlock& block) {
+    return block.columns.empty() ? std::visit(Defaults(), block.kind) : block.columns;
+  }
+
+  template <class Item>
+  static void write_labels(const Item& item, ColumnSet columns, BlockResult& result) {
+    if (columns.has(Column::kGroup)) result.groups.push_back(item.group);
+    if (columns.has(Column::kTag)) result.tags.push_back(item.tag);
+    if (columns.has(Column::kLayers)) result.layers.push_back(item.layers);
+  }
+
+  static void write(const Row& row, const QueryBlock& block, BlockResult& result) {
+    const ColumnSet columns = columns_of(block);
+    if (columns.has(Column::kT)) result.t.push_back(row.t);
+    if (columns.has(Column::kId)) result.ids.push_back(row.id);
+    if (columns.has(Column::kTriangle)) result.triangles.push_back(row.triangle);
+    Vec3d position;
+    Quaternion rotation{0, 0, 0, 0};
+    if (row.object != nullptr) {
+      write_labels(*row.object, columns, result);
+      position = row.object->shape.position;
+      rotation = row.object->shape.rotation;
+    } else if (row.instance != nullptr) {
+      write_labels(*row.instance, columns, result);
+      position = row.instance->transform.translation;
+      rotation = row.instance->transform.quaternion;
+    } else {
+      Object nothing;
+      nothing.layers = 0;
+      write_labels(nothing, columns, result);
+    }
+    if (!columns.has(Column::kPose)) return;
+    result.positions.insert(result.positions.end(), {position.x, position.y, position.z});
+    result.rotations.insert(result.rotations.end(), {rotation.x, rotation.y, rotation.z, rotation.w});
+  }
+
+  static void write_surface(const Row& row, const QueryBlock& block, const Question& question, BlockResult& result) {
+    const ColumnSet columns = columns_of(block);
+    if (columns.has(Column::kUv)) result.uvs.insert(result.uvs.end(), {row.u, row.v});
+    if (columns.has(Column::kNormal)) write_vector(to_float(row.normal), result.normals);
+    if (!columns.has(Column::kPoint)) return;
+    const Vec3d place = question.origin - block.frame + question.direction * double{row.t};
+    write_vector(row.id == 0 ? Vec3f{} : to_float(place), result.points);
+  }
+
+  static void write_vector(Vec3f v, std::vector<float>& column) { column.insert(column.end(), {v.x, v.y, v.z}); }
+
+  const bool clockwise_;
+  std::vector<const Instance*> instances_;
+  std::vector<const Object*> objects_;
+  std::map<const StaticMesh*, std::vector<uint32_t>> storage_;
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_

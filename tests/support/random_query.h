@@ -1,0 +1,250 @@
+// Random worlds of instances and objects, and random batches of queries about them, made from the sketches of
+// adversarial_scenes.h and grid_scenes.h: what troubles a structure alone troubles all of them together.
+#ifndef LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
+#define LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
+
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/support/grid_scenes.h"
+#include "tests/support/owned_block.h"
+#include "tests/support/query_world.h"
+#include "tests/support/scene_sketch.h"
+
+namespace locus::test {
+
+struct QueryScene {
+  QueryWorld world;
+  std::vector<OwnedBlock> blocks;
+};
+
+namespace internal {
+
+inline Layers random_layers(Random& random) {
+  constexpr Layers kLayers[] = {1, 1, 1, 2, 3, 0, 0x80000000u, 0xFFFFFFFFu};
+  return random.pick(kLayers);
+}
+
+// Near the sketch: where its vertices lie, turned and scaled, possibly far from the mesh's own origin.
+inline PlacedMesh random_placement(Vec3d near, Random& random) {
+  PlacedMesh placed;
+  if (random.chance(0.4)) return placed;
+  placed.translation = near;
+  if (random.chance(0.15)) placed.translation = near + random.vector(1e6);
+  if (random.chance(0.6)) placed.rotation = random.rotation();
+  if (random.chance(0.5)) placed.scale = static_cast<float>(random.magnitude(-10, 10));
+  return placed;
+}
+
+// `triangles` in mesh axes, so that they stand where they were, unless
+// that is outside what a mesh may hold.
+inline std::vector<Triangle> in_mesh_axes(const std::vector<Triangle>& triangles, const PlacedMesh& placed) {
+  const Transform transform = make_transform(placed.translation, placed.rotation, placed.scale);
+  constexpr Vec3d kEdge = {limits::kMaxCoordinate, limits::kMaxCoordinate, limits::kMaxCoordinate};
+  const auto local = [&](Vec3f v) { return to_float(max(min(transform.point_to_mesh(to_double(v)), kEdge), -kEdge)); };
+  std::vector<Triangle> result;
+  for (const Triangle& t : triangles) result.push_back({local(t.a), local(t.b), local(t.c), t.number});
+  return result;
+}
+
+inline void add_instances(const SceneSketch& sketch, Random& random, QueryWorld& world) {
+  for (uint64_t meshes = random.below(3); meshes > 0; --meshes) {
+    SceneSketch part{sketch.family, {}, {}, {}, {}};
+    for (const Placement& placement : sketch.placements)
+      if (random.chance(0.5)) part.placements.push_back(placement);
+    const auto scene = make_scene<Triangle>(part, random);
+    if (scene.values.empty()) continue;
+    const PlacedMesh first = random_placement(sketch.placements[0].center, random);
+    const StaticMeshPtr mesh = mesh_of(in_mesh_axes(scene.values, first));
+    for (uint64_t copy = random.below(4); copy < 4; ++copy) {
+      PlacedMesh placed = random.chance(0.4) ? random_placement(sketch.placements[0].center, random) : first;
+      placed.mesh = mesh;
+      if (random.chance(0.3)) placed.translation = placed.translation + random.whole_vector(2);
+      if (max_component(abs(placed.translation)) <= limits::kMaxCoordinate) world.instances.push_back(placed);
+    }
+  }
+  std::erase_if(world.instances, [](const PlacedMesh& placed) {
+    const Transform transform = make_transform(placed.translation, placed.rotation, placed.scale);
+    return magnitude(bounds_to_world(transform, placed.mesh->mesh().bounds())) > 1.9e9;
+  });
+}
+
+inline void add_objects(const SceneSketch& sketch, Random& random, QueryWorld& world) {
+  SceneSketch part{sketch.family, {}, {}, {}, {}};
+  for (const Placement& placement : sketch.placements)
+    if (max_component(placement.half) <= limits::kMaxCoordinate && random.chance(0.7))
+      part.placements.push_back(placement);
+  world.objects = make_scene<Object>(part, random).values;
+}
+
+// One shuffled run of ids over both, some with bit 63.
+inline void label(Random& random, QueryWorld& world) {
+  const std::vector<uint32_t> ids = shuffled_ids(world.instances.size() + world.objects.size(), random);
+  size_t next = 0;
+  const auto label_one = [&](auto& item) {
+    const uint32_t number = ids[next++];
+    item.id = number % 5 == 0 ? kChosenIdBit | number : number;
+    item.group = random.below(4);
+    item.tag = random.next();
+    item.layers = random_layers(random);
+  };
+  for (PlacedMesh& placed : world.instances) label_one(placed);
+  for (Object& object : world.objects) label_one(object);
+}
+
+inline void append(std::vector<float>& column, Vec3f v) { column.insert(column.end(), {v.x, v.y, v.z}); }
+
+// Offsets from the frame, kept inside the world.
+inline void append_point(OwnedBlock& block, Vec3d world) {
+  Vec3d clamped = world;
+  for (int axis = 0; axis < 3; ++axis)
+    clamped[axis] = std::min(std::max(world[axis], -limits::kMaxCoordinate), limits::kMaxCoordinate);
+  Vec3f offset = to_float(clamped - block.settings.frame);
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(block.settings.frame[axis] + double{offset[axis]}) > limits::kMaxCoordinate)
+      offset[axis] = std::nextafter(offset[axis], 0.0f);
+  append(block.points, offset);
+}
+
+inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& block) {
+  const size_t n = block.points.size() / 3;
+  QueryBlock& settings = block.settings;
+  settings.source = random.chance(0.6) ? Source::kBoth : random.chance(0.5) ? Source::kStatic : Source::kDynamic;
+  settings.precision = random.chance(0.3) ? Precision::kConservative : Precision::kExact;
+  if (random.chance(0.4)) settings.max_results = static_cast<uint32_t>(random.whole(1, 5));
+  if (random.chance(0.15)) settings.after_id = random.below(20);
+  const auto entries = [&] { return random.chance(0.5) ? n : size_t{1}; };
+  if (random.chance(0.3))
+    for (size_t i = entries(); i > 0; --i) block.masks.push_back(random_layers(random));
+  if (random.chance(0.3))
+    for (size_t i = entries(); i > 0; --i) block.ignore_groups.push_back(random.below(5));
+  if (random.chance(0.2) && !scene.world.objects.empty())
+    for (int i = 0; i < 3; ++i) block.ignore_ids.push_back(random.pick(scene.world.objects).id);
+}
+
+template <size_t kCount>
+void add_columns(const Column (&served)[kCount], Random& random, OwnedBlock& block) {
+  if (random.chance(0.3)) return;
+  for (const Column column : served)
+    if (random.chance(0.6)) block.settings.columns.add(column);
+}
+
+inline constexpr Column kRayColumns[] = {Column::kT,      Column::kId,    Column::kTriangle, Column::kUv,
+                                         Column::kNormal, Column::kPoint, Column::kGroup,    Column::kTag,
+                                         Column::kLayers, Column::kPose};
+inline constexpr Column kOverlapColumns[] = {Column::kId,  Column::kTriangle, Column::kGroup,
+                                             Column::kTag, Column::kLayers,   Column::kPose};
+inline constexpr Column kLookupColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+
+inline OwnedBlock block_at(const SceneSketch& sketch, Random& random) {
+  OwnedBlock block;
+  if (random.chance(0.5)) block.settings.frame = notable_point(sketch, random);
+  for (int axis = 0; axis < 3; ++axis) {
+    double& x = block.settings.frame[axis];
+    x = std::min(std::max(x, -limits::kMaxCoordinate), limits::kMaxCoordinate);
+  }
+  return block;
+}
+
+inline OwnedBlock ray_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  constexpr RayMode kModes[] = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};
+  constexpr Cull kCulls[] = {Cull::kNone, Cull::kNone, Cull::kBack, Cull::kFront};
+  constexpr Inside kInsides[] = {Inside::kSolid, Inside::kSolid, Inside::kHollow, Inside::kSkip};
+  RayColumns rays;
+  rays.mode = random.pick(kModes);
+  rays.cull = random.pick(kCulls);
+  rays.inside = random.pick(kInsides);
+  block.settings.kind = rays;
+  for (const Rayd& ray : sketch.rays) {
+    const Vec3f direction = to_float(ray.direction);
+    if (direction == Vec3f{} || !is_finite(direction)) continue;
+    append_point(block, ray.origin);
+    append(block.sizes, direction);
+  }
+  if (random.chance(0.4)) {
+    constexpr float kEnds[] = {0, 1, 0.5f, 2, 3, 1e-3f, 1e30f, std::numeric_limits<float>::infinity()};
+    for (size_t i = random.chance(0.5) ? 1 : block.points.size() / 3; i > 0; --i)
+      block.extras.push_back(random.pick(kEnds));
+  }
+  add_common(scene, random, block);
+  if (rays.mode != RayMode::kAny) add_columns(kRayColumns, random, block);
+  return block;
+}
+
+inline StaticDetail random_detail(Random& random) {
+  constexpr StaticDetail kDetails[] = {StaticDetail::kInstances, StaticDetail::kTriangles,
+                                       StaticDetail::kTrianglesSorted};
+  return random.pick(kDetails);
+}
+
+inline OwnedBlock ball_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  block.settings.kind = BallColumns{{}, {}, random_detail(random)};
+  for (const Balld& ball : sketch.balls) {
+    append_point(block, ball.center);
+    block.sizes.push_back(static_cast<float>(std::min(ball.radius, 1e9)));
+  }
+  add_common(scene, random, block);
+  add_columns(kOverlapColumns, random, block);
+  return block;
+}
+
+inline OwnedBlock box_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  block.settings.kind = BoxColumns{{}, {}, {}, random_detail(random)};
+  const bool turned = random.chance(0.5);
+  for (const Obbd& box : sketch.boxes) {
+    append_point(block, box.center);
+    append(block.sizes, to_float(min(box.half, Vec3d{1e9, 1e9, 1e9})));
+    const Quaternion q = random.rotation();
+    if (turned) block.extras.insert(block.extras.end(), {q.x, q.y, q.z, q.w});
+  }
+  add_common(scene, random, block);
+  add_columns(kOverlapColumns, random, block);
+  return block;
+}
+
+inline OwnedBlock lookup_block(const QueryScene& scene, Random& random) {
+  OwnedBlock block;
+  block.settings.kind = LookupColumns{};
+  if (random.chance(0.5)) {
+    for (int i = 0; i < 3; ++i) block.groups.push_back(1 + random.below(4));
+  } else {
+    block.ids = {1 + random.below(100), 1 + random.below(10), kChosenIdBit | 5u};
+  }
+  add_common(scene, random, block);
+  block.masks.clear();
+  block.ignore_groups.clear();
+  add_columns(kLookupColumns, random, block);
+  return block;
+}
+
+}  // namespace internal
+
+inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
+  QueryScene scene;
+  scene.world.name = sketch.family;
+  scene.world.winding = random.chance(0.3) ? Winding::kClockwise : Winding::kCounterClockwise;
+  internal::add_instances(sketch, random, scene.world);
+  internal::add_objects(sketch, random, scene.world);
+  internal::label(random, scene.world);
+  for (int i = 0; i < 3; ++i) scene.blocks.push_back(internal::ray_block(scene, sketch, random));
+  if (!sketch.balls.empty()) scene.blocks.push_back(internal::ball_block(scene, sketch, random));
+  if (!sketch.boxes.empty()) scene.blocks.push_back(internal::box_block(scene, sketch, random));
+  scene.blocks.push_back(internal::lookup_block(scene, random));
+  return scene;
+}
+
+inline SceneSketch random_sketch(uint64_t, Random& random) { return random_scene(random); }
+
+// Families made against trees and against grids take turns.
+inline SceneSketch troublesome_sketch(uint64_t seed, Random& random) {
+  return seed % 3 == 0 ? grid_scene(seed / 3, random) : adversarial_scene(seed, random);
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
