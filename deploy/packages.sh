@@ -1,6 +1,7 @@
 #!/bin/sh
 # Installs the Debian packages that locus needs, as far as they are missing. Safe to run again: with everything there it
 # asks nothing of the network and needs no rights.
+# shellcheck disable=SC2086  # lists of package names are meant to be split
 set -eu
 
 usage() {

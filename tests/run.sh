@@ -8,7 +8,7 @@
 #
 # Exits 0 only if nothing failed. A suite that cannot be installed, configured or built counts as one failure.
 set -uo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/.." || exit
 exec < /dev/null
 
 suites="release tsan asan"

@@ -13,9 +13,7 @@ namespace {
 // Answers what differs first, empty for nothing.
 using Comparison = std::string (*)();
 
-std::string compare_trees_with_list() {
-  return search_all_scenes<Triangle>(200, 200, tree_difference<Triangle>);
-}
+std::string compare_trees_with_list() { return search_all_scenes<Triangle>(200, 200, tree_difference<Triangle>); }
 
 std::string compare_grids_with_list() {
   return search_grid_scenes(scaled_count(400), any_adversarial_scene, grid_difference);

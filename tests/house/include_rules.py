@@ -1,0 +1,205 @@
+"""Who may include whom: rooms, third-party headers and cycles."""
+import posixpath
+import re
+
+from source_tree import includes, quoted_includes
+
+CORE_ROOMS = ("core/base", "core/geometry", "core/mesh", "core/index", "core/scene", "core/query")
+INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid")
+
+# A folder's sources may include their own folder and these. A name without a final "/*" means that folder alone, with it
+# the folders below it too. "proto" stands for what is generated from the protocol.
+ALLOWED = {
+    "core/base": [],
+    "core/geometry": ["core/base"],
+    "core/mesh": ["core/geometry", "core/base"],
+    "core/index": ["core/geometry", "core/base"],
+    "core/scene": ["core/index/*", "core/mesh", "core/geometry", "core/base"],
+    "core/query": ["core/scene", "core/index/*", "core/geometry", "core/base"],
+    "server": ["server/*", "core/*"],
+    "server/service": ["server/scheduling", "server/storage", "server/security", "server/observability", "server/config",
+                       "core/*", "proto"],
+    "server/scheduling": ["core/*", "server/config"],
+    "server/storage": ["core/*"],
+    "server/security": ["server/config", "core/base"],
+    "server/observability": ["server/config", "core/base"],
+    "server/config": ["core/base"],
+    "client/lib": ["proto"],
+    "client/cli": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
+    "client/cli/import": ["client/cli/import/*", "core/geometry", "core/base"],
+    "client/cli/import/quake": ["client/cli/import", "core/geometry", "core/base"],
+    "client/cli/generate": ["client/cli/import", "core/geometry", "core/base"],
+}
+ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
+
+# Third-party headers by the start of their names, and the folders (with those below) that may see them. Tests may see all.
+THIRD_PARTY = {
+    "grpc": ["server/service", "server/observability", "client/lib"],
+    "google/protobuf/": ["server/service", "client/lib"],
+    "spdlog/": ["server/observability"],
+    "CLI/": ["server/config", "client/cli"],
+    "nlohmann/": ["client/cli"],
+    "assimp/": ["client/cli/import"],
+    "zip.h": ["client/cli/import"],
+    "openssl/": ["server/service", "server/security", "client/lib"],
+}
+FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
+CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/scene\.(h|cc)")
+
+# A folder and the folder that holds it, where both are one room that was divided for its size only.
+ONE_ROOM = {"client/cli/import/quake": "client/cli/import"}
+
+
+def room_of_include(target):
+    """The folder that an include names, or None for Abseil and other libraries."""
+    if target.startswith("locus/v1/"):
+        return "proto"
+    top = target.split("/")[0]
+    return posixpath.dirname(target) if top in ("core", "server", "client", "tests", "proto", "deploy") else None
+
+
+def is_library(target):
+    return target.startswith(("absl/", "gtest/", "gmock/")) or any(target.startswith(start) for start in THIRD_PARTY)
+
+
+def may_include(folder, room):
+    if room == folder:
+        return True
+    return any(room == entry or (entry.endswith("/*") and (room + "/").startswith(entry[:-1]))
+               for entry in ALLOWED[folder])
+
+
+def includes_follow_the_directions(tree):
+    problems = []
+    for path in tree.code("core", "server", "client"):
+        folder = posixpath.dirname(path)
+        if folder not in ALLOWED:
+            problems.append(f"{path}: the folder {folder} has no entry in the table of allowed includes")
+            continue
+        for target in quoted_includes(tree.files[path]):
+            room = room_of_include(target)
+            if room is not None and room != "tests" and not may_include(folder, room):
+                problems.append(f"{path}: {folder} may not include {target}")
+    return problems
+
+
+def index_structures_do_not_see_each_other(tree):
+    problems = []
+    for path in tree.code(*("core/index/" + name for name in INDEX_STRUCTURES)):
+        own = path.split("/")[2]
+        for target in quoted_includes(tree.files[path]):
+            part = target.split("/")
+            if target.startswith("core/index/") and len(part) > 3 and part[2] != own:
+                problems.append(f"{path}: the {own} sees the {part[2]} through {target}")
+    return problems
+
+
+def core_stands_alone(tree):
+    problems = []
+    for path in tree.code("core"):
+        for quoted, target in includes(tree.files[path]):
+            if quoted and not target.startswith(("core/", "absl/")):
+                problems.append(f"{path}: the core includes {target}")
+            elif not quoted and ("/" in target or target.endswith(".h") or target in FORBIDDEN_IN_CORE):
+                problems.append(f"{path}: the core includes <{target}>, which is neither computation nor C++20")
+    return problems
+
+
+def core_reads_no_clock(tree):
+    return [f"{path}: <chrono> is for core/base/mutex.h and core/scene/scene.* only"
+            for path in tree.code("core") if not CLOCK_FILES.fullmatch(path)
+            for _, target in includes(tree.files[path]) if target == "chrono"]
+
+
+def libraries_stay_in_their_rooms(tree):
+    problems = []
+    for path in tree.code("core", "server", "client"):
+        for _, target in includes(tree.files[path]):
+            for start, rooms in THIRD_PARTY.items():
+                if target.startswith(start) and not path.startswith(tuple(room + "/" for room in rooms)):
+                    problems.append(f"{path}: {target} is for {', '.join(rooms)} only")
+    return problems
+
+
+def nothing_includes_tests(tree):
+    return [f"{path}: includes {target}" for path in tree.code("core", "server", "client")
+            for _, target in includes(tree.files[path]) if "tests/" in target]
+
+
+def includes_start_at_the_root(tree):
+    problems = []
+    for path in tree.code():
+        for target in quoted_includes(tree.files[path]):
+            room = room_of_include(target)
+            if room is None and not is_library(target):
+                problems.append(f"{path}: {target} is not written from the project's root")
+            elif room not in (None, "proto") and target not in tree.files:
+                problems.append(f"{path}: {target} does not exist")
+    return problems
+
+
+def cycles(graph):
+    """Sets of nodes that reach each other, by Tarjan's strongly connected components (1972), without recursion."""
+    number, low, on_stack, stack, found = {}, {}, set(), [], []
+    for root in sorted(graph):
+        work = [] if root in number else [(root, iter(sorted(graph[root])))]
+        if work:
+            number[root] = low[root] = len(number)
+            stack.append(root)
+            on_stack.add(root)
+        while work:
+            node, rest = work[-1]
+            following = next(rest, None)
+            if following is None:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[node])
+                if low[node] == number[node]:
+                    component = []
+                    while not component or component[-1] != node:
+                        component.append(stack.pop())
+                        on_stack.discard(component[-1])
+                    if len(component) > 1 or node in graph[node]:
+                        found.append(sorted(component))
+            elif following not in number:
+                number[following] = low[following] = len(number)
+                stack.append(following)
+                on_stack.add(following)
+                work.append((following, iter(sorted(graph.get(following, ())))))
+            elif following in on_stack:
+                low[node] = min(low[node], number[following])
+    return found
+
+
+def file_graph(tree):
+    return {path: {target for target in quoted_includes(tree.files[path]) if target in tree.files} for path in tree.code()}
+
+
+def files_have_no_cycle(tree):
+    return ["files include each other: " + " ".join(cycle) for cycle in cycles(file_graph(tree))]
+
+
+def folders_have_no_cycle(tree):
+    graph = {}
+    for path, targets in file_graph(tree).items():
+        folder = posixpath.dirname(path)
+        folder = ONE_ROOM.get(folder, folder)
+        for target in targets:
+            other = ONE_ROOM.get(posixpath.dirname(target), posixpath.dirname(target))
+            graph.setdefault(other, set())
+            if other != folder:
+                graph.setdefault(folder, set()).add(other)
+    return ["folders include each other: " + " ".join(cycle) for cycle in cycles(graph)]
+
+
+RULES = {
+    "IncludesFollowTheDirections": includes_follow_the_directions,
+    "IndexStructuresDoNotSeeEachOther": index_structures_do_not_see_each_other,
+    "CoreStandsAlone": core_stands_alone,
+    "CoreReadsNoClock": core_reads_no_clock,
+    "LibrariesStayInTheirRooms": libraries_stay_in_their_rooms,
+    "NothingIncludesTests": nothing_includes_tests,
+    "IncludesStartAtTheRoot": includes_start_at_the_root,
+    "FilesHaveNoIncludeCycle": files_have_no_cycle,
+    "FoldersHaveNoIncludeCycle": folders_have_no_cycle,
+}

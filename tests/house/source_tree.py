@@ -1,0 +1,139 @@
+"""The project's files as the house rules see them: a map from path to text, with the few things a rule asks of a C++ file.
+
+Rules take a Tree, so that each of them is also run over small examples that never were on a disk.
+"""
+import os
+import re
+import subprocess
+
+CODE_ENDINGS = (".h", ".cc")
+SKIPPED_FOLDERS = {".git", "build", ".cache", "__pycache__", "node_modules"}
+
+
+class Tree:
+    """Files by path from the project's root, '/' between folders."""
+
+    def __init__(self, files):
+        self.files = dict(files)
+
+    def code(self, *rooms):
+        """Paths of headers and sources, all or those below one of the given folders."""
+        return [path for path in sorted(self.files)
+                if path.endswith(CODE_ENDINGS) and (not rooms or path.startswith(tuple(room + "/" for room in rooms)))]
+
+
+def listed_by_git(root):
+    command = ["git", "-c", "safe.directory=*", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    try:
+        answer = subprocess.run(command, cwd=root, capture_output=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return [path for path in answer.stdout.decode().split("\0") if path]
+
+
+def listed_by_walk(root):
+    paths = []
+    for folder, subfolders, names in os.walk(root):
+        subfolders[:] = [name for name in subfolders if name not in SKIPPED_FOLDERS]
+        paths += [os.path.relpath(os.path.join(folder, name), root) for name in names]
+    return paths
+
+
+def read_tree(root):
+    paths = listed_by_git(root) if os.path.exists(os.path.join(root, ".git")) else None
+    files = {}
+    for path in paths if paths is not None else listed_by_walk(root):
+        full_path = os.path.join(root, path)
+        if os.path.isfile(full_path):
+            with open(full_path, encoding="utf-8", errors="replace") as file:
+                files[path] = file.read()
+    return Tree(files)
+
+
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
+
+
+def includes(text):
+    """(quoted, target) of each #include."""
+    return [(mark == '"', target) for mark, target in INCLUDE.findall(without_comments(text))]
+
+
+def quoted_includes(text):
+    return [target for quoted, target in includes(text) if quoted]
+
+
+COMMENT_OR_LITERAL = re.compile(
+    r'//(?:\\\n|[^\n])*|/\*.*?\*/|R"([^()\\\s]{0,16})\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<![0-9a-fA-F])\'(?:\\.|[^\'\\\n])+\'',
+    re.DOTALL)
+
+
+def blank(text):
+    return re.sub(r"[^\n]", " ", text)
+
+
+def without_comments(text):
+    """Comments turned into blanks; lines keep their numbers and literals stay."""
+    return COMMENT_OR_LITERAL.sub(lambda m: blank(m.group()) if m.group().startswith(("//", "/*")) else m.group(), text)
+
+
+def without_comments_and_literals(text):
+    """Also string and character literals turned into blanks: what is left has only braces that are braces."""
+    return COMMENT_OR_LITERAL.sub(lambda m: blank(m.group()), text)
+
+
+PREPROCESSOR = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.MULTILINE)
+TYPE_OR_NAMESPACE = re.compile(r"(inline\s+)?namespace\b|extern\s*$|(class|struct|union|enum)\b[^()]*$")
+ACCESS = re.compile(r"^(\s*(public|private|protected)\s*:)+")
+
+
+def after_template(declaration):
+    """The declaration without leading template<...>, whose `class` says nothing of what follows."""
+    declaration = ACCESS.sub("", declaration).strip()
+    while re.match(r"template\s*<", declaration):
+        position, depth = declaration.index("<"), 0
+        for position in range(position, len(declaration)):
+            depth += {"<": 1, ">": -1}.get(declaration[position], 0)
+            if depth == 0:
+                break
+        declaration = declaration[position + 1:].strip()
+    return re.sub(r"^(\[\[[^\]]*\]\]|alignas\s*\([^)]*\))\s*", "", declaration)
+
+
+def kind_of_brace(declaration):
+    """What the brace after this text opens outside of functions: 'scope', 'function' or 'value'."""
+    text = after_template(declaration)
+    if TYPE_OR_NAMESPACE.match(re.sub(r"alignas\s*\([^)]*\)|final\b", "", text)):
+        return "scope"
+    head = re.sub(r"operator\s*(\(\s*\)|[^\s\w(]+)", "operator_", text)
+    before_parameters, parenthesis, _ = head.partition("(")
+    if not parenthesis or re.search(r"(?<![=!<>])=(?!=)", before_parameters):
+        return "value"
+    return "function" if head.count("(") == head.count(")") else "value"
+
+
+def functions(text):
+    """(first line, number of lines) of each function that has a body, lambdas counted with what holds them.
+
+    A reading of formatted code by its braces, not a parser: a brace that touches the word before it is a value, like the
+    initialiser of a member.
+    """
+    code = PREPROCESSOR.sub(lambda m: blank(m.group()), without_comments_and_literals(text))
+    found, open_braces, start, line = [], [], 0, 1
+    for position, sign in enumerate(code):
+        in_scope = all(kind == "scope" for kind, _ in open_braces)
+        if sign == "\n":
+            line += 1
+        elif sign == "{":
+            touches = position > 0 and (code[position - 1].isalnum() or code[position - 1] in "_>)]")
+            kind = "value" if not in_scope or touches else kind_of_brace(code[start:position])
+            first_line = line - code[start:position].lstrip().count("\n")
+            open_braces.append((kind, first_line))
+            start = position + 1 if kind == "scope" else start
+        elif sign == "}" and open_braces:
+            kind, first_line = open_braces.pop()
+            if kind == "function":
+                found.append((first_line, line - first_line + 1))
+            start = position + 1 if kind != "value" else start
+        elif sign == ";" and in_scope:
+            start = position + 1
+    return found
