@@ -8,7 +8,6 @@
 #define LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 
 #include <cstdint>
-#include <initializer_list>
 #include <limits>
 
 #include "absl/types/span.h"
@@ -46,7 +45,7 @@ class BlockBuilder {
     block_->set_precision(precision);
     return derived();
   }
-  Derived& columns(std::initializer_list<v1::Column> columns) {
+  Derived& columns(absl::Span<const v1::Column> columns) {
     block_->clear_columns();
     for (const v1::Column column : columns) block_->add_columns(column);
     return derived();

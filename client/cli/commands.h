@@ -1,0 +1,31 @@
+// One function a command: it adds the command's options, help and examples to `parent`, and runs it through `context`
+// once the line is parsed. `context` outlives the parser.
+#ifndef LOCUS_CLIENT_CLI_COMMANDS_H_
+#define LOCUS_CLIENT_CLI_COMMANDS_H_
+
+#include "CLI/CLI.hpp"
+#include "client/cli/context.h"
+
+namespace locus::cli {
+
+void add_scene_command(CLI::App& parent, Context& context);
+void add_import_command(CLI::App& parent, Context& context);
+void add_generate_command(CLI::App& parent, Context& context);
+void add_insert_command(CLI::App& parent, Context& context);
+void add_move_command(CLI::App& parent, Context& context);
+void add_remove_command(CLI::App& parent, Context& context);
+void add_query_command(CLI::App& parent, Context& context);
+void add_get_command(CLI::App& parent, Context& context);
+void add_limits_command(CLI::App& parent, Context& context);
+void add_health_command(CLI::App& parent, Context& context);
+void add_version_command(CLI::App& parent, Context& context);
+
+// Runs `run(options, context)`, which returns an absl::Status, when `command` was chosen.
+template <class Options, class Run>
+void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
+  command.callback([options, &context, run] { context.finish(run(*options, context)); });
+}
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_COMMANDS_H_

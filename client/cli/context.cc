@@ -1,0 +1,28 @@
+#include "client/cli/context.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace locus::cli {
+
+absl::StatusOr<client::Client*> Context::connect() {
+  if (client_) return client_.get();
+  client::ClientOptions options;
+  if (options_.timeout_seconds) {
+    const absl::Duration timeout = absl::Seconds(*options_.timeout_seconds);
+    options.connect_timeout = timeout;
+    options.deadline = timeout;
+    options.long_deadline = timeout;
+  }
+  absl::StatusOr<std::unique_ptr<client::Client>> client = client::Client::connect(options_.address, options);
+  if (absl::IsUnavailable(client.status())) {
+    return absl::UnavailableError(
+        absl::StrCat("nothing answers at ", options_.address, ": start one with `locusd`, or give --address"));
+  }
+  if (!client.ok()) return client.status();
+  client_ = *std::move(client);
+  return client_.get();
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,42 @@
+#include <memory>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/output.h"
+
+namespace locus::cli {
+namespace {
+
+struct NoOptions {};
+
+// Counts without a decimal point; a limit may also be a fraction.
+Json number_json(double value) {
+  constexpr double kExactIntegers = 9007199254740992.0;
+  if (value < 0 || value > kExactIntegers || value != static_cast<double>(static_cast<uint64_t>(value))) return value;
+  return static_cast<uint64_t>(value);
+}
+
+absl::Status limits(const NoOptions&, Context& context) {
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const absl::StatusOr<v1::GetServerResponse> server = (*client)->get_server();
+  if (!server.ok()) return server.status();
+  Report report;
+  report.rows_name = "limits";
+  for (const v1::Limit& limit : server->limits()) {
+    report.rows.push_back(
+        {{"name", limit.name()}, {"value", number_json(limit.value())}, {"used", number_json(limit.used())}});
+  }
+  context.write(report);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void add_limits_command(CLI::App& parent, Context& context) {
+  CLI::App& command = *parent.add_subcommand("limits", "List every limit of the server, and how much is in use");
+  command.footer("Examples:\n  locus limits\n  locus -o json limits");
+  run_when_chosen(command, std::make_shared<NoOptions>(), context, limits);
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,87 @@
+#include "client/cli/query_report.h"
+
+#include <utility>
+
+#include "client/lib/result_rows.h"
+
+namespace locus::cli {
+namespace {
+
+using client::ResultRows;
+
+Json point_json(const ResultRows& rows, size_t row, const client::Double3& frame) {
+  const absl::Span<const float> offset = rows.points().subspan(row * 3, 3);
+  if (frame.x == 0 && frame.y == 0 && frame.z == 0) return floats_json(offset);
+  return doubles_json({frame.x + offset[0], frame.y + offset[1], frame.z + offset[2]});
+}
+
+Json triangle_json(uint32_t triangle) { return triangle == client::kNoTriangle ? Json() : Json(triangle); }
+
+// Null for a miss, and for a column that the server left out.
+void add_column(const ResultRows& rows, size_t row, bool hit, v1::Column column, const client::Double3& frame,
+                Json& json) {
+  const auto add = [&](const char* key, bool present, const auto& value) {
+    json[key] = hit && present ? value() : Json();
+  };
+  switch (column) {
+    case v1::COLUMN_T:
+      return add("t", !rows.t().empty(), [&] { return float_json(rows.t()[row]); });
+    case v1::COLUMN_ID:
+      return add("id", !rows.ids().empty(), [&] { return id_json(rows.ids()[row]); });
+    case v1::COLUMN_TRIANGLE:
+      return add("triangle", !rows.triangles().empty(), [&] { return triangle_json(rows.triangles()[row]); });
+    case v1::COLUMN_UV:
+      return add("uv", !rows.uvs().empty(), [&] { return floats_json(rows.uvs().subspan(row * 2, 2)); });
+    case v1::COLUMN_NORMAL:
+      return add("normal", !rows.normals().empty(), [&] { return floats_json(rows.normals().subspan(row * 3, 3)); });
+    case v1::COLUMN_POINT:
+      return add("point", !rows.points().empty(), [&] { return point_json(rows, row, frame); });
+    case v1::COLUMN_GROUP:
+      return add("group", !rows.groups().empty(), [&] { return id_json(rows.groups()[row]); });
+    case v1::COLUMN_TAG:
+      return add("tag", !rows.tags().empty(), [&] { return id_json(rows.tags()[row]); });
+    case v1::COLUMN_LAYERS:
+      return add("layers", !rows.layers().empty(), [&] { return Json(rows.layers()[row]); });
+    case v1::COLUMN_POSE:
+      add("position", !rows.positions().empty(), [&] { return doubles_json(rows.positions().subspan(row * 3, 3)); });
+      return add("rotation", !rows.rotations().empty(),
+                 [&] { return floats_json(rows.rotations().subspan(row * 4, 4)); });
+    default:
+      return;
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout) {
+  const absl::StatusOr<ResultRows> rows = ResultRows::of(block);
+  if (!rows.ok()) return rows.status();
+  std::vector<Json> result;
+  for (size_t query = 0; query < rows->queries(); ++query) {
+    const client::RowRange range = rows->rows_of(query);
+    for (size_t row = range.begin; row < range.end; ++row) {
+      Json json = Json::object();
+      const bool hit = rows->ids().empty() || rows->ids()[row] != 0;
+      if (!layout.query.empty()) json[layout.query] = query;
+      if (layout.dense) json["hit"] = hit;
+      for (const v1::Column column : layout.columns) add_column(*rows, row, hit, column, layout.frame, json);
+      result.push_back(std::move(json));
+    }
+  }
+  return result;
+}
+
+Json result_head(const v1::QueryResult& result) {
+  Json head = {{"epoch", id_json(result.epoch())}, {"revision", result.revision()}, {"tick", result.tick()}};
+  for (const v1::BlockResult& block : result.blocks()) {
+    for (const uint32_t query : block.truncated()) head["truncated"].push_back(query);
+  }
+  if (result.has_work()) {
+    const v1::Work& work = result.work();
+    head["work"] = {
+        {"nodes", work.nodes()}, {"cells", work.cells()}, {"tests", work.tests()}, {"nanoseconds", work.nanoseconds()}};
+  }
+  return head;
+}
+
+}  // namespace locus::cli

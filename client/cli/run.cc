@@ -1,0 +1,74 @@
+#include "client/cli/run.h"
+
+#include <algorithm>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/commands.h"
+
+namespace locus::cli {
+namespace {
+
+constexpr char kExamples[] = R"(Examples:
+  locus scene create arena
+  locus import level.glb --scene arena
+  locus generate city --triangles 100000 --seed 1 --scene arena --create
+  locus insert arena ball --id 7 --at 1,2,3 --radius 0.5
+  locus query ray arena --from 0,1,0 --dir 0,0,-1
+  locus -o json query ball arena --at 0,0,0 --radius 10
+  locus -a unix:/run/locus.sock health
+
+Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
+`locus COMMAND --help` shows a command's options and examples.)";
+
+}  // namespace
+
+void build_cli(CLI::App& app, Context& context) {
+  GlobalOptions& options = context.options();
+  app.name("locus");
+  app.description("The command line of locusd: scenes, moving objects, and exact ray, ball and box queries.");
+  app.footer(kExamples);
+  app.set_version_flag("--version", absl::StrCat("locus ", LOCUS_VERSION));
+  app.require_subcommand(1);
+  app.fallthrough();
+  app.add_option("-a,--address", options.address, "Where locusd listens: host:port or unix:/path")
+      ->envname("LOCUS_ADDRESS")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  app.add_option("--timeout", options.timeout_seconds,
+                 "Seconds for each call [10; 600 for uploads and changes of instances]")
+      ->type_name("SECONDS")
+      ->check(CLI::PositiveNumber);
+  const std::map<std::string, Format> formats = {
+      {"table", Format::kTable}, {"json", Format::kJson}, {"ndjson", Format::kNdjson}};
+  app.add_option("-o,--output", options.format, "How to print: table, json, ndjson [table]")
+      ->type_name("FORMAT")
+      ->transform(CLI::CheckedTransformer(formats).description(""));
+  add_scene_command(app, context);
+  add_import_command(app, context);
+  add_generate_command(app, context);
+  add_insert_command(app, context);
+  add_move_command(app, context);
+  add_remove_command(app, context);
+  add_query_command(app, context);
+  add_get_command(app, context);
+  add_limits_command(app, context);
+  add_health_command(app, context);
+  add_version_command(app, context);
+}
+
+ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
+  CLI::App app;
+  build_cli(app, context);
+  // The parser takes its arguments from the back, and reports by exceptions: this is where they end.
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  try {
+    app.parse(std::move(reversed));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, context.out(), context.err()) == 0 ? ExitCode::kOk : ExitCode::kUsage;
+  }
+  if (!context.outcome().ok()) write_failure(context.err(), context.options().format, context.outcome());
+  return exit_code_of(context.outcome());
+}
+
+}  // namespace locus::cli

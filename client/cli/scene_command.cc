@@ -1,0 +1,193 @@
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include "client/cli/arguments.h"
+#include "client/cli/commands.h"
+#include "client/cli/failure.h"
+#include "client/cli/output.h"
+
+namespace locus::cli {
+namespace {
+
+struct CreateOptions {
+  std::string name;
+  std::vector<std::string> labels;
+  v1::Winding winding = v1::WINDING_UNSPECIFIED;
+  std::string static_from;
+  bool if_absent = false;
+};
+
+struct ListOptions {
+  std::vector<std::string> labels;
+};
+
+struct DescribeOptions {
+  std::string name;
+};
+
+struct DeleteOptions {
+  std::string name;
+  bool if_present = false;
+};
+
+absl::StatusOr<std::map<std::string, std::string>> parse_labels(const std::vector<std::string>& texts) {
+  std::map<std::string, std::string> labels;
+  for (const std::string& text : texts) {
+    const size_t equals = text.find('=');
+    if (equals == 0 || equals == std::string::npos) {
+      return usage_error(absl::StrCat("label ", text, " is not of the form KEY=VALUE"));
+    }
+    labels[text.substr(0, equals)] = text.substr(equals + 1);
+  }
+  return labels;
+}
+
+std::string state_name(v1::SceneState state) {
+  return absl::AsciiStrToLower(absl::StripPrefix(v1::SceneState_Name(state), "SCENE_STATE_"));
+}
+
+Json summary_of(const v1::Scene& scene) {
+  return {{"name", scene.name()},           {"state", state_name(scene.state())},  {"revision", scene.revision()},
+          {"tick", scene.tick()},           {"objects", scene.objects()},          {"instances", scene.instances()},
+          {"triangles", scene.triangles()}, {"memory_bytes", scene.memory_bytes()}};
+}
+
+Json corner_of(bool present, const v1::Vec3d& corner) {
+  return present ? doubles_json({corner.x(), corner.y(), corner.z()}) : Json();
+}
+
+Report description_of(const v1::Scene& scene) {
+  Report report;
+  report.head = summary_of(scene);
+  report.head["epoch"] = id_json(scene.epoch());
+  report.head["min"] = corner_of(scene.has_min(), scene.min());
+  report.head["max"] = corner_of(scene.has_max(), scene.max());
+  report.head["winding"] = scene.spec().winding() == v1::WINDING_CLOCKWISE ? "clockwise" : "counter-clockwise";
+  report.head["pending_changes"] = scene.pending_changes();
+  if (!scene.last_build_error().empty()) report.head["last_build_error"] = scene.last_build_error();
+  Json labels = Json::object();
+  const std::map<std::string, std::string> sorted(scene.spec().labels().begin(), scene.spec().labels().end());
+  for (const auto& [key, value] : sorted) labels[key] = value;
+  if (!labels.empty()) report.head["labels"] = std::move(labels);
+  return report;
+}
+
+absl::Status create(const CreateOptions& options, Context& context) {
+  const auto labels = parse_labels(options.labels);
+  if (!labels.ok()) return labels.status();
+  v1::CreateSceneRequest request;
+  request.set_name(options.name);
+  request.set_if_absent(options.if_absent);
+  request.mutable_spec()->set_winding(options.winding);
+  request.mutable_spec()->set_static_from(options.static_from);
+  request.mutable_spec()->mutable_labels()->insert(labels->begin(), labels->end());
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const absl::StatusOr<v1::Scene> scene = (*client)->create_scene(request);
+  if (!scene.ok()) return scene.status();
+  context.write(description_of(*scene));
+  return absl::OkStatus();
+}
+
+absl::Status list(const ListOptions& options, Context& context) {
+  const auto labels = parse_labels(options.labels);
+  if (!labels.ok()) return labels.status();
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const absl::StatusOr<std::vector<v1::Scene>> scenes = (*client)->list_scenes(*labels);
+  if (!scenes.ok()) return scenes.status();
+  Report report;
+  report.rows_name = "scenes";
+  report.no_rows = "no scenes";
+  for (const v1::Scene& scene : *scenes) report.rows.push_back(summary_of(scene));
+  context.write(report);
+  return absl::OkStatus();
+}
+
+absl::Status describe(const DescribeOptions& options, Context& context) {
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const absl::StatusOr<v1::Scene> scene = (*client)->get_scene(options.name);
+  if (!scene.ok()) return scene.status();
+  context.write(description_of(*scene));
+  return absl::OkStatus();
+}
+
+absl::Status remove(const DeleteOptions& options, Context& context) {
+  v1::DeleteSceneRequest request;
+  request.set_name(options.name);
+  request.set_if_present(options.if_present);
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const absl::Status deleted = (*client)->delete_scene(request);
+  if (!deleted.ok()) return deleted;
+  Report report;
+  report.head["deleted"] = options.name;
+  context.write(report);
+  return absl::OkStatus();
+}
+
+void add_create(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<CreateOptions>();
+  CLI::App& command = *parent.add_subcommand("create", "Create an empty scene");
+  command.footer(R"(Examples:
+  locus scene create arena
+  locus scene create arena --if-absent --label map=delta --label mode=ctf
+  locus scene create arena-copy --static-from arena)");
+  command.add_option("NAME", options->name, "Lower case letters, digits and dashes, at most 63")->required();
+  command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
+  add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Words of your own about the scene");
+  const std::map<std::string, v1::Winding> windings = {{"ccw", v1::WINDING_COUNTER_CLOCKWISE},
+                                                       {"cw", v1::WINDING_CLOCKWISE}};
+  command.add_option("--winding", options->winding, "Order of vertices seen from a triangle's front: ccw, cw [ccw]")
+      ->type_name("ORDER")
+      ->transform(CLI::CheckedTransformer(windings).description(""));
+  command.add_option("--static-from", options->static_from, "Start with the instances of this scene")
+      ->type_name("SCENE");
+  run_when_chosen(command, options, context, create);
+}
+
+void add_list(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<ListOptions>();
+  CLI::App& command = *parent.add_subcommand("list", "List the scenes of the server");
+  command.footer("Examples:\n  locus scene list\n  locus -o ndjson scene list --label mode=ctf");
+  add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Only scenes with this label");
+  run_when_chosen(command, options, context, list);
+}
+
+void add_describe(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<DescribeOptions>();
+  CLI::App& command = *parent.add_subcommand("describe", "Show everything about a scene");
+  command.footer("Examples:\n  locus scene describe arena\n  locus -o json scene describe arena");
+  command.add_option("NAME", options->name, "The scene")->required();
+  run_when_chosen(command, options, context, describe);
+}
+
+void add_delete(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<DeleteOptions>();
+  CLI::App& command = *parent.add_subcommand("delete", "Delete a scene with its objects and instances; meshes stay");
+  command.footer("Examples:\n  locus scene delete arena\n  locus scene delete arena --if-present");
+  command.add_option("NAME", options->name, "The scene")->required();
+  command.add_flag("--if-present", options->if_present, "Accept that there is none");
+  run_when_chosen(command, options, context, remove);
+}
+
+}  // namespace
+
+void add_scene_command(CLI::App& parent, Context& context) {
+  CLI::App& command = *parent.add_subcommand("scene", "Create, list, describe and delete scenes");
+  command.footer("Examples:\n  locus scene create arena\n  locus scene list\n  locus scene delete arena");
+  command.require_subcommand(1);
+  add_create(command, context);
+  add_list(command, context);
+  add_describe(command, context);
+  add_delete(command, context);
+}
+
+}  // namespace locus::cli

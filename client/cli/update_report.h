@@ -1,0 +1,19 @@
+// What insert, move and remove have in common: sending one batch and printing its ack. For those commands.
+#ifndef LOCUS_CLIENT_CLI_UPDATE_REPORT_H_
+#define LOCUS_CLIENT_CLI_UPDATE_REPORT_H_
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "client/cli/context.h"
+#include "locus/v1/update_service.pb.h"
+
+namespace locus::cli {
+
+// Applies the batch and writes the ack: applied, refused, revision, tick, and a row for each refused item listed. The
+// answer is written even if items were refused; the status then says so.
+absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, Context& context);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_UPDATE_REPORT_H_

@@ -1,0 +1,60 @@
+// The program itself as scripts see it: exit codes and streams of a child process.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <string>
+
+#include "tests/client/lib/fake_server.h"
+
+namespace locus::cli {
+namespace {
+
+using client::testing::FakeServer;
+using ::testing::HasSubstr;
+
+struct Exit {
+  int code = -1;
+  std::string text;  // both streams
+};
+
+Exit run_program(const std::string& environment, const std::string& arguments) {
+  const std::string line = environment + " " + LOCUS_PROGRAM + " " + arguments + " 2>&1";
+  FILE* const pipe = popen(line.c_str(), "r");
+  Exit exit;
+  std::array<char, 4096> part{};
+  while (const size_t read = fread(part.data(), 1, part.size(), pipe)) exit.text.append(part.data(), read);
+  const int status = pclose(pipe);
+  exit.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return exit;
+}
+
+TEST(ExitCodeTest, HelpIsSuccess) {
+  const Exit exit = run_program("", "--help");
+  EXPECT_EQ(exit.code, 0);
+  EXPECT_THAT(exit.text, HasSubstr("Examples:"));
+}
+
+TEST(ExitCodeTest, AWrongLineIsTwo) { EXPECT_EQ(run_program("", "query sphere").code, 2); }
+
+TEST(ExitCodeTest, NobodyThereIsThree) {
+  const Exit exit = run_program("LOCUS_ADDRESS=unix:/nonexistent/locus.sock", "limits");
+  EXPECT_EQ(exit.code, 3);
+  EXPECT_THAT(exit.text, HasSubstr("nothing answers at unix:/nonexistent/locus.sock: start one with `locusd`"));
+}
+
+TEST(ExitCodeTest, DeniedIsFourNotFoundFiveFailedOneAndTheRestZero) {
+  FakeServer server;
+  const std::string environment = "LOCUS_ADDRESS=" + server.address();
+  EXPECT_EQ(run_program(environment, "health").code, 0);
+  EXPECT_EQ(run_program(environment, "scene describe nowhere").code, 5);
+  server.scenes.denied = true;
+  EXPECT_EQ(run_program(environment, "scene delete arena").code, 4);
+  server.updates.refused_ticks = {0};
+  EXPECT_EQ(run_program(environment, "remove arena --all").code, 1);
+}
+
+}  // namespace
+}  // namespace locus::cli
