@@ -1,4 +1,4 @@
-// How much of a long random test to run: all of it, or a part under sanitizers, which slow everything down.
+// How much of a long random test to run: all of it, or a part where sanitizers or a debug build slow everything down.
 #ifndef LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
 #define LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
 
@@ -6,7 +6,7 @@
 
 namespace locus::test {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
 inline constexpr uint64_t kSlowdown = 10;
 #else
 inline constexpr uint64_t kSlowdown = 1;
