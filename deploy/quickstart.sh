@@ -1,0 +1,110 @@
+#!/usr/bin/env bash
+# From a fresh Debian 12 machine to a running locusd that answers on a real game level, checked by brute force.
+#
+#   ./deploy/quickstart.sh [--seconds N] [--objects N] [--keep]
+#
+# Installs what is missing from Debian (as root or with sudo), builds Release into build/release, fetches a level, starts
+# locusd on a free loopback port, and runs `locus demo` against it: moves objects while clients ask, and compares the
+# answers with brute force. Exits 1 on any difference. --keep leaves the daemon running.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+seconds=5
+objects=10000
+keep=no
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --seconds) seconds=$2; shift 2 ;;
+    --objects) objects=$2; shift 2 ;;
+    --keep) keep=yes; shift ;;
+    -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    *) echo "quickstart: unknown option $1; see --help" >&2; exit 2 ;;
+  esac
+done
+
+build=build/release
+levels=build/levels
+package=openarena-081-maps
+entry=maps/delta.bsp
+
+say() { printf '\n== %s\n' "$*"; }
+
+say "1/5 packages"
+./deploy/packages.sh build
+
+say "2/5 build into $build"
+if [ ! -f "$build/build.ninja" ]; then
+  cmake --preset release -DLOCUS_TESTS=OFF > build.log.$$ 2>&1 || { cat build.log.$$; rm -f build.log.$$; exit 1; }
+  rm -f build.log.$$
+fi
+cmake --build "$build" --target locusd locus
+
+# The level's package is downloaded and unpacked, never installed.
+fetch_level() {
+  [ -f "$levels/pak1-maps.pk3" ] && return 0
+  mkdir -p "$levels"
+  local work
+  work=$(mktemp -d "$levels/fetch.XXXXXX")
+  chmod 755 "$work"
+  if (cd "$work" && apt-get download "$package" && dpkg-deb -x ./*.deb unpacked) > "$levels/fetch.log" 2>&1; then
+    find "$work/unpacked" -name pak1-maps.pk3 -exec cp {} "$levels/pak1-maps.pk3" \;
+  fi
+  rm -rf "$work"
+  [ -f "$levels/pak1-maps.pk3" ]
+}
+
+say "3/5 level"
+level=()
+if fetch_level; then
+  echo "OpenArena level $entry from Debian's package $package"
+  level=("$levels/pak1-maps.pk3" --entry "$entry")
+else
+  echo "THE PACKAGE $package COULD NOT BE HAD (see $levels/fetch.log): USING THE GENERATED CITY, NOT A REAL LEVEL"
+fi
+
+say "4/5 start locusd"
+run=$(mktemp -d)
+pids=()
+stop() {
+  for pid in "${pids[@]}"; do kill -TERM "$pid" 2> /dev/null && wait "$pid" 2> /dev/null || true; done
+  rm -rf "$run"
+}
+trap stop EXIT
+
+# Starts a daemon with the given number of threads; sets `address`.
+start() {
+  local name=$1 threads=$2
+  "$build/bin/locusd" --listen 127.0.0.1:0 --port-file "$run/$name.port" --threads "$threads" > "$run/$name.log" 2>&1 &
+  pids+=($!)
+  for _ in $(seq 100); do
+    [ -s "$run/$name.port" ] && { address="127.0.0.1:$(cat "$run/$name.port")"; return 0; }
+    kill -0 "${pids[-1]}" 2> /dev/null || break
+    sleep 0.1
+  done
+  echo "locusd did not start:" >&2
+  cat "$run/$name.log" >&2
+  exit 1
+}
+start main 2
+main=$address
+start check 1
+check=$address
+echo "locusd at $main (2 threads), and at $check (1 thread) to compare with"
+
+say "5/5 demo"
+"$build/bin/locus" --address "$main" demo "${level[@]}" --objects "$objects" --seconds "$seconds" --compare "$check"
+
+cat << TEXT
+
+All answers were as they must be. Try next:
+  $build/bin/locusd                                  start a daemon on 127.0.0.1:7575
+  $build/bin/locus scene create arena                make a scene
+  $build/bin/locus import LEVEL --scene arena        put your own level in it (OBJ, PLY, STL, glTF, BSP, PK3)
+  $build/bin/locus query ray arena --from 0,0,0 --dir 1,0,0
+  $build/bin/locus --help
+TEXT
+if [ "$keep" = yes ]; then
+  kill -TERM "${pids[1]}" && wait "${pids[1]}" || true
+  trap - EXIT
+  echo "locusd goes on at $main with scene 'demo'; stop it with: kill ${pids[0]}"
+fi
