@@ -100,7 +100,7 @@ inline void live_through_history(Scene& scene, const QueryWorld& world, Random& 
   }
   insert(scene, strangers);
   std::vector<PlacedMesh> visitors = world.instances;
-  for (PlacedMesh& placed : visitors) placed.translation = random.vector(50);
+  for (PlacedMesh& placed : visitors) placed.id += uint64_t{1} << 41;
   place(scene, visitors);
   UpdateBatch moves;
   std::vector<uint64_t> ids;

@@ -1,0 +1,315 @@
+#include "core/query/query_batch.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "core/base/refusal.h"
+#include "tests/support/small_world.h"
+
+namespace locus::test {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+// Three blocks that are right; the last, of 20 queries, is what tests spoil.
+std::vector<OwnedBlock> three_blocks(OwnedBlock last) {
+  return {rays_along_x(RayMode::kFirst), one_ball({0, 0, 0}, 1), std::move(last)};
+}
+
+OwnedBlock twenty_rays() {
+  OwnedBlock block = rays_along_x(RayMode::kFirst, std::vector<float>(60, 1));
+  block.sizes.assign(60, 1);
+  block.extras.assign(20, 1);
+  return block;
+}
+
+OwnedBlock twenty_balls() {
+  OwnedBlock block = one_ball({}, 1);
+  block.points.assign(60, 1);
+  block.sizes.assign(20, 1);
+  return block;
+}
+
+OwnedBlock twenty_boxes() {
+  OwnedBlock block = one_box({}, {1, 1, 1});
+  block.points.assign(60, 1);
+  block.sizes.assign(60, 1);
+  for (int i = 0; i < 20; ++i) block.extras.insert(block.extras.end(), {0, 0, 0, 1});
+  return block;
+}
+
+Refusal refusal_for(const std::vector<OwnedBlock>& blocks) {
+  const absl::Status status = check_batch(batch_of(blocks));
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
+  return refusal_of(status).value_or(Refusal{});
+}
+
+// `field` is relative to block 2; an index of -1 is none.
+void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
+  const Refusal refusal = refusal_for(three_blocks(block));
+  EXPECT_EQ(reason_name(refusal.reason), reason_name(reason));
+  EXPECT_EQ(refusal.field, "blocks[2]." + field);
+  EXPECT_EQ(refusal.index ? static_cast<int>(*refusal.index) : -1, index);
+}
+
+TEST(CheckBatchTest, BlocksThatAreRightPass) {
+  for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), lookup_of_ids({1}),
+                                  lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
+    EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+}
+
+TEST(CheckBatchTest, TheMessageNamesFieldAndIndex) {
+  OwnedBlock block = twenty_rays();
+  block.sizes[17 * 3 + 1] = kNan;
+  const absl::Status status = check_batch(batch_of(three_blocks(block)));
+  EXPECT_NE(status.message().find("blocks[2].rays.directions[17]"), absl::string_view::npos) << status;
+}
+
+TEST(CheckBatchTest, NumbersOfRaysThatAreNotFiniteAreRefused) {
+  for (const float wrong : {kNan, kInf, -kInf}) {
+    OwnedBlock block = twenty_rays();
+    block.points[19 * 3 + 2] = wrong;
+    expect_refusal(block, Reason::kNotFinite, "rays.origins", 19);
+    block = twenty_rays();
+    block.sizes[17 * 3] = wrong;
+    expect_refusal(block, Reason::kNotFinite, "rays.directions", 17);
+  }
+}
+
+TEST(CheckBatchTest, DirectionsOfZeroAreRefused) {
+  OwnedBlock block = twenty_rays();
+  for (int axis = 0; axis < 3; ++axis) block.sizes[static_cast<size_t>(5 * 3 + axis)] = axis == 1 ? -0.0f : 0.0f;
+  expect_refusal(block, Reason::kOutOfRange, "rays.directions", 5);
+}
+
+TEST(CheckBatchTest, DenormalDirectionsPass) {
+  OwnedBlock block = twenty_rays();
+  block.sizes.assign(60, std::numeric_limits<float>::denorm_min());
+  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+}
+
+TEST(CheckBatchTest, RayEndsMayBeInfiniteButNotNegativeNorNan) {
+  OwnedBlock block = twenty_rays();
+  block.extras[3] = kInf;
+  block.extras[4] = 0;
+  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  block.extras[7] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "rays.t_max", 7);
+  block.extras[7] = -std::numeric_limits<float>::denorm_min();
+  expect_refusal(block, Reason::kOutOfRange, "rays.t_max", 7);
+  block.extras[7] = -kInf;
+  expect_refusal(block, Reason::kOutOfRange, "rays.t_max", 7);
+}
+
+TEST(CheckBatchTest, RadiiMustBeFiniteAndNotNegative) {
+  OwnedBlock block = twenty_balls();
+  block.sizes[11] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "balls.radii", 11);
+  block.sizes[11] = kInf;
+  expect_refusal(block, Reason::kNotFinite, "balls.radii", 11);
+  block.sizes[11] = -1;
+  expect_refusal(block, Reason::kOutOfRange, "balls.radii", 11);
+  block.sizes[11] = 1.001e9f;
+  expect_refusal(block, Reason::kOutOfRange, "balls.radii", 11);
+  block.sizes[11] = 1e9f;
+  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+}
+
+TEST(CheckBatchTest, HalfExtentsMustBeFiniteAndNotNegative) {
+  OwnedBlock block = twenty_boxes();
+  block.sizes[3 * 8 + 2] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "boxes.half_extents", 8);
+  block.sizes[3 * 8 + 2] = -1;
+  expect_refusal(block, Reason::kOutOfRange, "boxes.half_extents", 8);
+}
+
+TEST(CheckBatchTest, CentresMustBeFinite) {
+  OwnedBlock balls = twenty_balls();
+  balls.points[4] = kNan;
+  expect_refusal(balls, Reason::kNotFinite, "balls.centers", 1);
+  OwnedBlock boxes = twenty_boxes();
+  boxes.points[59] = kInf;
+  expect_refusal(boxes, Reason::kNotFinite, "boxes.centers", 19);
+}
+
+TEST(CheckBatchTest, RotationsMustBeOfUnitLengthWithinAThousandth) {
+  OwnedBlock block = twenty_boxes();
+  float& w = block.extras[4 * 6 + 3];
+  w = 1.0009f;
+  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  for (const float wrong : {1.0011f, 0.9989f, 0.0f, -0.5f}) {
+    w = wrong;
+    expect_refusal(block, Reason::kOutOfRange, "boxes.rotations", 6);
+  }
+  w = kNan;
+  expect_refusal(block, Reason::kNotFinite, "boxes.rotations", 6);
+  w = kInf;
+  expect_refusal(block, Reason::kNotFinite, "boxes.rotations", 6);
+}
+
+TEST(CheckBatchTest, FramesMustBeFiniteAndInTheWorld) {
+  OwnedBlock block = twenty_rays();
+  block.settings.frame = {0, 0, std::numeric_limits<double>::quiet_NaN()};
+  expect_refusal(block, Reason::kNotFinite, "frame", -1);
+  block.settings.frame = {0, -1.0000001e9, 0};
+  expect_refusal(block, Reason::kOutOfRange, "frame", -1);
+}
+
+TEST(CheckBatchTest, FrameAndOffsetTogetherMustBeInTheWorld) {
+  OwnedBlock block = twenty_rays();
+  block.settings.frame = {1e9, 0, 0};
+  expect_refusal(block, Reason::kOutOfRange, "rays.origins", 0);
+  block.points.assign(60, -1);
+  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  block.points[3 * 12] = 0.5f;
+  expect_refusal(block, Reason::kOutOfRange, "rays.origins", 12);
+}
+
+struct Column20 {
+  const char* field;
+  OwnedBlock (*block)();
+  std::function<std::vector<float>&(OwnedBlock&)> column;
+  size_t width;
+  bool one_for_all, none;
+};
+
+TEST(CheckBatchTest, ColumnsHaveNEntriesOneOrWhereAllowedNone) {
+  const auto sizes = [](OwnedBlock& b) -> std::vector<float>& { return b.sizes; };
+  const auto extras = [](OwnedBlock& b) -> std::vector<float>& { return b.extras; };
+  const Column20 columns[] = {{"rays.directions", twenty_rays, sizes, 3, true, false},
+                              {"rays.t_max", twenty_rays, extras, 1, true, true},
+                              {"balls.radii", twenty_balls, sizes, 1, true, false},
+                              {"boxes.half_extents", twenty_boxes, sizes, 3, true, false},
+                              {"boxes.rotations", twenty_boxes, extras, 4, true, true}};
+  for (const Column20& c : columns) {
+    OwnedBlock block = c.block();
+    const std::vector<float> whole = c.column(block);
+    for (const size_t numbers : {size_t{0}, size_t{1}, c.width, 2 * c.width, whole.size() - 1, whole.size()}) {
+      c.column(block).assign(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(numbers));
+      if (c.width == 4 && numbers == 4) c.column(block) = {0, 0, 0, 1};
+      const bool fits = numbers == whole.size() || (c.one_for_all && numbers == c.width) || (c.none && numbers == 0);
+      if (fits) {
+        EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok()) << c.field << " " << numbers;
+      } else {
+        expect_refusal(block, Reason::kColumnLength, c.field, -1);
+      }
+    }
+  }
+  OwnedBlock rays = twenty_rays();
+  rays.points.pop_back();
+  expect_refusal(rays, Reason::kColumnLength, "rays.origins", -1);
+  OwnedBlock balls = twenty_balls();
+  balls.points.push_back(0);
+  expect_refusal(balls, Reason::kColumnLength, "balls.centers", -1);
+}
+
+TEST(CheckBatchTest, MasksAndIgnoredGroupsHaveNEntriesOneOrNone) {
+  OwnedBlock block = twenty_rays();
+  for (const size_t entries : {0u, 1u, 20u}) {
+    block.masks.assign(entries, 1);
+    block.ignore_groups.assign(entries, 1);
+    EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  }
+  block.masks.assign(19, 1);
+  expect_refusal(block, Reason::kColumnLength, "masks", -1);
+  block.masks.clear();
+  block.ignore_groups.assign(21, 1);
+  expect_refusal(block, Reason::kColumnLength, "ignore_groups", -1);
+}
+
+TEST(CheckBatchTest, AtMost64IdsAreIgnored) {
+  OwnedBlock block = twenty_rays();
+  block.ignore_ids.assign(64, 7);
+  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  block.ignore_ids.push_back(7);
+  expect_refusal(block, Reason::kLimit, "ignore_ids", -1);
+}
+
+TEST(CheckBatchTest, MaxResultsHasALimit) {
+  OwnedBlock block = twenty_rays();
+  block.settings.max_results = limits::kMaxMaxResults;
+  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  ++block.settings.max_results;
+  expect_refusal(block, Reason::kLimit, "max_results", -1);
+}
+
+TEST(CheckBatchTest, ABatchHasAtMost256Blocks) {
+  std::vector<OwnedBlock> blocks(256, rays_along_x(RayMode::kFirst));
+  EXPECT_TRUE(check_batch(batch_of(blocks)).ok());
+  blocks.push_back(rays_along_x(RayMode::kFirst));
+  const Refusal refusal = refusal_for(blocks);
+  EXPECT_EQ(refusal.field, "blocks");
+  EXPECT_EQ(refusal.limit, "blocks");
+  EXPECT_EQ(refusal.limit_value, 256);
+  EXPECT_EQ(refusal.asked, 257);
+}
+
+TEST(CheckBatchTest, ABatchHasAtMost65536QueriesOverAllBlocks) {
+  std::vector<OwnedBlock> blocks(2, rays_along_x(RayMode::kAny, std::vector<float>(3 * 32768, 0)));
+  EXPECT_TRUE(check_batch(batch_of(blocks)).ok());
+  blocks.push_back(lookup_of_ids({1}));
+  const Refusal refusal = refusal_for(blocks);
+  EXPECT_EQ(refusal.reason, Reason::kLimit);
+  EXPECT_EQ(refusal.limit, "queries");
+  EXPECT_EQ(refusal.asked, 65537);
+}
+
+TEST(CheckBatchTest, AReplyHasALargestSize) {
+  const std::vector<OwnedBlock> blocks = {rays_along_x(RayMode::kFirst)};
+  QueryBatch batch = batch_of(blocks);
+  batch.max_reply_bytes = limits::kMaxReplyBytes;
+  EXPECT_TRUE(check_batch(batch).ok());
+  ++batch.max_reply_bytes;
+  EXPECT_EQ(refusal_of(check_batch(batch)).value_or(Refusal{}).field, "max_reply_bytes");
+}
+
+TEST(CheckBatchTest, RowsThatCannotBeCutMustFitTheReply) {
+  std::vector<OwnedBlock> blocks = {rays_along_x(RayMode::kFirst, std::vector<float>(3 * 65536, 0))};
+  EXPECT_TRUE(check_batch(batch_of(blocks)).ok());  // T, ID and TRIANGLE: 16 bytes a ray
+  blocks[0].settings.columns = {Column::kT, Column::kId, Column::kNormal, Column::kPoint, Column::kPose};
+  const Refusal refusal = refusal_for(blocks);
+  EXPECT_EQ(refusal.reason, Reason::kLimit);
+  EXPECT_EQ(refusal.field, "max_reply_bytes");
+  EXPECT_EQ(refusal.limit_value, limits::kDefaultReplyBytes);
+  EXPECT_GT(refusal.asked, 65536.0 * 76);
+  QueryBatch batch = batch_of(blocks);
+  batch.max_reply_bytes = 8'000'000;
+  EXPECT_TRUE(check_batch(batch).ok());
+}
+
+TEST(CheckBatchTest, RaysOfAnyHaveNoColumns) {
+  OwnedBlock block = rays_along_x(RayMode::kAny);
+  block.settings.columns = {Column::kT};
+  expect_refusal(block, Reason::kMalformed, "columns", -1);
+}
+
+TEST(CheckBatchTest, ColumnsThatAKindCannotGiveAreRefused) {
+  for (const Column column : {Column::kT, Column::kUv, Column::kNormal, Column::kPoint}) {
+    for (OwnedBlock block : {twenty_balls(), twenty_boxes(), lookup_of_ids({1})}) {
+      block.settings.columns = {Column::kId, column};
+      expect_refusal(block, Reason::kMalformed, "columns", -1);
+    }
+  }
+  OwnedBlock lookup = lookup_of_groups({1});
+  lookup.settings.columns = {Column::kTriangle};
+  expect_refusal(lookup, Reason::kMalformed, "columns", -1);
+}
+
+TEST(CheckBatchTest, LookupsHaveIdsOrGroups) {
+  OwnedBlock both = lookup_of_ids({1});
+  both.groups = {1};
+  expect_refusal(both, Reason::kMalformed, "lookup", -1);
+  expect_refusal(lookup_of_ids({}), Reason::kMalformed, "lookup", -1);
+}
+
+TEST(CheckBatchTest, ZeroIsNoIdAndNoGroup) {
+  expect_refusal(lookup_of_ids({3, 4, 0}), Reason::kOutOfRange, "lookup.ids", 2);
+  expect_refusal(lookup_of_groups({3, 0}), Reason::kOutOfRange, "lookup.groups", 1);
+}
+
+}  // namespace
+}  // namespace locus::test
