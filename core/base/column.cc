@@ -11,8 +11,7 @@ namespace {
 bool fits(size_t numbers, size_t width, size_t items, ColumnNeed need) {
   if (numbers == width * items) return true;
   const bool one = need == ColumnNeed::kEachOrOne || need == ColumnNeed::kOptional;
-  const bool none = need == ColumnNeed::kOptional || need == ColumnNeed::kOptionalEach;
-  return (one && numbers == width) || (none && numbers == 0);
+  return (one && numbers == width) || (need == ColumnNeed::kOptional && numbers == 0);
 }
 
 }  // namespace
@@ -22,7 +21,7 @@ absl::Status check_column(size_t numbers, size_t width, size_t items, ColumnNeed
   std::string wanted = absl::StrCat(width * items);
   if (need == ColumnNeed::kEachOrOne || need == ColumnNeed::kOptional)
     absl::StrAppend(&wanted, ", ", width, " for all");
-  if (need == ColumnNeed::kOptional || need == ColumnNeed::kOptionalEach) absl::StrAppend(&wanted, ", or none");
+  if (need == ColumnNeed::kOptional) absl::StrAppend(&wanted, ", or none");
   return refuse_argument(Reason::kColumnLength, field, {},
                          absl::StrCat("holds ", numbers, " numbers; for ", items, " items give ", wanted));
 }

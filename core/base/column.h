@@ -26,11 +26,10 @@ class ColumnReader {
   size_t width_;
 };
 
-enum class ColumnNeed { kEach, kEachOrOne, kOptional, kOptionalEach };
+enum class ColumnNeed { kEach, kEachOrOne, kOptional };
 
 // INVALID_ARGUMENT COLUMN_LENGTH naming `field`, what it holds and what it may hold, unless `numbers` numbers are as
-// many as `items` entries of `width` (kEach), or one entry as well (kEachOrOne), or none as well (kOptional), or all or
-// none (kOptionalEach).
+// many as `items` entries of `width` (kEach), or one entry as well (kEachOrOne), or none as well (kOptional).
 absl::Status check_column(size_t numbers, size_t width, size_t items, ColumnNeed need, absl::string_view field);
 
 }  // namespace locus

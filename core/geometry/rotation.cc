@@ -15,7 +15,11 @@ double length(const Quaternion& q) {
 double unit_deviation(const Quaternion& q) { return std::abs(length(q) - 1.0); }
 
 Quaternion normalized(const Quaternion& q) {
+  // Four halves of a unit in the last place are the most that rounding to float takes a unit quaternion off unit
+  // length.
+  constexpr double kRounding = 0x1p-23;
   const double n = length(q);
+  if (std::abs(n - 1.0) <= kRounding) return q;
   return {static_cast<float>(q.x / n), static_cast<float>(q.y / n), static_cast<float>(q.z / n),
           static_cast<float>(q.w / n)};
 }

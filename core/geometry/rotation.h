@@ -16,7 +16,8 @@ struct Quaternion {
 
 // | |q| - 1 |, in double.
 double unit_deviation(const Quaternion& q);
-// Scaled to unit length in double, rounded once. Not for a zero quaternion.
+// Scaled to unit length in double, rounded once; kept bit for bit where it is of unit length as far as float can tell,
+// so that normalising again changes nothing. Not for a zero quaternion.
 Quaternion normalized(const Quaternion& q);
 
 // Rows of a rotation matrix; `to_world` is matrix * vector, `to_local` its transpose * vector.

@@ -19,7 +19,7 @@ absl::Status check_counts(const std::vector<float>& vertices, const std::vector<
     return refuse_argument(Reason::kColumnLength, "indices", {},
                            absl::StrCat("holds ", indices.size(), " numbers; give three for each triangle"));
   if (vertices.empty() || indices.empty())
-    return refuse_argument(Reason::kColumnLength, vertices.empty() ? "vertices" : "indices", {},
+    return refuse_argument(Reason::kMalformed, vertices.empty() ? "vertices" : "indices", {},
                            "a mesh needs at least one triangle");
   if (vertices.size() / 3 > limits::kMaxMeshVertices)
     return refuse_limit("vertices", "mesh_vertices", limits::kMaxMeshVertices,
@@ -38,8 +38,11 @@ absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles) {
     if (parts[i].name.size() > limits::kMaxLabelLength)
       return refuse_limit(absl::StrCat("parts[", i, "].name"), "label_length", limits::kMaxLabelLength,
                           static_cast<double>(parts[i].name.size()));
-    if (parts[i].first_triangle >= triangles || (i > 0 && parts[i].first_triangle <= parts[i - 1].first_triangle))
-      return refuse_argument(Reason::kOutOfRange, "parts", index, "first triangles must ascend and lie in the mesh");
+    const uint32_t first = parts[i].first_triangle;
+    const bool in_order = i == 0 ? first == 0 : first > parts[i - 1].first_triangle;
+    if (!in_order || first >= triangles)
+      return refuse_argument(Reason::kMalformed, "parts", index,
+                             "parts begin at triangle 0, ascend and lie within the mesh");
   }
   return absl::OkStatus();
 }
@@ -55,7 +58,7 @@ absl::Status check_values(const std::vector<float>& vertices, const std::vector<
   const size_t vertex_count = vertices.size() / 3;
   for (size_t i = 0; i < indices.size(); ++i)
     if (indices[i] >= vertex_count)
-      return refuse_argument(Reason::kOutOfRange, "indices", static_cast<uint32_t>(i),
+      return refuse_argument(Reason::kOutOfRange, "indices", static_cast<uint32_t>(i / 3),
                              absl::StrCat("vertex ", indices[i], " of ", vertex_count, " does not exist"));
   return absl::OkStatus();
 }

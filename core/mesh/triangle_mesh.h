@@ -20,8 +20,9 @@ struct MeshPart {
 
 class TriangleMesh {
  public:
-  // `vertices` holds 3V coordinates, `indices` 3T vertex numbers. Refuses with INVALID_ARGUMENT naming `vertices` or
-  // `indices` and the position in it, or with the limit that was passed.
+  // `vertices` holds 3V coordinates, `indices` 3T vertex numbers; the first of `parts`, if any, begins at 0. Refuses
+  // with INVALID_ARGUMENT naming `vertices` and the vertex, `indices` and the triangle, `parts` and the part, or the
+  // limit that was passed.
   static absl::StatusOr<TriangleMesh> create(std::vector<float> vertices, std::vector<uint32_t> indices,
                                              std::vector<MeshPart> parts);
 

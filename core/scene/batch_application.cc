@@ -146,7 +146,6 @@ bool BatchApplication::may_insert(Id id, uint32_t index, const std::string& fiel
   const bool known = current(id) != nullptr;
   if (id == kNoId) reason = Reason::kOutOfRange;
   if (statics_.find(id) != nullptr || (known && !batch_.upsert)) reason = Reason::kDuplicateId;
-  if (reason == Reason::kUnspecified && !known && count_ >= limits::kMaxObjects) reason = Reason::kLimit;
   if (reason != Reason::kUnspecified) refuse(field + ".ids", index, id, reason);
   return reason == Reason::kUnspecified;
 }

@@ -23,6 +23,8 @@ class BatchApplication {
   // Clear, removes, inserts, moves, relabels: in this order, once.
   void run();
 
+  // Objects there are now. Only inserts add any, and nothing removes after them: at its highest after run().
+  size_t object_count() const { return count_; }
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
   std::vector<ItemError>& errors() { return errors_; }

@@ -106,6 +106,10 @@ size_t Registry::scene_count() const {
 
 MeshPtr Registry::find_content(const Sha256& sha256) const {
   const MutexLock lock(mutex_);
+  return content(sha256);
+}
+
+MeshPtr Registry::content(const Sha256& sha256) const {
   for (const auto& [name, mesh] : meshes_)
     if (mesh->sha256() == sha256) return mesh;
   return nullptr;
@@ -129,26 +133,24 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
   }
   if (meshes_.size() >= limits::kMaxMeshes)
     return refuse_full("mesh", "meshes", limits::kMaxMeshes, static_cast<double>(meshes_.size() + 1), 0);
+  if (MeshPtr equal = content(mesh->sha256()); equal != nullptr) mesh = std::move(equal);
   meshes_.emplace(name, mesh);
   return mesh;
 }
 
-uint32_t Registry::count_uses(const std::vector<ScenePtr>& scenes, const StaticMesh* mesh) {
+uint32_t Registry::count_uses(const StaticMesh* mesh) const {
   uint32_t uses = 0;
-  for (const ScenePtr& scene : scenes) uses += scene->latest()->statics->uses(mesh);
+  for (const auto& [name, scene] : scenes_) uses += scene->latest()->statics->uses(mesh);
   return uses;
 }
 
-std::vector<ScenePtr> Registry::all_scenes() const { return list_scenes("", limits::kMaxScenes); }
-
 absl::Status Registry::delete_mesh(const std::string& name) {
-  const std::vector<ScenePtr> scenes = all_scenes();
   const MutexLock lock(mutex_);
   const auto known = meshes_.find(name);
   if (known == meshes_.end())
     return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "mesh",
                        absl::StrCat("no mesh is called '", name, "'"));
-  if (const uint32_t uses = count_uses(scenes, known->second.get()); uses > 0) {
+  if (const uint32_t uses = count_uses(known->second.get()); uses > 0) {
     Refusal refusal;
     refusal.reason = Reason::kInUse;
     refusal.field = "mesh";
@@ -161,15 +163,17 @@ absl::Status Registry::delete_mesh(const std::string& name) {
 }
 
 std::vector<Registry::NamedMesh> Registry::list_meshes(const std::string& after, size_t limit) const {
-  const std::vector<ScenePtr> scenes = all_scenes();
   const MutexLock lock(mutex_);
   std::vector<NamedMesh> result;
   for (auto it = after_key(meshes_, after); it != meshes_.end() && result.size() < limit; ++it)
-    result.push_back({it->first, it->second, count_uses(scenes, it->second.get())});
+    result.push_back({it->first, it->second, count_uses(it->second.get())});
   return result;
 }
 
-uint32_t Registry::mesh_uses(const StaticMesh* mesh) const { return count_uses(all_scenes(), mesh); }
+uint32_t Registry::mesh_uses(const StaticMesh* mesh) const {
+  const MutexLock lock(mutex_);
+  return count_uses(mesh);
+}
 
 size_t Registry::mesh_count() const {
   const MutexLock lock(mutex_);

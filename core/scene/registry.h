@@ -41,8 +41,8 @@ class Registry {
   // The mesh of that content under whichever name, or null.
   MeshPtr find_content(const Sha256& sha256) const LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
-  // Puts `mesh` under `name`. The same content again is fine and returns the mesh that was there; other content under a
-  // known name is ALREADY_EXISTS.
+  // Puts `mesh` under `name`, or the mesh of the same content that is there under any name, so that equal content is
+  // held once; returns the one that counts. Other content under a known name is ALREADY_EXISTS.
   absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
   // FAILED_PRECONDITION IN_USE with the count while instances of any scene use it.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
@@ -57,8 +57,8 @@ class Registry {
   uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
  private:
-  std::vector<ScenePtr> all_scenes() const LOCUS_EXCLUDES(mutex_);
-  static uint32_t count_uses(const std::vector<ScenePtr>& scenes, const StaticMesh* mesh);
+  uint32_t count_uses(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
+  MeshPtr content(const Sha256& sha256) const LOCUS_REQUIRES(mutex_);
 
   mutable Mutex mutex_;
   std::map<std::string, ScenePtr> scenes_ LOCUS_GUARDED_BY(mutex_);

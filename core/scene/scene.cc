@@ -41,6 +41,14 @@ absl::Status too_late(uint64_t newest, uint64_t asked) {
                 absl::StrCat("revision ", asked, " was not reached in time; the scene is at ", newest), refusal);
 }
 
+// The placement that asked for the id at `position` of all placed ones.
+absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id) {
+  size_t list = 0;
+  while (position >= change.place[list].count()) position -= change.place[list++].count();
+  return refuse_argument(Reason::kDuplicateId, absl::StrCat("place[", list, "].ids"), static_cast<uint32_t>(position),
+                         absl::StrCat("the id ", id, " was taken by an object meanwhile"));
+}
+
 }  // namespace
 
 Scene::Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics)
@@ -90,7 +98,7 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
   }
   const MutexLock lock(mutex_);
   --pending_changes_;
-  last_build_error_ = result.ok() ? "" : std::string(result.status().message());
+  if (!result.ok()) last_build_error_ = std::string(result.status().message());
   return result;
 }
 
@@ -103,9 +111,7 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
   if (absl::Status status = check_open(); !status.ok()) return status;
   // Objects inserted while the tree was being built may have taken an id.
   for (size_t i = 0; i < changed->placed.size(); ++i)
-    if (writer_.is_object(changed->placed[i]))
-      return refuse_argument(Reason::kDuplicateId, "place.ids", static_cast<uint32_t>(i),
-                             absl::StrCat("the id ", changed->placed[i], " was taken by an object meanwhile"));
+    if (writer_.is_object(changed->placed[i])) return taken_meanwhile(change, i, changed->placed[i]);
   SnapshotPtr snapshot = writer_.replace_statics(std::move(changed->set));
   InstanceChange result{std::move(changed->placed), snapshot->revision, snapshot->epoch};
   publish(std::move(snapshot), 0);

@@ -39,9 +39,9 @@ struct InstanceChange {
 };
 
 struct SceneStatus {
-  uint64_t memory_bytes = 0;
+  uint64_t memory_bytes = 0;  // of the latest revision, without meshes, which scenes share
   uint32_t pending_changes = 0;
-  std::string last_build_error;
+  std::string last_build_error;  // of the latest change that failed, whatever came after it
 };
 
 class Scene {

@@ -47,8 +47,8 @@ void WriterTable::record(uint64_t writer, uint64_t batch, const UpdateAck& ack) 
   writers_[writer] = {batch, ++clock_, ack};
 }
 
-SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics)
-    : epoch_(epoch), winding_(winding), statics_(std::move(statics)) {
+SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics, size_t max_objects)
+    : epoch_(epoch), max_objects_(max_objects), winding_(winding), statics_(std::move(statics)) {
   published_ = freeze();
 }
 
@@ -90,6 +90,9 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch
   }
   BatchApplication application(objects_, *statics_, batch);
   application.run();
+  if (application.object_count() > max_objects_)
+    return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
+                       static_cast<double>(application.object_count()), 0);
   Applied result;
   result.ack.applied = application.applied();
   result.ack.refused = application.refused();

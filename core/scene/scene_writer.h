@@ -9,6 +9,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
+#include "core/base/limits.h"
 #include "core/scene/batch_application.h"
 #include "core/scene/scene_snapshot.h"
 #include "core/scene/update_batch.h"
@@ -36,14 +37,16 @@ class WriterTable {
 
 class SceneWriter {
  public:
-  SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics);
+  SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics,
+              size_t max_objects = limits::kMaxObjects);
 
   struct Applied {
     UpdateAck ack;
     SnapshotPtr snapshot;         // null when nothing changed
     uint64_t replaced_items = 0;  // objects the revision before holds that this one does not
   };
-  // `batch` has passed check_form(). Item errors are in the ack; with all_or_nothing any of them refuses the batch.
+  // `batch` has passed check_form(). Item errors are in the ack; with all_or_nothing any of them refuses the batch. So
+  // does one object too many, with RESOURCE_EXHAUSTED.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
 
   // The next revision with other statics.
@@ -62,6 +65,7 @@ class SceneWriter {
   void commit(const UpdateBatch& batch, const BatchApplication::Difference& difference, Applied& result);
 
   uint64_t epoch_;
+  size_t max_objects_;
   uint64_t revision_ = 0;
   uint64_t tick_ = 0;
   Winding winding_;

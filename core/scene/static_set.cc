@@ -1,5 +1,6 @@
 #include "core/scene/static_set.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,12 +18,11 @@ namespace {
 constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
 
 absl::Status check_columns(const PlacementColumns& place, const std::string& field) {
-  const size_t n = place.translations.size() / 3;
+  const size_t n = place.count();
   const auto check = [&](size_t numbers, size_t width, ColumnNeed need, absl::string_view name) {
     return check_column(numbers, width, n, need, absl::StrCat(field, ".", name));
   };
-  if (absl::Status s = check(place.translations.size(), 3, ColumnNeed::kEach, "translations"); !s.ok()) return s;
-  if (absl::Status s = check(place.ids.size(), 1, ColumnNeed::kOptionalEach, "ids"); !s.ok()) return s;
+  if (absl::Status s = check(place.translations.size(), 3, ColumnNeed::kEachOrOne, "translations"); !s.ok()) return s;
   if (absl::Status s = check(place.rotations.size(), 4, ColumnNeed::kOptional, "rotations"); !s.ok()) return s;
   if (absl::Status s = check(place.scales.size(), 1, ColumnNeed::kOptional, "scales"); !s.ok()) return s;
   if (absl::Status s = check(place.layers.size(), 1, ColumnNeed::kOptional, "layers"); !s.ok()) return s;
@@ -76,6 +76,12 @@ absl::StatusOr<Instance> read_instance(const PlacementColumns& place, uint32_t i
   return instance;
 }
 
+absl::Status refuse_group_zero(const StaticChange& change) {
+  const auto zero = std::find(change.remove_groups.begin(), change.remove_groups.end(), Group{0});
+  return refuse_argument(Reason::kOutOfRange, "remove_groups",
+                         static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
+}
+
 // The instances of a change: those kept and those placed, with their ids.
 class Changing {
  public:
@@ -92,8 +98,9 @@ class Changing {
       removed.insert(id);
     }
     const absl::flat_hash_set<Group> groups(change.remove_groups.begin(), change.remove_groups.end());
+    if (groups.contains(0)) return refuse_group_zero(change);
     for (const Instance& instance : old_.tree().values()) {
-      if (removed.contains(instance.id) || (instance.group != 0 && groups.contains(instance.group))) continue;
+      if (removed.contains(instance.id) || groups.contains(instance.group)) continue;
       instances_.push_back(instance);
       taken_.insert(instance.id);
     }
@@ -103,7 +110,7 @@ class Changing {
   absl::Status place(const PlacementColumns& columns, const std::string& field) {
     LOCUS_CHECK(columns.mesh != nullptr);
     if (absl::Status status = check_columns(columns, field); !status.ok()) return status;
-    const size_t n = columns.translations.size() / 3;
+    const size_t n = columns.count();
     if (instances_.size() + n > limits::kMaxInstances)
       return refuse_full(field, "instances", limits::kMaxInstances, static_cast<double>(instances_.size() + n), 0);
     for (uint32_t i = 0; i < n; ++i) {
@@ -180,10 +187,6 @@ uint32_t StaticSet::uses(const StaticMesh* mesh) const {
   return found == uses_.end() ? 0 : found->second;
 }
 
-uint64_t StaticSet::bytes() const {
-  uint64_t bytes = tree_.bytes() + positions_.capacity() * (sizeof(Id) + sizeof(uint32_t));
-  for (const auto& [mesh, uses] : uses_) bytes += mesh->bytes();
-  return bytes;
-}
+uint64_t StaticSet::bytes() const { return tree_.bytes() + positions_.capacity() * (sizeof(Id) + sizeof(uint32_t)); }
 
 }  // namespace locus

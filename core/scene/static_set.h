@@ -16,17 +16,19 @@
 
 namespace locus {
 
-// Columns of one mesh's placements, borrowed. N comes from `translations`; another column has N entries, one for all,
-// or none for the default in brackets. Ids have N entries or none.
+// Columns of one mesh's placements, borrowed. N is the number of ids, or of translations where there are no ids;
+// another column has N entries, one for all, or none for the default in brackets.
 struct PlacementColumns {
   std::shared_ptr<const StaticMesh> mesh;
   absl::Span<const uint64_t> ids;         // [chosen, bit 63 set]
-  absl::Span<const double> translations;  // 3N
+  absl::Span<const double> translations;  // 3N, or 3 with ids
   absl::Span<const float> rotations;      // 4N, x y z w [identity]
   absl::Span<const float> scales;         // N, > 0 [1]
   absl::Span<const uint32_t> layers;      // [bit 0]
   absl::Span<const uint64_t> groups;      // [0]
   absl::Span<const uint64_t> tags;        // [0]
+
+  size_t count() const { return ids.empty() ? translations.size() / 3 : ids.size(); }
 };
 
 struct StaticChange {
@@ -55,6 +57,7 @@ class StaticSet {
   uint64_t triangle_count() const { return triangle_count_; }
   // Instances of that mesh.
   uint32_t uses(const StaticMesh* mesh) const;
+  // Without the meshes, which sets share.
   uint64_t bytes() const;
 
  private:

@@ -10,7 +10,7 @@ namespace {
 absl::Status check_positions(absl::Span<const float> relative, absl::Span<const double> absolute, size_t n,
                              const std::string& field) {
   if (!relative.empty() && !absolute.empty())
-    return refuse_argument(Reason::kColumnLength, field + ".positions_f64", {},
+    return refuse_argument(Reason::kMalformed, field + ".positions_f64", {},
                            "give positions or positions_f64, not both");
   if (absolute.empty()) return check_column(relative.size(), 3, n, ColumnNeed::kEachOrOne, field + ".positions");
   return check_column(absolute.size(), 3, n, ColumnNeed::kEachOrOne, field + ".positions_f64");
@@ -68,7 +68,7 @@ absl::Status check_numbers(const UpdateBatch& batch) {
   if (max_component(abs(batch.frame)) > limits::kMaxCoordinate)
     return refuse_argument(Reason::kOutOfRange, "frame", {}, "frames must lie within +-1e9");
   if ((batch.writer == 0) != (batch.batch == 0))
-    return refuse_argument(Reason::kOutOfRange, batch.writer == 0 ? "writer" : "batch", {},
+    return refuse_argument(Reason::kMalformed, batch.writer == 0 ? "writer" : "batch", {},
                            "writer and batch go together: a random number that is not 0, and 1, 2, 3, ...");
   const size_t items = item_count(batch);
   if (items > limits::kMaxUpdateItems)

@@ -76,7 +76,7 @@ struct UpdateAck {
   bool duplicate = false;
 };
 
-// The form of a batch: column lengths, frame and limits. INVALID_ARGUMENT or RESOURCE_EXHAUSTED naming the field.
+// The form of a batch: column lengths, frame and limits. INVALID_ARGUMENT naming the field.
 absl::Status check_form(const UpdateBatch& batch);
 
 }  // namespace locus

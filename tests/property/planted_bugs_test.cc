@@ -5,6 +5,7 @@
 
 #include "core/base/planted_bug.h"
 #include "tests/support/grid_comparison.h"
+#include "tests/support/scene_lockstep.h"
 #include "tests/support/scene_search.h"
 
 namespace locus::test {
@@ -23,6 +24,8 @@ std::string compare_moving_grids_with_list() {
   return search_grid_scenes(scaled_count(40), any_adversarial_scene, moving_grid_difference);
 }
 
+std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_count(20), 60); }
+
 struct Trial {
   const char* name;
   PlantedBug bug;
@@ -35,6 +38,8 @@ constexpr Trial kTrials[] = {
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
     {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},
+    {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},
+    {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
 };
 
 class PlantedBugTest : public ::testing::TestWithParam<Trial> {

@@ -1,0 +1,210 @@
+#include "core/scene/registry.h"
+
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+#include "tests/support/scene_fixture.h"
+
+namespace locus::test {
+namespace {
+
+class RegistryTest : public SceneFixture {
+ protected:
+  absl::StatusOr<Registry::CreatedScene> create(const std::string& name, const std::string& static_from = "",
+                                                bool if_absent = false) {
+    return registry_.create_scene(name, {}, ++epoch_, static_from, if_absent);
+  }
+  ScenePtr created(const std::string& name, const std::string& static_from = "") {
+    const auto scene = create(name, static_from);
+    EXPECT_TRUE(scene.ok()) << scene.status();
+    return scene->scene;
+  }
+
+  static std::vector<std::string> names(const std::vector<ScenePtr>& scenes) {
+    std::vector<std::string> result;
+    for (const ScenePtr& scene : scenes) result.push_back(scene->name());
+    return result;
+  }
+
+  Registry registry_;
+  uint64_t epoch_ = 0;
+};
+
+using Names = std::vector<std::string>;
+
+TEST_F(RegistryTest, SceneNamesFollowTheirRule) {
+  for (const std::string& name :
+       {std::string("a"), std::string("a1"), std::string("a-b"), std::string("z--9"), std::string(63, 'x')})
+    EXPECT_TRUE(check_scene_name(name, "name").ok()) << name;
+  for (const std::string& name :
+       {std::string(), std::string("1a"), std::string("-a"), std::string("a-"), std::string("A"), std::string("a_b"),
+        std::string("a b"), std::string("\xc3\xa4"), std::string(64, 'x'), std::string("a\0b", 3)})
+    expect_refusal(check_scene_name(name, "name"), absl::StatusCode::kInvalidArgument, Reason::kMalformed, "name");
+}
+
+TEST_F(RegistryTest, MeshNamesFollowTheirRule) {
+  for (const std::string& name : {std::string("A/b.obj#1"), std::string("0"), std::string(63, '~')})
+    EXPECT_TRUE(check_mesh_name(name, "mesh").ok()) << name;
+  for (const std::string& name : {std::string(), std::string("a b"), std::string(64, 'x'), std::string("a\n")})
+    expect_refusal(check_mesh_name(name, "mesh"), absl::StatusCode::kInvalidArgument, Reason::kMalformed, "mesh");
+}
+
+TEST_F(RegistryTest, ACreatedSceneIsFound) {
+  const ScenePtr scene = created("arena");
+  EXPECT_EQ(*registry_.find_scene("arena"), scene);
+  EXPECT_EQ(scene->latest()->epoch, 1u);
+  EXPECT_EQ(registry_.scene_count(), 1u);
+}
+
+TEST_F(RegistryTest, AnUnknownSceneIsNotFound) {
+  expect_refusal(registry_.find_scene("arena").status(), absl::StatusCode::kNotFound, Reason::kNotFound, "scene");
+}
+
+TEST_F(RegistryTest, ABadNameIsRefused) {
+  expect_refusal(create("Arena").status(), absl::StatusCode::kInvalidArgument, Reason::kMalformed, "name");
+}
+
+TEST_F(RegistryTest, ATakenNameIsRefused) {
+  created("arena");
+  expect_refusal(create("arena").status(), absl::StatusCode::kAlreadyExists, Reason::kAlreadyExists, "name");
+}
+
+TEST_F(RegistryTest, IfAbsentReturnsTheSceneThatIsThere) {
+  const ScenePtr scene = created("arena");
+  const auto again = create("arena", "nowhere", true);
+  ASSERT_TRUE(again.ok());
+  EXPECT_TRUE(again->existed);
+  EXPECT_EQ(again->scene, scene);
+  EXPECT_FALSE(create("other", "", true)->existed);
+}
+
+TEST_F(RegistryTest, TooManyScenesNameTheLimit) {
+  for (uint32_t i = 0; i < limits::kMaxScenes; ++i) created(absl::StrCat("s", i));
+  const absl::Status status = create("more").status();
+  expect_refusal(status, absl::StatusCode::kResourceExhausted, Reason::kLimit, "name");
+  EXPECT_EQ(refusal_of(status)->limit, "scenes");
+  EXPECT_TRUE(registry_.delete_scene("s7").ok());
+  EXPECT_TRUE(create("more").ok());
+}
+
+TEST_F(RegistryTest, ADeletedSceneIsClosedAndForgotten) {
+  const ScenePtr scene = created("arena");
+  EXPECT_TRUE(registry_.delete_scene("arena").ok());
+  EXPECT_EQ(registry_.find_scene("arena").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(scene->apply({}).status().code(), absl::StatusCode::kNotFound);
+  expect_refusal(registry_.delete_scene("arena"), absl::StatusCode::kNotFound, Reason::kNotFound, "name");
+}
+
+TEST_F(RegistryTest, ScenesAreListedByNamePageByPage) {
+  for (const char* name : {"d", "b", "a", "c"}) created(name);
+  EXPECT_EQ(names(registry_.list_scenes("", 3)), (Names{"a", "b", "c"}));
+  EXPECT_EQ(names(registry_.list_scenes("c", 3)), (Names{"d"}));
+  EXPECT_EQ(names(registry_.list_scenes("bb", 1)), (Names{"c"}));  // a scene deleted meanwhile does no harm
+  EXPECT_TRUE(registry_.list_scenes("d", 3).empty());
+}
+
+TEST_F(RegistryTest, StaticFromSharesInstancesAndNotObjects) {
+  const ScenePtr source = created("source");
+  ASSERT_TRUE(source->change_instances(placing(placement({8}, {0, 0, 0}))).ok());
+  ASSERT_TRUE(source->apply(with(points({1}, {0, 0, 0}))).ok());
+  const ScenePtr copy = created("copy", "source");
+  EXPECT_EQ(copy->latest()->statics, source->latest()->statics);
+  EXPECT_EQ(copy->latest()->objects.size(), 0u);
+  EXPECT_EQ(copy->latest()->revision, 0u);
+}
+
+TEST_F(RegistryTest, ChangesOfASharedStaticPartShowInOneSceneOnly) {
+  const ScenePtr source = created("source");
+  ASSERT_TRUE(source->change_instances(placing(placement({8}, {0, 0, 0}))).ok());
+  const ScenePtr copy = created("copy", "source");
+  ASSERT_TRUE(copy->change_instances(placing(placement({9}, {0, 0, 0}))).ok());
+  EXPECT_EQ(source->latest()->statics->size(), 1u);
+  EXPECT_EQ(copy->latest()->statics->size(), 2u);
+  EXPECT_EQ(copy->latest()->statics->find(8)->mesh, mesh_);
+}
+
+TEST_F(RegistryTest, StaticFromAnUnknownSceneIsNotFoundAndCreatesNothing) {
+  expect_refusal(create("copy", "nowhere").status(), absl::StatusCode::kNotFound, Reason::kNotFound,
+                 "spec.static_from");
+  EXPECT_EQ(registry_.scene_count(), 0u);
+}
+
+TEST_F(RegistryTest, AMeshIsFoundByNameAndByContent) {
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  EXPECT_EQ(*registry_.find_mesh("m", "mesh"), mesh_);
+  EXPECT_EQ(registry_.find_content(mesh_->sha256()), mesh_);
+  EXPECT_EQ(registry_.find_content(make_mesh("x", 99)->sha256()), nullptr);
+  expect_refusal(registry_.find_mesh("n", "place[0].mesh").status(), absl::StatusCode::kNotFound, Reason::kNotFound,
+                 "place[0].mesh");
+}
+
+TEST_F(RegistryTest, TheSameContentUnderItsNameIsFine) {
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  EXPECT_EQ(*registry_.add_mesh("m", make_mesh("m", 1)), mesh_);
+  EXPECT_EQ(registry_.mesh_count(), 1u);
+}
+
+TEST_F(RegistryTest, OtherContentUnderAKnownNameIsRefused) {
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  expect_refusal(registry_.add_mesh("m", make_mesh("m", 2)).status(), absl::StatusCode::kAlreadyExists,
+                 Reason::kAlreadyExists, "mesh");
+  EXPECT_EQ(*registry_.find_mesh("m", "mesh"), mesh_);
+}
+
+TEST_F(RegistryTest, EqualContentUnderTwoNamesIsHeldOnce) {
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  EXPECT_EQ(*registry_.add_mesh("alias", make_mesh("alias", 1)), mesh_);
+  EXPECT_EQ(*registry_.find_mesh("alias", "mesh"), mesh_);
+  EXPECT_EQ(registry_.mesh_count(), 2u);
+}
+
+TEST_F(RegistryTest, AnUnusedMeshIsDeleted) {
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  EXPECT_TRUE(registry_.delete_mesh("m").ok());
+  EXPECT_EQ(registry_.mesh_count(), 0u);
+  expect_refusal(registry_.delete_mesh("m"), absl::StatusCode::kNotFound, Reason::kNotFound, "mesh");
+}
+
+TEST_F(RegistryTest, AUsedMeshIsNotDeletedAndItsUsesOfAllScenesAreCounted) {
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  ASSERT_TRUE(created("a")->change_instances(placing(placement({1, 2}, {0, 0, 0}))).ok());
+  created("b", "a");
+  const absl::Status status = registry_.delete_mesh("m");
+  expect_refusal(status, absl::StatusCode::kFailedPrecondition, Reason::kInUse, "mesh");
+  EXPECT_EQ(refusal_of(status)->asked, 4);
+  EXPECT_EQ(registry_.mesh_uses(mesh_.get()), 4u);
+  EXPECT_TRUE(registry_.delete_scene("a").ok());
+  EXPECT_EQ(registry_.mesh_uses(mesh_.get()), 2u);
+  EXPECT_TRUE(registry_.delete_scene("b").ok());
+  EXPECT_TRUE(registry_.delete_mesh("m").ok());
+}
+
+TEST_F(RegistryTest, MeshesAreListedByNamePageByPageWithTheirUses) {
+  for (uint8_t i = 3; i > 0; --i) {
+    const std::string name(1, static_cast<char>('a' + i));
+    ASSERT_TRUE(registry_.add_mesh(name, make_mesh(name, i)).ok());
+  }
+  mesh_ = *registry_.find_mesh("c", "mesh");
+  ASSERT_TRUE(created("a")->change_instances(placing(placement({1}, {0, 0, 0}))).ok());
+  const std::vector<Registry::NamedMesh> page = registry_.list_meshes("b", 5);
+  ASSERT_EQ(page.size(), 2u);
+  EXPECT_EQ(page[0].name, "c");
+  EXPECT_EQ(page[0].uses, 1u);
+  EXPECT_EQ(page[1].name, "d");
+  EXPECT_EQ(page[1].uses, 0u);
+  EXPECT_EQ(registry_.list_meshes("", 2).size(), 2u);
+}
+
+TEST_F(RegistryTest, AMeshInUseOutlivesItsRegistry) {
+  ScenePtr scene;
+  {
+    Registry registry;
+    ASSERT_TRUE(registry.add_mesh("m", mesh_).ok());
+    scene = registry.create_scene("a", {}, 1, "", false)->scene;
+    ASSERT_TRUE(scene->change_instances(placing(placement({1}, {0, 0, 0}))).ok());
+  }
+  mesh_.reset();
+  EXPECT_EQ(scene->latest()->statics->find(1)->mesh->mesh().triangle_count(), 1u);
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,17 @@
+// Thousands of random batches put to scenes and to a model that applies one item after the other to a std::map.
+#include <gtest/gtest.h>
+
+#include "tests/support/scene_lockstep.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+TEST(SceneEqualsModelTest, ThroughManyShortLives) { EXPECT_EQ(search_scene_lockstep(scaled_count(100), 60), ""); }
+
+TEST(SceneEqualsModelTest, ThroughLongLives) {
+  EXPECT_EQ(search_scene_lockstep(4, static_cast<int>(scaled_count(2000))), "");
+}
+
+}  // namespace
+}  // namespace locus::test

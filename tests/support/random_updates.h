@@ -1,0 +1,154 @@
+// Random update batches of right form, with every kind of wrong item now and then. Ids, groups and writers come from
+// small pools, so that duplicates, unknown ids and repeated batches are frequent.
+#ifndef LOCUS_TESTS_SUPPORT_RANDOM_UPDATES_H_
+#define LOCUS_TESTS_SUPPORT_RANDOM_UPDATES_H_
+
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "core/scene/update_batch.h"
+#include "tests/support/columns.h"
+#include "tests/support/random.h"
+
+namespace locus::test {
+
+class RandomUpdates {
+ public:
+  // Ids are 0 to `ids` - 1.
+  RandomUpdates(Random& random, uint64_t ids) : random_(random), ids_(ids) {}
+
+  // Lists of at most `items` entries, whose columns live in `columns`.
+  UpdateBatch draw(Columns& columns, size_t items) {
+    UpdateBatch batch;
+    batch.frame = random_.pick(kFrames);
+    batch.clear = random_.chance(0.03);
+    batch.upsert = random_.chance(0.3);
+    batch.all_or_nothing = random_.chance(0.15);
+    batch.restart_ticks = random_.chance(0.05);
+    if (random_.chance(0.4)) batch.tick = random_.below(50);
+    if (random_.chance(0.3)) batch.remove_ids = columns.ids(draw_ids(1 + random_.below(items)));
+    if (random_.chance(0.1)) batch.remove_groups = columns.ids(draw_labels<uint64_t>(2));
+    for (uint64_t i = random_.below(4); i > 0; --i) batch.inserts.push_back(draw_insert(columns, items));
+    for (uint64_t i = random_.below(4); i > 0; --i) batch.moves.push_back(draw_move(columns, items));
+    for (uint64_t i = random_.below(2); i > 0; --i) batch.relabels.push_back(draw_relabel(columns, items));
+    if (random_.chance(0.3)) number(batch);
+    return batch;
+  }
+
+ private:
+  static constexpr Vec3d kFrames[] = {{}, {}, {1e6, -3, 0.1}, {-5e8, 5e8, 1e9}};
+
+  std::vector<uint64_t> draw_ids(size_t count) {
+    std::vector<uint64_t> ids(count);
+    for (uint64_t& id : ids) id = random_.below(ids_);
+    return ids;
+  }
+
+  template <class T>
+  std::vector<T> draw_labels(size_t count) {
+    std::vector<T> labels(count);
+    for (T& label : labels) label = static_cast<T>(random_.below(5));
+    return labels;
+  }
+
+  // Numbers for every one of n items or one for all.
+  template <class T, class Draw>
+  std::vector<T> draw_column(size_t n, const Draw& draw) {
+    std::vector<T> numbers;
+    for (size_t i = random_.chance(0.3) ? 1 : n; i > 0; --i)
+      for (const double value : draw()) numbers.push_back(static_cast<T>(random_.chance(0.003) ? bad_number() : value));
+    return numbers;
+  }
+
+  double bad_number() {
+    constexpr double kBad[] = {std::numeric_limits<double>::quiet_NaN(),
+                               std::numeric_limits<double>::infinity(),
+                               -std::numeric_limits<double>::infinity(),
+                               -2e9,
+                               2e9,
+                               -0.5};
+    return random_.pick(kBad);
+  }
+
+  // Often a place where something is already.
+  std::vector<double> draw_position() {
+    const Vec3d p = random_.chance(0.7) ? random_.whole_vector(3) * 8 : random_.vector(random_.magnitude(0, 12));
+    return {p.x, p.y, p.z};
+  }
+  std::vector<double> draw_size() {
+    const double scale = random_.magnitude(-4, 8);
+    return {random_.between(0, scale), random_.between(0, scale), random_.chance(0.2) ? 0 : scale};
+  }
+  std::vector<double> draw_rotation() {
+    const Quaternion q = random_.rotation();
+    const double length = random_.chance(0.05) ? random_.between(0.99, 1.01) : 1 + random_.between(-1e-7, 1e-7);
+    return {q.x * length, q.y * length, q.z * length, q.w * length};
+  }
+
+  template <class T>
+  void draw_pose(Columns& columns, size_t n, T& to) {
+    if (random_.chance(0.3)) {
+      to.positions_f64 = columns.doubles(draw_column<double>(n, [this] { return draw_position(); }));
+    } else {
+      to.positions = columns.floats(draw_column<float>(n, [this] { return draw_position(); }));
+    }
+    if (random_.chance(0.4)) to.rotations = columns.floats(draw_column<float>(n, [this] { return draw_rotation(); }));
+  }
+
+  template <class T>
+  void draw_label_columns(Columns& columns, size_t n, T& to) {
+    if (random_.chance(0.5)) to.layers = columns.words(draw_labels<uint32_t>(random_.chance(0.5) ? 1 : n));
+    if (random_.chance(0.5)) to.groups = columns.ids(draw_labels<uint64_t>(random_.chance(0.5) ? 1 : n));
+    if (random_.chance(0.5)) to.tags = columns.ids(draw_labels<uint64_t>(random_.chance(0.5) ? 1 : n));
+  }
+
+  InsertColumns draw_insert(Columns& columns, size_t items) {
+    const size_t n = 1 + random_.below(items);
+    InsertColumns insert;
+    insert.ids = columns.ids(draw_ids(n));
+    insert.kind = static_cast<ShapeKind>(random_.below(4));
+    draw_pose(columns, n, insert);
+    insert.extents = columns.floats(draw_column<float>(n, [this] { return draw_size(); }));
+    insert.radii = columns.floats(draw_column<float>(n, [this] { return std::vector<double>{draw_size()[0]}; }));
+    draw_label_columns(columns, n, insert);
+    return insert;
+  }
+
+  MoveColumns draw_move(Columns& columns, size_t items) {
+    const size_t n = 1 + random_.below(items);
+    MoveColumns move;
+    move.ids = columns.ids(draw_ids(n));
+    draw_pose(columns, n, move);
+    return move;
+  }
+
+  RelabelColumns draw_relabel(Columns& columns, size_t items) {
+    const size_t n = 1 + random_.below(items);
+    RelabelColumns relabel;
+    relabel.ids = columns.ids(draw_ids(n));
+    draw_label_columns(columns, n, relabel);
+    return relabel;
+  }
+
+  // The writer's next number, mostly; else one before or after it. A refused batch may thus leave a gap for good, so
+  // writers change.
+  void number(UpdateBatch& batch) {
+    batch.writer = 1 + random_.below(3) + 3 * (drawn_++ / 100);
+    uint64_t& next = next_numbers_[batch.writer];
+    if (random_.chance(0.8)) {
+      batch.batch = ++next;
+    } else {
+      batch.batch = 1 + random_.below(next + 2);
+    }
+  }
+
+  Random& random_;
+  uint64_t ids_;
+  uint64_t drawn_ = 0;
+  std::map<uint64_t, uint64_t> next_numbers_;
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_RANDOM_UPDATES_H_

@@ -1,0 +1,121 @@
+// A scene with short ways to change it: batches and placements as literals, refusals taken apart.
+#ifndef LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
+#define LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "gtest/gtest.h"
+#include "tests/support/columns.h"
+
+namespace locus::test {
+
+// Tells a refusal by everything a program can read of it.
+inline void expect_refusal(const absl::Status& status, absl::StatusCode code, Reason reason, const std::string& field,
+                           std::optional<uint32_t> index = {}) {
+  EXPECT_EQ(status.code(), code) << status;
+  const Refusal refusal = refusal_of(status).value_or(Refusal{});
+  EXPECT_EQ(refusal.reason, reason) << status;
+  EXPECT_EQ(refusal.field, field) << status;
+  EXPECT_EQ(refusal.index, index) << status;
+}
+
+inline std::shared_ptr<const StaticMesh> make_mesh(const std::string& name, uint8_t content,
+                                                   std::vector<float> vertices = {0, 0, 0, 1, 0, 0, 0, 1, 0}) {
+  Sha256 sha256{};
+  sha256[0] = content;
+  return *StaticMesh::build(name, sha256, *TriangleMesh::create(std::move(vertices), {0, 1, 2}, {}));
+}
+
+class SceneFixture : public ::testing::Test {
+ protected:
+  static constexpr uint64_t kEpoch = 77;
+
+  MoveColumns move_to(std::vector<Id> ids, std::vector<float> positions) {
+    MoveColumns move;
+    move.ids = columns_.ids(std::move(ids));
+    move.positions = columns_.floats(std::move(positions));
+    return move;
+  }
+
+  InsertColumns points(std::vector<Id> ids, std::vector<float> positions) {
+    InsertColumns insert;
+    insert.ids = columns_.ids(std::move(ids));
+    insert.positions = columns_.floats(std::move(positions));
+    return insert;
+  }
+
+  InsertColumns balls(std::vector<Id> ids, std::vector<float> radii) {
+    InsertColumns insert = points(std::move(ids), {0, 0, 0});
+    insert.kind = ShapeKind::kBall;
+    insert.radii = columns_.floats(std::move(radii));
+    return insert;
+  }
+
+  static UpdateBatch with(InsertColumns insert) {
+    UpdateBatch batch;
+    batch.inserts.push_back(insert);
+    return batch;
+  }
+  static UpdateBatch with(MoveColumns move) {
+    UpdateBatch batch;
+    batch.moves.push_back(move);
+    return batch;
+  }
+  static UpdateBatch with(RelabelColumns relabel) {
+    UpdateBatch batch;
+    batch.relabels.push_back(relabel);
+    return batch;
+  }
+  UpdateBatch removing(std::vector<Id> ids) {
+    UpdateBatch batch;
+    batch.remove_ids = columns_.ids(std::move(ids));
+    return batch;
+  }
+  static UpdateBatch numbered(UpdateBatch batch, uint64_t writer, uint64_t number) {
+    batch.writer = writer;
+    batch.batch = number;
+    return batch;
+  }
+
+  UpdateAck apply(const UpdateBatch& batch) {
+    const absl::StatusOr<UpdateAck> ack = scene_.apply(batch);
+    EXPECT_TRUE(ack.ok()) << ack.status();
+    return ack.ok() ? *ack : UpdateAck{};
+  }
+
+  PlacementColumns placement(std::vector<Id> ids, std::vector<double> translations) {
+    PlacementColumns place;
+    place.mesh = mesh_;
+    place.ids = columns_.ids(std::move(ids));
+    place.translations = columns_.doubles(std::move(translations));
+    return place;
+  }
+  static StaticChange placing(PlacementColumns place) {
+    StaticChange change;
+    change.place.push_back(std::move(place));
+    return change;
+  }
+
+  uint64_t revision() const { return scene_.latest()->revision; }
+  const Object* object(Id id) const { return scene_.latest()->objects.find(id); }
+  std::vector<Id> ids() const {
+    std::vector<Id> found;
+    scene_.latest()->objects.for_each([&](Id id, const Object&) { found.push_back(id); });
+    std::sort(found.begin(), found.end());
+    return found;
+  }
+
+  Columns columns_;
+  std::shared_ptr<const StaticMesh> mesh_ = make_mesh("triangle", 1);
+  Scene scene_{"scene", {}, kEpoch, StaticSet::empty()};
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_

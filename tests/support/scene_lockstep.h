@@ -1,0 +1,148 @@
+// Puts random update batches and static changes to a scene and to its model and compares everything that shows: acks
+// and refusals, objects, the grid's contents and answers, instances, and snapshots kept along the way. For the random
+// tests, which expect no difference, and for the tests of planted bugs, which expect one.
+#ifndef LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_
+#define LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/check.h"
+#include "core/index/index_queries.h"
+#include "core/scene/scene.h"
+#include "tests/support/random_updates.h"
+#include "tests/support/scene_model.h"
+
+namespace locus::test {
+
+inline std::shared_ptr<const StaticMesh> one_triangle_mesh() {
+  absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create({0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2}, {});
+  LOCUS_CHECK(mesh.ok());
+  absl::StatusOr<std::shared_ptr<const StaticMesh>> built = StaticMesh::build("triangle", {}, *std::move(mesh));
+  LOCUS_CHECK(built.ok());
+  return *std::move(built);
+}
+
+class SceneLockstep {
+ public:
+  explicit SceneLockstep(uint64_t seed)
+      : random_(seed),
+        updates_(random_, kIds),
+        mesh_(one_triangle_mesh()),
+        scene_("lockstep", {}, 1, StaticSet::empty()) {}
+
+  // What differs first; empty for nothing.
+  std::string run(int batches) {
+    for (int batch = 0; batch < batches; ++batch) {
+      std::string what = random_.chance(0.1) ? change_instances() : apply_batch();
+      if (what.empty()) what = difference(*scene_.latest(), model_);
+      if (!what.empty()) return "batch " + std::to_string(batch) + ": " + what;
+      if (random_.chance(0.02)) kept_.emplace_back(scene_.latest(), model_);
+    }
+    for (const auto& [snapshot, model] : kept_) {
+      const std::string what = difference(*snapshot, model);
+      if (!what.empty()) return "snapshot " + std::to_string(snapshot->revision) + ": " + what;
+    }
+    return "";
+  }
+
+ private:
+  static constexpr uint64_t kIds = 60;
+
+  static std::string difference(const ItemError& actual, const ItemError& expected) {
+    if (actual.field == expected.field && actual.index == expected.index && actual.id == expected.id &&
+        actual.reason == expected.reason)
+      return "";
+    return "error " + actual.field + " " + std::to_string(actual.index) + " for " + expected.field + " " +
+           std::to_string(expected.index);
+  }
+
+  static std::string difference(const UpdateAck& actual, const UpdateAck& expected) {
+    if (actual.revision != expected.revision || actual.tick != expected.tick) return "revision or tick of the ack";
+    if (actual.applied != expected.applied || actual.refused != expected.refused) return "counts of the ack";
+    if (actual.duplicate != expected.duplicate) return "duplicate";
+    if (actual.errors.size() != expected.errors.size()) return "number of errors";
+    for (size_t i = 0; i < actual.errors.size(); ++i)
+      if (std::string what = difference(actual.errors[i], expected.errors[i]); !what.empty()) return what;
+    return "";
+  }
+
+  static std::string difference(const absl::StatusOr<UpdateAck>& actual, const SceneModel::Outcome& expected) {
+    if (actual.status().code() != expected.code) return "status " + actual.status().ToString();
+    if (actual.ok()) return difference(*actual, expected.ack);
+    const Refusal refusal = refusal_of(actual.status()).value_or(Refusal{});
+    ItemError error{refusal.field, refusal.index.value_or(0), expected.error.id, refusal.reason};
+    return difference(error, expected.error);
+  }
+
+  // What a place holds by the grid and by going through the model.
+  std::string ball_difference(const SceneSnapshot& snapshot, const SceneModel& model) {
+    const Balld ball{random_.whole_vector(3) * 8, random_.between(0, 20)};
+    std::vector<Object> found;
+    ball_overlap(snapshot.grid, ball, found);
+    size_t expected = 0;
+    for (const auto& [id, object] : model.objects()) expected += ball_overlaps(ball, object.shape);
+    if (found.size() != expected) return "objects that a ball finds";
+    for (const Object& object : found) {
+      const auto known = model.objects().find(object.id);
+      if (known == model.objects().end() || !(known->second == object)) return "an object that a ball finds";
+    }
+    return "";
+  }
+
+  std::string difference(const SceneSnapshot& snapshot, const SceneModel& model) {
+    std::vector<Object> in_grid;
+    snapshot.grid.for_each([&](const Object& object) { in_grid.push_back(object); });
+    std::sort(in_grid.begin(), in_grid.end(), [](const Object& a, const Object& b) { return a.id < b.id; });
+    if (snapshot.objects.size() != model.objects().size()) return "number of objects";
+    if (in_grid.size() != model.objects().size()) return "number of objects in the grid";
+    size_t at = 0;
+    for (const auto& [id, object] : model.objects()) {
+      const Object* known = snapshot.objects.find(id);
+      if (known == nullptr || !(*known == object)) return "object " + std::to_string(id);
+      if (!(in_grid[at++] == object)) return "object " + std::to_string(id) + " in the grid";
+    }
+    if (snapshot.statics->size() != model.instances().size()) return "number of instances";
+    for (const Id id : model.instances())
+      if (snapshot.statics->find(id) == nullptr) return "instance " + std::to_string(id);
+    return ball_difference(snapshot, model);
+  }
+
+  std::string apply_batch() {
+    Columns columns;
+    const UpdateBatch batch = updates_.draw(columns, 12);
+    return difference(scene_.apply(batch), model_.apply(batch));
+  }
+
+  std::string change_instances() {
+    const uint64_t removed = random_.chance(0.7) ? 0 : random_.below(kIds);
+    const uint64_t placed = random_.below(kIds);
+    const double origin[3] = {};
+    StaticChange change;
+    if (removed != 0) change.remove_ids = {&removed, 1};
+    change.place.push_back({mesh_, {&placed, 1}, origin, {}, {}, {}, {}, {}});
+    return scene_.change_instances(change).ok() == model_.change_instances(removed, placed) ? "" : "static change";
+  }
+
+  Random random_;
+  RandomUpdates updates_;
+  std::shared_ptr<const StaticMesh> mesh_;
+  Scene scene_;
+  SceneModel model_;
+  std::vector<std::pair<SnapshotPtr, SceneModel>> kept_;
+};
+
+// The first difference over `count` scenes of `batches` batches each, empty when there is none.
+inline std::string search_scene_lockstep(uint64_t count, int batches) {
+  for (uint64_t seed = 0; seed < count; ++seed) {
+    const std::string what = SceneLockstep(seed).run(batches);
+    if (!what.empty()) return "seed " + std::to_string(seed) + ", " + what;
+  }
+  return "";
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_

@@ -1,0 +1,217 @@
+// What a scene promises about update batches, over a std::map and one item after the other: the reference of the random
+// tests. Knows neither index nor sharing nor differences.
+#ifndef LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
+#define LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "core/scene/object.h"
+#include "core/scene/update_batch.h"
+
+namespace locus::test {
+
+class SceneModel {
+ public:
+  using Objects = std::map<Id, Object>;
+
+  struct Outcome {
+    absl::StatusCode code = absl::StatusCode::kOk;
+    UpdateAck ack;    // when OK
+    ItemError error;  // reason, field and index of a refusal
+  };
+
+  const Objects& objects() const { return objects_; }
+  const std::set<Id>& instances() const { return instances_; }
+
+  // Takes an instance away, if `removed` is not 0, and places one as `placed`. False when that is refused.
+  bool change_instances(Id removed, Id placed) {
+    std::set<Id> next = instances_;
+    if (removed != kNoId && next.erase(removed) == 0) return false;
+    if (placed == kNoId || objects_.contains(placed) || !next.insert(placed).second) return false;
+    instances_ = std::move(next);
+    ++revision_;
+    return true;
+  }
+
+  // Of a batch of right form.
+  Outcome apply(const UpdateBatch& batch) {
+    if (batch.writer != 0) {
+      const auto& [number, last] = writers_[batch.writer];
+      if (batch.batch > number + 1)
+        return {absl::StatusCode::kFailedPrecondition, {}, {"batch", 0, kNoId, Reason::kBatchGap}};
+      if (batch.batch <= number) return {absl::StatusCode::kOk, duplicate(batch.batch == number ? last : now()), {}};
+    }
+    ack_ = {};
+    next_ = batch.clear ? Objects{} : objects_;
+    apply_items(batch);
+    if (batch.all_or_nothing && ack_.refused > 0) return {absl::StatusCode::kInvalidArgument, {}, ack_.errors.front()};
+    commit(batch);
+    if (batch.writer != 0) writers_[batch.writer] = {batch.batch, ack_};
+    return {absl::StatusCode::kOk, ack_, {}};
+  }
+
+ private:
+  void commit(const UpdateBatch& batch) {
+    uint64_t tick = batch.tick.value_or(tick_);
+    if (!batch.restart_ticks) tick = std::max(tick, tick_);
+    if (tick != tick_ || next_ != objects_) ++revision_;
+    tick_ = tick;
+    objects_ = std::move(next_);
+    ack_.revision = revision_;
+    ack_.tick = tick_;
+  }
+
+  UpdateAck now() const {
+    UpdateAck ack;
+    ack.revision = revision_;
+    ack.tick = tick_;
+    return ack;
+  }
+  static UpdateAck duplicate(UpdateAck ack) {
+    ack.duplicate = true;
+    return ack;
+  }
+
+  void apply_items(const UpdateBatch& batch) {
+    for (size_t i = 0; i < batch.remove_ids.size(); ++i) {
+      const Id id = batch.remove_ids[i];
+      count(next_.erase(id) == 1 ? Reason::kUnspecified : Reason::kUnknownId, "remove_ids", i, id);
+    }
+    for (size_t i = 0; i < batch.remove_groups.size(); ++i) {
+      const Group group = batch.remove_groups[i];
+      if (group != 0) std::erase_if(next_, [group](const auto& entry) { return entry.second.group == group; });
+      count(group == 0 ? Reason::kOutOfRange : Reason::kUnspecified, "remove_groups", i, kNoId);
+    }
+    for (size_t list = 0; list < batch.inserts.size(); ++list)
+      for (size_t i = 0; i < batch.inserts[list].ids.size(); ++i)
+        insert(batch, batch.inserts[list], i, "inserts[" + std::to_string(list) + "]");
+    for (size_t list = 0; list < batch.moves.size(); ++list)
+      for (size_t i = 0; i < batch.moves[list].ids.size(); ++i)
+        move(batch, batch.moves[list], i, "moves[" + std::to_string(list) + "]");
+    for (size_t list = 0; list < batch.relabels.size(); ++list)
+      for (size_t i = 0; i < batch.relabels[list].ids.size(); ++i)
+        relabel(batch.relabels[list], i, "relabels[" + std::to_string(list) + "]");
+  }
+
+  void count(Reason reason, const std::string& field, size_t index, Id id) {
+    if (reason == Reason::kUnspecified) {
+      ++ack_.applied;
+      return;
+    }
+    ++ack_.refused;
+    if (ack_.errors.size() < 1000) ack_.errors.push_back({field, static_cast<uint32_t>(index), id, reason});
+  }
+
+  template <class T>
+  static const T* entry(absl::Span<const T> column, size_t width, size_t i) {
+    return column.data() + (column.size() == width ? 0 : width * i);
+  }
+
+  template <class T>
+  static Reason judge(const T* numbers, size_t count, double lowest) {
+    for (size_t i = 0; i < count; ++i) {
+      if (!std::isfinite(numbers[i])) return Reason::kNotFinite;
+      if (numbers[i] < lowest || numbers[i] > 1e9) return Reason::kOutOfRange;
+    }
+    return Reason::kUnspecified;
+  }
+
+  // The field at fault, empty for none, and why.
+  using Fault = std::pair<std::string, Reason>;
+
+  template <class T>
+  static Fault read_pose(const UpdateBatch& batch, const T& columns, size_t i, Shape& shape) {
+    const bool absolute = !columns.positions_f64.empty();
+    for (int axis = 0; axis < 3; ++axis)
+      shape.position[axis] = absolute ? entry(columns.positions_f64, 3, i)[axis]
+                                      : batch.frame[axis] + static_cast<double>(entry(columns.positions, 3, i)[axis]);
+    const double numbers[] = {shape.position.x, shape.position.y, shape.position.z};
+    if (!is_finite(shape.position)) return {absolute ? ".positions_f64" : ".positions", Reason::kNotFinite};
+    if (const Reason reason = judge(numbers, 3, -1e9); reason != Reason::kUnspecified)
+      return {absolute ? ".positions_f64" : ".positions", reason};
+    if (columns.rotations.empty()) return {};
+    const float* q = entry(columns.rotations, 4, i);
+    const double length =
+        std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
+    if (!std::isfinite(length)) return {".rotations", Reason::kNotFinite};
+    if (std::abs(length - 1) > 1e-3) return {".rotations", Reason::kOutOfRange};
+    shape.rotation = normalized({q[0], q[1], q[2], q[3]});
+    return {};
+  }
+
+  static Fault read_shape(const InsertColumns& columns, size_t i, Shape& shape) {
+    shape.kind = columns.kind;
+    const bool capsule = columns.kind == ShapeKind::kCapsule;
+    const std::string kind = capsule ? ".capsule" : columns.kind == ShapeKind::kBall ? ".ball" : ".box";
+    if (capsule || columns.kind == ShapeKind::kBall) {
+      shape.radius = *entry(columns.radii, 1, i);
+      if (const Reason reason = judge(&shape.radius, 1, 0); reason != Reason::kUnspecified)
+        return {kind + ".radii", reason};
+    }
+    if (capsule || columns.kind == ShapeKind::kBox) {
+      const float* size = entry(columns.extents, 3, i);
+      if (const Reason reason = judge(size, 3, capsule ? -1e9 : 0); reason != Reason::kUnspecified)
+        return {kind + (capsule ? ".half_axes" : ".half_extents"), reason};
+      shape.size = {size[0], size[1], size[2]};
+    }
+    return {};
+  }
+
+  template <class T>
+  static void read_labels(const T& columns, size_t i, Object& object) {
+    if (!columns.layers.empty()) object.layers = *entry(columns.layers, 1, i);
+    if (!columns.groups.empty()) object.group = *entry(columns.groups, 1, i);
+    if (!columns.tags.empty()) object.tag = *entry(columns.tags, 1, i);
+  }
+
+  void insert(const UpdateBatch& batch, const InsertColumns& columns, size_t i, const std::string& field) {
+    Object object;
+    object.id = columns.ids[i];
+    Fault fault;
+    if (object.id == 0) {
+      fault = {".ids", Reason::kOutOfRange};
+    } else if (instances_.contains(object.id) || (next_.contains(object.id) && !batch.upsert)) {
+      fault = {".ids", Reason::kDuplicateId};
+    } else {
+      fault = read_pose(batch, columns, i, object.shape);
+      if (fault.first.empty()) fault = read_shape(columns, i, object.shape);
+    }
+    read_labels(columns, i, object);
+    if (fault.first.empty()) next_[object.id] = object;
+    count(fault.second, field + fault.first, i, object.id);
+  }
+
+  void move(const UpdateBatch& batch, const MoveColumns& columns, size_t i, const std::string& field) {
+    const Id id = columns.ids[i];
+    const auto known = next_.find(id);
+    if (known == next_.end()) return count(Reason::kUnknownId, field + ".ids", i, id);
+    Shape shape = known->second.shape;
+    const Fault fault = read_pose(batch, columns, i, shape);
+    if (fault.first.empty()) known->second.shape = shape;
+    count(fault.second, field + fault.first, i, id);
+  }
+
+  void relabel(const RelabelColumns& columns, size_t i, const std::string& field) {
+    const auto known = next_.find(columns.ids[i]);
+    if (known == next_.end()) return count(Reason::kUnknownId, field + ".ids", i, columns.ids[i]);
+    read_labels(columns, i, known->second);
+    count(Reason::kUnspecified, field, i, columns.ids[i]);
+  }
+
+  std::set<Id> instances_;
+  Objects objects_;
+  Objects next_;
+  UpdateAck ack_;
+  uint64_t revision_ = 0;
+  uint64_t tick_ = 0;
+  std::map<uint64_t, std::pair<uint64_t, UpdateAck>> writers_;  // last number and its ack
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
