@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "client/cli/output.h"
-#include "locus/v1/update_service.pb.h"
+#include "client/lib/client.h"
 
 namespace locus::cli {
 

@@ -7,8 +7,8 @@
 
 #include "absl/status/statusor.h"
 #include "client/cli/output.h"
+#include "client/lib/client.h"
 #include "client/lib/values.h"
-#include "locus/v1/query_service.pb.h"
 
 namespace locus::cli {
 

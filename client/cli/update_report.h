@@ -6,7 +6,7 @@
 
 #include "absl/status/status.h"
 #include "client/cli/context.h"
-#include "locus/v1/update_service.pb.h"
+#include "client/lib/client.h"
 
 namespace locus::cli {
 

@@ -108,6 +108,7 @@ def no_path_of_a_machine(tree):
 
 # Tests of one subject that is spread over several files, or that is no file of ours. Each needs a reason.
 MIRROR_EXCEPTIONS = {
+    "tests/client/cli/exit_code_test.cc": "the program as a child process: exit codes and streams",
     "tests/core/geometry/shape_ray_test.cc": "ray tests of every shape, whose predicates stand in one file a pair",
     "tests/core/geometry/watertight_test.cc": "leaks between neighbouring triangles, a matter of several files",
     "tests/core/index/bvh/bvh_equals_list_test.cc": "two structures compared",

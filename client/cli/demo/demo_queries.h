@@ -11,7 +11,7 @@
 #include "client/cli/demo/brute_force.h"
 #include "client/cli/demo/demo_random.h"
 #include "client/cli/demo/demo_world.h"
-#include "locus/v1/query_service.pb.h"
+#include "client/lib/client.h"
 
 namespace locus::cli {
 
