@@ -36,13 +36,15 @@ class TriangleRay {
   float from_scaled(float t) const;
   float to_scaled(float t) const;
 
-  // The verdict, a pure function of ray and triangle: the watertight test accepts with t >= 0 (scaled units), and so
-  // does the slab test of the triangle's own box; t is clamped to the box's interval, so that no tree can prune what a
-  // list reports. Exactly edge-on and zero-area triangles are never hit.
+  // The verdict, a pure function of ray and triangle: the watertight test accepts with t >= 0 (scaled units; t is 0
+  // where the origin lies on the triangle within the rounding of the test), and so does the slab test of the triangle's
+  // own box; t is clamped to the box's interval, so that no tree can prune what a list reports. Exactly edge-on and
+  // zero-area triangles are never hit.
   std::optional<TriangleHit> hit(const Triangle& triangle) const;
 
  private:
   std::optional<TriangleHit> edge_test(const Triangle& triangle) const;
+  double depth_noise(Vec3d a, Vec3d b, Vec3d c) const;
 
   int exponent_;  // given direction = scaled direction * 2^exponent
   Vec3d origin_, direction_;

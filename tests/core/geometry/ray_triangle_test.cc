@@ -43,6 +43,35 @@ Vec3d point_of(const Triangle& t, double u, double v) {
   return to_double(t.a) + (to_double(t.b) - to_double(t.a)) * u + (to_double(t.c) - to_double(t.a)) * v;
 }
 
+// Edge functions round, so that the depth of a plane that holds the origin exactly may come out as below zero.
+TEST(RayTriangleTest, ARayThatStartsOnAWallHitsItAtZeroWhateverItsDirection) {
+  constexpr uint64_t kSeed = 57;
+  Random random(kSeed);
+  for (int i = 0; i < 100000; ++i) {
+    const float x = random.float_between(-100, 100);
+    const Triangle wall = {{x, random.float_between(-9, -7), random.float_between(-9, -7)},
+                           {x, random.float_between(7, 9), random.float_between(-9, -7)},
+                           {x, random.float_between(-1, 1), random.float_between(4, 9)}};
+    const TriangleRay ray({x, random.between(-0.25, 0.25), random.between(-0.25, 0.25)}, random.unit_vector());
+    const std::optional<TriangleHit> hit = ray.hit(wall);
+    ASSERT_TRUE(hit.has_value()) << "seed " << kSeed << " case " << i;
+    ASSERT_LE(hit->t, 1e-9f) << "seed " << kSeed << " case " << i;
+  }
+}
+
+TEST(RayTriangleTest, ARayThatStartsVisiblyBehindATriangleMissesIt) {
+  constexpr uint64_t kSeed = 58;
+  Random random(kSeed);
+  for (int i = 0; i < 100000; ++i) {
+    const Triangle wall = {{1, -8, -8}, {1, 8, -8}, {1, 0, 8}};
+    Vec3d direction = random.unit_vector();
+    direction.x = std::max(std::abs(direction.x), 1e-3);
+    const double behind = random.magnitude(-33, 0);
+    const TriangleRay ray({1 + behind, random.between(-1, 1), random.between(-1, 1)}, direction);
+    ASSERT_FALSE(ray.hit(wall).has_value()) << "seed " << kSeed << " case " << i;
+  }
+}
+
 // The promise about misses, for one triangle: hit even when shrunk by e means a hit, no later than e allows.
 TEST(RayTriangleTest, NoMissAndNoLateHitAtAnyAngleAndDistance) {
   constexpr uint64_t kSeed = 51;
