@@ -39,12 +39,25 @@ absl::StatusOr<std::optional<UpdateAck>> WriterTable::admit(uint64_t writer, uin
 
 void WriterTable::record(uint64_t writer, uint64_t batch, const UpdateAck& ack) {
   if (writer == 0) return;
-  if (writers_.size() >= limits::kMaxWriters && !writers_.contains(writer)) {
-    const auto oldest = std::min_element(writers_.begin(), writers_.end(),
-                                         [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; });
-    writers_.erase(oldest);
-  }
-  writers_[writer] = {batch, ++clock_, ack};
+  if (writers_.size() >= limits::kMaxWriters && !writers_.contains(writer)) forget_oldest();
+  Last& last = writers_[writer];
+  kept_errors_ -= last.ack.errors.size();
+  if (kept_errors_ + ack.errors.size() > kMaxKeptErrors) forget_acks();
+  kept_errors_ += ack.errors.size();
+  last = {batch, ++clock_, ack};
+}
+
+void WriterTable::forget_oldest() {
+  const auto oldest = std::min_element(writers_.begin(), writers_.end(),
+                                       [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; });
+  kept_errors_ -= oldest->second.ack.errors.size();
+  writers_.erase(oldest);
+}
+
+// The numbers stay, so that no batch is applied twice.
+void WriterTable::forget_acks() {
+  for (auto& [writer, last] : writers_) last.ack = {};
+  kept_errors_ = 0;
 }
 
 SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics, size_t max_objects)

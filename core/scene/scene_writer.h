@@ -17,9 +17,13 @@
 namespace locus {
 
 // What each known writer sent last, so that a batch sent twice is applied once. Bounded: the writer heard longest ago
-// is forgotten first, and its next batch is refused rather than risked.
+// is forgotten first, and its next batch is refused rather than risked. Old acks go earlier if they list too many
+// errors.
 class WriterTable {
  public:
+  // Item errors listed by all acks that are kept.
+  static constexpr size_t kMaxKeptErrors = size_t{64} * limits::kMaxListedItemErrors;
+
   // Nothing if the batch is new and next in order; the old ack (or one marked duplicate) if it was applied before;
   // FAILED_PRECONDITION BATCH_GAP if a batch before it is missing.
   absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
@@ -31,8 +35,12 @@ class WriterTable {
     uint64_t heard = 0;
     UpdateAck ack;
   };
+  void forget_oldest();
+  void forget_acks();
+
   absl::flat_hash_map<uint64_t, Last> writers_;
   uint64_t clock_ = 0;
+  size_t kept_errors_ = 0;  // of all acks in writers_
 };
 
 class SceneWriter {

@@ -178,6 +178,18 @@ TEST_F(SceneWriterTest, BatchesWithoutWriterAreAppliedEachTime) {
   EXPECT_EQ(apply(with(points({1}, {0, 0, 0}))).refused, 1u);
 }
 
+TEST_F(SceneWriterTest, AcksThatListTooManyErrorsAreForgottenButNotTheirNumbers) {
+  const std::vector<Id> unknown(limits::kMaxListedItemErrors, 5);
+  const uint64_t writers = WriterTable::kMaxKeptErrors / limits::kMaxListedItemErrors + 1;
+  for (uint64_t writer = 1; writer <= writers; ++writer) apply(numbered(removing(unknown), writer, 1));
+  const UpdateAck first = apply(numbered(with(points({1}, {0, 0, 0})), 1, 1));
+  EXPECT_TRUE(first.duplicate);
+  EXPECT_EQ(first.refused, 0u);
+  EXPECT_EQ(first.epoch, kEpoch);
+  EXPECT_TRUE(ids().empty());
+  EXPECT_EQ(apply(numbered({}, writers, 1)).errors.size(), limits::kMaxListedItemErrors);
+}
+
 TEST_F(SceneWriterTest, TheWritersThatWroteLastAreRemembered) {
   for (uint64_t writer = 1; writer <= limits::kMaxWriters; ++writer) apply(numbered({}, writer, 1));
   apply(numbered({}, 1, 2));  // so that writer 2 is the one heard longest ago

@@ -1,5 +1,7 @@
 // One writer at full speed, static changes in between, and readers that never wait for either: whatever they look at,
 // they see one revision, whole.
+#include "core/scene/scene_snapshot.h"
+
 #include <atomic>
 #include <thread>
 
@@ -81,9 +83,9 @@ void expect_answers_of_one_revision(const SceneSnapshot& snapshot) {
   EXPECT_EQ(result->blocks[2].ids, ids);
 }
 
-class SnapshotIsolationTest : public SceneFixture {
+class SceneSnapshotTest : public SceneFixture {
  protected:
-  SnapshotIsolationTest() {
+  SceneSnapshotTest() {
     for (uint64_t id = 1; id <= kObjects; ++id) ids_.push_back(id);
     InsertColumns insert;
     insert.ids = ids_;
@@ -146,7 +148,7 @@ class SnapshotIsolationTest : public SceneFixture {
   std::vector<double> positions_;
 };
 
-TEST_F(SnapshotIsolationTest, ReadersSeeWholeRevisionsWhileTheWriterGoesOn) {
+TEST_F(SceneSnapshotTest, ReadersSeeWholeRevisionsWhileTheWriterGoesOn) {
   std::atomic<bool> done{false};
   std::atomic<uint64_t> reads{0};
   const auto read = [&](bool batches) {
@@ -175,7 +177,7 @@ TEST_F(SnapshotIsolationTest, ReadersSeeWholeRevisionsWhileTheWriterGoesOn) {
   EXPECT_EQ(scene_.latest()->tick, tick);
 }
 
-TEST_F(SnapshotIsolationTest, OldSnapshotsStayAsTheyWereWhileTheWriterGoesOn) {
+TEST_F(SceneSnapshotTest, OldSnapshotsStayAsTheyWereWhileTheWriterGoesOn) {
   std::vector<SnapshotPtr> kept;
   std::vector<uint64_t> ticks;
   for (uint64_t tick = 1; tick <= 30; ++tick) {
@@ -198,7 +200,7 @@ TEST_F(SnapshotIsolationTest, OldSnapshotsStayAsTheyWereWhileTheWriterGoesOn) {
   writer.join();
 }
 
-TEST_F(SnapshotIsolationTest, SnapshotsMayBeDroppedByAnyThreadWhileTheWriterGoesOn) {
+TEST_F(SceneSnapshotTest, SnapshotsMayBeDroppedByAnyThreadWhileTheWriterGoesOn) {
   std::atomic<bool> done{false};
   const auto read = [&] {
     std::vector<SnapshotPtr> kept(16);
@@ -215,7 +217,7 @@ TEST_F(SnapshotIsolationTest, SnapshotsMayBeDroppedByAnyThreadWhileTheWriterGoes
   second.join();
 }
 
-TEST_F(SnapshotIsolationTest, WritersOfDisjointObjectsBothGetThrough) {
+TEST_F(SceneSnapshotTest, WritersOfDisjointObjectsBothGetThrough) {
   const uint64_t count = scaled_count(500);
   const auto run = [&](Id id) {
     for (uint64_t i = 1; i <= count; ++i) {
