@@ -168,8 +168,9 @@ TEST(RunBatchTest, AStopInTheMiddleEndsTheBatch) {
   options.stop = [&] { return ++asked < 5 ? absl::OkStatus() : absl::CancelledError("gone"); };
   OwnedBlock block = one_ball({}, 1);
   block.points.assign(3 * 100, 0);
+  const OwnedBlock lookup = lookup_of_ids({1});
   QueryBatch batch;
-  batch.blocks = {block.view(), lookup_of_ids({1}).view()};
+  batch.blocks = {block.view(), lookup.view()};
   EXPECT_EQ(run_batch(*snapshot, batch, options).status().code(), absl::StatusCode::kCancelled);
   EXPECT_EQ(asked, 5) << "nobody asks again once it is over";
 }
