@@ -76,26 +76,39 @@ void write_table(std::ostream& out, const Report& report) {
   }) << '\n';
 }
 
+// A server's text may hold anything; what is not UTF-8 is replaced rather than thrown at.
+std::string line_of(const Json& json) {
+  return json.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
+}
+
+// Indented by hand: an entry of the head and a row take a line each, however many numbers they hold.
+void write_document(std::ostream& out, const Report& report) {
+  std::vector<std::string> entries;
+  for (const auto& [key, value] : report.head.items()) {
+    entries.push_back(absl::StrCat("  ", line_of(Json(key)), ": ", line_of(value)));
+  }
+  if (!report.rows_name.empty()) {
+    const std::string rows = absl::StrJoin(
+        report.rows, ",\n    ", [](std::string* text, const Json& row) { absl::StrAppend(text, line_of(row)); });
+    entries.push_back(absl::StrCat("  ", line_of(Json(report.rows_name)), ": [",
+                                   rows.empty() ? "" : absl::StrCat("\n    ", rows, "\n  "), "]"));
+  }
+  out << "{\n" << absl::StrJoin(entries, ",\n") << "\n}\n";
+}
+
 }  // namespace
 
 void write_report(std::ostream& out, Format format, const Report& report) {
-  // A server's text may hold anything; what is not UTF-8 is replaced rather than thrown at.
-  const auto dump = [](const Json& json, int indent) {
-    return json.dump(indent, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
-  };
   switch (format) {
     case Format::kTable:
       write_table(out, report);
       break;
-    case Format::kJson: {
-      Json document = report.head;
-      if (!report.rows_name.empty()) document[report.rows_name] = report.rows;
-      out << dump(document, 2) << '\n';
+    case Format::kJson:
+      write_document(out, report);
       break;
-    }
     case Format::kNdjson:
-      if (report.rows_name.empty()) out << dump(report.head, -1) << '\n';
-      for (const Json& row : report.rows) out << dump(row, -1) << '\n';
+      if (report.rows_name.empty()) out << line_of(report.head) << '\n';
+      for (const Json& row : report.rows) out << line_of(row) << '\n';
       break;
   }
 }

@@ -1,6 +1,7 @@
 #include "client/cli/query_options.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "client/cli/failure.h"
@@ -17,7 +18,8 @@ const std::map<std::string, v1::Column>& column_names() {
   return names;
 }
 
-bool is_float(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
+// What is not finite travels as it is, for the server to name the position and not the frame.
+bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
 
 void add_filter_options(CLI::App& command, QueryOptions& options) {
   const std::map<std::string, v1::Source> sources = {

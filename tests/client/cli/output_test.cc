@@ -39,6 +39,15 @@ TEST(OutputTest, JsonIsOneDocumentWithIdsAsStrings) {
   EXPECT_TRUE(document["hits"][1]["id"].is_null());
 }
 
+TEST(OutputTest, JsonKeepsARowOnALine) {
+  Report report;
+  report.head = {{"tick", 3}};
+  report.rows_name = "hits";
+  report.rows = {{{"point", {1, 2}}}, {{"point", {3, 4}}}};
+  EXPECT_EQ(written(Format::kJson, report),
+            "{\n  \"tick\": 3,\n  \"hits\": [\n    {\"point\":[1,2]},\n    {\"point\":[3,4]}\n  ]\n}\n");
+}
+
 TEST(OutputTest, NdjsonIsALineARow) {
   EXPECT_EQ(written(Format::kNdjson, two_rows()),
             "{\"ray\":0,\"hit\":true,\"id\":\"7\",\"point\":[0.5,1.0,-2.0]}\n"

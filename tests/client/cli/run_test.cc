@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <limits>
@@ -261,6 +262,12 @@ TEST_F(RunTest, PositionsThatAreNoFloatsTravelInAFrame) {
   const v1::QueryBlock& block = server_.queries.last_batch.blocks(0);
   EXPECT_EQ(block.frame().x(), 1000000.1);
   EXPECT_THAT(block.balls().centers(), ElementsAre(0, 0, 0, 1, 0, 0));
+}
+
+TEST_F(RunTest, APositionThatIsNotFiniteIsNotHiddenInTheFrame) {
+  run_here({"query", "ball", "arena", "--at", "nan,0,0", "--radius", "1"});
+  EXPECT_EQ(server_.queries.last_batch.blocks(0).frame().x(), 0);
+  EXPECT_TRUE(std::isnan(server_.queries.last_batch.blocks(0).balls().centers(0)));
 }
 
 TEST_F(RunTest, GetShowsWhatIsThereAndNamesWhatIsNot) {
