@@ -91,4 +91,10 @@ if [ "$long" = yes ]; then sets+=(lint); fi
 
 export UBSAN_OPTIONS="print_stacktrace=1:${UBSAN_OPTIONS-}"
 for suite in $suites; do run_suite "$suite"; done
+case "$long $suites" in
+  "yes release"*)
+    say "clang-tidy"
+    if /usr/bin/python3 tests/house/tidy.py build/release --jobs "$jobs"; then passed=$((passed + 1)); else fail "clang-tidy"; fi
+    ;;
+esac
 finish

@@ -63,18 +63,21 @@ std::ostream& operator<<(std::ostream& out, const Number64& number) { return out
 
 std::vector<uint64_t> values_of(const std::vector<Number64>& numbers) {
   std::vector<uint64_t> values;
+  values.reserve(numbers.size());
   for (const Number64& number : numbers) values.push_back(number.value);
   return values;
 }
 
 std::vector<uint32_t> values32_of(const std::vector<Number64>& numbers) {
   std::vector<uint32_t> values;
+  values.reserve(numbers.size());
   for (const Number64& number : numbers) values.push_back(static_cast<uint32_t>(number.value));
   return values;
 }
 
 std::vector<float> floats_of(const std::vector<double>& numbers) {
   std::vector<float> floats;
+  floats.reserve(numbers.size());
   for (const double number : numbers) floats.push_back(static_cast<float>(number));
   return floats;
 }

@@ -67,6 +67,7 @@ absl::StatusOr<std::vector<LevelEntry>> list_levels(zip_t* archive, const std::s
 
 std::vector<std::string> names_of(const std::vector<LevelEntry>& levels) {
   std::vector<std::string> names;
+  names.reserve(levels.size());
   for (const LevelEntry& level : levels) names.push_back(level.name);
   return names;
 }
