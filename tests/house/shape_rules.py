@@ -111,7 +111,6 @@ MIRROR_EXCEPTIONS = {
     "tests/client/cli/exit_code_test.cc": "the program as a child process: exit codes and streams",
     "tests/core/geometry/shape_ray_test.cc": "ray tests of every shape, whose predicates stand in one file a pair",
     "tests/core/geometry/watertight_test.cc": "leaks between neighbouring triangles, a matter of several files",
-    "tests/core/scene/snapshot_isolation_test.cc": "readers and writer of a scene together, a matter of several files",
 }
 MIRRORED = ("tests/core", "tests/server", "tests/client")
 
