@@ -10,6 +10,8 @@ namespace locus::limits {
 
 inline constexpr double kMaxCoordinate = 1e9;            // |x| of any position or frame, and of any extent
 inline constexpr double kMaxQuaternionDeviation = 1e-3;  // of |q| from 1
+inline constexpr float kMinScale = 1e-12f;               // of an instance: mesh axes must hold the world as floats
+inline constexpr float kMaxScale = 1e12f;
 
 inline constexpr uint32_t kMaxScenes = 1024;
 inline constexpr uint32_t kMaxMeshes = 65536;

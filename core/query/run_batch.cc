@@ -10,6 +10,9 @@ namespace {
 
 // Queries that one thread takes at once. A constant, so that pieces do not depend on the number of threads.
 constexpr size_t kPieceQueries = 256;
+// Pieces whose rows wait for their turn at once: bounds a batch's memory by so many replies. A constant likewise, since
+// later pieces learn from it how much room is left.
+constexpr size_t kWavePieces = 16;
 
 struct Piece {
   size_t block;
@@ -53,6 +56,8 @@ class Assembly {
     result_.nanoseconds += piece.result.nanoseconds;
   }
 
+  // Bytes of rows that still fit.
+  uint64_t room() const { return room_; }
   BatchResult finish() { return std::move(result_); }
 
  private:
@@ -85,21 +90,26 @@ absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const Query
                                       const RunOptions& options) {
   BatchControl control(batch.max_work, options.stop);
   std::vector<Piece> pieces = split(batch);
-  const auto run_piece = [&](size_t number) {
-    Piece& piece = pieces[number];
+  Assembly assembly(batch);
+  const auto run_piece = [&](Piece& piece) {
     const uint64_t start = options.clock ? options.clock() : 0;
     QueryTask task(snapshot, control, options.brute_force);
-    piece.result = BlockRunner(task, batch.blocks[piece.block], reply_limit(batch)).run(piece.begin, piece.end);
+    piece.result = BlockRunner(task, batch.blocks[piece.block], assembly.room()).run(piece.begin, piece.end);
     if (options.clock) piece.result.nanoseconds = options.clock() - start;
   };
-  if (options.parallel_for) {
-    options.parallel_for(pieces.size(), run_piece);
-  } else {
-    for (size_t number = 0; number < pieces.size(); ++number) run_piece(number);
+  for (size_t first = 0; first < pieces.size() && !control.stopped(); first += kWavePieces) {
+    const size_t count = std::min(kWavePieces, pieces.size() - first);
+    if (options.parallel_for) {
+      options.parallel_for(count, [&](size_t number) { run_piece(pieces[first + number]); });
+    } else {
+      for (size_t number = 0; number < count; ++number) run_piece(pieces[first + number]);
+    }
+    for (size_t number = first; number < first + count; ++number) {
+      assembly.add(pieces[number]);
+      pieces[number].result = {};
+    }
   }
   if (control.stopped()) return control.status();
-  Assembly assembly(batch);
-  for (const Piece& piece : pieces) assembly.add(piece);
   return assembly.finish();
 }
 

@@ -54,8 +54,8 @@ absl::StatusOr<Transform> read_transform(const PlacementColumns& place, uint32_t
   const float scale = ColumnReader<float>(place.scales, 1).value(i, 1.0f);
   if (!std::isfinite(scale))
     return refuse_argument(Reason::kNotFinite, field + ".scales", i, "a scale must be a finite number");
-  if (!(scale >= std::numeric_limits<float>::min()))
-    return refuse_argument(Reason::kOutOfRange, field + ".scales", i, "a scale must be positive");
+  if (!(scale >= limits::kMinScale && scale <= limits::kMaxScale))
+    return refuse_argument(Reason::kOutOfRange, field + ".scales", i, "a scale must lie within 1e-12 and 1e12");
   absl::StatusOr<Quaternion> rotation = read_rotation(place, i, field);
   if (!rotation.ok()) return rotation.status();
   return make_transform(translation, *rotation, scale);
