@@ -15,6 +15,7 @@
 #include "server/config/server_config.h"
 #include "server/config/version.h"
 #include "server/observability/log.h"
+#include "server/service/library_logs.h"
 #include "server/service/server.h"
 
 namespace locus::server {
@@ -69,7 +70,7 @@ void log_start(const Server& server, const ServerConfig& config) {
 int run(const ServerConfig& config) {
   start_logging(config.log_level, config.log_format);
   // A server that does not start says why itself; what gRPC has to say of it helps nobody.
-  capture_grpc_log(LogLevel::kDebug);
+  capture_library_logs(LogLevel::kDebug);
   const sigset_t signals = ending_signals();
   // Before any other thread starts, so that all of them leave these signals to this one.
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
@@ -82,7 +83,7 @@ int run(const ServerConfig& config) {
     log(LogLevel::kError, "cannot write the port file", {{"path", config.port_file}});
     return EXIT_FAILURE;
   }
-  capture_grpc_log(LogLevel::kWarning);
+  capture_library_logs(LogLevel::kWarning);
   log_start(**server, config);
   const int signal = wait_for_signal(signals);
   log(LogLevel::kInfo, "draining", {{"signal", strsignal(signal)}, {"grace_s", absl::StrCat(config.drain_grace_s)}});

@@ -1,6 +1,5 @@
 #include "server/observability/log.h"
 
-#include <grpc/support/log.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -16,7 +15,6 @@ namespace {
 constexpr size_t kMaxValue = 1024;
 
 std::atomic<LogFormat> log_format{LogFormat::kText};
-std::atomic<LogLevel> grpc_errors{LogLevel::kWarning};
 
 spdlog::level::level_enum to_spdlog(LogLevel level) {
   switch (level) {
@@ -80,11 +78,6 @@ std::string text_line(absl::string_view message, std::initializer_list<LogField>
   return line;
 }
 
-void log_for_grpc(gpr_log_func_args* args) {
-  const LogLevel level = args->severity == GPR_LOG_SEVERITY_ERROR ? grpc_errors.load() : LogLevel::kDebug;
-  log(level, "grpc", {{"text", args->message}});
-}
-
 }  // namespace
 
 void start_logging(LogLevel level, LogFormat format) {
@@ -101,11 +94,6 @@ void log(LogLevel level, absl::string_view message, std::initializer_list<LogFie
   if (!logs(level)) return;
   const std::string line = log_format == LogFormat::kJson ? json_line(message, fields) : text_line(message, fields);
   logger().log(to_spdlog(level), spdlog::string_view_t(line.data(), line.size()));
-}
-
-void capture_grpc_log(LogLevel errors) {
-  grpc_errors = errors;
-  gpr_set_log_function(&log_for_grpc);
 }
 
 }  // namespace locus::server

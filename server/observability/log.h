@@ -28,9 +28,6 @@ bool logs(LogLevel level);
 // which may come from callers, are escaped.
 void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields = {});
 
-// Sends what gRPC itself has to say the same way: its errors at `errors`, all else at debug. May be called again.
-void capture_grpc_log(LogLevel errors);
-
 }  // namespace locus::server
 
 #endif  // LOCUS_SERVER_OBSERVABILITY_LOG_H_

@@ -1,0 +1,247 @@
+#include <cmath>
+#include <limits>
+
+#include "core/base/limits.h"
+#include "server/service/mesh_upload.h"
+#include "tests/support/rpc_test.h"
+
+namespace locus::test {
+namespace {
+
+std::string hash_of(const CubeMesh& mesh) {
+  const Sha256 hash = server::mesh_hash(mesh.vertices, mesh.indices);
+  return std::string(hash.begin(), hash.end());
+}
+
+class MeshRpcTest : public RpcTest {
+ protected:
+  std::vector<v1::Mesh> list(uint32_t page_size = 0) {
+    std::vector<v1::Mesh> meshes;
+    v1::ListMeshesRequest request;
+    request.set_page_size(page_size);
+    do {
+      v1::ListMeshesResponse response;
+      EXPECT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, request, &response).ok());
+      meshes.insert(meshes.end(), response.meshes().begin(), response.meshes().end());
+      request.set_page_token(response.next_page_token());
+    } while (!request.page_token().empty());
+    return meshes;
+  }
+
+  grpc::Status remove_mesh(const std::string& name) {
+    v1::DeleteMeshRequest request;
+    request.set_mesh(name);
+    v1::DeleteMeshResponse response;
+    return call(*stubs().scenes, &v1::SceneService::Stub::DeleteMesh, request, &response);
+  }
+
+  // After any refused upload.
+  void expect_nothing_kept() { EXPECT_TRUE(list().empty()); }
+};
+
+TEST_F(MeshRpcTest, AMeshInOneMessageIsKnownUnderItsNameAndHash) {
+  v1::UploadMeshRequest request = whole_mesh("cube");
+  request.set_sha256(hash_of({}));
+  v1::MeshPart* part = request.add_parts();
+  part->set_name("floor");
+  part = request.add_parts();
+  part->set_name("rest");
+  part->set_first_triangle(2);
+  v1::UploadMeshResponse response;
+  ASSERT_TRUE(upload({request}, &response).ok());
+  EXPECT_FALSE(response.already_known());
+  EXPECT_EQ(response.mesh().name(), "cube");
+  EXPECT_EQ(response.mesh().sha256(), hash_of({}));
+  EXPECT_EQ(response.mesh().triangles(), 12u);
+  EXPECT_EQ(response.mesh().zero_area_triangles(), 0u);
+  EXPECT_GT(response.mesh().bytes(), 0u);
+  ASSERT_EQ(response.mesh().parts_size(), 2);
+  EXPECT_EQ(response.mesh().parts(1).first_triangle(), 2u);
+  ASSERT_EQ(list().size(), 1u);
+  EXPECT_EQ(list()[0].SerializeAsString(), response.mesh().SerializeAsString());
+}
+
+TEST_F(MeshRpcTest, AMeshInManyPiecesIsTheSameMesh) {
+  const CubeMesh cube;
+  std::vector<v1::UploadMeshRequest> messages(1, whole_mesh("cube"));
+  messages[0].set_sha256(hash_of(cube));
+  messages[0].clear_vertices();
+  messages[0].clear_indices();
+  for (const float vertex : cube.vertices) messages.emplace_back().add_vertices(vertex);
+  for (const uint32_t index : cube.indices) messages.emplace_back().add_indices(index);
+  v1::UploadMeshResponse response;
+  const grpc::Status status = upload(messages, &response);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.mesh().sha256(), hash_of(cube));
+  EXPECT_EQ(response.mesh().triangles(), 12u);
+}
+
+TEST_F(MeshRpcTest, WithoutAHashTheServerComputesIt) {
+  v1::UploadMeshResponse response;
+  ASSERT_TRUE(upload({whole_mesh("cube")}, &response).ok());
+  EXPECT_EQ(response.mesh().sha256(), hash_of({}));
+}
+
+TEST_F(MeshRpcTest, KnownBytesNeedNotBeSentAgain) {
+  ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
+  v1::UploadMeshRequest request = whole_mesh("other");
+  request.set_sha256(hash_of({}));
+  request.clear_vertices();
+  request.clear_indices();
+  grpc::ClientContext context;
+  set_timeout(context);
+  v1::UploadMeshResponse response;
+  const auto writer = stubs().scenes->UploadMesh(&context, &response);
+  ASSERT_TRUE(writer->Write(request));
+  // Answered though the caller has not said that it is done.
+  const grpc::Status status = writer->Finish();
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_TRUE(response.already_known());
+  EXPECT_EQ(response.mesh().name(), "other");
+  EXPECT_EQ(response.mesh().triangles(), 12u);
+  EXPECT_EQ(list().size(), 2u);
+}
+
+TEST_F(MeshRpcTest, UploadingTheSameAgainIsFineAndOtherBytesUnderTheNameAreNot) {
+  ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
+  v1::UploadMeshResponse response;
+  ASSERT_TRUE(upload({whole_mesh("cube")}, &response).ok());
+  EXPECT_TRUE(response.already_known());
+  CubeMesh other;
+  other.vertices[0] = -2;
+  const Refused taken{grpc::StatusCode::ALREADY_EXISTS, v1::REASON_ALREADY_EXISTS, "mesh"};
+  expect_refused(upload({whole_mesh("cube", other)}), taken);
+  v1::UploadMeshRequest with_hash = whole_mesh("cube", other);
+  with_hash.set_sha256(hash_of(other));
+  expect_refused(upload({with_hash}), taken);
+  EXPECT_EQ(list()[0].sha256(), hash_of({}));
+}
+
+TEST_F(MeshRpcTest, BytesOfAnotherHashAreRefused) {
+  v1::UploadMeshRequest request = whole_mesh("cube");
+  request.set_sha256(std::string(32, 'x'));
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_HASH_MISMATCH, "sha256"});
+  request.set_sha256("short");
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "sha256"});
+  expect_nothing_kept();
+}
+
+TEST_F(MeshRpcTest, CountsAreCheckedBeforeAnythingIsAllocated) {
+  v1::UploadMeshRequest request = whole_mesh("cube");
+  request.set_vertex_count(0);
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "vertex_count"});
+  request.set_vertex_count(limits::kMaxMeshVertices + 1);
+  v1::Error error = error_of(upload({request}));
+  expect_error(error, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "vertex_count"});
+  EXPECT_EQ(error.limit(), "mesh_vertices");
+  request = whole_mesh("cube");
+  request.set_triangle_count(0);
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "triangle_count"});
+  request.set_triangle_count(limits::kMaxMeshTriangles + 1);
+  error = error_of(upload({request}));
+  expect_error(error, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "triangle_count"});
+  EXPECT_EQ(error.asked(), limits::kMaxMeshTriangles + 1.0);
+  expect_nothing_kept();
+}
+
+TEST_F(MeshRpcTest, MoreOrFewerNumbersThanAnnouncedAreRefused) {
+  v1::UploadMeshRequest request = whole_mesh("cube");
+  request.add_vertices(0);
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_COLUMN_LENGTH, "vertices"});
+  request = whole_mesh("cube");
+  v1::UploadMeshRequest more;
+  more.add_indices(0);
+  expect_refused(upload({request, more}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_COLUMN_LENGTH, "indices"});
+  request.mutable_indices()->RemoveLast();
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_COLUMN_LENGTH, "indices"});
+  request = whole_mesh("cube");
+  request.mutable_vertices()->RemoveLast();
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_COLUMN_LENGTH, "vertices"});
+  expect_nothing_kept();
+}
+
+TEST_F(MeshRpcTest, WrongVerticesAndIndicesAreNamedWithTheirNumber) {
+  CubeMesh mesh;
+  mesh.vertices[7] = std::numeric_limits<float>::quiet_NaN();
+  expect_refused(upload({whole_mesh("cube", mesh)}),
+                 {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_NOT_FINITE, "vertices", 2});
+  mesh.vertices[7] = std::numeric_limits<float>::infinity();
+  expect_refused(upload({whole_mesh("cube", mesh)}),
+                 {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_NOT_FINITE, "vertices", 2});
+  mesh.vertices[7] = 2e9f;
+  expect_refused(upload({whole_mesh("cube", mesh)}),
+                 {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_OUT_OF_RANGE, "vertices", 2});
+  mesh = {};
+  mesh.indices[13] = 8;
+  expect_refused(upload({whole_mesh("cube", mesh)}),
+                 {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_OUT_OF_RANGE, "indices", 4});
+  expect_nothing_kept();
+}
+
+TEST_F(MeshRpcTest, FieldsOfTheFirstMessageAreRefusedLater) {
+  v1::UploadMeshRequest again;
+  again.set_mesh("cube");
+  expect_refused(upload({whole_mesh("cube"), again}),
+                 {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "mesh"});
+  expect_refused(upload({}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, ""});
+  expect_nothing_kept();
+}
+
+TEST_F(MeshRpcTest, PartsOutOfOrderAndBadNamesAreRefused) {
+  v1::UploadMeshRequest request = whole_mesh("cube");
+  request.add_parts()->set_first_triangle(1);
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "parts", 0});
+  request.mutable_parts(0)->set_first_triangle(0);
+  request.add_parts()->set_first_triangle(12);
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "parts", 1});
+  request.mutable_parts(1)->set_first_triangle(3);
+  request.mutable_parts(1)->set_name(std::string(limits::kMaxLabelLength + 1, 'x'));
+  expect_refused(upload({request}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "parts[1].name"});
+  for (const std::string& name : {std::string(), std::string("two words"), std::string(64, 'x')})
+    expect_refused(upload({whole_mesh(name)}), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "mesh"});
+  expect_nothing_kept();
+}
+
+TEST_F(MeshRpcTest, ZeroAreaTrianglesAreCountedAndKept) {
+  CubeMesh mesh;
+  mesh.indices[1] = mesh.indices[0];
+  v1::UploadMeshResponse response;
+  ASSERT_TRUE(upload({whole_mesh("cube", mesh)}, &response).ok());
+  EXPECT_EQ(response.mesh().triangles(), 12u);
+  EXPECT_EQ(response.mesh().zero_area_triangles(), 1u);
+}
+
+TEST_F(MeshRpcTest, PagesListMeshesByName) {
+  for (const char* name : {"c", "a", "b"}) ASSERT_TRUE(upload({whole_mesh(name)}).ok());
+  std::vector<std::string> names;
+  for (const v1::Mesh& mesh : list(2)) names.push_back(mesh.name());
+  EXPECT_EQ(names, (std::vector<std::string>{"a", "b", "c"}));
+  v1::ListMeshesRequest request;
+  v1::ListMeshesResponse response;
+  request.set_page_size(limits::kMaxPageSize + 1);
+  expect_refused(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, request, &response),
+                 {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "page_size"});
+  request.set_page_size(1);
+  request.set_page_token("no token");
+  expect_refused(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, request, &response),
+                 {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "page_token"});
+}
+
+TEST_F(MeshRpcTest, AMeshInUseIsNotDeleted) {
+  ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
+  ASSERT_TRUE(change(place_one("cube", 100)).ok());
+  const v1::Error error = error_of(remove_mesh("cube"));
+  expect_error(error, {grpc::StatusCode::FAILED_PRECONDITION, v1::REASON_IN_USE, "mesh"});
+  EXPECT_EQ(error.asked(), 1);
+  EXPECT_EQ(list()[0].uses(), 1u);
+  v1::ChangeInstancesRequest removal;
+  removal.set_scene("world");
+  removal.add_remove_ids(100);
+  ASSERT_TRUE(change(removal).ok());
+  EXPECT_TRUE(remove_mesh("cube").ok());
+  expect_refused(remove_mesh("cube"), {grpc::StatusCode::NOT_FOUND, v1::REASON_NOT_FOUND, "mesh"});
+  expect_refused(remove_mesh(""), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "mesh"});
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,370 @@
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <set>
+
+#include "core/base/limits.h"
+#include "tests/support/rpc_test.h"
+
+namespace locus::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+const float kNan = std::numeric_limits<float>::quiet_NaN();
+const float kInfinity = std::numeric_limits<float>::infinity();
+
+// Balls 1 to 4 of radius 1 at x = 3, 6, 9, 12, and a cube, instance 100, from 9 to 11.
+class QueryRpcTest : public RpcTest {
+ protected:
+  void SetUp() override {
+    RpcTest::SetUp();
+    ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
+    ASSERT_TRUE(change(place_one("cube", 100)).ok());
+    ASSERT_TRUE(apply(insert_balls(1, 4)).ok());
+  }
+
+  v1::QueryResult ask(const v1::QueryBatch& batch) {
+    v1::QueryResult result;
+    const grpc::Status status = query(batch, &result);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return result;
+  }
+
+  void expect_query_refused(const v1::QueryBatch& batch, const Refused& expected) {
+    const std::string before = dump();
+    expect_refused(query(batch), expected);
+    EXPECT_EQ(dump(), before);
+  }
+};
+
+v1::QueryBatch ball_at(float x, float radius) {
+  v1::QueryBatch batch;
+  v1::Balls* balls = batch.add_blocks()->mutable_balls();
+  fill(balls->mutable_centers(), {x, 0.f, 0.f});
+  balls->add_radii(radius);
+  return batch;
+}
+
+v1::QueryBatch box_at(float x, float half) {
+  v1::QueryBatch batch;
+  v1::Boxes* boxes = batch.add_blocks()->mutable_boxes();
+  fill(boxes->mutable_centers(), {x, 0.f, 0.f});
+  fill(boxes->mutable_half_extents(), {half, half, half});
+  return batch;
+}
+
+TEST_F(QueryRpcTest, AReplyNamesTheRevisionThatItSaw) {
+  const v1::QueryResult result = ask({});
+  EXPECT_EQ(result.revision(), 2u);
+  EXPECT_EQ(result.epoch(), get("world").epoch());
+  EXPECT_EQ(result.blocks_size(), 0);
+  EXPECT_FALSE(result.has_work());
+}
+
+TEST_F(QueryRpcTest, RaysFindTheNearestTheAnyAndAll) {
+  v1::QueryBatch batch = ray_along_x();
+  for (const v1::RayMode mode : {v1::RAY_MODE_ANY, v1::RAY_MODE_ALL}) {
+    *batch.add_blocks() = batch.blocks(0);
+    batch.mutable_blocks(batch.blocks_size() - 1)->mutable_rays()->set_mode(mode);
+  }
+  const v1::QueryResult result = ask(batch);
+  ASSERT_EQ(result.blocks_size(), 3);
+  EXPECT_THAT(result.blocks(0).t(), ElementsAre(2.f));
+  EXPECT_THAT(result.blocks(0).ids(), ElementsAre(1u));
+  EXPECT_THAT(result.blocks(0).triangles(), ElementsAre(0xFFFFFFFFu));
+  EXPECT_THAT(result.blocks(0).normals(), IsEmpty());
+  EXPECT_EQ(result.blocks(1).hits(), std::string(1, '\1'));
+  EXPECT_THAT(result.blocks(1).ids(), IsEmpty());
+  // At x = 9 the cube's front side, on the diagonal of two triangles or in one of them, and at 11 its back.
+  const v1::BlockResult& all = result.blocks(2);
+  EXPECT_THAT(all.counts(), ElementsAre(static_cast<uint32_t>(all.ids_size())));
+  EXPECT_TRUE(std::is_sorted(all.t().begin(), all.t().end()));
+  EXPECT_THAT(std::set<uint64_t>(all.ids().begin(), all.ids().end()), ElementsAre(1u, 2u, 3u, 4u, 100u));
+}
+
+TEST_F(QueryRpcTest, OverlapsListObjectsAndInstancesInOneOrder) {
+  EXPECT_THAT(ask(ball_at(9, 0.5f)).blocks(0).ids(), ElementsAre(3u, 100u));
+  EXPECT_THAT(ask(box_at(6, 3)).blocks(0).ids(), ElementsAre(1u, 2u, 3u, 100u));
+  v1::QueryBatch triangles = ball_at(9, 0.5f);
+  triangles.mutable_blocks(0)->mutable_balls()->set_detail(v1::STATIC_DETAIL_TRIANGLES_SORTED);
+  triangles.mutable_blocks(0)->set_source(v1::SOURCE_STATIC);
+  const v1::QueryResult result = ask(triangles);
+  EXPECT_THAT(result.blocks(0).ids(), ElementsAre(100u, 100u));
+  EXPECT_THAT(result.blocks(0).triangles(), ElementsAre(8u, 9u));
+}
+
+TEST_F(QueryRpcTest, SourceMasksAndIgnoresChoose) {
+  v1::QueryBatch batch = ray_along_x();
+  v1::QueryBlock* block = batch.mutable_blocks(0);
+  block->set_source(v1::SOURCE_STATIC);
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(100u));
+  block->set_source(v1::SOURCE_DYNAMIC);
+  fill(block->mutable_ignore_ids(), {uint64_t{1}, uint64_t{2}, uint64_t{999}});
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(3u));
+  block->add_masks(2);
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(0u));
+}
+
+TEST_F(QueryRpcTest, OnlyWantedColumnsComeAndAllOfThemCan) {
+  v1::QueryBatch batch = ray_along_x();
+  for (int column = v1::COLUMN_T; column <= v1::COLUMN_POSE; ++column)
+    batch.mutable_blocks(0)->add_columns(static_cast<v1::Column>(column));
+  const v1::BlockResult all = ask(batch).blocks(0);
+  EXPECT_THAT(all.uvs(), ElementsAre(0.f, 0.f));
+  EXPECT_THAT(all.normals(), ElementsAre(-1.f, 0.f, 0.f));
+  EXPECT_THAT(all.points(), ElementsAre(2.f, 0.f, 0.f));
+  EXPECT_THAT(all.groups(), ElementsAre(0u));
+  EXPECT_THAT(all.tags(), ElementsAre(0u));
+  EXPECT_THAT(all.layers(), ElementsAre(1u));
+  EXPECT_THAT(all.positions(), ElementsAre(3.0, 0.0, 0.0));
+  EXPECT_THAT(all.rotations(), ElementsAre(0.f, 0.f, 0.f, 1.f));
+  batch.mutable_blocks(0)->clear_columns();
+  batch.mutable_blocks(0)->add_columns(v1::COLUMN_T);
+  const v1::BlockResult one = ask(batch).blocks(0);
+  EXPECT_THAT(one.t(), ElementsAre(2.f));
+  EXPECT_THAT(one.ids(), IsEmpty());
+}
+
+TEST_F(QueryRpcTest, LookupsFindByIdAndByGroup) {
+  v1::UpdateBatch relabel;
+  fill(relabel.add_relabels()->mutable_ids(), {uint64_t{2}, uint64_t{4}});
+  relabel.mutable_relabels(0)->add_groups(7);
+  relabel.mutable_relabels(0)->add_layers(0);
+  ASSERT_TRUE(apply(relabel).ok());
+  v1::QueryBatch batch;
+  fill(batch.add_blocks()->mutable_lookup()->mutable_ids(), {uint64_t{100}, uint64_t{55}, uint64_t{4}});
+  fill(batch.add_blocks()->mutable_lookup()->mutable_groups(), {uint64_t{7}, uint64_t{8}});
+  const v1::QueryResult result = ask(batch);
+  EXPECT_THAT(result.blocks(0).ids(), ElementsAre(100u, 0u, 4u));
+  EXPECT_THAT(result.blocks(0).positions(), ElementsAre(10., 0., 0., 0., 0., 0., 12., 0., 0.));
+  EXPECT_THAT(result.blocks(1).counts(), ElementsAre(2u, 0u));
+  EXPECT_THAT(result.blocks(1).ids(), ElementsAre(2u, 4u));
+}
+
+TEST_F(QueryRpcTest, CutOverlapsSaySoAndGoOn) {
+  v1::QueryBatch batch = box_at(6, 100);
+  batch.mutable_blocks(0)->set_max_results(2);
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));
+  EXPECT_THAT(ask(batch).blocks(0).truncated(), ElementsAre(0u));
+  batch.mutable_blocks(0)->set_after_id(2);
+  batch.mutable_blocks(0)->set_max_results(3);
+  const v1::QueryResult rest = ask(batch);
+  EXPECT_THAT(rest.blocks(0).ids(), ElementsAre(3u, 4u, 100u));
+  EXPECT_THAT(rest.blocks(0).truncated(), IsEmpty());
+}
+
+TEST_F(QueryRpcTest, RepliesStayBelowTheSizeThatIsAskedFor) {
+  ASSERT_TRUE(apply(insert_balls(1000, 3000)).ok());
+  v1::QueryBatch batch;
+  for (int i = 0; i < 8; ++i) {
+    *batch.add_blocks() = box_at(6, 1e6f).blocks(0);
+    batch.mutable_blocks(i)->set_max_results(100000);
+  }
+  for (const uint32_t bytes : {5000u, 50000u}) {
+    batch.set_max_reply_bytes(bytes);
+    const v1::QueryResult result = ask(batch);
+    EXPECT_LE(result.ByteSizeLong(), bytes);
+    EXPECT_GT(result.ByteSizeLong(), bytes / 2);
+    ASSERT_EQ(result.blocks_size(), 8);
+    EXPECT_THAT(result.blocks(7).truncated(), ElementsAre(0u));
+  }
+  batch = ray_along_x();
+  batch.set_max_reply_bytes(1);
+  const v1::Error error = error_of(query(batch));
+  expect_error(error, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "max_reply_bytes"});
+}
+
+TEST_F(QueryRpcTest, ExplainReportsTheWorkOfTheBatchAndItsBlocks) {
+  v1::QueryBatch batch = ray_along_x();
+  *batch.add_blocks() = ball_at(9, 0.5f).blocks(0);
+  v1::QueryResult plain = ask(batch);
+  EXPECT_FALSE(plain.has_work());
+  batch.set_explain(true);
+  v1::QueryResult explained = ask(batch);
+  ASSERT_TRUE(explained.has_work());
+  EXPECT_GT(explained.work().tests(), 0u);
+  EXPECT_GT(explained.work().nodes(), 0u);
+  EXPECT_GT(explained.work().cells(), 0u);
+  EXPECT_GT(explained.work().nanoseconds(), 0u);
+  EXPECT_EQ(explained.work().tests(), explained.blocks(0).work().tests() + explained.blocks(1).work().tests());
+  EXPECT_EQ(explained.work().nanoseconds(),
+            explained.blocks(0).work().nanoseconds() + explained.blocks(1).work().nanoseconds());
+  explained.clear_work();
+  for (v1::BlockResult& block : *explained.mutable_blocks()) block.clear_work();
+  EXPECT_EQ(explained.SerializeAsString(), plain.SerializeAsString());
+}
+
+TEST_F(QueryRpcTest, AWorkBudgetCutsAndSaysWhere) {
+  ASSERT_TRUE(apply(insert_balls(1000, 3000)).ok());
+  v1::QueryBatch batch;
+  for (int i = 0; i < 100; ++i) *batch.add_blocks() = box_at(6, 1e6f).blocks(0);
+  batch.set_max_work(1);
+  const v1::QueryResult result = ask(batch);
+  ASSERT_EQ(result.blocks_size(), 100);
+  EXPECT_THAT(result.blocks(99).truncated(), ElementsAre(0u));
+}
+
+TEST_F(QueryRpcTest, WrongValuesRefuseTheBatchAndAreNamed) {
+  const auto refused = [this](v1::QueryBatch batch, const std::string& field, v1::Reason reason,
+                              std::optional<uint32_t> index, const std::function<void(v1::QueryBlock*)>& spoil) {
+    SCOPED_TRACE(field);
+    *batch.add_blocks() = batch.blocks(0);
+    spoil(batch.mutable_blocks(1));
+    expect_query_refused(batch, {grpc::StatusCode::INVALID_ARGUMENT, reason, "blocks[1]." + field, index});
+  };
+  const v1::Reason not_finite = v1::REASON_NOT_FINITE;
+  const v1::Reason range = v1::REASON_OUT_OF_RANGE;
+  const v1::Reason length = v1::REASON_COLUMN_LENGTH;
+  const auto two = [](v1::QueryBatch batch) {
+    v1::Rays* rays = batch.mutable_blocks(0)->mutable_rays();
+    fill(rays->mutable_origins(), {0.f, 0.f, 0.f, 1.f, 1.f, 1.f});
+    fill(rays->mutable_directions(), {1.f, 0.f, 0.f, 1.f, 1.f, 1.f});
+    return batch;
+  };
+  const v1::QueryBatch rays = two(ray_along_x());
+  refused(rays, "frame", not_finite, {}, [](auto* block) { block->mutable_frame()->set_z(kNan); });
+  refused(rays, "rays.origins", not_finite, 1, [](auto* block) { block->mutable_rays()->set_origins(4, kNan); });
+  refused(rays, "rays.origins", range, 1, [](auto* block) { block->mutable_rays()->set_origins(4, 2e9f); });
+  refused(rays, "rays.origins", length, {}, [](auto* block) { block->mutable_rays()->add_origins(0); });
+  refused(rays, "rays.directions", not_finite, 1,
+          [](auto* block) { block->mutable_rays()->set_directions(5, kInfinity); });
+  refused(rays, "rays.directions", range, 1, [](auto* block) {
+    fill(block->mutable_rays()->mutable_directions(), {1.f, 0.f, 0.f, 0.f, 0.f, 0.f});
+  });
+  refused(rays, "rays.directions", length, {}, [](auto* block) { block->mutable_rays()->clear_directions(); });
+  refused(rays, "rays.t_max", not_finite, 0, [](auto* block) { block->mutable_rays()->add_t_max(kNan); });
+  refused(rays, "rays.t_max", range, 0, [](auto* block) { block->mutable_rays()->add_t_max(-1); });
+  refused(rays, "masks", length, {}, [](auto* block) { fill(block->mutable_masks(), {1u, 2u, 3u}); });
+  refused(rays, "ignore_groups", length, {}, [](auto* block) {
+    fill(block->mutable_ignore_groups(), {uint64_t{1}, uint64_t{2}, uint64_t{3}});
+  });
+  const v1::QueryBatch balls = ball_at(0, 1);
+  refused(balls, "balls.radii", range, 0, [](auto* block) { block->mutable_balls()->set_radii(0, -1); });
+  refused(balls, "balls.radii", not_finite, 0, [](auto* block) { block->mutable_balls()->set_radii(0, kInfinity); });
+  refused(balls, "balls.radii", length, {}, [](auto* block) { block->mutable_balls()->clear_radii(); });
+  refused(balls, "balls.centers", not_finite, 0, [](auto* block) { block->mutable_balls()->set_centers(0, kNan); });
+  const v1::QueryBatch boxes = box_at(0, 1);
+  refused(boxes, "boxes.half_extents", range, 0, [](auto* block) { block->mutable_boxes()->set_half_extents(2, -1); });
+  refused(boxes, "boxes.rotations", range, 0, [](auto* block) {
+    fill(block->mutable_boxes()->mutable_rotations(), {0.f, 0.f, 0.f, 3.f});
+  });
+  refused(boxes, "boxes.rotations", length, {}, [](auto* block) { block->mutable_boxes()->add_rotations(1); });
+  refused(boxes, "lookup.groups", range, 0, [](auto* block) { block->mutable_lookup()->add_groups(0); });
+}
+
+TEST_F(QueryRpcTest, WrongFormRefusesTheBatchAndIsNamed) {
+  const auto refused = [this](const std::string& field, std::optional<uint32_t> index,
+                              const std::function<void(v1::QueryBlock*)>& spoil) {
+    SCOPED_TRACE(field);
+    v1::QueryBatch batch = ray_along_x();
+    spoil(batch.mutable_blocks(0));
+    expect_query_refused(batch, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "blocks[0]" + field, index});
+  };
+  refused("", {}, [](auto* block) { block->clear_kind(); });
+  refused(".source", {}, [](auto* block) { block->set_source(static_cast<v1::Source>(4)); });
+  refused(".precision", {}, [](auto* block) { block->set_precision(static_cast<v1::Precision>(-1)); });
+  refused(".rays.mode", {}, [](auto* block) { block->mutable_rays()->set_mode(static_cast<v1::RayMode>(4)); });
+  refused(".rays.cull", {}, [](auto* block) { block->mutable_rays()->set_cull(static_cast<v1::Cull>(99)); });
+  refused(".rays.inside", {}, [](auto* block) { block->mutable_rays()->set_inside(static_cast<v1::Inside>(4)); });
+  refused(".balls.detail", {},
+          [](auto* block) { block->mutable_balls()->set_detail(static_cast<v1::StaticDetail>(4)); });
+  refused(".boxes.detail", {},
+          [](auto* block) { block->mutable_boxes()->set_detail(static_cast<v1::StaticDetail>(4)); });
+  refused(".columns", 1, [](auto* block) {
+    block->add_columns(v1::COLUMN_ID);
+    block->add_columns(static_cast<v1::Column>(11));
+  });
+  refused(".columns", 0, [](auto* block) { block->add_columns(v1::COLUMN_UNSPECIFIED); });
+  refused(".columns", {}, [](auto* block) {
+    block->mutable_balls();
+    block->add_columns(v1::COLUMN_T);
+  });
+  refused(".lookup", {}, [](auto* block) { block->mutable_lookup(); });
+  refused(".lookup", {}, [](auto* block) {
+    block->mutable_lookup()->add_ids(1);
+    block->mutable_lookup()->add_groups(1);
+  });
+}
+
+TEST_F(QueryRpcTest, KindsAndFieldsThatAreNotServedAreNamed) {
+  const auto refused = [this](const std::string& field, const std::function<void(v1::QueryBlock*)>& spoil) {
+    v1::QueryBatch batch = ray_along_x();
+    spoil(batch.mutable_blocks(0));
+    expect_query_refused(batch, {grpc::StatusCode::UNIMPLEMENTED, v1::REASON_NOT_SERVED, "blocks[0]." + field});
+  };
+  refused("capsules", [](auto* block) { block->mutable_capsules(); });
+  refused("frustums", [](auto* block) { block->mutable_frustums(); });
+  refused("sweeps", [](auto* block) { block->mutable_sweeps(); });
+  refused("nearest", [](auto* block) { block->mutable_nearest(); });
+  refused("sight", [](auto* block) { block->mutable_sight(); });
+  refused("as_of_ticks", [](auto* block) { block->add_as_of_ticks(1); });
+  refused("as_of_fractions", [](auto* block) { block->add_as_of_fractions(0); });
+  refused("outside_history", [](auto* block) { block->set_outside_history(v1::OUTSIDE_HISTORY_CLAMP); });
+}
+
+TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {
+  const auto refused = [this](const v1::QueryBatch& batch, const std::string& field, const std::string& limit,
+                              double value, double asked) {
+    const v1::Error error = error_of(query(batch));
+    expect_error(error, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, field});
+    EXPECT_EQ(error.limit(), limit);
+    EXPECT_EQ(error.limit_value(), value);
+    EXPECT_EQ(error.asked(), asked);
+  };
+  v1::QueryBatch batch;
+  for (uint32_t i = 0; i <= limits::kMaxBlocks; ++i) batch.add_blocks();
+  refused(batch, "blocks", "blocks", limits::kMaxBlocks, limits::kMaxBlocks + 1.0);
+  batch = ray_along_x();
+  batch.mutable_blocks(0)->mutable_rays()->mutable_origins()->Resize(3 * (static_cast<int>(limits::kMaxQueries) + 1),
+                                                                     0);
+  refused(batch, "blocks", "queries", limits::kMaxQueries, limits::kMaxQueries + 1.0);
+  batch = ray_along_x();
+  for (uint32_t i = 0; i <= limits::kMaxIgnoredIds; ++i) batch.mutable_blocks(0)->add_ignore_ids(i + 1);
+  refused(batch, "blocks[0].ignore_ids", "ignored_ids", limits::kMaxIgnoredIds, limits::kMaxIgnoredIds + 1.0);
+  batch = ray_along_x();
+  batch.mutable_blocks(0)->set_max_results(limits::kMaxMaxResults + 1);
+  refused(batch, "blocks[0].max_results", "max_results", limits::kMaxMaxResults, limits::kMaxMaxResults + 1.0);
+  batch = ray_along_x();
+  batch.set_max_reply_bytes(limits::kMaxReplyBytes + 1);
+  refused(batch, "max_reply_bytes", "reply_bytes", limits::kMaxReplyBytes, limits::kMaxReplyBytes + 1.0);
+}
+
+TEST_F(QueryRpcTest, RepliesAreTheSameBytesOnOneAndFourThreads) {
+  ASSERT_TRUE(apply(insert_balls(1000, 3000)).ok());
+  v1::QueryBatch batch;
+  v1::Rays* rays = batch.add_blocks()->mutable_rays();
+  for (int i = 0; i < 5000; ++i)
+    for (int axis = 0; axis < 3; ++axis) rays->add_origins(static_cast<float>((i * 7919 + axis * 104729) % 1000) / 10);
+  fill(rays->mutable_directions(), {1.f, 0.25f, -0.5f});
+  std::vector<std::string> replies;
+  for (const uint32_t threads : {1u, 4u}) {
+    server::ServerConfig config = test_config();
+    config.threads = threads;
+    RunningServer other(config);
+    grpc::ClientContext create_context;
+    v1::CreateSceneRequest scene;
+    scene.set_name("world");
+    v1::CreateSceneResponse created;
+    ASSERT_TRUE(other.stubs().scenes->CreateScene(&create_context, scene, &created).ok());
+    grpc::ClientContext update_context;
+    v1::ApplyUpdatesRequest update;
+    update.set_scene("world");
+    *update.mutable_batch() = insert_balls(1, 3000);
+    v1::ApplyUpdatesResponse applied;
+    ASSERT_TRUE(other.stubs().updates->ApplyUpdates(&update_context, update, &applied).ok());
+    grpc::ClientContext query_context;
+    v1::QueryRequest request;
+    request.set_scene("world");
+    *request.mutable_batch() = batch;
+    v1::QueryResponse response;
+    ASSERT_TRUE(other.stubs().queries->Query(&query_context, request, &response).ok());
+    response.mutable_result()->clear_epoch();
+    replies.push_back(response.SerializeAsString());
+  }
+  EXPECT_EQ(replies[0], replies[1]);
+}
+
+}  // namespace
+}  // namespace locus::test

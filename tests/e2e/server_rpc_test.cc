@@ -1,0 +1,86 @@
+#include <set>
+
+#include "core/base/limits.h"
+#include "tests/support/raw_call.h"
+#include "tests/support/rpc_test.h"
+
+namespace locus::test {
+namespace {
+
+using ServerRpcTest = RpcTest;
+
+v1::GetServerResponse get_server(Stubs& stubs) {
+  grpc::ClientContext context;
+  set_timeout(context);
+  v1::GetServerResponse response;
+  EXPECT_TRUE(stubs.server->GetServer(&context, {}, &response).ok());
+  return response;
+}
+
+const v1::Limit& limit_of(const v1::GetServerResponse& server, const std::string& name) {
+  for (const v1::Limit& limit : server.limits())
+    if (limit.name() == name) return limit;
+  ADD_FAILURE() << "no limit " << name;
+  return v1::Limit::default_instance();
+}
+
+TEST_F(ServerRpcTest, TheServerSaysWhatItIsAndServes) {
+  const v1::GetServerResponse server = get_server(stubs());
+  EXPECT_EQ(server.version(), LOCUS_VERSION);
+  EXPECT_FALSE(server.instruction_set().empty());
+  EXPECT_THAT(server.features(), ::testing::ElementsAre("balls", "boxes", "lookup", "rays", "static_from"));
+}
+
+TEST_F(ServerRpcTest, LimitsAreListedInOrderWithWhatIsUsed) {
+  const v1::GetServerResponse server = get_server(stubs());
+  std::vector<std::string> names;
+  for (const v1::Limit& limit : server.limits()) names.push_back(limit.name());
+  EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
+  EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
+  EXPECT_EQ(limit_of(server, "scenes").value(), limits::kMaxScenes);
+  EXPECT_EQ(limit_of(server, "scenes").used(), 1);
+  EXPECT_EQ(limit_of(server, "meshes").used(), 0);
+  EXPECT_EQ(limit_of(server, "calls").used(), 1);
+  EXPECT_EQ(limit_of(server, "queries").value(), limits::kMaxQueries);
+  EXPECT_EQ(limit_of(server, "receive_bytes").value(), limits::kReceiveBytes);
+}
+
+TEST_F(ServerRpcTest, OpenStreamsCountAsUsed) {
+  grpc::ClientContext context;
+  set_timeout(context);
+  const auto stream = stubs().queries->StreamQueries(&context);
+  v1::StreamQueriesRequest request;
+  request.set_scene("world");
+  v1::StreamQueriesResponse response;
+  ASSERT_TRUE(stream->Write(request));
+  ASSERT_TRUE(stream->Read(&response));
+  EXPECT_EQ(limit_of(get_server(stubs()), "streams").used(), 1);
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
+TEST_F(ServerRpcTest, HealthAnswersServingForTheServerAndEachService) {
+  for (const std::string service : {"", "locus.v1.QueryService", "locus.v1.SceneService"}) {
+    // HealthCheckRequest{service = 1}, HealthCheckResponse{status = 1: SERVING}.
+    const std::string request =
+        service.empty() ? "" : std::string("\x0a") + static_cast<char>(service.size()) + service;
+    const RawReply reply = raw_call(stubs().channel, "/grpc.health.v1.Health/Check", request);
+    EXPECT_TRUE(reply.status.ok()) << service << ": " << reply.status.error_message();
+    EXPECT_EQ(reply.bytes, "\x08\x01") << service;
+  }
+  const RawReply unknown = raw_call(stubs().channel, "/grpc.health.v1.Health/Check", "\x0a\x02no");
+  EXPECT_EQ(unknown.status.error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
+TEST_F(ServerRpcTest, ReflectionListsEveryService) {
+  // ServerReflectionRequest{list_services = 7: ""}; the reply's names are plain text in it.
+  const RawReply reply = raw_call(stubs().channel, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+                                  std::string("\x3a\x00", 2));
+  EXPECT_TRUE(reply.status.ok()) << reply.status.error_message();
+  for (const char* service : {"locus.v1.ServerService", "locus.v1.SceneService", "locus.v1.UpdateService",
+                              "locus.v1.QueryService", "grpc.health.v1.Health"})
+    EXPECT_THAT(reply.bytes, ::testing::HasSubstr(service));
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,111 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/service/convert.h"
+
+namespace locus::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+TEST(ConvertQueriesTest, ColumnsPointIntoTheMessage) {
+  v1::QueryBatch batch;
+  v1::Rays* rays = batch.add_blocks()->mutable_rays();
+  for (int i = 0; i < 6; ++i) rays->add_origins(static_cast<float>(i));
+  batch.mutable_blocks(0)->add_masks(7);
+  const absl::StatusOr<QueryBatch> queries = to_queries(batch);
+  ASSERT_TRUE(queries.ok()) << queries.status();
+  const auto& columns = std::get<RayColumns>(queries->blocks[0].kind);
+  EXPECT_EQ(columns.origins.data(), rays->origins().data());
+  EXPECT_EQ(columns.origins.size(), 6u);
+  EXPECT_TRUE(columns.directions.empty());
+  EXPECT_EQ(queries->blocks[0].masks[0], 7u);
+}
+
+TEST(ConvertQueriesTest, ZeroIsTheDefaultOfEveryEnum) {
+  v1::QueryBatch batch;
+  batch.add_blocks()->mutable_rays();
+  batch.add_blocks()->mutable_boxes();
+  const absl::StatusOr<QueryBatch> queries = to_queries(batch);
+  ASSERT_TRUE(queries.ok()) << queries.status();
+  EXPECT_EQ(queries->blocks[0].source, Source::kBoth);
+  EXPECT_EQ(queries->blocks[0].precision, Precision::kExact);
+  EXPECT_TRUE(queries->blocks[0].columns.empty());
+  const auto& rays = std::get<RayColumns>(queries->blocks[0].kind);
+  EXPECT_EQ(rays.mode, RayMode::kFirst);
+  EXPECT_EQ(rays.cull, Cull::kNone);
+  EXPECT_EQ(rays.inside, Inside::kSolid);
+  EXPECT_EQ(std::get<BoxColumns>(queries->blocks[1].kind).detail, StaticDetail::kInstances);
+}
+
+TEST(ConvertQueriesTest, EveryEnumNumberHasItsMeaning) {
+  v1::QueryBatch batch;
+  v1::QueryBlock* block = batch.add_blocks();
+  block->set_source(v1::SOURCE_DYNAMIC);
+  block->set_precision(v1::PRECISION_CONSERVATIVE);
+  block->add_columns(v1::COLUMN_POSE);
+  block->mutable_rays()->set_mode(v1::RAY_MODE_ALL);
+  block->mutable_rays()->set_cull(v1::CULL_FRONT);
+  block->mutable_rays()->set_inside(v1::INSIDE_HOLLOW);
+  batch.add_blocks()->mutable_balls()->set_detail(v1::STATIC_DETAIL_TRIANGLES_SORTED);
+  const absl::StatusOr<QueryBatch> queries = to_queries(batch);
+  ASSERT_TRUE(queries.ok()) << queries.status();
+  EXPECT_EQ(queries->blocks[0].source, Source::kDynamic);
+  EXPECT_EQ(queries->blocks[0].precision, Precision::kConservative);
+  EXPECT_TRUE(queries->blocks[0].columns.has(Column::kPose));
+  EXPECT_FALSE(queries->blocks[0].columns.has(Column::kT));
+  const auto& rays = std::get<RayColumns>(queries->blocks[0].kind);
+  EXPECT_EQ(rays.mode, RayMode::kAll);
+  EXPECT_EQ(rays.cull, Cull::kFront);
+  EXPECT_EQ(rays.inside, Inside::kHollow);
+  EXPECT_EQ(std::get<BallColumns>(queries->blocks[1].kind).detail, StaticDetail::kTrianglesSorted);
+}
+
+TEST(ConvertQueriesTest, EveryColumnOfAResultArrives) {
+  BlockResult block;
+  block.counts = {2};
+  block.truncated = {0};
+  block.hits = std::string("\1\0", 2);
+  block.t = {1, 2};
+  block.ids = {3, 4};
+  block.triangles = {5, 6};
+  block.uvs = {0.25f, 0.5f};
+  block.normals = {1, 0, 0};
+  block.points = {7, 8, 9};
+  block.groups = {10};
+  block.tags = {11};
+  block.layers = {12};
+  block.positions = {13, 14, 15};
+  block.rotations = {0, 0, 0, 1};
+  v1::BlockResult out;
+  to_proto(block, &out);
+  EXPECT_THAT(out.counts(), ElementsAre(2u));
+  EXPECT_THAT(out.truncated(), ElementsAre(0u));
+  EXPECT_EQ(out.hits(), block.hits);
+  EXPECT_THAT(out.t(), ElementsAre(1.f, 2.f));
+  EXPECT_THAT(out.ids(), ElementsAre(3u, 4u));
+  EXPECT_THAT(out.triangles(), ElementsAre(5u, 6u));
+  EXPECT_THAT(out.uvs(), ElementsAre(0.25f, 0.5f));
+  EXPECT_THAT(out.normals(), ElementsAre(1.f, 0.f, 0.f));
+  EXPECT_THAT(out.points(), ElementsAre(7.f, 8.f, 9.f));
+  EXPECT_THAT(out.groups(), ElementsAre(10u));
+  EXPECT_THAT(out.tags(), ElementsAre(11u));
+  EXPECT_THAT(out.layers(), ElementsAre(12u));
+  EXPECT_THAT(out.positions(), ElementsAre(13., 14., 15.));
+  EXPECT_THAT(out.rotations(), ElementsAre(0.f, 0.f, 0.f, 1.f));
+}
+
+TEST(ConvertQueriesTest, ViewsSayWhichRevision) {
+  v1::View view;
+  EXPECT_EQ(to_view(view).kind, View::Kind::kLatest);
+  view.set_epoch(5);
+  view.set_at_least(0);
+  EXPECT_EQ(to_view(view).kind, View::Kind::kAtLeast);
+  view.set_exactly(7);
+  EXPECT_EQ(to_view(view).kind, View::Kind::kExactly);
+  EXPECT_EQ(to_view(view).revision, 7u);
+  EXPECT_EQ(to_view(view).epoch, 5u);
+}
+
+}  // namespace
+}  // namespace locus::server

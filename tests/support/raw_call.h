@@ -1,0 +1,48 @@
+// A call with bytes instead of messages: for sending what no client of ours would send.
+#ifndef LOCUS_TESTS_SUPPORT_RAW_CALL_H_
+#define LOCUS_TESTS_SUPPORT_RAW_CALL_H_
+
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/support/byte_buffer.h>
+
+#include <memory>
+#include <string>
+
+#include "tests/support/running_server.h"
+
+namespace locus::test {
+
+struct RawReply {
+  grpc::Status status;
+  std::string bytes;
+};
+
+// Sends one message and no more to `method`, also to those that take streams, and reads at most one.
+inline RawReply raw_call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
+                         const std::string& bytes, std::chrono::milliseconds timeout = kCallTimeout) {
+  grpc::ClientContext context;
+  set_timeout(context, timeout);
+  grpc::CompletionQueue queue;
+  grpc::GenericStub stub(channel);
+  const grpc::Slice slice(bytes);
+  const grpc::ByteBuffer request(&slice, 1);
+  const auto call = stub.PrepareUnaryCall(&context, method, request, &queue);
+  grpc::ByteBuffer response;
+  RawReply reply;
+  call->StartCall();
+  call->Finish(&response, &reply.status, &reply);
+  void* tag = nullptr;
+  bool ok = false;
+  queue.Next(&tag, &ok);
+  std::vector<grpc::Slice> slices;
+  if (response.Valid() && response.Dump(&slices).ok())
+    for (const grpc::Slice& part : slices) reply.bytes.append(reinterpret_cast<const char*>(part.begin()), part.size());
+  queue.Shutdown();
+  while (queue.Next(&tag, &ok)) {
+  }
+  return reply;
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_RAW_CALL_H_
