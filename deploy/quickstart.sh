@@ -40,16 +40,28 @@ fi
 cmake --build "$build" --target locusd locus
 
 # The level's package is downloaded and unpacked, never installed.
+download_level() {
+  local work status=0
+  work=$(mktemp -d "$levels/fetch.XXXXXX")
+  chmod 755 "$work"
+  (cd "$work" && apt-get download "$package" && dpkg-deb -x ./*.deb unpacked) >> "$levels/fetch.log" 2>&1 || status=1
+  find "$work" -name pak1-maps.pk3 -exec mv {} "$levels/pak1-maps.pk3" \;
+  rm -rf "$work"
+  return $status
+}
+
+# A machine that never asked for Debian's lists does not know the package: ask once.
+update_lists() {
+  local as_root=()
+  [ "$(id -u)" = 0 ] || as_root=(sudo)
+  "${as_root[@]}" apt-get update >> "$levels/fetch.log" 2>&1
+}
+
 fetch_level() {
   [ -f "$levels/pak1-maps.pk3" ] && return 0
   mkdir -p "$levels"
-  local work
-  work=$(mktemp -d "$levels/fetch.XXXXXX")
-  chmod 755 "$work"
-  if (cd "$work" && apt-get download "$package" && dpkg-deb -x ./*.deb unpacked) > "$levels/fetch.log" 2>&1; then
-    find "$work/unpacked" -name pak1-maps.pk3 -exec cp {} "$levels/pak1-maps.pk3" \;
-  fi
-  rm -rf "$work"
+  : > "$levels/fetch.log"
+  download_level || { update_lists && download_level; } || true
   [ -f "$levels/pak1-maps.pk3" ]
 }
 
