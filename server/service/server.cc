@@ -27,6 +27,11 @@ using std::chrono::system_clock;
 
 // gRPC's own threads, and calls that are being refused for want of room.
 constexpr int kSpareThreads = 64;
+// A caller whose machine is gone would otherwise keep its streams for ever.
+constexpr int kPingEveryMs = 30'000;
+constexpr int kPingAnswerMs = 10'000;
+// Callers may ping that often too, to notice when this server is gone.
+constexpr int kLeastPingIntervalMs = 5'000;
 // For statuses on their way and for health watchers, once no call is in work.
 constexpr milliseconds kLastWords{500};
 
@@ -61,6 +66,10 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.SetMaxSendMessageSize(-1);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              static_cast<int>(config.max_streams) + calls + kSpareThreads);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kLeastPingIntervalMs);
   // Two daemons on one port would share its calls at random; the second is to fail instead.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
 }

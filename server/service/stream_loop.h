@@ -56,7 +56,10 @@ absl::Status answer_all(BlockingStream<Request, Response>& stream, const Caller&
   ReadOutcome outcome = stream.read(&request);
   for (; outcome == ReadOutcome::kMessage; outcome = stream.read(&request)) {
     if (first) {
-      if (absl::Status status = binding.bind(caller, request.scene()); !status.ok()) return status;
+      if (absl::Status status = binding.bind(caller, request.scene()); !status.ok()) {
+        log_refusal(rpc, status);
+        return status;
+      }
       first = false;
     }
     response.Clear();

@@ -230,6 +230,7 @@ class FullServerTest : public RpcTest {
           config.max_scenes = 2;
           config.max_meshes = 1;
           config.max_streams = 1;
+          config.max_calls = 1;
           config.max_receive_bytes = 1 << 16;
           return config;
         }()) {}
@@ -249,6 +250,25 @@ TEST_F(FullServerTest, OneSceneOrMeshTooManyIsRefusedNamingTheLimit) {
   error = error_of(upload({whole_mesh("second-cube")}));
   expect_error(error, {grpc::StatusCode::RESOURCE_EXHAUSTED, v1::REASON_LIMIT, "mesh"});
   EXPECT_EQ(error.limit(), "meshes");
+}
+
+TEST_F(FullServerTest, OneCallTooManyIsRefusedAndMayBeTriedAgain) {
+  grpc::ClientContext context;
+  set_timeout(context);
+  v1::UploadMeshResponse uploaded;
+  const auto first = stubs().scenes->UploadMesh(&context, &uploaded);
+  ASSERT_TRUE(first->Write(whole_mesh("cube")));
+  grpc::Status status;
+  // Until the upload has begun there is still room.
+  do status = create("second", {}, nullptr, true);
+  while (status.ok());
+  const v1::Error error = error_of(status);
+  expect_error(error, {grpc::StatusCode::RESOURCE_EXHAUSTED, v1::REASON_LIMIT, ""});
+  EXPECT_EQ(error.limit(), "calls");
+  EXPECT_GT(error.retry_after_ms(), 0u);
+  first->WritesDone();
+  EXPECT_TRUE(first->Finish().ok());
+  EXPECT_TRUE(create("second", {}, nullptr, true).ok());
 }
 
 TEST_F(FullServerTest, OneStreamTooManyIsRefusedAndTheFirstGoesOn) {

@@ -217,11 +217,11 @@ TEST_F(StreamRpcTest, AStreamThatItsCallerDropsLeavesNothingBehind) {
     grpc::ClientContext context;
     set_timeout(context);
     const auto stream = stubs().updates->StreamUpdates(&context);
-    stream->Write(update("world", 1, insert_balls(1, 2)));
-    if (i % 2 == 0) {
-      v1::StreamUpdatesResponse response;
-      stream->Read(&response);
-    }
+    ASSERT_TRUE(stream->Write(update("world", 1, insert_balls(1, 2))));
+    // From here on the server has the stream.
+    v1::StreamUpdatesResponse response;
+    ASSERT_TRUE(stream->Read(&response));
+    if (i % 2 == 0) stream->Write(update("world", 2, insert_balls(3, 4)));
     context.TryCancel();
     EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
   }
