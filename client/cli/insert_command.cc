@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/arguments.h"
+#include "client/cli/choices.h"
 #include "client/cli/commands.h"
 #include "client/cli/failure.h"
 #include "client/cli/update_report.h"
@@ -92,7 +93,7 @@ void add_insert_command(CLI::App& parent, Context& context) {
   command.add_option("SCENE", options->scene, "The scene")->required();
   command.add_option("SHAPE", options->shape, "point, ball, box or capsule")
       ->required()
-      ->check(CLI::IsMember({"point", "ball", "box", "capsule"}).description(""));
+      ->check(choices({"point", "ball", "box", "capsule"}));
   add_repeatable(command, "--id", options->ids, "ID", "Its id, not 0; repeat --id and --at for more objects")
       ->required();
   add_repeatable(command, "--at", options->at, "X,Y,Z", "Its centre")->required();

@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
+#include "client/cli/choices.h"
 #include "client/cli/failure.h"
 
 namespace locus::cli {
 namespace {
 
-const std::map<std::string, v1::Column>& column_names() {
-  static const auto& names = *new std::map<std::string, v1::Column>{
+const NamedValues<v1::Column>& column_names() {
+  static const auto& names = *new NamedValues<v1::Column>{
       {"t", v1::COLUMN_T},         {"id", v1::COLUMN_ID},         {"triangle", v1::COLUMN_TRIANGLE},
       {"uv", v1::COLUMN_UV},       {"normal", v1::COLUMN_NORMAL}, {"point", v1::COLUMN_POINT},
       {"group", v1::COLUMN_GROUP}, {"tag", v1::COLUMN_TAG},       {"layers", v1::COLUMN_LAYERS},
@@ -22,16 +22,16 @@ const std::map<std::string, v1::Column>& column_names() {
 bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
 
 void add_filter_options(CLI::App& command, QueryOptions& options) {
-  const std::map<std::string, v1::Source> sources = {
+  const NamedValues<v1::Source> sources = {
       {"both", v1::SOURCE_BOTH}, {"static", v1::SOURCE_STATIC}, {"dynamic", v1::SOURCE_DYNAMIC}};
   command.add_option("--source", options.source, "Where to look: both, static, dynamic [both]")
       ->type_name("SOURCE")
-      ->transform(CLI::CheckedTransformer(sources).description(""));
-  const std::map<std::string, v1::Precision> precisions = {{"exact", v1::PRECISION_EXACT},
-                                                           {"conservative", v1::PRECISION_CONSERVATIVE}};
+      ->transform(choices(sources));
+  const NamedValues<v1::Precision> precisions = {{"exact", v1::PRECISION_EXACT},
+                                                 {"conservative", v1::PRECISION_CONSERVATIVE}};
   command.add_option("--precision", options.precision, "What decides: exact, conservative (bounds) [exact]")
       ->type_name("PRECISION")
-      ->transform(CLI::CheckedTransformer(precisions).description(""));
+      ->transform(choices(precisions));
   add_repeatable(command, "--mask", options.masks, "BITS", "Find only what has one of these layers [all]")
       ->check(fits_32_bits());
   add_repeatable(command, "--ignore-group", options.ignore_groups, "GROUP",
@@ -59,17 +59,17 @@ void add_query_options(CLI::App& command, QueryOptions& options) {
       ->type_name("NAMES")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->transform(CLI::CheckedTransformer(column_names()).description(""));
+      ->transform(choices(column_names()));
   add_view_options(command, options);
 }
 
 void add_detail_option(CLI::App& command, v1::StaticDetail& detail) {
-  const std::map<std::string, v1::StaticDetail> details = {{"instances", v1::STATIC_DETAIL_INSTANCES},
-                                                           {"triangles", v1::STATIC_DETAIL_TRIANGLES},
-                                                           {"sorted", v1::STATIC_DETAIL_TRIANGLES_SORTED}};
+  const NamedValues<v1::StaticDetail> details = {{"instances", v1::STATIC_DETAIL_INSTANCES},
+                                                 {"triangles", v1::STATIC_DETAIL_TRIANGLES},
+                                                 {"sorted", v1::STATIC_DETAIL_TRIANGLES_SORTED}};
   command.add_option("--detail", detail, "Static rows: instances, triangles, sorted (triangles) [instances]")
       ->type_name("DETAIL")
-      ->transform(CLI::CheckedTransformer(details).description(""));
+      ->transform(choices(details));
 }
 
 absl::Status check(const QueryOptions& options) {

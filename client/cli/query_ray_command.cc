@@ -1,10 +1,10 @@
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "client/cli/arguments.h"
+#include "client/cli/choices.h"
 #include "client/cli/commands.h"
 #include "client/cli/query_command.h"
 #include "client/lib/result_rows.h"
@@ -60,23 +60,22 @@ void add_ray_options(CLI::App& command, RayOptions& options) {
                  "Where it goes, any length but zero; t counts in this length; one for each or one for all")
       ->required();
   add_repeatable(command, "--max-t", options.t_max, "T", "How far, in lengths of --dir [inf]");
-  const std::map<std::string, v1::RayMode> modes = {
+  const NamedValues<v1::RayMode> modes = {
       {"first", v1::RAY_MODE_FIRST}, {"any", v1::RAY_MODE_ANY}, {"all", v1::RAY_MODE_ALL}};
   command.add_option("--mode", options.mode, "Which hits: first, any (yes or no), all [first]")
       ->type_name("MODE")
-      ->transform(CLI::CheckedTransformer(modes).description(""));
-  const std::map<std::string, v1::Cull> culls = {
-      {"none", v1::CULL_NONE}, {"back", v1::CULL_BACK}, {"front", v1::CULL_FRONT}};
+      ->transform(choices(modes));
+  const NamedValues<v1::Cull> culls = {{"none", v1::CULL_NONE}, {"back", v1::CULL_BACK}, {"front", v1::CULL_FRONT}};
   command.add_option("--cull", options.cull, "Side of triangles to pass: none, back, front [none]")
       ->type_name("SIDE")
-      ->transform(CLI::CheckedTransformer(culls).description(""));
-  const std::map<std::string, v1::Inside> insides = {
+      ->transform(choices(culls));
+  const NamedValues<v1::Inside> insides = {
       {"solid", v1::INSIDE_SOLID}, {"hollow", v1::INSIDE_HOLLOW}, {"skip", v1::INSIDE_SKIP}};
   command
       .add_option("--inside", options.inside,
                   "An object it starts in: solid (hit at 0), hollow (where it leaves), skip [solid]")
       ->type_name("RULE")
-      ->transform(CLI::CheckedTransformer(insides).description(""));
+      ->transform(choices(insides));
 }
 
 }  // namespace

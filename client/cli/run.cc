@@ -1,9 +1,9 @@
 #include "client/cli/run.h"
 
 #include <algorithm>
-#include <map>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/choices.h"
 #include "client/cli/commands.h"
 
 namespace locus::cli {
@@ -39,11 +39,10 @@ void build_cli(CLI::App& app, Context& context) {
                  "Seconds for each call [10; 600 for uploads and changes of instances]")
       ->type_name("SECONDS")
       ->check(CLI::PositiveNumber);
-  const std::map<std::string, Format> formats = {
-      {"table", Format::kTable}, {"json", Format::kJson}, {"ndjson", Format::kNdjson}};
+  const NamedValues<Format> formats = {{"table", Format::kTable}, {"json", Format::kJson}, {"ndjson", Format::kNdjson}};
   app.add_option("-o,--output", options.format, "How to print: table, json, ndjson [table]")
       ->type_name("FORMAT")
-      ->transform(CLI::CheckedTransformer(formats).description(""));
+      ->transform(choices(formats));
   add_scene_command(app, context);
   add_import_command(app, context);
   add_generate_command(app, context);

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "client/cli/arguments.h"
+#include "client/cli/choices.h"
 #include "client/cli/commands.h"
 #include "client/cli/failure.h"
 #include "client/cli/output.h"
@@ -143,11 +144,10 @@ void add_create(CLI::App& parent, Context& context) {
   command.add_option("NAME", options->name, "Lower case letters, digits and dashes, at most 63")->required();
   command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
   add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Words of your own about the scene");
-  const std::map<std::string, v1::Winding> windings = {{"ccw", v1::WINDING_COUNTER_CLOCKWISE},
-                                                       {"cw", v1::WINDING_CLOCKWISE}};
+  const NamedValues<v1::Winding> windings = {{"ccw", v1::WINDING_COUNTER_CLOCKWISE}, {"cw", v1::WINDING_CLOCKWISE}};
   command.add_option("--winding", options->winding, "Order of vertices seen from a triangle's front: ccw, cw [ccw]")
       ->type_name("ORDER")
-      ->transform(CLI::CheckedTransformer(windings).description(""));
+      ->transform(choices(windings));
   command.add_option("--static-from", options->static_from, "Start with the instances of this scene")
       ->type_name("SCENE");
   run_when_chosen(command, options, context, create);

@@ -1,0 +1,43 @@
+#include "client/cli/choices.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
+
+namespace locus::cli {
+namespace {
+
+// A validator's name is never printed, and the parser gives it back: that is where the words are kept.
+constexpr char kName[] = "choices:";
+
+}  // namespace
+
+CLI::Validator translated_choices(const std::vector<std::string>& words, const std::vector<std::string>& texts) {
+  const auto translate = [words, texts](std::string& text) -> std::string {
+    const auto found = std::find(words.begin(), words.end(), text);
+    if (found == words.end()) return absl::StrCat("'", text, "' is none of ", absl::StrJoin(words, ", "));
+    text = texts[static_cast<size_t>(found - words.begin())];
+    return "";
+  };
+  return CLI::Validator(translate, "", absl::StrCat(kName, absl::StrJoin(words, "|")));
+}
+
+CLI::Validator choices(const std::vector<std::string>& words) { return translated_choices(words, words); }
+
+std::vector<std::string> choices_of(CLI::Option& option) {
+  for (int i = 0;; ++i) {
+    const CLI::Validator* validator = nullptr;
+    try {  // the parser tells the end of its list so, and no other way
+      validator = option.get_validator(i);
+    } catch (const CLI::OptionNotFound&) {
+      return {};
+    }
+    absl::string_view name = validator->get_name();
+    if (absl::ConsumePrefix(&name, kName)) return absl::StrSplit(name, '|');
+  }
+}
+
+}  // namespace locus::cli
