@@ -25,4 +25,15 @@ absl::StatusOr<client::Client*> Context::connect() {
   return client_.get();
 }
 
+void Context::write(const Report& report) {
+  write_report(out_, options_.format, report);
+  if (keeps_reports_) kept_ = std::make_shared<const Report>(report);
+}
+
+std::optional<client::Revision> Context::own(const std::string& scene) const {
+  const auto found = own_.find(scene);
+  if (found == own_.end()) return std::nullopt;
+  return found->second;
+}
+
 }  // namespace locus::cli

@@ -3,10 +3,12 @@
 #ifndef LOCUS_CLIENT_CLI_CONTEXT_H_
 #define LOCUS_CLIENT_CLI_CONTEXT_H_
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -39,7 +41,22 @@ class Context {
   absl::StatusOr<client::Client*> connect();
 
   // Writes to the output in the chosen format.
-  void write(const Report& report) { write_report(out_, options_.format, report); }
+  void write(const Report& report);
+
+  // From here on the last report written is kept as well, for whoever works with its values.
+  void keep_reports() { keeps_reports_ = true; }
+  // The last report written since the last call; null if there was none.
+  std::shared_ptr<const Report> take_report() { return std::move(kept_); }
+
+  // The scene of lines that name none; empty = every line must.
+  const std::string& default_scene() const { return default_scene_; }
+  void use_scene(std::string scene) { default_scene_ = std::move(scene); }
+
+  // The latest revision of a scene that a change made through this context was acknowledged under. Queries that ask for
+  // no other view ask for at least this one, so that many lines in one process see their own writes.
+  std::optional<client::Revision> own(const std::string& scene) const;
+  void remember_own(const std::string& scene, client::Revision revision) { own_[scene] = revision; }
+  void forget_own(const std::string& scene) { own_.erase(scene); }
 
   // The outcome of the command that ran.
   void finish(absl::Status outcome) { outcome_ = std::move(outcome); }
@@ -52,6 +69,10 @@ class Context {
   GlobalOptions options_;
   std::unique_ptr<client::Client> client_;
   absl::Status outcome_;
+  bool keeps_reports_ = false;
+  std::shared_ptr<const Report> kept_;
+  std::string default_scene_;
+  std::map<std::string, client::Revision> own_;
 };
 
 }  // namespace locus::cli

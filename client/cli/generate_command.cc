@@ -31,7 +31,8 @@ absl::Status write_city(const std::string& path, const ImportedMesh& city, Conte
   return absl::OkStatus();
 }
 
-absl::Status generate_city_command(const CityOptions& options, Context& context) {
+absl::Status generate_city_command(CityOptions options, Context& context) {
+  if (options.out.empty() && options.placement.scene.empty()) options.placement.scene = context.default_scene();
   if (options.placement.scene.empty() == options.out.empty()) return usage_error("give either --scene or --out");
   ImportedMesh city = generate_city(options.triangles, options.seed);
   if (!options.out.empty()) return write_city(options.out, city, context);

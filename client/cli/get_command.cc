@@ -7,7 +7,9 @@
 #include "absl/strings/str_join.h"
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
+#include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
+#include "client/cli/query_options.h"
 #include "client/cli/query_report.h"
 #include "client/lib/query_builder.h"
 #include "client/lib/result_rows.h"
@@ -28,8 +30,9 @@ const std::vector<v1::Column>& columns() {
 }
 
 // One block of ids and one of groups, as far as they are asked for.
-v1::QueryBatch batch_of(const GetOptions& options) {
+v1::QueryBatch batch_of(const GetOptions& options, const Context& context) {
   client::QueryBuilder builder;
+  see_own(options.scene, context, builder);
   if (!options.ids.empty()) builder.lookup().ids(values_of(options.ids)).columns(columns());
   if (!options.groups.empty()) {
     client::LookupBlock block = builder.lookup();
@@ -55,7 +58,7 @@ absl::Status get(const GetOptions& options, Context& context) {
   if (options.ids.empty() && options.groups.empty()) return usage_error("nothing to get: give --id or --group");
   const absl::StatusOr<client::Client*> client = context.connect();
   if (!client.ok()) return client.status();
-  const v1::QueryBatch batch = batch_of(options);
+  const v1::QueryBatch batch = batch_of(options, context);
   const absl::StatusOr<v1::QueryResult> result = (*client)->query(options.scene, batch);
   if (!result.ok()) return result.status();
   if (result->blocks_size() != batch.blocks_size()) return absl::DataLossError("the server left blocks unanswered");
@@ -87,7 +90,7 @@ void add_get_command(CLI::App& parent, Context& context) {
   locus get arena --id 7
   locus get arena --id 7 --id 8
   locus -o json get arena --group 3)");
-  command.add_option("SCENE", options->scene, "The scene")->required();
+  add_scene_argument(command, options->scene);
   add_repeatable(command, "--id", options->ids, "ID", "An object or instance");
   add_repeatable(command, "--group", options->groups, "GROUP", "Everything in a group");
   run_when_chosen(command, options, context, get);

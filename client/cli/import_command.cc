@@ -25,6 +25,7 @@ absl::Status import(const ImportCommandOptions& options, Context& context) {
 
 void add_import_command(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<ImportCommandOptions>();
+  options->placement.scene = context.default_scene();
   CLI::App& command =
       *parent.add_subcommand("import",
                              "Upload a level from a file and place it in a scene: OBJ, PLY, STL, glTF, GLB, "
@@ -34,7 +35,9 @@ void add_import_command(CLI::App& parent, Context& context) {
   locus import pak1-maps.pk3 --entry maps/oa_dm1.bsp --scene arena --scale 0.0254
   locus import house.obj --scene arena --mesh house --at 100,0,0 --layers 2)");
   command.add_option("FILE", options->file, "The file")->required();
-  command.add_option("--scene", options->placement.scene, "The scene to place it in")->required()->type_name("SCENE");
+  command.add_option("--scene", options->placement.scene, "The scene to place it in")
+      ->required(context.default_scene().empty())
+      ->type_name("SCENE");
   command.add_option("--entry", options->import.entry, "The level inside a PK3 [the first]")->type_name("PATH");
   command.add_option("--scale", options->import.scale, "Multiplies every coordinate [1]")->type_name("FACTOR");
   command

@@ -7,6 +7,7 @@
 #include "client/cli/arguments.h"
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
+#include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
 #include "client/cli/update_report.h"
 #include "client/lib/update_builder.h"
@@ -90,7 +91,7 @@ void add_insert_command(CLI::App& parent, Context& context) {
   locus insert arena box --id 9 --at 4,0,0 --half 1,1,2 --rotation 0,0,0.7071068,0.7071068
   locus insert arena capsule --id 10 --at 0,3,0 --axis 0,0.6,0 --radius 0.3 --group 3 --layers 2
   locus insert arena ball --id 1 --at 0,0,0 --id 2 --at 5,0,0 --radius 1)");
-  command.add_option("SCENE", options->scene, "The scene")->required();
+  add_scene_argument(command, options->scene);
   command.add_option("SHAPE", options->shape, "point, ball, box or capsule")
       ->required()
       ->check(choices({"point", "ball", "box", "capsule"}));

@@ -94,6 +94,7 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
   }
   const absl::StatusOr<v1::ChangeInstancesResponse> placed = (*client)->change_instances(change);
   if (!placed.ok()) return placed.status();
+  context.remember_own(options.scene, {placed->epoch(), placed->revision()});
   for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed->ids_size(); ++i) {
     report.rows[i]["id"] = id_json(placed->ids(static_cast<int>(i)));
   }

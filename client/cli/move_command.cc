@@ -5,6 +5,7 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
+#include "client/cli/default_scene.h"
 #include "client/cli/update_report.h"
 #include "client/lib/update_builder.h"
 
@@ -40,7 +41,7 @@ void add_move_command(CLI::App& parent, Context& context) {
   locus move arena --id 7 --to 1,2,4
   locus move arena --id 7 --to 1,2,4 --id 8 --to 0,0,1 --tick 120
   locus move arena --id 9 --to 4,0,0 --rotation 0,0,0,1 --teleport)");
-  command.add_option("SCENE", options->scene, "The scene")->required();
+  add_scene_argument(command, options->scene);
   add_repeatable(command, "--id", options->ids, "ID", "An object; repeat --id and --to for more")->required();
   add_repeatable(command, "--to", options->to, "X,Y,Z", "Its new centre")->required();
   add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Its new rotation [kept]");

@@ -11,7 +11,7 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
                                           Context& context) {
   const absl::Status checked = check(options);
   if (!checked.ok()) return checked;
-  apply_to_batch(options, builder);
+  apply_to_batch(options, context, builder);
   const absl::StatusOr<client::Client*> client = context.connect();
   if (!client.ok()) return client.status();
   absl::StatusOr<v1::QueryResult> result = (*client)->query(options.scene, builder.build());

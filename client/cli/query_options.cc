@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "client/cli/choices.h"
+#include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
 
 namespace locus::cli {
@@ -50,7 +51,7 @@ void add_view_options(CLI::App& command, QueryOptions& options) {
 }  // namespace
 
 void add_query_options(CLI::App& command, QueryOptions& options) {
-  command.add_option("SCENE", options.scene, "The scene")->required();
+  add_scene_argument(command, options.scene);
   add_filter_options(command, options);
   command.add_option("--max-results", options.max_results, "Most rows a query [1024]")->type_name("ROWS");
   command
@@ -77,7 +78,12 @@ absl::Status check(const QueryOptions& options) {
   return absl::OkStatus();
 }
 
-void apply_to_batch(const QueryOptions& options, client::QueryBuilder& builder) {
+void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder) {
+  if (const std::optional<client::Revision> own = context.own(scene)) builder.at_least(*own);
+}
+
+void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder) {
+  if (!options.at_least && !options.exactly) see_own(options.scene, context, builder);
   if (options.at_least) builder.at_least({options.epoch.value, *options.at_least});
   if (options.exactly) builder.exactly({options.epoch.value, *options.exactly});
   builder.max_work(options.max_work);

@@ -9,6 +9,7 @@
 #include "CLI/CLI.hpp"
 #include "absl/status/status.h"
 #include "client/cli/arguments.h"
+#include "client/cli/context.h"
 #include "client/lib/query_builder.h"
 
 namespace locus::cli {
@@ -39,8 +40,11 @@ void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
 // Usage error for options that exclude each other.
 absl::Status check(const QueryOptions& options);
 
-// View and budget.
-void apply_to_batch(const QueryOptions& options, client::QueryBuilder& builder);
+// Makes the batch see what was acknowledged to this context on the scene, if anything was.
+void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder);
+
+// View and budget. Without a view of its own the batch sees what was acknowledged to this context.
+void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder);
 
 // Everything of a block but its kind and columns.
 template <class Block>

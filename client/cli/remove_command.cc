@@ -4,6 +4,7 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
+#include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
 #include "client/cli/update_report.h"
 #include "client/lib/update_builder.h"
@@ -39,7 +40,7 @@ void add_remove_command(CLI::App& parent, Context& context) {
   locus remove arena --id 7 --id 8
   locus remove arena --group 3
   locus remove arena --all)");
-  command.add_option("SCENE", options->scene, "The scene")->required();
+  add_scene_argument(command, options->scene);
   add_repeatable(command, "--id", options->ids, "ID", "An object");
   add_repeatable(command, "--group", options->groups, "GROUP", "All objects of a group");
   command.add_flag("--all", options->all, "Every object");

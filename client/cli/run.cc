@@ -1,10 +1,14 @@
 #include "client/cli/run.h"
 
 #include <algorithm>
+#include <optional>
+#include <sstream>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
+#include "client/cli/default_scene.h"
 
 namespace locus::cli {
 namespace {
@@ -19,7 +23,43 @@ constexpr char kExamples[] = R"(Examples:
   locus -a unix:/run/locus.sock health
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
+LOCUS_SCENE names the scene of commands that are given none.
 `locus COMMAND --help` shows a command's options and examples.)";
+
+// What the parser has to say instead of running a command: help, which is code 0, or what is wrong with the line.
+struct Refusal {
+  int code = 0;
+  std::string out;
+  std::string err;
+  bool lacks_something = false;  // a required option or argument
+};
+
+// The parser takes its arguments from the back, and reports by exceptions: this is where they end.
+std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::string>& arguments) {
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  try {
+    app.parse(std::move(reversed));
+  } catch (const CLI::ParseError& error) {
+    std::ostringstream out;
+    std::ostringstream err;
+    const int code = app.exit(error, out, err);
+    return Refusal{code, out.str(), err.str(), dynamic_cast<const CLI::RequiredError*>(&error) != nullptr};
+  }
+  return std::nullopt;
+}
+
+// Nothing is run before a line has all it needs, so a line that lacks something may be tried again with the scene.
+std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& arguments, Context& context) {
+  CLI::App app;
+  build_cli(app, context);
+  const std::optional<Refusal> refusal = parse_and_run(app, arguments);
+  if (!refusal || !refusal->lacks_something || context.default_scene().empty()) return refusal;
+  const std::optional<std::vector<std::string>> longer = with_scene(app, arguments, context.default_scene());
+  if (!longer) return refusal;
+  CLI::App second;
+  build_cli(second, context);
+  return parse_and_run(second, *longer);
+}
 
 }  // namespace
 
@@ -58,14 +98,11 @@ void build_cli(CLI::App& app, Context& context) {
 }
 
 ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
-  CLI::App app;
-  build_cli(app, context);
-  // The parser takes its arguments from the back, and reports by exceptions: this is where they end.
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-  try {
-    app.parse(std::move(reversed));
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error, context.out(), context.err()) == 0 ? ExitCode::kOk : ExitCode::kUsage;
+  context.finish(absl::OkStatus());
+  if (const std::optional<Refusal> refusal = run_with_default_scene(arguments, context)) {
+    context.out() << refusal->out;
+    context.err() << refusal->err;
+    return refusal->code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
   if (!context.outcome().ok()) write_failure(context.err(), context.options().format, context.outcome());
   return exit_code_of(context.outcome());

@@ -10,6 +10,7 @@
 #include "client/cli/arguments.h"
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
+#include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
 #include "client/cli/output.h"
 
@@ -92,6 +93,7 @@ absl::Status create(const CreateOptions& options, Context& context) {
   if (!client.ok()) return client.status();
   const absl::StatusOr<v1::Scene> scene = (*client)->create_scene(request);
   if (!scene.ok()) return scene.status();
+  context.remember_own(options.name, {scene->epoch(), scene->revision()});
   context.write(description_of(*scene));
   return absl::OkStatus();
 }
@@ -128,6 +130,7 @@ absl::Status remove(const DeleteOptions& options, Context& context) {
   if (!client.ok()) return client.status();
   const absl::Status deleted = (*client)->delete_scene(request);
   if (!deleted.ok()) return deleted;
+  context.forget_own(options.name);
   Report report;
   report.head["deleted"] = options.name;
   context.write(report);
@@ -165,7 +168,7 @@ void add_describe(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<DescribeOptions>();
   CLI::App& command = *parent.add_subcommand("describe", "Show everything about a scene");
   command.footer("Examples:\n  locus scene describe arena\n  locus -o json scene describe arena");
-  command.add_option("NAME", options->name, "The scene")->required();
+  add_scene_argument(command, options->name);
   run_when_chosen(command, options, context, describe);
 }
 

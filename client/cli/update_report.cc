@@ -12,6 +12,7 @@ absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, C
   if (!client.ok()) return client.status();
   const absl::StatusOr<v1::UpdateAck> ack = (*client)->apply(scene, std::move(batch));
   if (!ack.ok()) return ack.status();
+  context.remember_own(scene, {ack->epoch(), ack->revision()});
   Report report;
   report.head = {{"applied", ack->applied()},
                  {"refused", ack->refused()},
