@@ -10,6 +10,7 @@
 #include "client/lib/call_metadata.h"
 #include "client/lib/connection.h"
 #include "client/lib/health_check.h"
+#include "client/lib/mesh_download.h"
 #include "client/lib/mesh_upload.h"
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
@@ -138,6 +139,16 @@ absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& me
                                                            const UploadProgress& progress) const {
   return locus::client::upload_mesh(*connection_->scenes, mesh, absl::Now() + connection_->options.long_deadline,
                                     progress);
+}
+
+absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, const DownloadProgress& progress) const {
+  const absl::Time deadline = absl::Now() + connection_->options.long_deadline;
+  absl::StatusOr<DownloadedMesh> mesh = absl::UnknownError("not asked yet");
+  with_retries(connection_->options.retry, deadline, [&] {
+    mesh = locus::client::download_mesh(*connection_->scenes, name, deadline, progress);
+    return mesh.status();
+  }).IgnoreError();
+  return mesh;
 }
 
 absl::StatusOr<std::vector<v1::Mesh>> Client::list_meshes() const {

@@ -44,6 +44,9 @@ enum class Health { kUnknown = 0, kServing = 1, kNotServing = 2, kServiceUnknown
 // Called after each message of an upload with the bytes sent so far and the bytes in all.
 using UploadProgress = std::function<void(uint64_t sent, uint64_t total)>;
 
+// Called after each message of a download with the bytes received so far and the bytes in all.
+using DownloadProgress = std::function<void(uint64_t received, uint64_t total)>;
+
 // Thread promise: every method may be called from any number of threads at once. Streams hold what they need of the
 // connection and may outlive the client. Each client has a connection of its own.
 class Client {
@@ -74,6 +77,10 @@ class Client {
   // INVALID_ARGUMENT before anything is sent if a column does not hold triples or is too long to count.
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
+  // The mesh as it is stored, held in memory whole: 12 bytes a vertex and a triangle. Repeated when safe. DATA_LOSS if
+  // what came is not what the server announced: counts, hash, or an index beyond the vertices. Never holds more than
+  // was announced.
+  absl::StatusOr<DownloadedMesh> download_mesh(absl::string_view name, const DownloadProgress& progress = {}) const;
   // All pages.
   absl::StatusOr<std::vector<v1::Mesh>> list_meshes() const;
   absl::Status delete_mesh(absl::string_view name) const;

@@ -1,10 +1,12 @@
-// A mesh ready for upload, and the name of its bytes. For callers of Client::upload_mesh. Plain data and one function.
+// A mesh ready for upload, a downloaded one, and the name of a mesh's bytes. For callers of Client::upload_mesh and
+// Client::download_mesh. Plain data and one function.
 #ifndef LOCUS_CLIENT_LIB_MESH_H_
 #define LOCUS_CLIENT_LIB_MESH_H_
 
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/types/span.h"
 #include "locus/v1/scene_service.pb.h"
@@ -19,6 +21,17 @@ struct MeshColumns {
   absl::Span<const float> vertices = {};      // x, y, z of each vertex
   absl::Span<const uint32_t> indices = {};    // three vertex numbers a triangle
   absl::Span<const v1::MeshPart> parts = {};  // ascending by first triangle; none = one nameless part
+};
+
+// Owned columns of a mesh as the server stores it.
+struct DownloadedMesh {
+  v1::Mesh description;           // without its parts
+  std::vector<float> vertices;    // x, y, z of each vertex
+  std::vector<uint32_t> indices;  // three vertex numbers a triangle, each below the number of vertices
+  std::vector<v1::MeshPart> parts;
+
+  // Borrowed from this, ready for upload under the same name.
+  MeshColumns columns() const { return {description.name(), vertices, indices, parts}; }
 };
 
 // SHA-256 over, in this order and all little-endian: the number of vertices as uint32, the number of triangles as

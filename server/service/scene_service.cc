@@ -8,6 +8,7 @@
 #include "server/service/call.h"
 #include "server/service/convert.h"
 #include "server/service/instance_changes.h"
+#include "server/service/mesh_download.h"
 #include "server/service/mesh_upload.h"
 #include "server/service/scene_dump.h"
 
@@ -156,6 +157,12 @@ grpc::Status SceneService::DeleteMesh(grpc::ServerContext* context, const v1::De
     log(LogLevel::kInfo, "mesh deleted", {{"mesh", request->mesh()}});
     return absl::OkStatus();
   });
+}
+
+grpc::Status SceneService::DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
+                                        grpc::ServerWriter<v1::DownloadMeshResponse>* writer) {
+  return serve(host_, *context, "DownloadMesh",
+               [&](const Caller& caller) { return download_mesh(host_, caller, *request, *writer); });
 }
 
 grpc::Status SceneService::ChangeInstances(grpc::ServerContext* context, const v1::ChangeInstancesRequest* request,

@@ -28,6 +28,8 @@ class SceneService final : public v1::SceneService::Service {
                           v1::ListMeshesResponse* response) override;
   grpc::Status DeleteMesh(grpc::ServerContext* context, const v1::DeleteMeshRequest* request,
                           v1::DeleteMeshResponse* response) override;
+  grpc::Status DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
+                            grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override;
   grpc::Status ChangeInstances(grpc::ServerContext* context, const v1::ChangeInstancesRequest* request,
                                v1::ChangeInstancesResponse* response) override;
   grpc::Status DumpScene(grpc::ServerContext* context, const v1::DumpSceneRequest* request,

@@ -60,7 +60,8 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
   const auto body = [&](const Caller&) {
     response->set_version(kVersion);
     response->set_instruction_set("portable");
-    for (const char* feature : {"balls", "boxes", "lookup", "rays", "static_from"}) response->add_features(feature);
+    for (const char* feature : {"balls", "boxes", "download_mesh", "lookup", "rays", "static_from"})
+      response->add_features(feature);
     for (const NamedLimit& limit : limits_of(host_)) {
       v1::Limit* out = response->add_limits();
       out->set_name(limit.name);

@@ -28,7 +28,8 @@ TEST_F(ServerRpcTest, TheServerSaysWhatItIsAndServes) {
   const v1::GetServerResponse server = get_server(stubs());
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_FALSE(server.instruction_set().empty());
-  EXPECT_THAT(server.features(), ::testing::ElementsAre("balls", "boxes", "lookup", "rays", "static_from"));
+  EXPECT_THAT(server.features(),
+              ::testing::ElementsAre("balls", "boxes", "download_mesh", "lookup", "rays", "static_from"));
 }
 
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithWhatIsUsed) {

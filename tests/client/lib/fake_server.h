@@ -299,6 +299,21 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
+  // The planned pieces, whatever was uploaded.
+  grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
+                            grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
+    std::lock_guard lock(mutex_);
+    if (no_mesh) return missing(request->mesh());
+    for (size_t i = 0; i < mesh_pieces.size(); ++i) {
+      if (i == 1 && failing_downloads > 0) {
+        --failing_downloads;
+        return {grpc::StatusCode::UNAVAILABLE, "planned"};
+      }
+      writer->Write(mesh_pieces[i]);
+    }
+    return grpc::Status::OK;
+  }
+
   grpc::Status ChangeInstances(grpc::ServerContext*, const v1::ChangeInstancesRequest* request,
                                v1::ChangeInstancesResponse* response) override {
     std::lock_guard lock(mutex_);
@@ -330,6 +345,9 @@ class FakeScenes final : public v1::SceneService::Service {
   std::vector<float> vertices;
   std::vector<uint32_t> indices;
   size_t largest_message = 0;
+  std::vector<v1::DownloadMeshResponse> mesh_pieces;
+  int failing_downloads = 0;  // how many end after their first piece
+  bool no_mesh = false;
   v1::ChangeInstancesRequest last_change;
   int creates = 0;
   int failing_creates = 0;

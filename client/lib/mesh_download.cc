@@ -1,0 +1,94 @@
+#include "client/lib/mesh_download.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/lib/status.h"
+#include "grpcpp/client_context.h"
+
+namespace locus::client {
+namespace {
+
+absl::Status damaged(absl::string_view name, absl::string_view what) {
+  return absl::DataLossError(absl::StrCat("mesh ", name, " came damaged: ", what, "; download it again"));
+}
+
+// Appends a piece's column unless it would hold more than was announced.
+template <class T, class Repeated>
+bool append(const Repeated& column, size_t announced, std::vector<T>* to) {
+  if (static_cast<size_t>(column.size()) > announced - to->size()) return false;
+  to->insert(to->end(), column.begin(), column.end());
+  return true;
+}
+
+class Receiver {
+ public:
+  Receiver(absl::string_view name, const DownloadProgress& progress) : name_(name), progress_(progress) {}
+
+  absl::Status take(v1::DownloadMeshResponse& piece) {
+    if (piece.has_mesh() != first_) return damaged(name_, "its description is not in the first piece alone");
+    if (first_) begin(piece);
+    if (!append(piece.parts(), mesh_.description.triangles(), &mesh_.parts) ||
+        !append(piece.vertices(), vertex_numbers_, &mesh_.vertices) ||
+        !append(piece.indices(), index_numbers_, &mesh_.indices))
+      return damaged(name_, "more came than was announced");
+    if (progress_) {
+      progress_((mesh_.vertices.size() + mesh_.indices.size()) * sizeof(uint32_t),
+                (vertex_numbers_ + index_numbers_) * sizeof(uint32_t));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<DownloadedMesh> finish() {
+    if (first_) return damaged(name_, "nothing came");
+    if (mesh_.vertices.size() != vertex_numbers_ || mesh_.indices.size() != index_numbers_)
+      return damaged(name_, "less came than was announced");
+    const size_t vertices = vertex_numbers_ / 3;
+    if (std::any_of(mesh_.indices.begin(), mesh_.indices.end(), [=](uint32_t index) { return index >= vertices; }))
+      return damaged(name_, "an index is beyond its vertices");
+    const Sha256 hash = mesh_sha256(mesh_.vertices, mesh_.indices);
+    if (!std::equal(hash.begin(), hash.end(), mesh_.description.sha256().begin(), mesh_.description.sha256().end(),
+                    [](uint8_t a, char b) { return a == static_cast<uint8_t>(b); }))
+      return damaged(name_, "its bytes have another SHA-256 than was announced");
+    return std::move(mesh_);
+  }
+
+ private:
+  void begin(v1::DownloadMeshResponse& piece) {
+    first_ = false;
+    mesh_.description = std::move(*piece.mutable_mesh());
+    vertex_numbers_ = size_t{3} * mesh_.description.vertices();
+    index_numbers_ = size_t{3} * mesh_.description.triangles();
+  }
+
+  const absl::string_view name_;
+  const DownloadProgress& progress_;
+  bool first_ = true;
+  size_t vertex_numbers_ = 0;
+  size_t index_numbers_ = 0;
+  DownloadedMesh mesh_;
+};
+
+}  // namespace
+
+absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& stub, absl::string_view name,
+                                             absl::Time deadline, const DownloadProgress& progress) {
+  grpc::ClientContext context;
+  context.set_deadline(absl::ToChronoTime(deadline));
+  v1::DownloadMeshRequest request;
+  request.set_mesh(std::string(name));
+  const auto reader = stub.DownloadMesh(&context, request);
+  Receiver receiver(name, progress);
+  v1::DownloadMeshResponse piece;
+  absl::Status taken;
+  while (taken.ok() && reader->Read(&piece)) taken = receiver.take(piece);
+  if (!taken.ok()) context.TryCancel();
+  const absl::Status end = to_absl_status(reader->Finish());
+  if (!taken.ok()) return taken;
+  if (!end.ok()) return end;
+  return receiver.finish();
+}
+
+}  // namespace locus::client

@@ -1,0 +1,20 @@
+// The streaming half of Client::download_mesh. Internal to the library.
+#ifndef LOCUS_CLIENT_LIB_MESH_DOWNLOAD_H_
+#define LOCUS_CLIENT_LIB_MESH_DOWNLOAD_H_
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+#include "client/lib/client.h"
+#include "client/lib/mesh.h"
+#include "locus/v1/scene_service.grpc.pb.h"
+
+namespace locus::client {
+
+// See Client::download_mesh. One try.
+absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& stub, absl::string_view name,
+                                             absl::Time deadline, const DownloadProgress& progress);
+
+}  // namespace locus::client
+
+#endif  // LOCUS_CLIENT_LIB_MESH_DOWNLOAD_H_

@@ -1,0 +1,133 @@
+#include "client/lib/mesh_download.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/lib/fake_server.h"
+
+namespace locus::client {
+namespace {
+
+using testing::FakeServer;
+using ::testing::HasSubstr;
+
+std::string hash_of(const std::vector<float>& vertices, const std::vector<uint32_t>& indices) {
+  const Sha256 hash = mesh_sha256(vertices, indices);
+  return std::string(hash.begin(), hash.end());
+}
+
+// A server that holds one mesh: two triangles over four vertices, in three pieces.
+class MeshDownloadTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ClientOptions options;
+    options.retry = {.max_attempts = 2, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(2)};
+    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address(), options);
+    ASSERT_TRUE(client.ok()) << client.status();
+    client_ = *std::move(client);
+    pieces().resize(3);
+    v1::Mesh* mesh = pieces()[0].mutable_mesh();
+    mesh->set_name("level");
+    mesh->set_vertices(4);
+    mesh->set_triangles(2);
+    mesh->set_sha256(hash_of(vertices_, indices_));
+    pieces()[0].add_parts()->set_name("floor");
+    pieces()[0].mutable_vertices()->Add(vertices_.begin(), vertices_.begin() + 6);
+    pieces()[1].mutable_vertices()->Add(vertices_.begin() + 6, vertices_.end());
+    pieces()[1].mutable_indices()->Add(indices_.begin(), indices_.begin() + 3);
+    pieces()[2].mutable_indices()->Add(indices_.begin() + 3, indices_.end());
+  }
+
+  std::vector<v1::DownloadMeshResponse>& pieces() { return server_.scenes.mesh_pieces; }
+
+  void expect_damaged(const std::string& how) {
+    const absl::Status status = client_->download_mesh("level").status();
+    EXPECT_TRUE(absl::IsDataLoss(status)) << status;
+    EXPECT_THAT(std::string(status.message()), HasSubstr("mesh level came damaged: " + how));
+  }
+
+  const std::vector<float> vertices_ = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const std::vector<uint32_t> indices_ = {0, 1, 2, 0, 2, 3};
+  FakeServer server_;
+  std::unique_ptr<Client> client_;
+};
+
+TEST_F(MeshDownloadTest, PiecesBecomeOneMeshAndProgressIsTold) {
+  std::vector<uint64_t> received;
+  const absl::StatusOr<DownloadedMesh> mesh = client_->download_mesh("level", [&](uint64_t bytes, uint64_t total) {
+    received.push_back(bytes);
+    EXPECT_EQ(total, 72u);
+  });
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->vertices, vertices_);
+  EXPECT_EQ(mesh->indices, indices_);
+  ASSERT_EQ(mesh->parts.size(), 1u);
+  EXPECT_EQ(mesh->parts[0].name(), "floor");
+  EXPECT_EQ(mesh->description.name(), "level");
+  EXPECT_EQ(received, (std::vector<uint64_t>{24, 60, 72}));
+}
+
+TEST_F(MeshDownloadTest, WhatWasUploadedComesBackWithTheSameHash) {
+  ASSERT_TRUE(client_->upload_mesh({.name = "level", .vertices = vertices_, .indices = indices_}).ok());
+  const absl::StatusOr<DownloadedMesh> mesh = client_->download_mesh("level");
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  const MeshColumns again = mesh->columns();
+  EXPECT_EQ(mesh_sha256(again.vertices, again.indices), mesh_sha256(vertices_, indices_));
+  EXPECT_EQ(again.name, "level");
+  EXPECT_EQ(again.parts.size(), 1u);
+}
+
+TEST_F(MeshDownloadTest, ADescriptionMissingOrGivenTwiceIsDataLoss) {
+  *pieces()[1].mutable_mesh() = pieces()[0].mesh();
+  expect_damaged("its description is not in the first piece alone");
+  pieces()[0].clear_mesh();
+  expect_damaged("its description is not in the first piece alone");
+  pieces().clear();
+  expect_damaged("nothing came");
+}
+
+TEST_F(MeshDownloadTest, MoreOfAnyColumnThanAnnouncedIsDataLoss) {
+  pieces()[2].add_indices(0);
+  expect_damaged("more came than was announced");
+  pieces()[2].mutable_indices()->RemoveLast();
+  pieces()[2].add_vertices(0);
+  expect_damaged("more came than was announced");
+  pieces()[2].clear_vertices();
+  pieces()[2].add_parts();
+  pieces()[2].add_parts();
+  expect_damaged("more came than was announced");
+}
+
+TEST_F(MeshDownloadTest, LessThanAnnouncedIsDataLoss) {
+  pieces().pop_back();
+  expect_damaged("less came than was announced");
+}
+
+TEST_F(MeshDownloadTest, AnIndexBeyondTheVerticesIsDataLoss) {
+  pieces()[2].set_indices(0, 4);
+  expect_damaged("an index is beyond its vertices");
+}
+
+TEST_F(MeshDownloadTest, BytesOfAnotherHashAreDataLoss) {
+  pieces()[0].set_vertices(0, 0.5f);
+  expect_damaged("its bytes have another SHA-256 than was announced");
+  pieces()[0].mutable_mesh()->clear_sha256();
+  expect_damaged("its bytes have another SHA-256 than was announced");
+}
+
+TEST_F(MeshDownloadTest, ADownloadIsRepeatedWhereTheServerWasAway) {
+  server_.scenes.failing_downloads = 1;
+  EXPECT_TRUE(client_->download_mesh("level").ok());
+  server_.scenes.failing_downloads = 2;
+  EXPECT_TRUE(absl::IsUnavailable(client_->download_mesh("level").status()));
+}
+
+TEST_F(MeshDownloadTest, AMeshThatIsNotThereIsTheServersToName) {
+  server_.scenes.mesh_pieces.clear();
+  server_.scenes.no_mesh = true;
+  const absl::Status status = client_->download_mesh("level").status();
+  EXPECT_TRUE(absl::IsNotFound(status)) << status;
+}
+
+}  // namespace
+}  // namespace locus::client
