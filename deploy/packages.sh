@@ -10,6 +10,7 @@ usage: deploy/packages.sh [--list|--check] SET...
 
 sets:
   build   what configuring and building locusd and locus needs
+  python  what building and using the Python package needs
   test    what tests/run.sh needs on top of it
   lint    what tests/run.sh --long needs on top of both
 
@@ -21,15 +22,17 @@ TEXT
 # The compiler and what find_package and pkg-config look for.
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libssl-dev"
+python_packages="python3 python3-grpcio python3-protobuf"
 # binutils gives nm to the house test.
-test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils"
-lint_packages="clang-tidy"
+test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy"
+lint_packages="clang-tidy mypy"
 
 action=install
 packages=
 for argument in "$@"; do
   case $argument in
     build) packages="$packages $build_packages" ;;
+    python) packages="$packages $python_packages" ;;
     test) packages="$packages $test_packages" ;;
     lint) packages="$packages $lint_packages" ;;
     --list) action=list ;;

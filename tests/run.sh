@@ -74,7 +74,7 @@ run_suite() {
   if [ "$suite" = tsan ]; then wrapper=(${steady_addresses[@]+"${steady_addresses[@]}"}); fi
   if [ "$suite" = release ] && [ "$long" = yes ]; then labels=(); fi
   say "$suite: configure"
-  cmake --preset "$suite" -DLOCUS_TESTS=ON || { fail "$suite: configure"; return; }
+  cmake --preset "$suite" -DLOCUS_TESTS=ON -DLOCUS_PYTHON=ON || { fail "$suite: configure"; return; }
   say "$suite: build"
   cmake --build --preset "$suite" --parallel "$jobs" || { fail "$suite: build"; return; }
   say "$suite: test"
@@ -85,7 +85,7 @@ run_suite() {
 }
 
 say "packages"
-sets=(build test)
+sets=(build python test)
 if [ "$long" = yes ]; then sets+=(lint); fi
 ./deploy/packages.sh "${sets[@]}" || { fail "install packages"; finish; }
 

@@ -1,0 +1,123 @@
+"""A game server's loop: each tick it streams the players' moves and asks what they see, at the revision just made.
+
+    PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/game_tick.py --address 127.0.0.1:7575
+
+Makes a scene of its own and deletes it at the end. Players walk on circles around a wall; each tick asks who is in
+reach of each player (balls) and whether each player sees the next one (rays, any hit in between).
+"""
+from __future__ import annotations
+
+import argparse
+import array
+import math
+import statistics
+import time
+from typing import Iterable, List, NamedTuple
+
+import locus
+
+WALL = 1  # an id; players are FIRST and up
+FIRST = 100
+RADIUS = 0.5
+REACH = 6.0
+
+
+class Tick(NamedTuple):
+    """What one tick found."""
+
+    revision: int
+    in_reach: int
+    seen: int
+    seconds: float
+
+
+def positions(players: int, tick: int) -> "array.array[float]":
+    """3N float32: players walk on three circles around the wall, in both directions."""
+    column = array.array("f")
+    for player in range(players):
+        distance = 10.0 + 5.0 * (player % 3)
+        angle = 2 * math.pi * player / players + (0.02 if player % 2 else -0.02) * tick
+        column.extend((distance * math.cos(angle), distance * math.sin(angle), 1.0))
+    return column
+
+
+def shifted(column: "array.array[float]") -> "array.array[float]":
+    """The positions of each player's next one."""
+    return column[3:] + column[:3]
+
+
+def difference(a: Iterable[float], b: Iterable[float]) -> "array.array[float]":
+    """From each of `b` to its counterpart in `a`."""
+    return array.array("f", (x - y for x, y in zip(a, b)))
+
+
+class Game:
+    """One scene, its update stream and its query stream."""
+
+    def __init__(self, client: locus.Client, scene: str, players: int) -> None:
+        self.ids = array.array("Q", range(FIRST, FIRST + players))
+        self.updates = client.update_stream(scene)
+        self.queries = client.query_stream(scene)
+        start = locus.UpdateBatch(tick=0)
+        start.insert_boxes(WALL, [0.0, 0.0, 2.0], [8.0, 0.25, 2.0])
+        start.insert_balls(self.ids, positions(players, 0), RADIUS, groups=self.ids)
+        self.updates.send(start).result()
+
+    def step(self, number: int) -> Tick:
+        """Moves everybody, then asks at the revision that shows it."""
+        begin = time.perf_counter()
+        here = positions(len(self.ids), number)
+        ack = self.updates.send(locus.UpdateBatch(tick=number).move(self.ids, here)).result()
+        batch = locus.QueryBatch(at_least=ack)
+        batch.balls(here, REACH, block=locus.Block(ignore_groups=self.ids, ignore_ids=[WALL]))
+        # From player to next player; t counts in their distance, so a hit before 1 is something else in between.
+        batch.rays(here, difference(shifted(here), here), t_max=1.0, mode=locus.RayMode.FIRST,
+                   block=locus.Block(ignore_groups=self.ids))
+        near, sight = self.queries.send(batch).result().blocks
+        next_ids = self.ids[1:] + self.ids[:1]
+        seen = sum(1 for found, wanted in zip(sight.ids.tolist(), next_ids) if found == wanted)
+        return Tick(ack.revision, near.rows, seen, time.perf_counter() - begin)
+
+    def close(self) -> None:
+        """Ends both streams in peace."""
+        self.updates.close()
+        self.queries.close()
+
+
+def run(client: locus.Client, scene: str, players: int, ticks: int, rate: float) -> List[Tick]:
+    """So many ticks at `rate` a second; the rate is kept as long as a tick is shorter than its slot."""
+    game = Game(client, scene, players)
+    done = []
+    due = time.perf_counter()
+    for number in range(1, ticks + 1):
+        done.append(game.step(number))
+        due += 1 / rate
+        time.sleep(max(0.0, due - time.perf_counter()))
+    game.close()
+    return done
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--address", default=locus.DEFAULT_ADDRESS)
+    parser.add_argument("--scene", default="game-ring")
+    parser.add_argument("--players", type=int, default=64)
+    parser.add_argument("--ticks", type=int, default=90)
+    parser.add_argument("--rate", type=float, default=30.0)
+    options = parser.parse_args()
+    with locus.connect(options.address) as client:
+        client.create_scene(options.scene)
+        try:
+            ticks = run(client, options.scene, options.players, options.ticks, options.rate)
+        finally:
+            client.delete_scene(options.scene)
+    times = sorted(tick.seconds * 1000 for tick in ticks)
+    print(f"ticks             {len(ticks)} of {options.players} players, the last at revision {ticks[-1].revision}")
+    print(f"tick, ms          median {statistics.median(times):.2f}, longest {times[-1]:.2f}")
+    print(f"late ticks        {sum(1 for tick in times if tick > 1000 / options.rate)}")
+    print(f"in reach, a tick  {statistics.mean(tick.in_reach for tick in ticks):.1f}")
+    print(f"seen, a tick      {statistics.mean(tick.seen for tick in ticks):.1f}")
+
+
+if __name__ == "__main__":
+    main()

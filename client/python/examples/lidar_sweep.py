@@ -1,0 +1,111 @@
+"""A spinning lidar on a vehicle: one sweep of rays after another from a moving sensor, and what each ray cost the client.
+
+    PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/lidar_sweep.py --address 127.0.0.1:7575
+
+Makes a scene of its own, a street of boxes with moving balls, and deletes it at the end. "Client time" is what this
+process spends on making the request's bytes and on turning the answer's bytes into columns; gRPC and the network count
+as waiting.
+"""
+from __future__ import annotations
+
+import argparse
+import array
+import math
+import statistics
+import time
+from typing import Any, List, NamedTuple, Sequence, Tuple
+
+import locus
+
+RINGS = 64
+LOWEST, HIGHEST = math.radians(-24.8), math.radians(2.0)  # like common 64-ring sensors
+RANGE = 120.0
+HEIGHT = 1.75
+STEP = 0.25  # metres between sweeps; exact in float32
+
+
+class Cost(NamedTuple):
+    """Nanoseconds of one sweep."""
+
+    encode: int
+    wait: int
+    decode: int
+
+
+def directions(rays: int) -> "array.array[float]":
+    """3N float32: one turn of `rays` unit directions, ring by ring; z is up."""
+    steps = -(-rays // RINGS)
+    column = array.array("f")
+    for ray in range(rays):
+        ring, step = ray % RINGS, ray // RINGS
+        pitch = LOWEST + (HIGHEST - LOWEST) * ring / (RINGS - 1)
+        yaw = 2 * math.pi * step / steps
+        column.extend((math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)))
+    return column
+
+
+def position(sweep: int) -> Tuple[float, float, float]:
+    """Where the sensor is."""
+    return (STEP * sweep, 0.0, HEIGHT)
+
+
+def build_street(client: locus.Client, scene: str) -> locus.Revision:
+    """A ground, houses on both sides, and balls on the road; the revision that shows them."""
+    client.create_scene(scene)
+    batch = locus.UpdateBatch()
+    batch.insert_boxes([1], [0.0, 0.0, -0.5], [500.0, 500.0, 0.5], tags=1)
+    houses = range(60)
+    centers = [(16.0 * (house // 2) - 200.0, 14.0 if house % 2 else -14.0, 4.0) for house in houses]
+    batch.insert_boxes([100 + house for house in houses], centers, [6.0, 5.0, 4.0], tags=2)
+    batch.insert_balls([1000 + car for car in range(20)], [(10.0 * car - 60.0, 4.0, 0.8) for car in range(20)], 0.8, tags=3)
+    return client.apply(scene, batch)
+
+
+def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, directed: Any,
+                   built: locus.Revision) -> Tuple[locus.BlockResult, Cost]:
+    """One sweep. All rays start in the frame's origin, so only the frame moves."""
+    begin = time.perf_counter_ns()
+    batch = locus.QueryBatch(at_least=built)
+    batch.rays(zeros, directed, t_max=RANGE, block=locus.Block(frame=position(sweep)))
+    request = batch.request_bytes(scene)
+    asked = time.perf_counter_ns()
+    answer = client.query_bytes(scene, request)
+    answered = time.perf_counter_ns()
+    hits = locus.QueryResult.from_bytes(answer).blocks[0]
+    hits.t, hits.ids, hits.triangles  # columns are made when first read
+    return hits, Cost(asked - begin, answered - asked, time.perf_counter_ns() - answered)
+
+
+def report(costs: Sequence[Cost], rays: int, hits: int) -> List[str]:
+    """Lines of name and value; times are medians over the sweeps, in nanoseconds a ray."""
+    encode, wait, decode = (statistics.median(column) / rays for column in zip(*costs))
+    own = statistics.median(cost.encode + cost.decode for cost in costs) / rays
+    return [f"rays a sweep            {rays}", f"sweeps                  {len(costs)}", f"hits                    {hits}",
+            f"columns                 {'numpy' if locus.columns.numpy else 'array.array'}",
+            f"encode, ns a ray        {encode:.2f}", f"decode, ns a ray        {decode:.2f}",
+            f"client time, ns a ray   {own:.2f}", f"wait, ns a ray          {wait:.1f}"]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--address", default=locus.DEFAULT_ADDRESS)
+    parser.add_argument("--scene", default="lidar-street")
+    parser.add_argument("--rays", type=int, default=8192)
+    parser.add_argument("--sweeps", type=int, default=100)
+    options = parser.parse_args()
+    zeros, directed = array.array("f", bytes(12 * options.rays)), directions(options.rays)
+    with locus.connect(options.address) as client:
+        built = build_street(client, options.scene)
+        try:
+            costs, hits = [], 0
+            for sweep in range(options.sweeps):
+                block, cost = measured_sweep(client, options.scene, sweep, zeros, directed, built)
+                costs.append(cost)
+                hits += sum(1 for thing in block.ids.tolist() if thing)
+        finally:
+            client.delete_scene(options.scene)
+    print("\n".join(report(costs, options.rays, hits)))
+
+
+if __name__ == "__main__":
+    main()

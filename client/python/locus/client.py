@@ -1,0 +1,199 @@
+"""The door of the package: a connection to one locusd, its calls, and the streams opened from it.
+
+    import locus
+
+    with locus.connect("127.0.0.1:7575") as client:
+        result = client.query("arena", locus.QueryBatch().rays([0, 0, 100], [0, 0, -1]))
+        print(result.blocks[0].t, result.blocks[0].ids)
+
+Calls block. Errors are LocusError (locus/errors.py); wrong arguments are TypeError and ValueError. Calls that change
+nothing are repeated while the server cannot be reached, within their timeout; an update only if it carries `writer` and
+`number`; anything else never.
+"""
+from __future__ import annotations
+
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence
+
+import grpc
+
+from . import columns, meshes, schema
+from .connection import Connection, Retry, scene_metadata
+from .enums import Winding
+from .errors import LocusError, from_call, parsed
+from .meshes import InstanceChange, PlacedInstances
+from .queries import QueryBatch
+from .query_stream import QueryStream
+from .results import QueryResult
+from .update_stream import UpdateStream
+from .updates import UpdateBatch
+from .values import Ack, Mesh, MeshPart, Scene, Server
+
+DEFAULT_ADDRESS = "127.0.0.1:7575"
+_HEALTH = schema.method("grpc.health.v1.Health", "Check")
+_SERVING = 1
+
+
+def _rpc(service: str, name: str) -> schema.Method:
+    return schema.method(f"locus.v1.{service}Service", name)
+
+
+def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeout: float = 600.0,
+            wait_for_server: bool = False, max_send_bytes: int = 32 << 20, max_receive_bytes: int = 64 << 20,
+            retry: Retry = Retry()) -> "Client":
+    """Connects to a locusd at `host:port` (the port may be left out: 7575) or `unix:/path`.
+
+    `timeout`: seconds a call may take, its repetitions included; `long_timeout` the same for mesh uploads and changes of
+    instances. With `wait_for_server` it goes on trying for `timeout`, else a refused connection fails at once: LocusError
+    UNAVAILABLE naming the address. The server's default receives 32 MiB; answers may be as large as a batch's
+    `max_reply_bytes`.
+    """
+    client = Client(Connection(address, timeout=timeout, long_timeout=long_timeout, max_send_bytes=max_send_bytes,
+                               max_receive_bytes=max_receive_bytes, retry=retry))
+    try:
+        client._greet(wait_for_server)
+    except BaseException:
+        client.close()
+        raise
+    return client
+
+
+class Client:
+    """Got from connect(). Every method may be called from any thread; use it as a context manager, or close() it."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._unary = connection.unary
+
+    @property
+    def address(self) -> str:
+        """What the client is connected to."""
+        return self._connection.address
+
+    def close(self) -> None:
+        """Ends the connection; streams opened from it end too."""
+        self._connection.close()
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(self, *unused: Any) -> None:
+        self.close()
+
+    def server(self) -> Server:
+        """Version, features and limits of the server."""
+        rpc = _rpc("Server", "GetServer")
+        return Server.of(self._unary(rpc, rpc.request(), repeat=True))
+
+    def healthy(self, service: str = "") -> bool:
+        """True if the server, or one of its services by its full name, says that it serves."""
+        return bool(self._unary(_HEALTH, _HEALTH.request(service=service), repeat=True).status == _SERVING)
+
+    def create_scene(self, name: str, *, if_absent: bool = False, labels: Optional[Mapping[str, str]] = None,
+                     winding: Winding = Winding.UNSPECIFIED, static_from: str = "") -> Scene:
+        """Creates an empty scene, or one that starts with the instances of `static_from`.
+
+        `if_absent` returns a scene of that name as it is; otherwise that is ALREADY_EXISTS.
+        """
+        rpc = _rpc("Scene", "CreateScene")
+        request = rpc.request(name=name, if_absent=if_absent)
+        request.spec.labels.update(labels or {})
+        request.spec.winding = winding
+        request.spec.static_from = static_from
+        return Scene.of(self._unary(rpc, request, scene=name).scene)
+
+    def scene(self, name: str) -> Scene:
+        """Describes a scene as it is now."""
+        rpc = _rpc("Scene", "GetScene")
+        return Scene.of(self._unary(rpc, rpc.request(name=name), scene=name, repeat=True).scene)
+
+    def scenes(self, labels: Optional[Mapping[str, str]] = None) -> List[Scene]:
+        """All scenes that have these labels, ascending by name."""
+        pages = self._pages(_rpc("Scene", "ListScenes"), labels=labels or {})
+        return [Scene.of(scene) for page in pages for scene in page.scenes]
+
+    def delete_scene(self, name: str, *, if_present: bool = False) -> None:
+        """Deletes a scene with its objects and instances; meshes stay."""
+        rpc = _rpc("Scene", "DeleteScene")
+        self._unary(rpc, rpc.request(name=name, if_present=if_present), scene=name)
+
+    def upload_mesh(self, name: str, vertices: columns.ColumnLike, indices: columns.ColumnLike,
+                    parts: Sequence[MeshPart] = (), progress: Optional[meshes.Progress] = None) -> Mesh:
+        """Uploads a mesh: 3V float32 `vertices` x, y, z and 3T uint32 `indices`; returns when its tree stands.
+
+        Bytes that the server knows are not sent again. Safe to repeat.
+        """
+        rpc = _rpc("Scene", "UploadMesh")
+        messages = meshes.upload_messages(name, vertices, indices, parts, progress)
+        call = self._connection.channel.stream_unary(rpc.path, rpc.request.SerializeToString)
+        try:
+            raw = call(messages, timeout=self._connection.long_timeout)
+        except grpc.RpcError as failure:
+            raise from_call(failure) from None
+        return Mesh.of(parsed(rpc.response, raw).mesh)
+
+    def meshes(self) -> List[Mesh]:
+        """All uploaded meshes, ascending by name."""
+        return [Mesh.of(mesh) for page in self._pages(_rpc("Scene", "ListMeshes")) for mesh in page.meshes]
+
+    def delete_mesh(self, name: str) -> None:
+        """Deletes a mesh that no instance uses."""
+        rpc = _rpc("Scene", "DeleteMesh")
+        self._unary(rpc, rpc.request(mesh=name))
+
+    def change_instances(self, scene: str, change: InstanceChange, *, no_wait: bool = False) -> PlacedInstances:
+        """Removes and places instances as one revision; returns when it is visible, or at once with `no_wait`."""
+        rpc = _rpc("Scene", "ChangeInstances")
+        request = rpc.request()
+        request.CopyFrom(change.message)
+        request.scene = scene
+        request.no_wait = no_wait
+        response = self._unary(rpc, request, scene=scene, timeout=self._connection.long_timeout)
+        return PlacedInstances.of(response)
+
+    def apply(self, scene: str, batch: UpdateBatch) -> Ack:
+        """Applies one batch. For a steady flow use update_stream()."""
+        rpc = _rpc("Update", "ApplyUpdates")
+        once_only = batch.message.writer != 0 and batch.message.batch != 0
+        raw = self._connection.unary_bytes(rpc.path, batch.request_bytes(scene), scene=scene, repeat=once_only)
+        return Ack.of(parsed(rpc.response, raw).ack)
+
+    def query(self, scene: str, batch: QueryBatch) -> QueryResult:
+        """Asks one batch, answered whole at one revision. For a steady flow use query_stream()."""
+        return QueryResult.from_bytes(self.query_bytes(scene, batch.request_bytes(scene)))
+
+    def query_bytes(self, scene: str, request: bytes) -> bytes:
+        """The middle of query(): from QueryBatch.request_bytes() to what QueryResult.from_bytes() takes.
+
+        For callers that keep requests, or measure what the client itself costs.
+        """
+        return self._connection.unary_bytes(_rpc("Query", "Query").path, request, scene=scene, repeat=True)
+
+    def update_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(attempts=10)) -> UpdateStream:
+        """A pipelined stream of batches into one scene, each applied exactly once. Connects with the first batch."""
+        return UpdateStream(self._connection, scene, max_in_flight, reconnect)
+
+    def query_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry()) -> QueryStream:
+        """A pipelined stream of query batches against one scene. Connects with the first batch."""
+        return QueryStream(self._connection, scene, max_in_flight, reconnect)
+
+    def _pages(self, rpc: schema.Method, **fields: Any) -> Iterator[Any]:
+        request = rpc.request(**fields)
+        while True:
+            page = self._unary(rpc, request, repeat=True)
+            yield page
+            if not page.next_page_token:
+                return
+            request.page_token = page.next_page_token
+
+    def _greet(self, wait_for_server: bool) -> None:
+        """The first call: tells a wrong address at once and in plain words."""
+        rpc = _rpc("Server", "GetServer")
+        call = self._connection.channel.unary_unary(rpc.path)
+        try:
+            call(b"", timeout=self._connection.timeout, wait_for_ready=wait_for_server)
+        except grpc.RpcError as failure:
+            error = from_call(failure)
+            if error.refused or error.code not in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED):
+                raise error from None
+            message = f"nothing answers at {self.address}: start locusd there, or give its address"
+            raise LocusError(grpc.StatusCode.UNAVAILABLE, message) from None

@@ -1,0 +1,104 @@
+"""A gRPC channel to one locusd: addresses, deadlines, and repeating what may be repeated. Internal to the package."""
+from __future__ import annotations
+
+import dataclasses
+import random
+import re
+import time
+from typing import Any, Callable, List, Optional, Tuple, TypeVar
+
+import grpc
+
+from . import schema
+from .errors import LocusError, from_call, parsed
+
+DEFAULT_PORT = 7575
+_LEGAL_SCENE = re.compile(r"[a-z0-9-]{1,63}")
+_LOCAL = ("127.", "localhost", "[::1]", "unix:")
+_Answer = TypeVar("_Answer")
+
+
+@dataclasses.dataclass(frozen=True)
+class Retry:
+    """How often and how patiently something is tried again.
+
+    `attempts` counts the first try too; 1 = never again. The wait starts at `first_wait` seconds and doubles up to
+    `max_wait`, varied by a fifth so that many clients do not come back in step; a server's own hint lengthens it.
+    """
+
+    attempts: int = 5
+    first_wait: float = 0.1
+    max_wait: float = 2.0
+
+    def wait_after(self, failures: int, error: LocusError) -> Optional[float]:
+        """Seconds to wait after so many failures in a row; None when the tries are used up."""
+        if failures >= self.attempts:
+            return None
+        wait = min(self.first_wait * 2.0 ** min(failures - 1, 20), self.max_wait)
+        return max(wait * random.uniform(0.8, 1.2), error.retry_after)
+
+
+def target_of(address: str) -> str:
+    """What gRPC is to connect to: `address` with the default port where it names none."""
+    if not address:
+        raise ValueError("the address is empty: give host:port or unix:/path")
+    has_port = not address.endswith("]") if address.startswith("[") else ":" in address
+    return address if has_port else f"{address}:{DEFAULT_PORT}"
+
+
+def scene_metadata(scene: str) -> List[Tuple[str, str]]:
+    """The header that routers go by; left out for a name that is no legal header, which the server then refuses."""
+    return [("x-scene", scene)] if _LEGAL_SCENE.fullmatch(scene) else []
+
+
+class Connection:
+    """One channel of its own. Every method may be called from any thread."""
+
+    def __init__(self, address: str, *, timeout: float, long_timeout: float, max_send_bytes: int,
+                 max_receive_bytes: int, retry: Retry) -> None:
+        self.address = target_of(address)
+        self.timeout = timeout
+        self.long_timeout = long_timeout
+        self.retry = retry
+        options = [("grpc.max_send_message_length", max_send_bytes),
+                   ("grpc.max_receive_message_length", max_receive_bytes),
+                   ("grpc.use_local_subchannel_pool", 1),
+                   ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 2000)]
+        if self.address.startswith(_LOCAL):  # a proxy of the environment cannot reach this machine's loopback
+            options.append(("grpc.enable_http_proxy", 0))
+        self.channel = grpc.insecure_channel(self.address, options)
+
+    def close(self) -> None:
+        """Ends the connection and every call on it."""
+        self.channel.close()
+
+    def unary(self, rpc: schema.Method, request: Any, *, scene: str = "", repeat: bool = False,
+              timeout: Optional[float] = None) -> Any:
+        """Calls with a message and returns the answer as one. `repeat`: the call changes nothing, or not twice."""
+        raw = self.unary_bytes(rpc.path, request.SerializeToString(), scene=scene, repeat=repeat, timeout=timeout)
+        return parsed(rpc.response, raw)
+
+    def unary_bytes(self, path: str, request: bytes, *, scene: str = "", repeat: bool = False,
+                    timeout: Optional[float] = None) -> bytes:
+        """The same with messages in their wire form."""
+        call = self.channel.unary_unary(path)
+        deadline = time.monotonic() + (self.timeout if timeout is None else timeout)
+
+        def attempt() -> bytes:
+            metadata = scene_metadata(scene)
+            return bytes(call(request, timeout=max(0.0, deadline - time.monotonic()), metadata=metadata))
+
+        return self._attempts(attempt, deadline if repeat else None)
+
+    def _attempts(self, attempt: Callable[[], _Answer], deadline: Optional[float]) -> _Answer:
+        failures = 0
+        while True:
+            try:
+                return attempt()
+            except grpc.RpcError as failure:
+                failures += 1
+                error = from_call(failure)
+                wait = self.retry.wait_after(failures, error) if deadline and error.worth_repeating else None
+                if wait is None or deadline is None or time.monotonic() + wait >= deadline:
+                    raise error from None
+            time.sleep(wait)

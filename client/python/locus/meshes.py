@@ -1,0 +1,119 @@
+"""Static geometry: uploading meshes, and placing and removing their instances as one change."""
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import struct
+from typing import Any, Callable, Iterator, Optional, Sequence, Tuple
+
+from . import columns, schema
+from .columns import FLOAT32, FLOAT64, UINT32, UINT64, ColumnLike, Values
+from .values import MeshPart
+
+_Change = schema.message("ChangeInstancesRequest")
+_Upload = schema.message("UploadMeshRequest")
+_BYTES_A_MESSAGE = 12 * 87_040  # a little under 1 MiB; messages end between triples
+
+# Called after each message of an upload with the bytes sent so far and the bytes in all.
+Progress = Callable[[int, int], None]
+
+
+class InstanceChange:
+    """Instances to remove and to place, as one atomic revision; removes come first. Methods return the change."""
+
+    def __init__(self) -> None:
+        self.message = _Change()
+
+    def remove(self, ids: ColumnLike) -> "InstanceChange":
+        """Removes instances: uint64 ids. An unknown one refuses the change."""
+        self.message.remove_ids += columns.encode("remove_ids", ids, UINT64)
+        return self
+
+    def remove_groups(self, groups: ColumnLike) -> "InstanceChange":
+        """Removes every instance of each group: uint64 groups, not 0."""
+        self.message.remove_groups += columns.encode("remove_groups", groups, UINT64)
+        return self
+
+    def place(self, mesh: str, translations: ColumnLike = (0.0, 0.0, 0.0), *, ids: ColumnLike = None,
+              rotations: ColumnLike = None, scales: ColumnLike = None, layers: ColumnLike = None,
+              groups: ColumnLike = None, tags: ColumnLike = None) -> "InstanceChange":
+        """Places an uploaded mesh N times: world = translation + scale * (rotation * mesh).
+
+        N is the number of `ids` (uint64, not 0), or of `translations` where the server is to choose ids. `translations`:
+        3N float64 or three; `rotations`: 4N float32 or four, unit quaternions x, y, z, w, none = identity; `scales`: N
+        float32 or one, none = 1; `layers` N uint32 (none = bit 0), `groups` and `tags` N uint64 (none = 0).
+        """
+        path = f"place[{len(self.message.place)}]."
+        with self._new_placement() as message:
+            message.mesh = mesh
+            message.ids = columns.encode(path + "ids", ids, UINT64)
+            message.translations = columns.encode(path + "translations", translations, FLOAT64, 3)
+            count = columns.entries(message.ids, UINT64) or columns.entries(message.translations, FLOAT64, 3)
+            for name, value, kind, width in (
+                    ("translations", message.translations, FLOAT64, 3), ("rotations", rotations, FLOAT32, 4),
+                    ("scales", scales, FLOAT32, 1), ("layers", layers, UINT32, 1), ("groups", groups, UINT64, 1),
+                    ("tags", tags, UINT64, 1)):
+                setattr(message, name, columns.encode_for(path + name, value, kind, count, width))
+        return self
+
+    @contextlib.contextmanager
+    def _new_placement(self) -> Iterator[Any]:
+        message = self.message.place.add()
+        try:
+            yield message
+        except Exception:
+            del self.message.place[-1]
+            raise
+
+
+@dataclasses.dataclass(frozen=True)
+class PlacedInstances:
+    """A change of instances that is visible at `revision`, or, with `no_wait`, accepted (`revision` is None).
+
+    `ids`: uint64, one for each placed instance in the order of the request. `change` counts changes within the epoch.
+    """
+
+    ids: Values
+    change: int
+    epoch: int
+    revision: Optional[int]
+
+    @classmethod
+    def of(cls, message: Any) -> "PlacedInstances":
+        """From the protocol's ChangeInstancesResponse."""
+        revision = message.revision if message.HasField("revision") else None
+        return cls(columns.decode(message.ids, UINT64), message.change, message.epoch, revision)
+
+
+def mesh_sha256(vertices: bytes, indices: bytes) -> bytes:
+    """The name of a mesh's bytes: SHA-256 over both counts as uint32, the float32 vertices and the uint32 indices."""
+    digest = hashlib.sha256(struct.pack("<II", len(vertices) // 12, len(indices) // 12))
+    digest.update(vertices)
+    digest.update(indices)
+    return digest.digest()
+
+
+def upload_messages(name: str, vertices: ColumnLike, indices: ColumnLike, parts: Sequence[MeshPart],
+                    progress: Optional[Progress]) -> Iterator[Any]:
+    """The messages of UploadMesh: what comes, then the columns in pieces of less than 1 MiB."""
+    columns_: Tuple[Tuple[str, bytes], ...] = (("vertices", columns.encode("vertices", vertices, FLOAT32, 3)),
+                                               ("indices", columns.encode("indices", indices, UINT32, 3)))
+    raw = dict(columns_)
+    opening = _Upload(mesh=name, sha256=mesh_sha256(raw["vertices"], raw["indices"]),
+                      vertex_count=len(raw["vertices"]) // 12, triangle_count=len(raw["indices"]) // 12)
+    for part in parts:
+        opening.parts.add(name=part.name, first_triangle=part.first_triangle)
+    return _pieces(opening, columns_, progress)
+
+
+def _pieces(opening: Any, raw: Sequence[Tuple[str, bytes]], progress: Optional[Progress]) -> Iterator[Any]:
+    yield opening
+    sent, total = 0, sum(len(column) for _, column in raw)
+    for name, column in raw:
+        for begin in range(0, len(column), _BYTES_A_MESSAGE):
+            piece = column[begin:begin + _BYTES_A_MESSAGE]
+            yield _Upload(**{name: piece})
+            sent += len(piece)
+            if progress is not None:
+                progress(sent, total)

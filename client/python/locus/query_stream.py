@@ -1,0 +1,47 @@
+"""A steady flow of query batches against one scene: pipelined, answers matched whatever order they come in. For callers
+that ask every tick.
+"""
+from __future__ import annotations
+
+from concurrent.futures import Future
+from typing import Any, Tuple
+
+from . import schema, wire
+from .connection import Connection, Retry
+from .errors import from_error, parsed
+from .pipelined_stream import Item, PipelinedStream, neither
+from .queries import QueryBatch
+from .results import QueryResult
+
+_METHOD = schema.method("locus.v1.QueryService", "StreamQueries")
+_BATCH = _METHOD.request.DESCRIPTOR.fields_by_name["batch"].number
+_SEQUENCE, _RESULT, _ERROR = (_METHOD.response.DESCRIPTOR.fields_by_name[name].number
+                              for name in ("sequence", "result", "error"))
+
+
+class QueryStream(PipelinedStream[QueryResult]):
+    """Got from Client.query_stream(). Every method may be called from any thread. After a broken connection unanswered
+    batches are asked again on a new one, since asking changes nothing.
+    """
+
+    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
+        super().__init__(connection, _METHOD.path, scene, max_in_flight, retry)
+
+    def send(self, batch: QueryBatch) -> "Future[QueryResult]":
+        """Asks; blocks while `max_in_flight` batches are unanswered.
+
+        The future gets the answer, or the LocusError of this batch. The batch is copied and may be used again.
+        LocusError if the stream has ended. 8 batches of 1,024 queries, or 2 of 8,192, keep a local server busy.
+        """
+        return self._send(batch.message.SerializeToString())
+
+    def _request_of(self, item: Item[QueryResult]) -> bytes:
+        head = _METHOD.request(scene=self._scene, sequence=item.sequence).SerializeToString()
+        return b"".join((head, *wire.delimited(_BATCH, item.batch)))
+
+    def _answer_in(self, response: bytes) -> Tuple[int, Any]:
+        found = wire.fields(memoryview(response))
+        sequence = wire.fixed64(found, _SEQUENCE)
+        if _RESULT in found:
+            return sequence, QueryResult.of(wire.column(found, _RESULT))
+        return sequence, from_error(parsed(_METHOD.response, response).error) if _ERROR in found else neither()

@@ -1,0 +1,80 @@
+"""A steady flow of update batches into one scene: pipelined, and applied exactly once each even across broken
+connections. For game servers that send a batch a tick.
+"""
+from __future__ import annotations
+
+import secrets
+from concurrent.futures import Future
+from typing import Any, Optional, Tuple
+
+from . import schema, wire
+from .connection import Connection, Retry
+from .enums import Reason
+from .errors import LocusError, from_error, parsed
+from .pipelined_stream import Item, PipelinedStream, neither
+from .updates import UpdateBatch
+from .values import Ack, Revision
+
+_METHOD = schema.method("locus.v1.UpdateService", "StreamUpdates")
+_BATCH = _METHOD.request.DESCRIPTOR.fields_by_name["batch"].number
+
+
+class UpdateStream(PipelinedStream[Ack]):
+    """Got from Client.update_stream(). Every method may be called from any thread.
+
+    Each batch carries the stream's random `writer` number and a dense batch number. After a broken connection every
+    batch without an ack is sent again, in order; the server answers what it had applied with Ack.duplicate. A batch that
+    the server refuses does not use up its number: the batches behind it are numbered anew and sent again. The stream
+    ends for good when the server refuses it or forgot the writer (the scene started over), or when reconnecting fails
+    too often: then every unanswered batch gets that LocusError, and their outcome is unknown.
+    """
+
+    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
+        super().__init__(connection, _METHOD.path, scene, max_in_flight, retry)
+        self.writer = secrets.randbelow(2**64 - 1) + 1
+        self._next_batch = 1
+        self._last_ack: Optional[Ack] = None
+
+    def send(self, batch: UpdateBatch) -> "Future[Ack]":
+        """Sends a batch; blocks while `max_in_flight` are unanswered: that is how the server's pace reaches the caller.
+
+        The future gets the Ack, or the LocusError of this batch. The batch is copied and may be used again; its own
+        writer and number do not count. LocusError if the stream has ended.
+        """
+        return self._send(batch.message.SerializeToString())
+
+    @property
+    def last_ack(self) -> Optional[Revision]:
+        """Where the latest ack put its batch: a query `at_least` this sees every batch acked so far."""
+        with self._changed:
+            return self._last_ack
+
+    def _number(self, item: Item[Ack]) -> None:
+        super()._number(item)
+        item.number = self._next_batch
+        self._next_batch += 1
+
+    def _request_of(self, item: Item[Ack]) -> bytes:
+        # The batch stands there twice, which makes one of both: its columns, then its numbers.
+        numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
+        numbers.batch.writer, numbers.batch.batch = self.writer, item.number
+        return b"".join((*wire.delimited(_BATCH, item.batch), numbers.SerializeToString()))
+
+    def _answer_in(self, response: bytes) -> Tuple[int, Any]:
+        message = parsed(_METHOD.response, response)
+        kind = message.WhichOneof("outcome")
+        if kind == "ack":
+            return message.sequence, Ack.of(message.ack)
+        return message.sequence, from_error(message.error) if kind else neither()
+
+    def _answered(self, outcome: Any, position: int) -> None:
+        if not isinstance(outcome, LocusError):
+            self._last_ack = outcome
+        elif not outcome.refused or outcome.reason == Reason.BATCH_GAP:
+            # Whether the number was used is open, or the server does not know the writer: going on could lose a batch.
+            self._fatal = outcome
+        else:
+            self._next_batch -= len(self._items) - position + 1
+            for item in self._items[position:]:
+                item.written = False
+                self._number(item)

@@ -1,0 +1,155 @@
+"""Update batches: changes of moving objects, written in columns, that become one revision of a scene."""
+from __future__ import annotations
+
+import contextlib
+from typing import Any, Iterator, Optional
+
+from . import columns, schema
+from .columns import FLOAT32, FLOAT64, UINT32, UINT64, ColumnLike
+
+_Request = schema.message("ApplyUpdatesRequest")
+
+
+class UpdateBatch:
+    """Changes that become one revision, applied in this order: clear, removes, inserts, moves, relabels.
+
+    N is the number of ids of a call. Another column holds N entries, one for all, or none for its default. `positions`
+    are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64` are 3N float64, absolute;
+    exactly one of them is given. `rotations` are 4N float32, unit quaternions x, y, z, w; none = identity in inserts,
+    kept in moves. `layers` are N uint32 (none = bit 0; 0 hides), `groups` and `tags` N uint64 (none = 0). Ids are
+    uint64, chosen by the caller, never 0. Lengths and angles are in the caller's units.
+
+    Columns are checked for type and length here (TypeError and ValueError name the column), values by the server: it
+    refuses wrong items one by one and lists them in Ack.errors, or the whole batch with `all_or_nothing`.
+
+    Settings: `tick` the caller's time step; `clear` removes every object first; `upsert` makes an insert of a known id
+    a replace; `restart_ticks` takes `tick` even if it is lower than the scene's; `writer` (random, not 0) and `number`
+    (1, 2, 3 ...) make a repeated batch apply once, streams set them by themselves.
+
+    Methods return the batch, so that calls chain. Not for several threads at once.
+    """
+
+    def __init__(self, *, frame: Optional[ColumnLike] = None, tick: Optional[int] = None, clear: bool = False,
+                 upsert: bool = False, all_or_nothing: bool = False, restart_ticks: bool = False, writer: int = 0,
+                 number: int = 0) -> None:
+        # Within a request from the start: putting a batch into one later would copy it.
+        self._request = _Request()
+        self.message = self._request.batch
+        self.message.clear, self.message.upsert, self.message.all_or_nothing = clear, upsert, all_or_nothing
+        self.message.restart_ticks, self.message.writer, self.message.batch = restart_ticks, writer, number
+        if tick is not None:
+            self.message.tick = tick
+        origin = columns.vector("frame", frame)
+        if origin is not None:
+            self.message.frame.x, self.message.frame.y, self.message.frame.z = origin
+
+    def remove(self, ids: ColumnLike) -> "UpdateBatch":
+        """Removes objects: N uint64 ids, after those of earlier calls."""
+        self.message.remove_ids += columns.encode("remove_ids", ids, UINT64)
+        return self
+
+    def remove_groups(self, groups: ColumnLike) -> "UpdateBatch":
+        """Removes every object of each group: uint64 groups, not 0."""
+        self.message.remove_groups += columns.encode("remove_groups", groups, UINT64)
+        return self
+
+    def insert_points(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
+                      rotations: ColumnLike = None, layers: ColumnLike = None, groups: ColumnLike = None,
+                      tags: ColumnLike = None) -> "UpdateBatch":
+        """N new objects without extent: found by overlaps and lookups, never hit by a ray."""
+        with _new_entry(self.message.inserts, "inserts", ids) as insert:
+            insert.message.point.SetInParent()
+            insert.pose(positions, positions_f64, rotations)
+            insert.labels(layers, groups, tags)
+        return self
+
+    def insert_balls(self, ids: ColumnLike, positions: ColumnLike = None, radii: ColumnLike = None, *,
+                     positions_f64: ColumnLike = None, rotations: ColumnLike = None, layers: ColumnLike = None,
+                     groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
+        """N new solid balls. `radii`: N float32 or one, 0 .. 1e9."""
+        with _new_entry(self.message.inserts, "inserts", ids) as insert:
+            insert.message.ball.SetInParent()
+            insert.pose(positions, positions_f64, rotations)
+            insert.message.ball.radii = insert.column("ball.radii", radii, FLOAT32)
+            insert.labels(layers, groups, tags)
+        return self
+
+    def insert_boxes(self, ids: ColumnLike, positions: ColumnLike = None, half_extents: ColumnLike = None, *,
+                     positions_f64: ColumnLike = None, rotations: ColumnLike = None, layers: ColumnLike = None,
+                     groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
+        """N new solid boxes. `half_extents`: 3N float32 or three, half the size along the box's own axes."""
+        with _new_entry(self.message.inserts, "inserts", ids) as insert:
+            insert.message.box.SetInParent()
+            insert.pose(positions, positions_f64, rotations)
+            insert.message.box.half_extents = insert.column("box.half_extents", half_extents, FLOAT32, 3)
+            insert.labels(layers, groups, tags)
+        return self
+
+    def insert_capsules(self, ids: ColumnLike, positions: ColumnLike = None, half_axes: ColumnLike = None,
+                        radii: ColumnLike = None, *, positions_f64: ColumnLike = None, rotations: ColumnLike = None,
+                        layers: ColumnLike = None, groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
+        """N new solid capsules. `half_axes`: 3N float32 or three, from the centre to one end of the inner segment, in
+        the object's own axes; `radii`: N float32 or one, 0 .. 1e9.
+        """
+        with _new_entry(self.message.inserts, "inserts", ids) as insert:
+            insert.message.capsule.SetInParent()
+            insert.pose(positions, positions_f64, rotations)
+            insert.message.capsule.half_axes = insert.column("capsule.half_axes", half_axes, FLOAT32, 3)
+            insert.message.capsule.radii = insert.column("capsule.radii", radii, FLOAT32)
+            insert.labels(layers, groups, tags)
+        return self
+
+    def move(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
+             rotations: ColumnLike = None, teleport: bool = False) -> "UpdateBatch":
+        """New centres and rotations of N objects. `teleport`: they jumped, and were never in between."""
+        with _new_entry(self.message.moves, "moves", ids) as entry:
+            entry.pose(positions, positions_f64, rotations)
+            entry.message.teleport = teleport
+        return self
+
+    def relabel(self, ids: ColumnLike, *, layers: ColumnLike = None, groups: ColumnLike = None,
+                tags: ColumnLike = None) -> "UpdateBatch":
+        """New labels of N objects; a column that is not given keeps what each object has."""
+        with _new_entry(self.message.relabels, "relabels", ids) as entry:
+            entry.labels(layers, groups, tags)
+        return self
+
+    def request_bytes(self, scene: str) -> bytes:
+        """The whole request for ApplyUpdates, as it goes over the wire."""
+        self._request.scene = scene
+        return bytes(self._request.SerializeToString())
+
+
+class _Entry:
+    """A new entry of one of the batch's lists, whose columns are named `moves[1].positions` in errors."""
+
+    def __init__(self, message: Any, path: str, ids: ColumnLike) -> None:
+        self.message = message
+        self._path = path
+        message.ids = columns.encode(path + "ids", ids, UINT64)
+        self._count = columns.entries(message.ids, UINT64)
+
+    def column(self, name: str, value: ColumnLike, kind: columns.Kind, width: int = 1) -> bytes:
+        return columns.encode_for(self._path + name, value, kind, self._count, width)
+
+    def pose(self, positions: ColumnLike, positions_f64: ColumnLike, rotations: ColumnLike) -> None:
+        self.message.positions = self.column("positions", positions, FLOAT32, 3)
+        self.message.positions_f64 = self.column("positions_f64", positions_f64, FLOAT64, 3)
+        self.message.rotations = self.column("rotations", rotations, FLOAT32, 4)
+
+    def labels(self, layers: ColumnLike, groups: ColumnLike, tags: ColumnLike) -> None:
+        self.message.layers = self.column("layers", layers, UINT32)
+        self.message.groups = self.column("groups", groups, UINT64)
+        self.message.tags = self.column("tags", tags, UINT64)
+
+
+@contextlib.contextmanager
+def _new_entry(entries: Any, name: str, ids: ColumnLike) -> Iterator[_Entry]:
+    """Adds an entry to fill; one with a column that is refused is taken out again."""
+    path = f"{name}[{len(entries)}]."
+    message = entries.add()
+    try:
+        yield _Entry(message, path, ids)
+    except Exception:
+        del entries[-1]
+        raise

@@ -1,0 +1,121 @@
+"""What goes in as a column, what comes out, and what is refused by name."""
+import array
+import struct
+import unittest
+
+from locus import columns
+from locus.columns import FLOAT32, FLOAT64, UINT8, UINT32, UINT64
+from support import without_numpy
+
+numpy = columns.numpy
+ONE_TO_SIX = struct.pack("<6f", 1, 2, 3, 4, 5, 6)
+
+
+class EncodeTest(unittest.TestCase):
+    def assertRefused(self, kind, pattern, value, *settings):
+        with self.assertRaisesRegex(kind, pattern):
+            columns.encode("a.column", value, *settings)
+
+    def test_lists_tuples_and_nested_lists_are_the_same_column(self):
+        for value in ([1, 2, 3, 4, 5, 6], (1.0, 2.0, 3.0, 4.0, 5.0, 6.0), [(1, 2, 3), (4, 5, 6)], [[1, 2, 3], [4, 5, 6]],
+                      (number for number in range(1, 7)), range(1, 7)):
+            self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
+
+    def test_buffers_of_the_right_type_are_taken_as_they_are(self):
+        numbers = array.array("f", range(1, 7))
+        for value in (numbers, memoryview(numbers), ONE_TO_SIX, bytearray(ONE_TO_SIX), memoryview(numbers).cast("B").cast("f", [2, 3])):
+            self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
+
+    def test_one_number_is_a_column_of_one(self):
+        self.assertEqual(columns.encode("c", 0.5, FLOAT32), struct.pack("<f", 0.5))
+        self.assertEqual(columns.encode("c", 2**64 - 1, UINT64), b"\xff" * 8)
+
+    def test_none_is_an_empty_column(self):
+        self.assertEqual(columns.encode("c", None, FLOAT32, 3), b"")
+
+    def test_a_memory_view_with_gaps_is_copied_in_its_order(self):
+        numbers = array.array("f", range(12))
+        self.assertEqual(columns.encode("c", memoryview(numbers)[::2], FLOAT32), struct.pack("<6f", 0, 2, 4, 6, 8, 10))
+
+    def test_unsigned_longs_pass_as_what_they_are_as_wide_as(self):
+        kind = UINT64 if array.array("L").itemsize == 8 else UINT32
+        self.assertEqual(columns.encode("c", array.array("L", [7]), kind), (7).to_bytes(kind.size, "little"))
+
+    def test_numbers_of_another_type_are_refused_with_both_names(self):
+        for code, found in (("d", "float64"), ("i", "int32"), ("q", "int64"), ("B", "uint8")):
+            self.assertRefused(TypeError, f"^a.column: holds {found}, but float32 is wanted.*astype\\('float32'\\)",
+                               array.array(code, [1, 2, 3]), FLOAT32, 3)
+        self.assertRefused(TypeError, "holds int64, but uint64 is wanted", array.array("q", [1]), UINT64)
+
+    def test_what_holds_no_numbers_is_refused(self):
+        for value in ("abc", ["a"], [None], object(), [[1, 2], 3]):
+            self.assertRefused(TypeError, "^a.column: .*give float32 numbers", value, FLOAT32)
+        self.assertRefused(TypeError, "^a.column: .*give uint64 numbers", [1.5], UINT64)
+
+    def test_ids_that_do_not_fit_are_refused(self):
+        for value in (-1, 2**64):
+            self.assertRefused(TypeError, "^a.column: .*give uint64 numbers", [value], UINT64)
+
+    def test_a_column_of_broken_vectors_is_refused(self):
+        self.assertRefused(ValueError, "^a.column: has 4 numbers: give 3 float32 for each entry", [1, 2, 3, 4], FLOAT32, 3)
+        self.assertRefused(ValueError, "^a.column: has 7 bytes: give 1 uint64 for each entry", b"1234567", UINT64)
+
+    def test_a_column_has_as_many_entries_as_things_or_one_or_none(self):
+        for count in (0, 1, 3):
+            raw = columns.encode_for("c", [5] * count, UINT32, 3)
+            self.assertEqual(columns.entries(raw, UINT32), count)
+        with self.assertRaisesRegex(ValueError, "^a.column: has 2 entries: give 3, one for all, or none"):
+            columns.encode_for("a.column", [5, 5], UINT32, 3)
+
+
+@unittest.skipIf(without_numpy(), "what numpy arrays do is seen with numpy")
+class NumpyTest(unittest.TestCase):
+    def test_arrays_of_any_shape_and_order_go_in_row_by_row(self):
+        table = numpy.arange(1, 7, dtype="float32").reshape(2, 3)
+        for value in (table, numpy.asfortranarray(table), numpy.repeat(table, 2, axis=1)[:, ::2], table.ravel()):
+            self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
+
+    def test_read_only_arrays_and_scalars_go_in(self):
+        frozen = numpy.arange(1, 7, dtype="float32")
+        frozen.setflags(write=False)
+        self.assertEqual(columns.encode("c", frozen, FLOAT32, 3), ONE_TO_SIX)
+        self.assertEqual(columns.encode("c", numpy.float32(0.5), FLOAT32), struct.pack("<f", 0.5))
+        self.assertEqual(columns.encode("c", [numpy.arange(1, 4), numpy.arange(4, 7)], FLOAT32, 3), ONE_TO_SIX)
+
+    def test_other_types_are_refused_with_both_names(self):
+        for kind, found in (("float64", "float64"), ("float16", "float16"), ("int32", "int32"), (">f4", "big-endian"), ("bool", "bool"),
+                            ("uint8", "uint8")):
+            with self.assertRaisesRegex(TypeError, f"^a.column: holds {found}.*but float32 is wanted"):
+                columns.encode("a.column", numpy.ones(3, dtype=kind), FLOAT32, 3)
+
+    def test_columns_come_out_as_views_of_the_bytes(self):
+        flat = columns.decode(ONE_TO_SIX, FLOAT32)
+        table = columns.decode(ONE_TO_SIX, FLOAT32, 3)
+        self.assertEqual((flat.shape, table.shape, flat.dtype), ((6,), (2, 3), numpy.float32))
+        self.assertFalse(flat.flags.owndata or flat.flags.writeable)
+        self.assertEqual(flat.__array_interface__["data"], table.__array_interface__["data"])
+
+    def test_an_empty_column_has_no_rows_of_its_width(self):
+        self.assertEqual(columns.decode(b"", FLOAT32, 3).shape, (0, 3))
+
+
+class DecodeTest(unittest.TestCase):
+    def test_every_kind_of_number_comes_out_as_it_went_in(self):
+        for kind, numbers in ((FLOAT32, [0.5, -1.0]), (FLOAT64, [0.1, 1e300]), (UINT32, [0, 2**32 - 1]),
+                              (UINT64, [1, 2**64 - 1]), (UINT8, [0, 255])):
+            self.assertEqual(columns.decode(columns.encode("c", numbers, kind), kind).tolist(), numbers)
+
+    @unittest.skipUnless(without_numpy(), "array.array comes out only without numpy")
+    def test_without_numpy_columns_are_flat_arrays(self):
+        column = columns.decode(memoryview(ONE_TO_SIX), FLOAT32, 3)
+        self.assertEqual(column, array.array("f", [1, 2, 3, 4, 5, 6]))
+
+
+class VectorTest(unittest.TestCase):
+    def test_three_numbers_make_a_vector(self):
+        self.assertEqual(columns.vector("frame", array.array("f", [1, 2, 3])), [1.0, 2.0, 3.0])
+        self.assertIsNone(columns.vector("frame", None))
+
+    def test_another_number_of_them_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "^frame: has 2 numbers: give x, y and z"):
+            columns.vector("frame", [1, 2])

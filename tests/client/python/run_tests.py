@@ -1,0 +1,40 @@
+"""Runs one test file of the Python package: run_tests.py FILE --package DIR --bin DIR --protoc PROGRAM [--without-numpy].
+
+The package is the one that was built. Without numpy, importing it fails as on a machine that does not have it, whether
+this one does or not; with numpy a machine that does not have it fails every test.
+"""
+import argparse
+import importlib.util
+import os
+import sys
+import unittest
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def options():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file")
+    for name in ("package", "bin", "protoc"):
+        parser.add_argument("--" + name, required=True)
+    parser.add_argument("--without-numpy", action="store_true")
+    return parser.parse_args()
+
+
+def main():
+    chosen = options()
+    sys.dont_write_bytecode = True
+    sys.path[:0] = [chosen.package, HERE, os.path.join(HERE, "../../../client/python")]
+    os.environ.update(LOCUS_PACKAGE=chosen.package, LOCUS_BIN=chosen.bin, LOCUS_PROTOC=chosen.protoc)
+    if chosen.without_numpy:
+        sys.modules["numpy"] = None
+    else:
+        import numpy  # noqa: F401  fails here, and says so, rather than as a skipped test
+    spec = importlib.util.spec_from_file_location("tests", chosen.file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    unittest.main(module, argv=sys.argv[:1], verbosity=2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""What the Python tests share: a real locusd of their own, the command line, and the protocol as protoc generates it."""
+import glob
+import importlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import locus
+from locus import columns
+
+BIN = os.environ["LOCUS_BIN"]
+PROTO = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../proto")
+START_SECONDS = 60
+WAIT_SECONDS = 60
+
+
+class Daemon:
+    """A locusd on a free port, ended by stop()."""
+
+    def __init__(self, *options, address="127.0.0.1:0"):
+        self.folder = tempfile.TemporaryDirectory()
+        port_file = os.path.join(self.folder.name, "port")
+        self.process = subprocess.Popen([os.path.join(BIN, "locusd"), "--listen", address, "--port-file", port_file, *options],
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        deadline = time.monotonic() + START_SECONDS
+        while not os.path.exists(port_file):
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                self.process.kill()
+                self.folder.cleanup()
+                raise RuntimeError("locusd did not start")
+            time.sleep(0.02)
+        with open(port_file, encoding="utf-8") as file:
+            self.address = "127.0.0.1:" + file.read().strip()
+
+    def stop(self):
+        self.process.terminate()
+        code = self.process.wait(timeout=WAIT_SECONDS)
+        self.folder.cleanup()
+        if code != 0:
+            raise RuntimeError(f"locusd ended with {code}")
+
+    def kill(self):
+        """Ends it as a crash would."""
+        self.process.kill()
+        self.process.wait(timeout=WAIT_SECONDS)
+        self.folder.cleanup()
+
+
+class DaemonTest(unittest.TestCase):
+    """Tests of one class share a locusd and a client; each gets a scene named after it."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Daemon()
+        cls.client = locus.connect(cls.daemon.address, timeout=WAIT_SECONDS)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.client.close()
+        cls.daemon.stop()
+
+    def setUp(self):
+        self.scene = self._testMethodName[:60].replace("_", "-").lower().rstrip("-")
+        self.client.create_scene(self.scene)
+
+    def apply(self, batch):
+        return self.client.apply(self.scene, batch)
+
+    def ask(self, batch):
+        """The blocks of the answer."""
+        return self.client.query(self.scene, batch).blocks
+
+    def command_line(self, *arguments):
+        """What `locus -o json ...` prints, as Python values; fails with what it says."""
+        command = [os.path.join(BIN, "locus"), "--address", self.daemon.address, "-o", "json", *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_SECONDS)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
+    def assertRefused(self, error, code, reason, field=None):
+        self.assertEqual((error.code.name, error.reason.name), (code, reason), str(error))
+        if field is not None:
+            self.assertEqual(error.field, field)
+
+
+def listed(values):
+    """A column as a flat list, whichever form it came in."""
+    return values.ravel().tolist() if columns.numpy else values.tolist()
+
+
+def number(text):
+    """The number behind a value of JSON, where infinity and ids are strings."""
+    return float(text) if text in ("inf", "-inf", "nan") else int(text)
+
+
+def generated_protocol(test_class):
+    """Modules that protoc makes of the real files, by name; removed with the test class."""
+    folder = tempfile.TemporaryDirectory()
+    test_class.addClassCleanup(folder.cleanup)
+    files = sorted(glob.glob(os.path.join(PROTO, "locus/v1/*.proto")))
+    subprocess.run([os.environ["LOCUS_PROTOC"], "-I", PROTO, "--python_out=" + folder.name, *files], check=True,
+                   timeout=WAIT_SECONDS)
+    locus.__path__.append(os.path.join(folder.name, "locus"))
+    names = [os.path.basename(file)[:-len(".proto")] + "_pb2" for file in files]
+    return {name: importlib.import_module("locus.v1." + name) for name in names}
+
+
+def floats(values):
+    """The same numbers rounded to float32."""
+    return memoryview(columns.encode("floats", list(values), columns.FLOAT32)).cast("f").tolist()
+
+
+def without_numpy():
+    return sys.modules.get("numpy") is None
