@@ -104,7 +104,7 @@ ExitCode exit_code_of(const absl::Status& status) {
 
 void write_failure(std::ostream& err, Format format, const absl::Status& status) {
   const std::string hint = hint_of(status);
-  if (format != Format::kTable) {
+  if (format == Format::kJson || format == Format::kNdjson) {
     Report report;
     report.head["error"] = failure_json(status, hint);
     write_report(err, Format::kNdjson, report);

@@ -20,8 +20,8 @@ absl::Status usage_error(absl::string_view message);
 
 ExitCode exit_code_of(const absl::Status& status);
 
-// One line "error: ..." and one line "hint: ..." where there is one; with a JSON format one object on one line instead:
-// {"error": {"code", "message", "reason", "field", "index", "hint"}}, absent parts left out.
+// One line "error: ..." and one line "hint: ..." where there is one; with json and ndjson instead one object on one
+// line: {"error": {"code", "message", "reason", "field", "index", "hint"}}, absent parts left out.
 void write_failure(std::ostream& err, Format format, const absl::Status& status);
 
 // OK if the ack refused nothing. Otherwise says how many items were refused and why the first was: NOT_FOUND if all

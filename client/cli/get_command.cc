@@ -65,6 +65,7 @@ absl::Status get(const GetOptions& options, Context& context) {
   Report report;
   report.head = result_head(*result);
   report.rows_name = "things";
+  report.keys = row_keys({.columns = columns()});
   for (const v1::BlockResult& block : result->blocks()) {
     absl::StatusOr<std::vector<Json>> rows = rows_json(block, {.columns = columns()});
     if (!rows.ok()) return rows.status();

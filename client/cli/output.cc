@@ -4,113 +4,94 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/csv_text.h"
+#include "client/cli/report_stream.h"
 
 namespace locus::cli {
 namespace {
 
-std::string cell_text(const Json& value) {
-  if (value.is_null()) return "-";
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  std::vector<std::string> parts;
-  if (value.is_array()) {
-    for (const Json& part : value) parts.push_back(part.is_string() ? part.get<std::string>() : part.dump());
-  } else if (value.is_object()) {
-    for (const auto& [key, part] : value.items()) parts.push_back(absl::StrCat(key, "=", cell_text(part)));
-  } else {
-    return value.dump();
-  }
-  return parts.empty() ? "-" : absl::StrJoin(parts, ",");
-}
-
-std::vector<std::string> keys_of(const Json& row) {
+// In the order in which they first appear.
+std::vector<std::string> keys_of_all(const std::vector<Json>& rows) {
   std::vector<std::string> keys;
-  for (const auto& [key, value] : row.items()) keys.push_back(key);
+  std::set<std::string> seen;
+  for (const Json& row : rows) {
+    for (const auto& [key, value] : row.items()) {
+      if (seen.insert(key).second) keys.push_back(key);
+    }
+  }
   return keys;
 }
 
-void write_lines(std::ostream& out, const std::vector<std::vector<std::string>>& lines) {
-  std::vector<size_t> widths;
-  for (const std::vector<std::string>& line : lines) {
-    widths.resize(std::max(widths.size(), line.size()));
-    for (size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], line[i].size());
-  }
-  for (const std::vector<std::string>& line : lines) {
-    std::string text;
-    for (size_t i = 0; i < line.size(); ++i) {
-      absl::StrAppend(&text, i == 0 ? "" : "  ", line[i]);
-      if (i + 1 < line.size()) text.append(widths[i] - line[i].size(), ' ');
-    }
-    out << text << '\n';
+void write_rows(std::ostream& out, Format format, const Report& report) {
+  ReportShape shape = {.rows_name = report.rows_name, .keys = report.keys, .no_rows = report.no_rows};
+  if (format == Format::kCsv && shape.keys.empty()) shape.keys = keys_of_all(report.rows);
+  ReportStream stream(out, format, std::move(shape));
+  stream.begin(report.head);
+  for (const Json& row : report.rows) stream.add(row);
+  stream.end();
+}
+
+void write_facts_table(std::ostream& out, const Json& head) {
+  size_t width = 0;
+  for (const auto& [key, value] : head.items()) width = std::max(width, key.size());
+  for (const auto& [key, value] : head.items()) {
+    out << key << std::string(width - key.size() + 2, ' ') << table_cell(value) << '\n';
   }
 }
 
-void write_rows(std::ostream& out, const Report& report) {
-  if (report.rows.empty()) {
-    out << report.no_rows << '\n';
-    return;
-  }
-  const std::vector<std::string> keys = keys_of(report.rows.front());
-  std::vector<std::vector<std::string>> lines = {keys};
-  for (const Json& row : report.rows) {
-    std::vector<std::string>& line = lines.emplace_back();
-    for (const std::string& key : keys) line.push_back(row.contains(key) ? cell_text(row[key]) : "-");
-  }
-  write_lines(out, lines);
-}
-
-void write_table(std::ostream& out, const Report& report) {
-  std::vector<std::vector<std::string>> facts;
-  for (const auto& [key, value] : report.head.items()) facts.push_back({key, cell_text(value)});
-  if (report.rows_name.empty()) {
-    write_lines(out, facts);
-    return;
-  }
-  write_rows(out, report);
-  if (facts.empty()) return;
-  out << absl::StrJoin(facts, ", ", [](std::string* text, const std::vector<std::string>& fact) {
-    absl::StrAppend(text, fact[0], " ", fact[1]);
-  }) << '\n';
-}
-
-// A server's text may hold anything; what is not UTF-8 is replaced rather than thrown at.
-std::string line_of(const Json& json) {
-  return json.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
-}
-
-// Indented by hand: an entry of the head and a row take a line each, however many numbers they hold.
-void write_document(std::ostream& out, const Report& report) {
+void write_facts(std::ostream& out, Format format, const Json& head) {
   std::vector<std::string> entries;
-  for (const auto& [key, value] : report.head.items()) {
-    entries.push_back(absl::StrCat("  ", line_of(Json(key)), ": ", line_of(value)));
+  switch (format) {
+    case Format::kTable:
+      write_facts_table(out, head);
+      break;
+    case Format::kJson:
+      for (const auto& [key, value] : head.items()) {
+        entries.push_back(absl::StrCat("  ", json_line(Json(key)), ": ", json_line(value)));
+      }
+      out << "{\n" << absl::StrJoin(entries, ",\n") << "\n}\n";
+      break;
+    case Format::kNdjson:
+      out << json_line(head) << '\n';
+      break;
+    case Format::kCsv:
+      out << csv_header(keys_of_all({head})) << '\n' << csv_line(head, keys_of_all({head})) << '\n';
+      break;
   }
-  if (!report.rows_name.empty()) {
-    const std::string rows = absl::StrJoin(
-        report.rows, ",\n    ", [](std::string* text, const Json& row) { absl::StrAppend(text, line_of(row)); });
-    entries.push_back(absl::StrCat("  ", line_of(Json(report.rows_name)), ": [",
-                                   rows.empty() ? "" : absl::StrCat("\n    ", rows, "\n  "), "]"));
-  }
-  out << "{\n" << absl::StrJoin(entries, ",\n") << "\n}\n";
 }
 
 }  // namespace
 
 void write_report(std::ostream& out, Format format, const Report& report) {
-  switch (format) {
-    case Format::kTable:
-      write_table(out, report);
-      break;
-    case Format::kJson:
-      write_document(out, report);
-      break;
-    case Format::kNdjson:
-      if (report.rows_name.empty()) out << line_of(report.head) << '\n';
-      for (const Json& row : report.rows) out << line_of(row) << '\n';
-      break;
+  if (report.rows_name.empty()) {
+    write_facts(out, format, report.head);
+  } else {
+    write_rows(out, format, report);
   }
+}
+
+std::string json_line(const Json& value) {
+  return value.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
+}
+
+std::string table_cell(const Json& value) {
+  if (value.is_null()) return "-";
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  std::vector<std::string> parts;
+  if (value.is_array()) {
+    for (const Json& part : value) parts.push_back(part.is_string() ? part.get<std::string>() : json_line(part));
+  } else if (value.is_object()) {
+    for (const auto& [key, part] : value.items()) parts.push_back(absl::StrCat(key, "=", table_cell(part)));
+  } else {
+    return value.dump();
+  }
+  return parts.empty() ? "-" : absl::StrJoin(parts, ",");
 }
 
 Json id_json(uint64_t id) { return absl::StrCat(id); }

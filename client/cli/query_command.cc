@@ -31,6 +31,7 @@ absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& b
   report.head = result_head(*result);
   report.rows_name = rows_name;
   report.rows = *std::move(rows);
+  report.keys = row_keys(layout);
   context.write(report);
   return absl::OkStatus();
 }

@@ -30,6 +30,7 @@ absl::Status report_any(const RayOptions& options, client::QueryBuilder& builder
   Report report;
   report.head = result_head(*result);
   report.rows_name = "rays";
+  report.keys = {"ray", "hit"};
   for (size_t ray = 0; ray < hits->size(); ++ray) report.rows.push_back({{"ray", ray}, {"hit", hits->hit(ray)}});
   context.write(report);
   return absl::OkStatus();

@@ -1,5 +1,7 @@
 #include "client/cli/query_report.h"
 
+#include <algorithm>
+#include <map>
 #include <utility>
 
 #include "client/lib/result_rows.h"
@@ -51,7 +53,36 @@ void add_column(const ResultRows& rows, size_t row, bool hit, v1::Column column,
   }
 }
 
+const std::vector<std::string>& keys_of(v1::Column column) {
+  static const auto& keys =
+      *new std::map<v1::Column, std::vector<std::string>>{{v1::COLUMN_T, {"t"}},
+                                                          {v1::COLUMN_ID, {"id"}},
+                                                          {v1::COLUMN_TRIANGLE, {"triangle"}},
+                                                          {v1::COLUMN_UV, {"uv"}},
+                                                          {v1::COLUMN_NORMAL, {"normal"}},
+                                                          {v1::COLUMN_POINT, {"point"}},
+                                                          {v1::COLUMN_GROUP, {"group"}},
+                                                          {v1::COLUMN_TAG, {"tag"}},
+                                                          {v1::COLUMN_LAYERS, {"layers"}},
+                                                          {v1::COLUMN_UNSPECIFIED, {}},
+                                                          {v1::COLUMN_POSE, {"position", "rotation"}}};
+  const auto found = keys.find(column);
+  return found == keys.end() ? keys.at(v1::COLUMN_UNSPECIFIED) : found->second;
+}
+
 }  // namespace
+
+std::vector<std::string> row_keys(const RowLayout& layout) {
+  std::vector<std::string> keys;
+  if (!layout.query.empty()) keys.push_back(layout.query);
+  if (layout.dense) keys.emplace_back("hit");
+  for (const v1::Column column : layout.columns) {
+    for (const std::string& key : keys_of(column)) {
+      if (std::find(keys.begin(), keys.end(), key) == keys.end()) keys.push_back(key);
+    }
+  }
+  return keys;
+}
 
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout) {
   const absl::StatusOr<ResultRows> rows = ResultRows::of(block);

@@ -23,6 +23,9 @@ struct RowLayout {
 // a miss has null in all of them.
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout);
 
+// The keys of such rows, in their order.
+std::vector<std::string> row_keys(const RowLayout& layout);
+
 // Epoch, revision and tick, the queries that were cut, and the work if it was reported.
 Json result_head(const v1::QueryResult& result);
 

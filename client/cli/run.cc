@@ -79,8 +79,9 @@ void build_cli(CLI::App& app, Context& context) {
                  "Seconds for each call [10; 600 for uploads and changes of instances]")
       ->type_name("SECONDS")
       ->check(CLI::PositiveNumber);
-  const NamedValues<Format> formats = {{"table", Format::kTable}, {"json", Format::kJson}, {"ndjson", Format::kNdjson}};
-  app.add_option("-o,--output", options.format, "How to print: table, json, ndjson [table]")
+  const NamedValues<Format> formats = {
+      {"table", Format::kTable}, {"json", Format::kJson}, {"ndjson", Format::kNdjson}, {"csv", Format::kCsv}};
+  app.add_option("-o,--output", options.format, "How to print: table, json, ndjson, csv [table]")
       ->type_name("FORMAT")
       ->transform(choices(formats));
   add_scene_command(app, context);

@@ -108,6 +108,8 @@ absl::Status list(const ListOptions& options, Context& context) {
   Report report;
   report.rows_name = "scenes";
   report.no_rows = "no scenes";
+  const Json columns = summary_of({});
+  for (const auto& [key, value] : columns.items()) report.keys.push_back(key);
   for (const v1::Scene& scene : *scenes) report.rows.push_back(summary_of(scene));
   context.write(report);
   return absl::OkStatus();

@@ -70,6 +70,42 @@ TEST(OutputTest, AReportWithoutRowsIsItsHead) {
   EXPECT_EQ(written(Format::kNdjson, report), "{\"name\":\"arena\",\"min\":null}\n");
 }
 
+TEST(OutputTest, CsvIsAHeaderAndALineARowWithVectorsSplitAndNullEmpty) {
+  EXPECT_EQ(written(Format::kCsv, two_rows()),
+            "ray,hit,id,point.x,point.y,point.z\n"
+            "0,true,7,0.5,1.0,-2.0\n"
+            "1,false,,,,\n");
+}
+
+TEST(OutputTest, CsvHasTheKeysOfEveryRow) {
+  Report report;
+  report.rows_name = "things";
+  report.rows = {{{"id", "1"}}, {{"id", "2"}, {"radius", 0.5}}};
+  EXPECT_EQ(written(Format::kCsv, report), "id,radius\n1,\n2,0.5\n");
+}
+
+TEST(OutputTest, CsvWithoutRowsIsTheHeaderOfTheNamedKeys) {
+  Report report;
+  report.rows_name = "found";
+  report.keys = {"ball", "id"};
+  EXPECT_EQ(written(Format::kCsv, report), "ball,id\n");
+}
+
+TEST(OutputTest, CsvOfAReportWithoutRowsIsOneHeaderAndOneLine) {
+  Report report;
+  report.head = {{"name", "arena"}, {"min", nullptr}, {"features", {"rays", "balls"}}};
+  EXPECT_EQ(written(Format::kCsv, report),
+            "name,min.x,min.y,min.z,features\narena,,,,\"[\"\"rays\"\",\"\"balls\"\"]\"\n");
+}
+
+TEST(OutputTest, NamedKeysAreTheColumnsOfATableToo) {
+  Report report;
+  report.rows_name = "things";
+  report.keys = {"id", "radius"};
+  report.rows = {{{"id", "1"}}, {{"id", "2"}, {"radius", 0.5}}};
+  EXPECT_EQ(written(Format::kTable, report), "id  radius\n1   -\n2   0.5\n");
+}
+
 TEST(OutputTest, IdsKeepAll64Bits) { EXPECT_EQ(id_json(0xFFFFFFFFFFFFFFFFull), "18446744073709551615"); }
 
 TEST(OutputTest, FloatsPrintTheShortestDecimalAndInfinityIsNull) {

@@ -320,6 +320,37 @@ TEST_F(RunTest, AGeneratedCityWrittenToAFileCanBeImported) {
   EXPECT_THAT(server_.scenes.last_change.place(0).ids(), ElementsAre(5));
 }
 
+TEST_F(RunTest, EveryCommandAnswersInCsv) {
+  const auto csv = [this](std::vector<std::string> line) {
+    line.insert(line.begin(), {"-o", "csv"});
+    const Outcome outcome = run_here(line);
+    EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+    return outcome.out;
+  };
+  EXPECT_EQ(csv({"scene", "list"}), "name,state,revision,tick,objects,instances,triangles,memory_bytes\n");
+  EXPECT_THAT(csv({"scene", "create", "arena"}), HasSubstr("\narena,ready,0,0,0,0,0,0,9223372036854775808,"));
+  EXPECT_THAT(csv({"scene", "describe", "arena"}), HasSubstr(",min.x,min.y,min.z,max.x,"));
+  EXPECT_EQ(csv({"insert", "arena", "point", "--id", "1", "--at", "0,0,0"}),
+            "applied,refused,revision,tick,epoch\n1,0,1,0,9\n");
+  EXPECT_EQ(csv({"limits"}), "name,value,used\nmax_scenes,1024,2\n");
+  EXPECT_THAT(csv({"health"}), HasSubstr("address,status\n"));
+  EXPECT_THAT(csv({"version", "--server"}), HasSubstr("\"[\"\"rays\"\"]\""));
+  EXPECT_THAT(csv({"generate", "city", "--triangles", "100", "--scene", "arena"}), HasSubstr("mesh,triangles,"));
+  server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
+    result.add_blocks()->add_counts(0);
+    return grpc::Status::OK;
+  };
+  EXPECT_EQ(csv({"query", "ball", "arena", "--at", "0,0,0", "--radius", "1", "--columns", "pose"}),
+            "ball,id,position.x,position.y,position.z,rotation.x,rotation.y,rotation.z,rotation.w\n");
+  EXPECT_EQ(csv({"scene", "delete", "arena"}), "deleted\narena\n");
+}
+
+TEST_F(RunTest, ErrorsBesideCsvAreWords) {
+  const Outcome outcome = run_here({"-o", "csv", "scene", "describe", "nowhere"});
+  EXPECT_THAT(outcome.err, ::testing::StartsWith("error: "));
+  EXPECT_EQ(outcome.out, "");
+}
+
 TEST_F(RunTest, AFileThatIsNotThereIsNotFound) {
   EXPECT_EQ(run_here({"import", "/nonexistent/level.obj", "--scene", "arena"}).code, ExitCode::kNotFound);
 }
