@@ -84,8 +84,8 @@ class PipelinedStream(Generic[Result]):
             self._changed.wait_for(
                 lambda: self._ended or self._closing or len(self._items) < self._max_in_flight)
             if self._ended or self._closing:
-                raise self._end or LocusError(grpc.StatusCode.FAILED_PRECONDITION,
-                                              "the stream was closed: open a new one")
+                raise self._end or (_broken_off() if self._broken_off else LocusError(
+                    grpc.StatusCode.FAILED_PRECONDITION, "the stream was closed: open a new one"))
             self._number(item)
             self._items.append(item)
             if self._thread is None:
@@ -147,7 +147,7 @@ class PipelinedStream(Generic[Result]):
                 self._changed.wait_for(lambda: self._broken_off, wait)
                 self._changed.wait_for(lambda: self._items or self._closing)
             if self._broken_off:
-                end = LocusError(grpc.StatusCode.CANCELLED, "the stream was broken off")
+                end = _broken_off()
             elif wait is not None and self._items:
                 return True
             self._ended = True
@@ -242,6 +242,10 @@ class PipelinedStream(Generic[Result]):
         with self._changed:
             self._items.clear()
             self._changed.notify_all()
+
+
+def _broken_off() -> LocusError:
+    return LocusError(grpc.StatusCode.CANCELLED, "the stream was broken off")
 
 
 def neither() -> LocusError:

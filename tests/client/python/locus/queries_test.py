@@ -1,0 +1,225 @@
+"""Answers in Python against those of the command line: equal to the last bit, for every kind of query."""
+import array
+import math
+import random
+
+import locus
+from locus import Block, Column, QueryBatch, RayMode, StaticDetail
+from support import DaemonTest, floats, listed, number
+
+SEED = 11
+ALL_COLUMNS = (Column.T, Column.ID, Column.TRIANGLE, Column.UV, Column.NORMAL, Column.POINT, Column.GROUP, Column.TAG,
+               Column.LAYERS, Column.POSE)
+QUAD = ([0, 0, 0, 20, 0, 0, 20, 20, 0, 0, 20, 0], [0, 1, 2, 0, 2, 3])
+
+
+def text(vector):
+    return ",".join(repr(value) for value in vector)
+
+
+def triples(column):
+    return [column[begin:begin + 3] for begin in range(0, len(column), 3)]
+
+
+def cut(column, width, row):
+    return column[width * row:width * row + width]
+
+
+class AnswersEqualTheCommandLineTest(DaemonTest):
+    def setUp(self):
+        super().setUp()
+        self.random = random.Random(SEED)
+        self.client.upload_mesh("quad", *QUAD)
+        self.client.change_instances(self.scene, locus.InstanceChange().place(
+            "quad", [[-10, -10, 0], [-10, -10, -3]], ids=[1, 2], groups=[7], tags=[70, 71], rotations=[0, 0, 0, 1]))
+        ids = range(100, 160)
+        batch = locus.UpdateBatch(tick=5)
+        batch.insert_balls(ids, self.cloud(60), [self.random.uniform(0.2, 2) for _ in ids], tags=[3 * one for one in ids])
+        batch.insert_boxes([200, 201], [[0, 0, 5], [4, 4, 4]], [1, 2, 0.5], rotations=[0, 0, 0.6, 0.8], groups=[9])
+        batch.insert_capsules(300, [-5, 5, 3], [0, 0, 1.5], 0.75, layers=6)
+        batch.insert_points(400, [1, 1, 1])
+        self.built = self.apply(batch)
+        self.assertEqual(self.built.refused, 0)
+
+    def cloud(self, count, size=10.0):
+        return floats(self.random.uniform(-size, size) for _ in range(3 * count))
+
+    def report(self, *arguments):
+        return self.command_line("query", *arguments)
+
+    def check_rays(self, mode, **settings):
+        rays = 60
+        origins = triples(self.cloud(rays))
+        directions = triples(self.cloud(rays, 2.0))
+        options = [word for pair in zip(origins, directions)
+                   for word in (f"--from={text(pair[0])}", f"--dir={text(pair[1])}")]
+        report = self.report("ray", self.scene, *options, "--mode", mode.name.lower(), "--columns",
+                             "triangle,uv,normal,point,group,tag,layers,pose")
+        (block,) = self.ask(QueryBatch().rays(origins, directions, mode=mode, block=Block(columns=ALL_COLUMNS), **settings))
+        self.assertEqual(block.rows, len(report["hits"]))
+        self.check_rows(block, report["hits"])
+        return block, report["hits"]
+
+    def check_rows(self, block, rows):
+        widths = {"t": ("t", 1), "id": ("ids", 1), "triangle": ("triangles", 1), "uv": ("uvs", 2), "normal": ("normals", 3),
+                  "point": ("points", 3), "group": ("groups", 1), "tag": ("tags", 1), "layers": ("layers", 1),
+                  "position": ("positions", 3), "rotation": ("rotations", 4)}
+        for row, shown in enumerate(rows):
+            hit = shown.get("hit", True)
+            self.assertEqual(listed(block.ids)[row] != 0, hit)
+            for name in set(shown) & set(widths) if hit else ():
+                column, width = widths[name]
+                found = cut(listed(getattr(block, column)), width, row)
+                if shown[name] is None:
+                    self.assertEqual(found, [locus.NO_TRIANGLE])
+                    continue
+                wanted = shown[name] if isinstance(shown[name], list) else [shown[name]]
+                wanted = [number(value) if isinstance(value, str) else value for value in wanted]
+                self.assertEqual(found, wanted if column == "positions" else
+                                 floats(wanted) if isinstance(found[0], float) else wanted, f"{name} of row {row}")
+
+    def test_first_hits(self):
+        block, rows = self.check_rays(RayMode.FIRST)
+        self.assertEqual(block.rows, 60)
+        self.assertIn(True, [row["hit"] for row in rows])
+        self.assertIn(False, [row["hit"] for row in rows])
+        missed = next(row for row, shown in enumerate(rows) if not shown["hit"])
+        self.assertEqual((listed(block.t)[missed], listed(block.triangles)[missed]), (math.inf, locus.NO_TRIANGLE))
+
+    def test_all_hits_by_ray(self):
+        block, rows = self.check_rays(RayMode.ALL)
+        self.assertEqual(sum(listed(block.counts)), len(rows))
+        for ray in range(60):
+            self.assertEqual(block.ids[block.rows_of(ray)].tolist(), [int(row["id"]) for row in rows if row["ray"] == ray])
+
+    def test_any_hit(self):
+        origins = triples(self.cloud(40))
+        options = [f"--from={text(origin)}" for origin in origins]
+        report = self.report("ray", self.scene, *options, "--dir=0,0,-1", "--mode", "any")
+        (block,) = self.ask(QueryBatch().rays(origins, [0, 0, -1], mode=RayMode.ANY))
+        self.assertEqual([bool(hit) for hit in block.hits], [row["hit"] for row in report["rays"]])
+        self.assertEqual(block.rows, 0)
+
+    def check_overlaps(self, kind, options, batch):
+        report = self.report(kind, self.scene, *options)
+        (block,) = self.ask(batch)
+        rows = report[next(key for key, value in report.items() if isinstance(value, list))]
+        self.assertEqual([(query, one) for query in range(len(block.counts)) for one in block.ids[block.rows_of(query)].tolist()],
+                         [(row[kind], int(row["id"])) for row in rows])
+        self.assertGreater(len(rows), 20)
+        if len(block.triangles):
+            self.assertEqual([one if one != locus.NO_TRIANGLE else None for one in listed(block.triangles)],
+                             [row["triangle"] for row in rows])
+
+    def test_balls(self):
+        centers = triples(self.cloud(30))
+        radii = floats(self.random.uniform(0, 4) for _ in range(30))
+        options = [word for center, radius in zip(centers, radii) for word in (f"--at={text(center)}", f"--radius={radius!r}")]
+        self.check_overlaps("ball", options, QueryBatch().balls(centers, radii))
+
+    def test_triangles_of_balls(self):
+        options = [word for height in range(-5, 5) for word in (f"--at=0,0,{height}",)] + ["--radius=6", "--detail", "sorted"]
+        centers = [(0, 0, height) for height in range(-5, 5)]
+        self.check_overlaps("ball", options, QueryBatch().balls(centers, 6, detail=StaticDetail.TRIANGLES_SORTED))
+
+    def test_turned_boxes(self):
+        centers = triples(self.cloud(20))
+        options = [f"--at={text(center)}" for center in centers] + ["--half=3,2,1", "--rotation=0.6,0,0,0.8"]
+        self.check_overlaps("box", options, QueryBatch().boxes(centers, (3, 2, 1), rotations=(0.6, 0, 0, 0.8)))
+
+    def test_lookups(self):
+        ids = [1, 100, 159, 200, 300, 400]
+        report = self.command_line("get", self.scene, *[f"--id={one}" for one in ids])
+        columns = Block(columns=[Column.ID, Column.POSE, Column.GROUP, Column.TAG, Column.LAYERS])
+        (block,) = self.ask(QueryBatch().lookup(ids, block=columns))
+        rows = report[next(key for key, value in report.items() if isinstance(value, list))]
+        self.assertEqual(len(rows), len(ids))
+        self.check_rows(block, rows)
+
+    def test_lookups_of_groups(self):
+        (block,) = self.ask(QueryBatch().lookup_groups([9, 7, 8]))
+        self.assertEqual((listed(block.counts), listed(block.ids)), ([2, 2, 0], [200, 201, 1, 2]))
+
+    def test_settings_of_a_block_reach_the_server(self):
+        block = Block(source=locus.Source.DYNAMIC, masks=6, ignore_ids=[100], max_results=1, columns=[Column.ID, Column.LAYERS])
+        (found,) = self.ask(QueryBatch().balls([-5, 5, 3], 20, block=block))
+        self.assertEqual((listed(found.ids), listed(found.layers)), ([300], [6]))
+
+    def test_what_did_not_fit_is_listed_and_gone_on_with(self):
+        (first,) = self.ask(QueryBatch().balls([0, 0, 0], 30, block=Block(max_results=10)))
+        self.assertEqual((listed(first.truncated), first.rows), ([0], 10))
+        last = listed(first.ids)[-1]
+        (rest,) = self.ask(QueryBatch().balls([0, 0, 0], 30, block=Block(after_id=last)))
+        (whole,) = self.ask(QueryBatch().balls([0, 0, 0], 30))
+        self.assertEqual(listed(first.ids) + listed(rest.ids), listed(whole.ids))
+
+    def test_ignored_groups_are_passed_over_query_by_query(self):
+        (block,) = self.ask(QueryBatch().rays([[0, 0, 30]] * 2, [0, 0, -1], block=Block(ignore_groups=[9, 0], ignore_ids=range(100, 160))))
+        self.assertEqual(listed(block.ids), [1, 200])
+
+    def test_a_frame_moves_positions_and_answers(self):
+        far = 1_000_000.25
+        self.apply(locus.UpdateBatch(frame=(far, 0, 0)).insert_balls(5, [0, 0, 0], 0.5))
+        (block,) = self.ask(QueryBatch().rays([0, 0, 10], [0, 0, -1], block=Block(frame=(far, 0, 0), columns=ALL_COLUMNS)))
+        self.assertEqual((listed(block.ids), listed(block.t), listed(block.points)), ([5], [9.5], [0, 0, 0.5]))
+        self.assertEqual(listed(block.positions), [far, 0, 0])
+
+    def test_numbers_of_every_form_ask_the_same(self):
+        origins = self.cloud(50)
+        forms = (origins, triples(origins), array.array("f", origins), array.array("f", origins).tobytes())
+        answers = {tuple(listed(self.ask(QueryBatch().rays(form, [0, 0, -1]))[0].t)) for form in forms}
+        self.assertEqual(len(answers), 1)
+
+    def test_blocks_come_back_in_order_at_one_revision(self):
+        batch = QueryBatch(at_least=self.built, explain=True)
+        batch.lookup([1]).rays([0, 0, 9], [0, 0, -1]).balls([0, 0, 5], 0).boxes([0, 0, 5], [0, 0, 0])
+        result = self.client.query(self.scene, batch)
+        self.assertEqual([listed(block.ids)[0] for block in result.blocks], [1, 200, 200, 200])
+        self.assertEqual((result.epoch, result.revision, result.tick), (self.built.epoch, self.built.revision, 5))
+        self.assertGreater(result.work.tests, 0)
+        self.assertGreater(result.blocks[1].work.tests, 0)
+
+
+class ViewTest(DaemonTest):
+    def test_a_batch_sees_the_revision_it_names(self):
+        first = self.apply(locus.UpdateBatch().insert_balls(1, [0, 0, 0], 1))
+        second = self.apply(locus.UpdateBatch().move(1, [5, 0, 0]))
+        for view, x in ((dict(exactly=first), 0), (dict(at_least=first), 5), (dict(exactly=second), 5)):
+            result = self.client.query(self.scene, QueryBatch(**view).lookup(1))
+            self.assertEqual(listed(result.blocks[0].positions)[0], x)
+
+    def test_another_epoch_is_refused(self):
+        ack = self.apply(locus.UpdateBatch().insert_balls(1, [0, 0, 0], 1))
+        self.client.delete_scene(self.scene)
+        self.client.create_scene(self.scene)
+        with self.assertRaises(locus.LocusError) as raised:
+            self.ask(QueryBatch(at_least=ack).lookup(1))
+        self.assertRefused(raised.exception, "FAILED_PRECONDITION", "SCENE_RESTARTED")
+
+    def test_two_views_exclude_each_other(self):
+        with self.assertRaisesRegex(ValueError, "at_least or exactly, not both"):
+            QueryBatch(at_least=locus.Revision(1, 1), exactly=locus.Revision(1, 1))
+
+
+class RefusalTest(DaemonTest):
+    def test_a_column_of_a_wrong_length_is_named(self):
+        with self.assertRaisesRegex(ValueError, r"^blocks\[1\].rays.directions: has 2 entries: give 3, one for all, or none"):
+            QueryBatch().lookup(1).rays([0] * 9, [0] * 6)
+        with self.assertRaisesRegex(ValueError, r"^blocks\[0\].masks: has 2 entries: give 1"):
+            QueryBatch().lookup(1, block=Block(masks=[1, 2]))
+
+    def test_a_column_of_a_wrong_type_is_named(self):
+        with self.assertRaisesRegex(TypeError, r"^blocks\[0\].balls.radii: holds float64, but float32 is wanted"):
+            QueryBatch().balls([0, 0, 0], array.array("d", [1]))
+
+    def test_a_refused_block_is_no_part_of_the_batch(self):
+        batch = QueryBatch().lookup(1)
+        with self.assertRaises(TypeError):
+            batch.rays([0, 0, 0], "up")
+        self.assertEqual(len(self.ask(batch)), 1)
+
+    def test_a_wrong_value_is_refused_by_the_server_with_its_place(self):
+        with self.assertRaises(locus.LocusError) as raised:
+            self.ask(QueryBatch().lookup(1).rays([[0, 0, 0]] * 3, [[0, 0, 1], [0, 0, 1], [0, 0, 0]]))
+        self.assertRefused(raised.exception, "INVALID_ARGUMENT", "OUT_OF_RANGE", "blocks[1].rays.directions")
+        self.assertEqual(raised.exception.index, 2)

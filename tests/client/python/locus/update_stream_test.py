@@ -1,0 +1,197 @@
+"""Update streams: in order, exactly once, across refusals and broken connections."""
+import socket
+import threading
+
+import grpc
+import locus
+from locus import QueryBatch, UpdateBatch
+from support import WAIT_SECONDS, Daemon, DaemonTest, listed
+
+
+
+class Relay:
+    """A port that passes bytes on to a server, until cut() breaks every connection through it."""
+
+    def __init__(self, address):
+        host, port = address.rsplit(":", 1)
+        self.target = (host, int(port))
+        self.lock = threading.Lock()
+        self.sockets = []
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.address = "127.0.0.1:%d" % self.listener.getsockname()[1]
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        while True:
+            try:
+                near, _ = self.listener.accept()
+                far = socket.create_connection(self.target)
+            except OSError:
+                return
+            with self.lock:
+                self.sockets += [near, far]
+            for source, sink in ((near, far), (far, near)):
+                threading.Thread(target=self.pump, args=(source, sink), daemon=True).start()
+
+    def pump(self, source, sink):
+        try:
+            while data := source.recv(65536):
+                sink.sendall(data)
+        except OSError:
+            pass
+
+    def cut(self):
+        with self.lock:
+            for one in self.sockets:
+                try:
+                    one.shutdown(socket.SHUT_RDWR)
+                except OSError:
+                    pass
+                one.close()
+            self.sockets.clear()
+
+    def close(self):
+        self.listener.shutdown(socket.SHUT_RDWR)  # wakes accept(), which close() would not
+        self.listener.close()
+        self.cut()
+
+
+class UpdateStreamTest(DaemonTest):
+    def moved(self, number):
+        return UpdateBatch(upsert=True).insert_balls([1, 1 + number], [number, 0, 0], 0.5)
+
+    def x_of(self, number, view=None):
+        (block,) = self.ask(QueryBatch(at_least=view).lookup(number))
+        return listed(block.positions)[0]
+
+    def test_batches_are_applied_in_the_order_sent(self):
+        with self.client.update_stream(self.scene) as stream:
+            futures = [stream.send(self.moved(number)) for number in range(1, 101)]
+            stream.sync(WAIT_SECONDS)
+            self.assertTrue(all(future.done() for future in futures))
+            self.assertEqual([future.result().revision for future in futures], list(range(1, 101)))
+            self.assertEqual(stream.last_ack.revision, 100)
+            self.assertEqual(self.x_of(1, stream.last_ack), 100)
+
+    def test_a_batch_may_be_changed_and_sent_again(self):
+        batch = UpdateBatch(upsert=True).insert_balls(1, [0, 0, 0], 1)
+        with self.client.update_stream(self.scene) as stream:
+            first = stream.send(batch)
+            batch.insert_balls(2, [1, 0, 0], 1)
+            second = stream.send(batch)
+        self.assertEqual((first.result().applied, second.result().applied), (1, 2))
+
+    def test_a_refused_batch_does_not_stop_those_behind_it(self):
+        with self.client.update_stream(self.scene) as stream:
+            futures = []
+            for number in range(1, 41):
+                futures.append(stream.send(self.moved(number)))
+                if number % 5 == 0:
+                    futures.append(stream.send(UpdateBatch(all_or_nothing=True).remove(10**6 + number)))
+        refused = [future.exception() for future in futures if future.exception()]
+        acks = [future.result() for future in futures if not future.exception()]
+        self.assertEqual([ack.revision for ack in acks], list(range(1, 41)))
+        self.assertEqual(len(refused), 8)
+        self.assertRefused(refused[0], "INVALID_ARGUMENT", "UNKNOWN_ID", "remove_ids")
+        self.assertEqual([error.index for error in refused], [0] * 8)
+
+    def test_no_batch_is_lost_or_applied_twice_when_connections_break(self):
+        relay = Relay(self.daemon.address)
+        self.addCleanup(relay.close)
+        batches = 120
+        with locus.connect(relay.address) as client:
+            with client.update_stream(self.scene) as stream:
+                futures = []
+                for number in range(1, batches + 1):
+                    futures.append(stream.send(self.moved(number)))
+                    if number in (20, 50, 51, 90):
+                        relay.cut()
+                stream.sync(WAIT_SECONDS)
+        # Each batch makes one revision, so the last one tells how many were applied.
+        self.assertEqual(futures[-1].result().revision, batches)
+        self.assertEqual(self.client.scene(self.scene).revision, batches)
+        self.assertEqual(self.client.scene(self.scene).objects, batches + 1)
+
+    def test_sending_waits_while_too_many_batches_are_under_way(self):
+        relay = Relay(self.daemon.address)
+        client = locus.connect(relay.address)
+        stream = client.update_stream("no-such-scene", max_in_flight=2)
+        relay.close()
+        futures = [stream.send(self.moved(number)) for number in (1, 2)]
+        third = threading.Thread(target=lambda: futures.append(self.outcome_of(stream)), daemon=True)
+        third.start()
+        third.join(0.3)
+        self.assertEqual(len(futures), 2)
+        stream.cancel()
+        third.join(WAIT_SECONDS)
+        self.assertEqual(futures[2].code, grpc.StatusCode.CANCELLED)
+        client.close()
+
+    def outcome_of(self, stream):
+        try:
+            return stream.send(self.moved(3))
+        except locus.LocusError as error:
+            return error
+
+    def test_a_scene_that_is_deleted_refuses_batch_by_batch(self):
+        with self.client.update_stream(self.scene) as stream:
+            stream.send(self.moved(1)).result(WAIT_SECONDS)
+            self.client.delete_scene(self.scene)
+            for _ in range(2):
+                error = stream.send(self.moved(2)).exception(WAIT_SECONDS)
+                self.assertRefused(error, "NOT_FOUND", "NOT_FOUND")
+
+    def test_a_scene_that_started_over_ends_the_stream(self):
+        stream = self.client.update_stream(self.scene)
+        for number in (1, 2):
+            stream.send(self.moved(number)).result(WAIT_SECONDS)
+        self.client.delete_scene(self.scene)
+        self.client.create_scene(self.scene)
+        self.assertRefused(stream.send(self.moved(3)).exception(WAIT_SECONDS), "FAILED_PRECONDITION", "BATCH_GAP")
+        with self.assertRaisesRegex(locus.LocusError, "BATCH_GAP"):
+            stream.sync(WAIT_SECONDS)
+        with self.assertRaisesRegex(locus.LocusError, "BATCH_GAP"):
+            stream.send(self.moved(4))
+
+    def test_a_bad_name_ends_the_stream(self):
+        stream = self.client.update_stream("No Scene")
+        self.assertRefused(stream.send(self.moved(1)).exception(WAIT_SECONDS), "INVALID_ARGUMENT", "MALFORMED")
+        with self.assertRaises(locus.LocusError):
+            stream.close(WAIT_SECONDS)
+
+    def test_a_server_that_is_gone_ends_the_stream_when_the_tries_are_used_up(self):
+        daemon = Daemon()
+        client = locus.connect(daemon.address)
+        client.create_scene("arena")
+        stream = client.update_stream("arena", reconnect=locus.Retry(attempts=3, first_wait=0.01))
+        stream.send(self.moved(1)).result(WAIT_SECONDS)
+        daemon.kill()
+        error = stream.send(self.moved(2)).exception(WAIT_SECONDS)
+        self.assertEqual((error.code, error.refused), (grpc.StatusCode.UNAVAILABLE, False))
+        client.close()
+
+    def test_a_closed_stream_takes_no_more(self):
+        stream = self.client.update_stream(self.scene)
+        stream.send(self.moved(1))
+        stream.close(WAIT_SECONDS)
+        with self.assertRaisesRegex(locus.LocusError, "the stream was closed: open a new one"):
+            stream.send(self.moved(2))
+
+    def test_closing_the_client_ends_its_streams(self):
+        client = locus.connect(self.daemon.address)
+        stream = client.update_stream(self.scene)
+        stream.send(self.moved(1)).result(WAIT_SECONDS)
+        client.close()
+        error = stream.send(self.moved(2)).exception(WAIT_SECONDS)
+        self.assertIn("the client was closed", str(error))
+
+    def test_an_exception_inside_breaks_the_stream_off(self):
+        with self.assertRaises(ZeroDivisionError):
+            with self.client.update_stream(self.scene) as stream:
+                raise ZeroDivisionError
+        with self.assertRaisesRegex(locus.LocusError, "broken off|closed"):
+            stream.send(self.moved(1))
+
+    def test_no_room_at_all_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "max_in_flight is 0: give 1 or more"):
+            self.client.update_stream(self.scene, max_in_flight=0)
