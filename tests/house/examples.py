@@ -38,6 +38,7 @@ def lines(count):
     return "  step();\n" * count
 
 
+MODULE = "client/python/locus/thing.py"
 README = "# room\n\nWhat it is.\n"
 GOOD_EXAMPLE = {
     **core("core/base/mutex.h", "<chrono>"),
@@ -53,6 +54,9 @@ GOOD_EXAMPLE = {
                              "}  // namespace locus\n",
     "server/main.cc": '#include "server/service/query_service.h"\n\nint main() { return 0; }\n',
     "tests/core/geometry/vec3_test.cc": '#include "core/geometry/vec3.h"\n\nnamespace locus {\n}  // namespace locus\n',
+    MODULE: '"""Things."""\n\n\nclass Thing:\n    """A thing."""\n\n    def grow(self, by: int = 1) -> None:\n'
+            '        """Makes it larger."""\n\n    def _grown(self) -> int:\n        return 1\n',
+    "tests/client/python/locus/thing_test.py": '"""Tests of things."""\n',
     **{room + "/README.md": README for room in ("proto", "server", "client", "core", "deploy", "tests")},
     **{path: "content\n" for path in ("README.md", "CMakeLists.txt", "LICENSE", "CMakePresets.json", ".ci/run",
                                       ".clang-format", ".clang-tidy", ".gitignore")},
@@ -66,6 +70,16 @@ LONG_TEST = 'TEST(WalkerTest, Walks) {\n  say("}");\n  say(\'{\');  // }\n' + li
 LONG_INNER = "void walk() {\n  const auto inner = [&] {\n" + lines(85) + "  };\n}\n"
 
 BAD_EXAMPLES = {
+    "PythonFilesAreTidy": [{MODULE: "def grow(:\n"}, {MODULE: "import os\n"},
+                           {"tests/run.py": '"""Long."""\nx = "' + "y" * 130 + '"\n'},
+                           {MODULE: '"""Long."""\ndef f() -> None:\n' + "    f()\n" * 80}],
+    "PythonNamesAreDocumented": [
+        {MODULE: '"""Things."""\ndef grow() -> None:\n    pass\n'},
+        {MODULE: '"""Things."""\nclass Thing:\n    """A thing."""\n    def grow(self) -> None:\n        pass\n'},
+        {MODULE: '"""Things."""\ndef _grow(by) -> None:\n    pass\n'}, {MODULE: '"""Things."""\ndef _grow():\n    pass\n'},
+    ],
+    "PythonTestsMirrorTheSources": [{"tests/client/python/locus/gone_test.py": '"""Gone."""\n'},
+                                    {"tests/client/python/thing_test.py": '"""Elsewhere."""\n'}],
     "IncludesFollowTheDirections": [
         core("core/geometry/vec3.h", '"core/index/spatial_index.h"'),
         core("core/mesh/mesh.h", '"core/scene/scene.h"'),

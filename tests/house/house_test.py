@@ -14,13 +14,14 @@ import sys
 sys.dont_write_bytecode = True
 
 import include_rules
+import python_rules
 import shape_rules
 import tool_rules
 from examples import BAD_EXAMPLES, BAD_SOURCE, BAD_SYMBOLS, GOOD_EXAMPLE, GOOD_SOURCE, GOOD_SYMBOLS
 from source_tree import Tree, read_tree
 
 SKIPPED = 77
-TREE_RULES = {**include_rules.RULES, **shape_rules.RULES}
+TREE_RULES = {**include_rules.RULES, **shape_rules.RULES, **python_rules.RULES}
 
 
 def failures_of_the_rule_itself(name, rule):

@@ -3,7 +3,7 @@
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/game_tick.py --address 127.0.0.1:7575
 
 Makes a scene of its own and deletes it at the end. Players walk on circles around a wall; each tick asks who is in
-reach of each player (balls) and whether each player sees the next one (rays, any hit in between).
+reach of each player (balls) and whether each player sees the next one (rays to it).
 """
 from __future__ import annotations
 
@@ -70,9 +70,8 @@ class Game:
         ack = self.updates.send(locus.UpdateBatch(tick=number).move(self.ids, here)).result()
         batch = locus.QueryBatch(at_least=ack)
         batch.balls(here, REACH, block=locus.Block(ignore_groups=self.ids, ignore_ids=[WALL]))
-        # From player to next player; t counts in their distance, so a hit before 1 is something else in between.
-        batch.rays(here, difference(shifted(here), here), t_max=1.0, mode=locus.RayMode.FIRST,
-                   block=locus.Block(ignore_groups=self.ids))
+        # From player to next player, past itself: what is hit first is the one that was looked for, or hides it.
+        batch.rays(here, difference(shifted(here), here), t_max=1.0, block=locus.Block(ignore_groups=self.ids))
         near, sight = self.queries.send(batch).result().blocks
         next_ids = self.ids[1:] + self.ids[:1]
         seen = sum(1 for found, wanted in zip(sight.ids.tolist(), next_ids) if found == wanted)

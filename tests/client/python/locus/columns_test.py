@@ -23,7 +23,8 @@ class EncodeTest(unittest.TestCase):
 
     def test_buffers_of_the_right_type_are_taken_as_they_are(self):
         numbers = array.array("f", range(1, 7))
-        for value in (numbers, memoryview(numbers), ONE_TO_SIX, bytearray(ONE_TO_SIX), memoryview(numbers).cast("B").cast("f", [2, 3])):
+        table = memoryview(numbers).cast("B").cast("f", [2, 3])
+        for value in (numbers, memoryview(numbers), ONE_TO_SIX, bytearray(ONE_TO_SIX), table):
             self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
 
     def test_one_number_is_a_column_of_one(self):
@@ -83,8 +84,8 @@ class NumpyTest(unittest.TestCase):
         self.assertEqual(columns.encode("c", [numpy.arange(1, 4), numpy.arange(4, 7)], FLOAT32, 3), ONE_TO_SIX)
 
     def test_other_types_are_refused_with_both_names(self):
-        for kind, found in (("float64", "float64"), ("float16", "float16"), ("int32", "int32"), (">f4", "big-endian"), ("bool", "bool"),
-                            ("uint8", "uint8")):
+        for kind, found in (("float64", "float64"), ("float16", "float16"), ("int32", "int32"), (">f4", "big-endian"),
+                            ("bool", "bool"), ("uint8", "uint8")):
             with self.assertRaisesRegex(TypeError, f"^a.column: holds {found}.*but float32 is wanted"):
                 columns.encode("a.column", numpy.ones(3, dtype=kind), FLOAT32, 3)
 

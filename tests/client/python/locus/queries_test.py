@@ -4,7 +4,7 @@ import math
 import random
 
 import locus
-from locus import Block, Column, QueryBatch, RayMode, StaticDetail
+from locus import Block, Column, QueryBatch, RayMode, StaticDetail, wire
 from support import DaemonTest, floats, listed, number
 
 SEED = 11
@@ -104,8 +104,8 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         report = self.report(kind, self.scene, *options)
         (block,) = self.ask(batch)
         rows = report[next(key for key, value in report.items() if isinstance(value, list))]
-        self.assertEqual([(query, one) for query in range(len(block.counts)) for one in block.ids[block.rows_of(query)].tolist()],
-                         [(row[kind], int(row["id"])) for row in rows])
+        found = [(query, one) for query in range(len(block.counts)) for one in block.ids[block.rows_of(query)].tolist()]
+        self.assertEqual(found, [(row[kind], int(row["id"])) for row in rows])
         self.assertGreater(len(rows), 20)
         if len(block.triangles):
             self.assertEqual([one if one != locus.NO_TRIANGLE else None for one in listed(block.triangles)],
@@ -114,7 +114,8 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
     def test_balls(self):
         centers = triples(self.cloud(30))
         radii = floats(self.random.uniform(0, 4) for _ in range(30))
-        options = [word for center, radius in zip(centers, radii) for word in (f"--at={text(center)}", f"--radius={radius!r}")]
+        options = [word for center, radius in zip(centers, radii)
+                   for word in (f"--at={text(center)}", f"--radius={radius!r}")]
         self.check_overlaps("ball", options, QueryBatch().balls(centers, radii))
 
     def test_triangles_of_balls(self):
@@ -154,7 +155,8 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         self.assertEqual(listed(first.ids) + listed(rest.ids), listed(whole.ids))
 
     def test_ignored_groups_are_passed_over_query_by_query(self):
-        (block,) = self.ask(QueryBatch().rays([[0, 0, 30]] * 2, [0, 0, -1], block=Block(ignore_groups=[9, 0], ignore_ids=range(100, 160))))
+        passing = Block(ignore_groups=[9, 0], ignore_ids=range(100, 160))
+        (block,) = self.ask(QueryBatch().rays([[0, 0, 30]] * 2, [0, 0, -1], block=passing))
         self.assertEqual(listed(block.ids), [1, 200])
 
     def test_a_frame_moves_positions_and_answers(self):
@@ -169,6 +171,16 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         forms = (origins, triples(origins), array.array("f", origins), array.array("f", origins).tobytes())
         answers = {tuple(listed(self.ask(QueryBatch().rays(form, [0, 0, -1]))[0].t)) for form in forms}
         self.assertEqual(len(answers), 1)
+
+    def test_the_server_writes_each_column_once_and_whole(self):
+        batch = QueryBatch().balls([0, 0, 0] * 1000, 30, block=Block(columns=[Column.ID, Column.POSE, Column.TAG, Column.LAYERS]))
+        batch.rays([0, 0, 30] * 2000, [0, 0, -1], block=Block(columns=ALL_COLUMNS))
+        raw = self.client.query_bytes(self.scene, batch.request_bytes(self.scene))
+        self.assertGreater(len(raw), 2_000_000)
+        result = wire.fields(wire.fields(memoryview(raw))[1][0])
+        self.assertEqual(len(result[4]), 2)
+        for block in result[4]:
+            self.assertEqual({len(pieces) for pieces in wire.fields(block).values()}, {1})
 
     def test_blocks_come_back_in_order_at_one_revision(self):
         batch = QueryBatch(at_least=self.built, explain=True)

@@ -103,7 +103,8 @@ class ColumnsOfBatchesTest(unittest.TestCase):
         for pattern, call in (
                 (r"^moves\[1\].positions: has 2 entries: give 3", lambda: batch.move([1, 2, 3], [0] * 6)),
                 (r"^moves\[1\].rotations: has 3 numbers: give 4", lambda: batch.move(1, [0] * 3, rotations=[0, 0, 1])),
-                (r"^inserts\[0\].capsule.half_axes: has 2 numbers: give 3", lambda: batch.insert_capsules(1, [0] * 3, [1, 1], 1)),
+                (r"^inserts\[0\].capsule.half_axes: has 2 numbers: give 3",
+                 lambda: batch.insert_capsules(1, [0] * 3, [1, 1], 1)),
                 (r"^inserts\[0\].ball.radii: has 2 entries: give 1", lambda: batch.insert_balls(1, [0] * 3, [1, 1])),
                 (r"^relabels\[0\].tags: has 2 entries: give 1", lambda: batch.relabel(1, tags=[1, 2])),
                 (r"^remove_ids: has 3 bytes", lambda: batch.remove(b"123"))):

@@ -1,0 +1,16 @@
+"""Addresses and headers as they are given and as gRPC takes them."""
+import unittest
+
+from locus import connection
+
+
+class ConnectionTest(unittest.TestCase):
+    def test_the_default_port_is_added_where_none_is_named(self):
+        for address, target in (("localhost", "localhost:7575"), ("10.0.0.1:80", "10.0.0.1:80"), ("[::1]", "[::1]:7575"),
+                                ("[::1]:9", "[::1]:9"), ("unix:/run/locus.sock", "unix:/run/locus.sock")):
+            self.assertEqual(connection.target_of(address), target)
+
+    def test_only_a_legal_name_becomes_a_header(self):
+        self.assertEqual(connection.scene_metadata("arena-1"), [("x-scene", "arena-1")])
+        for name in ("", "Arena", "a b", "a\n", "ä", "x" * 64):
+            self.assertEqual(connection.scene_metadata(name), [])

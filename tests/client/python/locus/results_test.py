@@ -1,0 +1,62 @@
+"""Answers as columns: which rows belong to which query, and answers that contradict themselves."""
+import struct
+import unittest
+
+import grpc
+from locus import LocusError, QueryResult, schema
+from support import listed
+
+
+def answer(**columns):
+    """A result of one block with these columns."""
+    response = schema.message("QueryResponse")()
+    response.result.epoch, response.result.revision, response.result.tick = 7, 8, 9
+    response.result.blocks.add(**columns)
+    return QueryResult.from_bytes(response.SerializeToString())
+
+
+class ResultsTest(unittest.TestCase):
+    def test_rows_go_by_counts(self):
+        (block,) = answer(counts=struct.pack("<3I", 2, 0, 1), ids=struct.pack("<3Q", 5, 6, 7)).blocks
+        self.assertEqual([block.ids[block.rows_of(query)].tolist() for query in range(3)], [[5, 6], [], [7]])
+        self.assertEqual(block.rows, 3)
+
+    def test_without_counts_every_query_has_one_row(self):
+        (block,) = answer(ids=struct.pack("<2Q", 5, 0), normals=struct.pack("<6f", *range(6))).blocks
+        self.assertEqual((block.rows, block.rows_of(1)), (2, slice(1, 2)))
+        self.assertEqual(listed(block.normals), list(range(6)))
+
+    def test_any_column_tells_the_number_of_rows(self):
+        for name, size in (("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
+                           ("layers", 4), ("positions", 24)):
+            (block,) = answer(**{name: bytes(3 * size)}).blocks
+            self.assertEqual(block.rows, 3, name)
+
+    def test_columns_not_asked_for_are_empty(self):
+        (block,) = answer(ids=bytes(8)).blocks
+        for name in ("t", "triangles", "uvs", "normals", "points", "groups", "tags", "layers", "positions", "rotations",
+                     "counts", "truncated", "hits"):
+            self.assertEqual(len(getattr(block, name)), 0, name)
+        self.assertIsNone(block.work)
+
+    def test_an_answer_to_nothing_names_its_revision(self):
+        result = QueryResult.from_bytes(b"")
+        self.assertEqual((result.epoch, result.revision, result.tick, result.blocks, result.work), (0, 0, 0, (), None))
+        self.assertEqual((answer().epoch, answer().revision, answer().tick), (7, 8, 9))
+
+    def test_columns_of_unequal_length_are_a_contradiction(self):
+        for columns in (dict(ids=bytes(16), t=bytes(4)), dict(counts=struct.pack("<I", 3), t=bytes(8)),
+                        dict(t=bytes(5))):
+            (block,) = answer(**columns).blocks
+            with self.assertRaisesRegex(LocusError, "contradicts itself: t has") as raised:
+                block.t
+            self.assertEqual(raised.exception.code, grpc.StatusCode.DATA_LOSS)
+
+    def test_counts_that_are_no_numbers_are_a_contradiction(self):
+        (block,) = answer(counts=b"12345").blocks
+        with self.assertRaisesRegex(LocusError, "contradicts itself: counts has 5 bytes"):
+            block.counts
+
+    def test_columns_outlive_the_result(self):
+        ids = answer(ids=struct.pack("<2Q", 5, 6)).blocks[0].ids
+        self.assertEqual(listed(ids), [5, 6])
