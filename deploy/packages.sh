@@ -23,8 +23,8 @@ TEXT
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libssl-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
-# binutils gives nm to the house test.
-test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy"
+# binutils gives nm to the house test; zsh and fish run the completions; mandoc reads the manual pages.
+test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc"
 lint_packages="clang-tidy mypy"
 
 action=install

@@ -20,6 +20,7 @@ void add_demo_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
 void add_health_command(CLI::App& parent, Context& context);
 void add_version_command(CLI::App& parent, Context& context);
+void add_completion_command(CLI::App& parent, Context& context);
 
 // Runs `run(options, context)`, which returns an absl::Status, when `command` was chosen.
 template <class Options, class Run>

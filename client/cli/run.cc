@@ -24,7 +24,8 @@ constexpr char kExamples[] = R"(Examples:
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
 LOCUS_SCENE names the scene of commands that are given none.
-`locus COMMAND --help` shows a command's options and examples.)";
+`locus COMMAND --help` shows a command's options and examples. `source <(locus completion bash)` lets the shell complete
+lines of locus; zsh and fish have theirs.)";
 
 // What the parser has to say instead of running a command: help, which is code 0, or what is wrong with the line.
 struct Refusal {
@@ -96,6 +97,7 @@ void build_cli(CLI::App& app, Context& context) {
   add_limits_command(app, context);
   add_health_command(app, context);
   add_version_command(app, context);
+  add_completion_command(app, context);
 }
 
 ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {

@@ -27,6 +27,7 @@ ALLOWED = {
     "client/lib": ["proto"],
     "client/cli": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
     "client/cli/demo": ["client/cli", "client/cli/generate", "client/cli/import", "client/lib", "core/geometry", "core/base"],
+    "client/cli/completion": ["client/cli"],
     "client/cli/import": ["client/cli/import/*", "core/geometry", "core/base"],
     "client/cli/import/quake": ["client/cli/import", "core/geometry", "core/base"],
     "client/cli/generate": ["client/cli/import", "core/geometry", "core/base"],
