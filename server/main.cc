@@ -4,6 +4,7 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -24,10 +25,10 @@ namespace {
 constexpr int kEndedAtOnce = 130;
 
 // Messages of megabytes come and go all the time. By default glibc gives their memory back to the kernel each time,
-// which halves throughput.
-void keep_freed_memory() {
+// which halves throughput. Where memory is short, less is kept.
+void keep_freed_memory(uint64_t memory_limit) {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
-  mallopt(M_TRIM_THRESHOLD, 512 << 20);
+  mallopt(M_TRIM_THRESHOLD, static_cast<int>(std::min(uint64_t{512} << 20, memory_limit / 8)));
   mallopt(M_TOP_PAD, 16 << 20);
 }
 
@@ -61,6 +62,7 @@ void log_start(const Server& server, const ServerConfig& config) {
       {{"addresses", absl::StrJoin(server.addresses(), ",")},
        {"version", kVersion},
        {"threads", absl::StrCat(config.threads)},
+       {"memory_bytes", absl::StrCat(config.memory_limit)},
        {"receive_bytes", absl::StrCat(config.max_receive_bytes)},
        {"streams", absl::StrCat(config.max_streams)},
        {"storage", "memory only: scenes are lost at exit"}});
@@ -100,10 +102,12 @@ int run(const ServerConfig& config) {
 }  // namespace locus::server
 
 int main(int argc, char** argv) {
-  locus::server::keep_freed_memory();
   const locus::server::Invocation invocation =
       locus::server::read_invocation({argv + 1, argv + argc}, locus::server::process_environment);
-  if (invocation.config) return locus::server::run(*invocation.config);
+  if (invocation.config) {
+    locus::server::keep_freed_memory(invocation.config->memory_limit);
+    return locus::server::run(*invocation.config);
+  }
   std::fputs(invocation.text.c_str(), invocation.exit_code == 0 ? stdout : stderr);
   return invocation.exit_code;
 }

@@ -47,12 +47,14 @@ inline constexpr uint64_t kRecentItems = 1u << 20;     // ... while they replace
 inline constexpr uint32_t kDefaultWaitMs = 1000;       // at_least without a deadline
 inline constexpr uint32_t kTestsBetweenChecks = 4096;  // primitive tests between two looks at the deadline
 
-inline constexpr uint32_t kReceiveBytes = 32u << 20;  // one message
-inline constexpr uint32_t kMaxStreams = 1024;         // open update and query streams
-inline constexpr uint32_t kMaxCalls = 256;            // calls in work at once, streams apart
-inline constexpr uint32_t kMaxThreads = 256;          // that work on one batch
-inline constexpr uint32_t kMaxWaitingBatches = 1024;  // that wait for a helping thread; more work alone
-inline constexpr uint32_t kMaxDrainGraceS = 3600;     // for calls in work when the server is told to end
+inline constexpr uint32_t kReceiveBytes = 32u << 20;          // one message
+inline constexpr uint32_t kMaxStreams = 1024;                 // open update and query streams
+inline constexpr uint32_t kMaxCalls = 256;                    // calls in work at once, streams apart
+inline constexpr uint32_t kMaxThreads = 256;                  // that work on one batch
+inline constexpr uint32_t kMaxWaitingBatches = 1024;          // that wait for a helping thread; more work alone
+inline constexpr uint64_t kLeastMemory = uint64_t{64} << 20;  // bytes that a server may be told to get along with ...
+inline constexpr uint64_t kMostMemory = uint64_t{1} << 50;    // ... and the most it may be promised
+inline constexpr uint32_t kMaxDrainGraceS = 3600;             // for calls in work when the server is told to end
 inline constexpr uint32_t kMaxListenAddresses = 16;
 inline constexpr uint32_t kMaxPageSize = 1000;  // scenes or meshes a page
 

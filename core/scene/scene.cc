@@ -159,6 +159,14 @@ absl::StatusOr<SnapshotPtr> Scene::view(const View& view, std::chrono::steady_cl
   return latest_;
 }
 
+void Scene::forget_recent() {
+  std::deque<Recent> forgotten;  // freed after the lock, as in publish()
+  const MutexLock lock(mutex_);
+  forgotten.swap(recent_);
+  recent_.push_back({latest_, 0});
+  recent_items_ = 0;
+}
+
 void Scene::close() {
   const MutexLock lock(mutex_);
   closed_ = true;

@@ -66,6 +66,9 @@ class Scene {
   absl::StatusOr<SnapshotPtr> view(const View& view, std::chrono::steady_clock::time_point deadline) const
       LOCUS_EXCLUDES(mutex_);
 
+  // Keeps no revision but the latest for `exactly` views, until more come: gives memory back when it is short.
+  void forget_recent() LOCUS_EXCLUDES(mutex_);
+
   // The scene was deleted: wakes all who wait, refuses all that comes.
   void close() LOCUS_EXCLUDES(mutex_);
 

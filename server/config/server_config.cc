@@ -1,18 +1,17 @@
 #include "server/config/server_config.h"
 
-#include <sched.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
 #include <map>
-#include <thread>
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "server/config/listen_address.h"
+#include "server/config/machine.h"
 #include "server/config/version.h"
 
 namespace locus::server {
@@ -36,6 +35,14 @@ Examples:
 Try it: locus health; locus limits; locus scene create demo
 It ends on SIGTERM or SIGINT once calls in work are done, with exit code 0; a
 second signal ends it at once.)";
+
+// CLI11 has made a plain number of the size by now.
+std::string check_memory(const std::string& text) {
+  uint64_t bytes = 0;
+  const bool good =
+      absl::SimpleAtoi(text, &bytes) && (bytes == 0 || (bytes >= limits::kLeastMemory && bytes <= limits::kMostMemory));
+  return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 64MiB .. 1PiB");
+}
 
 // The options as CLI11 sees them, writing to `config`. CLI11 keeps pointers into it.
 void add_options(CLI::App& app, ServerConfig& config) {
@@ -67,6 +74,11 @@ void add_options(CLI::App& app, ServerConfig& config) {
   add_limit("--max-meshes", config.max_meshes, "Most meshes");
   add_limit("--max-streams", config.max_streams, "Most open update and query streams");
   add_limit("--max-calls", config.max_calls, "Most calls in work at once, streams apart");
+  app.add_option("--memory-limit", config.memory_limit,
+                 "Memory to hold before more is refused, such as 512MiB; 0 = 3/4 of what there is")
+      ->transform(CLI::AsSizeValue(false).description("SIZE"))
+      ->check(CLI::Validator(check_memory, ""))
+      ->capture_default_str();
   app.add_option("--drain-grace-s", config.drain_grace_s, "Seconds that calls in work may take after SIGTERM")
       ->check(CLI::Range(0u, limits::kMaxDrainGraceS))
       ->capture_default_str();
@@ -111,20 +123,21 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
   return all;
 }
 
-uint32_t usable_cores() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  const int count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 0;
-  const uint32_t cores = count > 0 ? static_cast<uint32_t>(count) : std::max(1u, std::thread::hardware_concurrency());
-  return std::min(cores, limits::kMaxThreads);
+// What the machine decides where the operator does not.
+void follow_machine(ServerConfig& config) {
+  const Machine machine = read_machine();
+  if (config.threads == 0) config.threads = std::min(machine.cores, limits::kMaxThreads);
+  if (config.memory_limit == 0) config.memory_limit = machine.memory_bytes / 4 * 3;
 }
 
 absl::Status reachable_from_outside(absl::string_view address) {
   return absl::InvalidArgumentError(absl::StrCat(
       "`", address,
-      "` can be reached from other machines, but this build has neither encryption nor passwords: anyone ",
-      "there could read and change every scene. Either listen on 127.0.0.1, [::1] or a unix socket and put a proxy ",
-      "with TLS in front, or, where every machine in reach is trusted, say so with --insecure or LOCUS_INSECURE=1"));
+      "` can be reached from other machines, but this version has neither TLS nor passwords: anyone there could read ",
+      "and change every scene. There are two ways out:\n",
+      "  1. Where only trusted machines reach it, such as a container whose port is published on its host's 127.0.0.1 ",
+      "only, say so with LOCUS_INSECURE=1 or --insecure.\n",
+      "  2. Otherwise listen on 127.0.0.1, [::1] or a unix socket, and put a proxy in front that ends TLS."));
 }
 
 Invocation mistake(absl::string_view message) {
@@ -144,7 +157,7 @@ Invocation parse_all(const std::vector<std::string>& arguments, const Environmen
   app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
   parse(app, with_environment(arguments, environment));
   if (const absl::Status status = check_config(config); !status.ok()) return mistake(status.message());
-  if (config.threads == 0) config.threads = usable_cores();
+  follow_machine(config);
   invocation.config = std::move(config);
   return invocation;
 }

@@ -27,8 +27,8 @@ struct ServerConfig {
   // scripts that start the daemon on port 0.
   std::string port_file;
 
-  // Threads that may work on one query batch, the caller's own included; 0 = the cores this process may use. Answers do
-  // not depend on it. Lower it to leave cores to others.
+  // Threads that may work on one query batch, the caller's own included; 0 = the cores this process may use, by its
+  // affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
   uint32_t threads = 0;
 
   // What is logged to standard error. `debug` adds a line for each refused call.
@@ -44,6 +44,11 @@ struct ServerConfig {
   uint32_t max_meshes = limits::kMaxMeshes;
   uint32_t max_streams = limits::kMaxStreams;  // open update and query streams; each costs a thread
   uint32_t max_calls = limits::kMaxCalls;      // calls in work at once, streams apart
+
+  // Bytes of memory that the process may hold before uploads, inserts and placements are refused; 0 = three quarters of
+  // what the machine or its control group has. The rest is for messages, answers and moves, which are not refused.
+  // Lower it to leave memory to others; above the default the kernel may end the process.
+  uint64_t memory_limit = 0;
 
   // Seconds that calls in work may take to finish after SIGTERM. Raise it where batches run long; keep it below what
   // the service manager waits before it kills.
@@ -68,7 +73,8 @@ struct Invocation {
   std::string text;
 };
 
-// `arguments` without the program's name. Never ends the process. The config is checked and `threads` is filled in.
+// `arguments` without the program's name. Never ends the process. The config is checked; `threads` and
+// `memory_limit` are filled in.
 Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment);
 
 // INVALID_ARGUMENT where an address cannot be listened to, or should not be without `insecure`.

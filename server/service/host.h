@@ -8,19 +8,26 @@
 #include "server/scheduling/change_queue.h"
 #include "server/scheduling/drain.h"
 #include "server/scheduling/gate.h"
+#include "server/scheduling/memory_budget.h"
 #include "server/scheduling/thread_group.h"
 #include "server/scheduling/worker_pool.h"
+#include "server/service/memory_use.h"
 
 namespace locus::server {
 
 struct Host {
   explicit Host(const ServerConfig& with)
-      : config(with), pool(with.threads), calls(with.max_calls), streams(with.max_streams) {}
+      : config(with),
+        memory(with.memory_limit, process_memory(registry)),
+        pool(with.threads),
+        calls(with.max_calls),
+        streams(with.max_streams) {}
 
   static constexpr uint32_t kChangeThreads = 2;
 
   const ServerConfig config;
   Registry registry;
+  MemoryBudget memory;
   WorkerPool pool;
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
   Gate calls;           // in work, streams apart

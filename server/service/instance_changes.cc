@@ -103,6 +103,17 @@ absl::Status check_placements(const StaticChange& change) {
       .status();
 }
 
+using SharedClaim = std::shared_ptr<const MemoryBudget::Claim>;
+
+// Room for the next set of instances while it is built. Removing is never refused.
+absl::StatusOr<SharedClaim> make_room(Host& host, const Scene& scene, const StaticChange& change) {
+  const uint64_t cost = change_cost(*scene.latest()->statics, change);
+  if (cost == 0) return nullptr;
+  absl::StatusOr<MemoryBudget::Claim> claim = host.memory.claim("place", cost);
+  if (!claim.ok()) return claim.status();
+  return std::make_shared<const MemoryBudget::Claim>(*std::move(claim));
+}
+
 void log_change(const Scene& scene, uint64_t number, const absl::StatusOr<InstanceChange>& change) {
   if (change.ok()) return;
   log(LogLevel::kInfo, "change of instances failed",
@@ -119,10 +130,12 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   if (!owned.ok()) return owned.status();
   if (request.no_wait())
     if (absl::Status status = check_placements((*owned)->change); !status.ok()) return status;
+  const absl::StatusOr<SharedClaim> room = make_room(host, **scene, (*owned)->change);
+  if (!room.ok()) return room.status();
   const auto outcome = std::make_shared<Outcome>();
   const uint64_t epoch = (*scene)->latest()->epoch;
   const absl::StatusOr<uint64_t> number =
-      host.changes.submit(epoch, [scene = *scene, owned = *owned, outcome](uint64_t change_number) {
+      host.changes.submit(epoch, [scene = *scene, owned = *owned, outcome, room = *room](uint64_t change_number) {
         absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
         log_change(*scene, change_number, change);
         outcome->set(std::move(change));

@@ -186,6 +186,9 @@ absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1
   if (!upload.ok()) return upload.status();
   const absl::StatusOr<bool> answered = answer_early(host, *upload, response);
   if (!answered.ok() || *answered) return answered.status();
+  const absl::StatusOr<MemoryBudget::Claim> room =
+      host.memory.claim("triangle_count", upload_cost(message.vertex_count(), message.triangle_count()));
+  if (!room.ok()) return room.status();
   absl::Status status = upload->append(message);
   while (status.ok() && reader.Read(&message)) status = upload->append_later(message);
   if (status.ok()) status = caller.stop();

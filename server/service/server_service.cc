@@ -29,6 +29,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"listed_item_errors", limits::kMaxListedItemErrors},
       {"reply_bytes", limits::kMaxReplyBytes},
       {"max_results", limits::kMaxMaxResults},
+      {"memory_bytes", static_cast<double>(host.memory.limit()), static_cast<double>(host.memory.used())},
       {"mesh_parts", limits::kMaxMeshParts},
       {"mesh_triangles", limits::kMaxMeshTriangles},
       {"mesh_vertices", limits::kMaxMeshVertices},

@@ -9,11 +9,22 @@ namespace {
 
 using Stream = BlockingStream<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse>;
 
-absl::Status apply(const Caller& caller, const std::string& name, const v1::UpdateBatch& batch, v1::UpdateAck* out) {
+// Room for what the batch needs while it is applied. A batch that inserts may be refused; others only change what is
+// there, or make room themselves.
+absl::StatusOr<MemoryBudget::Claim> make_room(Host& host, const UpdateBatch& batch) {
+  const UpdateCost cost = cost_of(batch);
+  if (cost.inserts) return host.memory.claim("inserts", cost.bytes);
+  return host.memory.claim_anyway(cost.bytes);
+}
+
+absl::Status apply(Host& host, const Caller& caller, const std::string& name, const v1::UpdateBatch& batch,
+                   v1::UpdateAck* out) {
   const absl::StatusOr<ScenePtr> scene = find_scene(caller, name, "scene");
   if (!scene.ok()) return scene.status();
   const absl::StatusOr<UpdateBatch> updates = to_updates(batch);
   if (!updates.ok()) return updates.status();
+  const absl::StatusOr<MemoryBudget::Claim> room = make_room(host, *updates);
+  if (!room.ok()) return room.status();
   const absl::StatusOr<UpdateAck> ack = (*scene)->apply(*updates);
   if (!ack.ok()) return ack.status();
   *out = to_proto(*ack);
@@ -25,7 +36,7 @@ absl::Status apply(const Caller& caller, const std::string& name, const v1::Upda
 grpc::Status UpdateService::ApplyUpdates(grpc::ServerContext* context, const v1::ApplyUpdatesRequest* request,
                                          v1::ApplyUpdatesResponse* response) {
   return serve(host_, *context, "ApplyUpdates", [&](const Caller& caller) {
-    return apply(caller, request->scene(), request->batch(), response->mutable_ack());
+    return apply(host_, caller, request->scene(), request->batch(), response->mutable_ack());
   });
 }
 
@@ -34,8 +45,8 @@ RawReactor* UpdateService::StreamUpdates(grpc::CallbackServerContext* context) {
     const Caller caller(host_, *context);
     return answer_all(
         stream, caller, "StreamUpdates",
-        [&caller](const std::string& scene, const v1::UpdateBatch& batch, v1::StreamUpdatesResponse* response) {
-          return apply(caller, scene, batch, response->mutable_ack());
+        [this, &caller](const std::string& scene, const v1::UpdateBatch& batch, v1::StreamUpdatesResponse* response) {
+          return apply(host_, caller, scene, batch, response->mutable_ack());
         });
   });
 }

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "core/base/check.h"
+#include "core/base/limits.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "locus/v1/scene_service.grpc.pb.h"
 #include "locus/v1/server_service.grpc.pb.h"
@@ -54,6 +55,7 @@ inline server::ServerConfig test_config() {
   server::ServerConfig config;
   config.listen = {"127.0.0.1:0"};
   config.threads = 2;
+  config.memory_limit = limits::kMostMemory;
   config.log_level = server::LogLevel::kError;
   return config;
 }

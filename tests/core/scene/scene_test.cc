@@ -114,6 +114,16 @@ TEST_F(SceneTest, RevisionsAreKeptWhileTheyReplacedAtMostTheLimitOfObjects) {
   EXPECT_EQ((*scene_.view(exactly(2), kNow))->objects.find(1)->shape.position.x, 1);
 }
 
+TEST_F(SceneTest, ForgettingKeepsTheLatestRevisionAndThoseToCome) {
+  tick(3);
+  scene_.forget_recent();
+  expect_outside(2, "3 to 3");
+  EXPECT_EQ((*scene_.view(exactly(3), kNow))->revision, 3u);
+  tick(1);
+  EXPECT_EQ((*scene_.view(exactly(3), kNow))->revision, 3u);
+  EXPECT_EQ((*scene_.view(exactly(4), kNow))->revision, 4u);
+}
+
 TEST_F(SceneTest, AnotherEpochIsRefusedByEveryView) {
   for (const View::Kind kind : {View::Kind::kLatest, View::Kind::kAtLeast, View::Kind::kExactly})
     expect_refusal(scene_.view({kind, 0, kEpoch + 1}, far_away()).status(), absl::StatusCode::kFailedPrecondition,

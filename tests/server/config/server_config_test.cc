@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <map>
+
+#include "server/config/machine.h"
 
 namespace locus::server {
 namespace {
@@ -69,10 +72,12 @@ TEST_F(ServerConfigTest, TheFileMayListAddresses) {
 TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
   write_file("no-such-option = 1\n");
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
-      {{"--max-scenes", "0"}, "--max-scenes"}, {{"--max-scenes", "1000000"}, "--max-scenes"},
-      {{"--threads", "many"}, "--threads"},    {{"--log-level", "loud"}, "--log-level"},
-      {{"--listen", "nowhere"}, "nowhere"},    {{"--no-such-option"}, "--no-such-option"},
-      {{"--config", file_}, "no-such-option"}, {{"--config", "/no/such/file"}, "/no/such/file"},
+      {{"--max-scenes", "0"}, "--max-scenes"},        {{"--max-scenes", "1000000"}, "--max-scenes"},
+      {{"--threads", "many"}, "--threads"},           {{"--log-level", "loud"}, "--log-level"},
+      {{"--listen", "nowhere"}, "nowhere"},           {{"--no-such-option"}, "--no-such-option"},
+      {{"--memory-limit", "lots"}, "--memory-limit"}, {{"--memory-limit", "1"}, "64MiB"},
+      {{"--memory-limit", "2PiB"}, "1PiB"},           {{"--memory-limit", "-1"}, "--memory-limit"},
+      {{"--config", file_}, "no-such-option"},        {{"--config", "/no/such/file"}, "/no/such/file"},
   };
   for (const auto& [arguments, named] : cases) {
     const Invocation invocation = read(arguments);
@@ -88,7 +93,9 @@ TEST_F(ServerConfigTest, ListeningBeyondTheMachineNeedsASecondWord) {
   EXPECT_FALSE(refused.config.has_value());
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.text, HasSubstr("0.0.0.0:7575"));
+  EXPECT_THAT(refused.text, HasSubstr("two ways out"));
   EXPECT_THAT(refused.text, HasSubstr("127.0.0.1"));
+  EXPECT_THAT(refused.text, HasSubstr("proxy in front that ends TLS"));
   EXPECT_THAT(refused.text, HasSubstr("--insecure"));
   EXPECT_THAT(refused.text, HasSubstr("LOCUS_INSECURE=1"));
   EXPECT_TRUE(read({"--listen", "0.0.0.0:7575", "--insecure"}).config.has_value());
@@ -96,6 +103,23 @@ TEST_F(ServerConfigTest, ListeningBeyondTheMachineNeedsASecondWord) {
   EXPECT_TRUE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
   environment_ = {{"LOCUS_INSECURE", "0"}};
   EXPECT_FALSE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
+}
+
+TEST_F(ServerConfigTest, ThreadsAndMemoryFollowTheMachineUnlessGiven) {
+  const Machine machine = read_machine();
+  const ServerConfig followed = *read({}).config;
+  EXPECT_EQ(followed.threads, std::min(machine.cores, limits::kMaxThreads));
+  EXPECT_EQ(followed.memory_limit, machine.memory_bytes / 4 * 3);
+  const ServerConfig given = *read({"--threads", "7", "--memory-limit", "512MiB"}).config;
+  EXPECT_EQ(given.threads, 7u);
+  EXPECT_EQ(given.memory_limit, uint64_t{512} << 20);
+}
+
+TEST_F(ServerConfigTest, SizesAreReadFromTheEnvironmentAndTheFileToo) {
+  write_file("memory-limit = 2GiB\n");
+  EXPECT_EQ(read({"--config", file_}).config->memory_limit, uint64_t{2} << 30);
+  environment_ = {{"LOCUS_CONFIG", file_}, {"LOCUS_MEMORY_LIMIT", "1g"}};
+  EXPECT_EQ(read({}).config->memory_limit, uint64_t{1} << 30);
 }
 
 TEST_F(ServerConfigTest, HelpExplainsWithExamplesAndEndsWithZero) {

@@ -1,0 +1,73 @@
+#include "server/scheduling/memory_budget.h"
+
+#include "absl/strings/str_cat.h"
+#include "core/base/refusal.h"
+
+namespace locus::server {
+
+MemoryBudget::MemoryBudget(uint64_t limit, Meter meter) : limit_(limit), meter_(std::move(meter)) {
+  MutexLock lock(mutex_);
+  measure();
+}
+
+void MemoryBudget::measure() {
+  measured_ = meter_.used();
+  ended_since_ = 0;
+}
+
+// Work under way counts twice as far as it holds already what it claimed: too much rather than too little.
+bool MemoryBudget::fits(uint64_t bytes) const {
+  const uint64_t taken = measured_ + ended_since_ + claimed_;
+  return taken <= limit_ && bytes <= limit_ - taken;
+}
+
+bool MemoryBudget::make_room(uint64_t bytes) {
+  if (!fits(bytes) || ended_since_ > limit_ / kStepShare) measure();
+  if (fits(bytes)) return true;
+  // What can never fit is not worth the trouble.
+  if (bytes > limit_) return false;
+  meter_.give_back();
+  measure();
+  return fits(bytes);
+}
+
+absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field, uint64_t bytes) {
+  MutexLock lock(mutex_);
+  if (make_room(bytes)) {
+    claimed_ += bytes;
+    return Claim(this, bytes);
+  }
+  Refusal refusal;
+  refusal.reason = Reason::kLimit;
+  refusal.field = std::string(field);
+  refusal.limit = "memory_bytes";
+  refusal.limit_value = static_cast<double>(limit_);
+  refusal.asked = static_cast<double>(measured_ + claimed_ + bytes);
+  return refuse(
+      absl::StatusCode::kResourceExhausted,
+      absl::StrCat("limit memory_bytes is ", limit_, ", of which ", measured_ + claimed_, " are taken; this may need ",
+                   bytes, " more. Delete scenes or meshes, remove objects, send smaller batches, or start locusd ",
+                   "with a larger --memory-limit"),
+      refusal);
+}
+
+MemoryBudget::Claim MemoryBudget::claim_anyway(uint64_t bytes) {
+  MutexLock lock(mutex_);
+  // Nobody can be refused, so looking now and then is enough.
+  if (ended_since_ > limit_ / kStepShare) make_room(bytes);
+  claimed_ += bytes;
+  return Claim(this, bytes);
+}
+
+uint64_t MemoryBudget::used() const {
+  MutexLock lock(mutex_);
+  return meter_.used();
+}
+
+void MemoryBudget::end(uint64_t bytes) {
+  MutexLock lock(mutex_);
+  claimed_ -= bytes;
+  ended_since_ += bytes;
+}
+
+}  // namespace locus::server
