@@ -9,10 +9,12 @@ usage() {
 usage: deploy/packages.sh [--list|--check] SET...
 
 sets:
-  build   what configuring and building locusd and locus needs
-  python  what building and using the Python package needs
-  test    what tests/run.sh needs on top of it
-  lint    what tests/run.sh --long needs on top of both
+  build      what configuring and building locusd and locus needs
+  python     what building and using the Python package needs
+  test       what tests/run.sh needs on top of build
+  lint       what tests/run.sh --long needs on top of these
+  container  what tests/container.sh needs to build and run the image without a registry or a daemon
+  runtime    what locusd and locus need to run once they are built; the image has nothing else
 
   --list    print the names of the packages and do nothing
   --check   print the names of the missing packages; exit 1 if there is one
@@ -26,6 +28,10 @@ python_packages="python3 python3-grpcio python3-protobuf"
 # binutils gives nm to the house test; zsh and fish run the completions; mandoc reads the manual pages.
 test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc"
 lint_packages="clang-tidy mypy"
+# systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
+container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
+# The libraries that the programs name themselves; these bring their own.
+runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libssl3 libstdc++6"
 
 action=install
 packages=
@@ -35,6 +41,8 @@ for argument in "$@"; do
     python) packages="$packages $python_packages" ;;
     test) packages="$packages $test_packages" ;;
     lint) packages="$packages $lint_packages" ;;
+    container) packages="$packages $container_packages" ;;
+    runtime) packages="$packages $runtime_packages" ;;
     --list) action=list ;;
     --check) action=check ;;
     -h | --help) usage; exit 0 ;;

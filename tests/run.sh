@@ -3,7 +3,7 @@
 #
 #   ./tests/run.sh                  release (everything), tsan (what has threads), asan (everything but the long ones)
 #   ./tests/run.sh --only asan      one suite: release, tsan or asan
-#   ./tests/run.sh --long           also the tests labelled long and clang-tidy
+#   ./tests/run.sh --long           also the tests labelled long, clang-tidy and the container
 #   ./tests/run.sh --jobs 8         compile and test with 8 jobs (default: one a processor)
 #
 # Exits 0 only if nothing failed. A suite that cannot be installed, configured or built counts as one failure.
@@ -53,8 +53,8 @@ finish() {
   exit
 }
 
-# Adds the results that ctest wrote to the sums.
-count_results() {
+# Adds the lines on standard input to the sums: `passed`, `skipped` or `failed` and a name each.
+count_lines() {
   local suite=$1 kind name
   while read -r kind name; do
     case "$kind" in
@@ -62,7 +62,20 @@ count_results() {
       skipped) skipped=$((skipped + 1)) ;;
       failed) fail "$suite: $name" ;;
     esac
-  done < <(/usr/bin/python3 tests/house/read_results.py "build/$suite/results.xml" || echo "failed no readable results")
+  done
+}
+
+# Adds the results that ctest wrote to the sums.
+count_results() {
+  count_lines "$1" < <(/usr/bin/python3 tests/house/read_results.py "build/$1/results.xml" || echo "failed no readable results")
+}
+
+# The image and a container of it. Counted only if the script came to its end.
+run_container() {
+  say "container"
+  ./tests/container.sh || true
+  if ! tail -n 1 build/container/results.txt | grep -q "^ended"; then fail "container: did not come to its end"; fi
+  count_lines container < build/container/results.txt
 }
 
 # GCC 12's ThreadSanitizer stops where the kernel randomises addresses over more bits than it knows of.
@@ -95,6 +108,7 @@ case "$long $suites" in
   "yes release"*)
     say "clang-tidy"
     if /usr/bin/python3 tests/house/tidy.py build/release --jobs "$jobs"; then passed=$((passed + 1)); else fail "clang-tidy"; fi
+    run_container
     ;;
 esac
 finish

@@ -1,0 +1,239 @@
+#!/usr/bin/env bash
+# Builds the image of deploy/Dockerfile and shows what a container of it does, without a registry or a Docker daemon: the
+# base comes from this machine's Debian sources, buildah builds, podman runs. Checks the compose file and the systemd
+# unit too. Everything lies under build/container and is used again by the next run. Needs root.
+#
+#   ./tests/container.sh            ends with: N passed, M failed, K skipped
+#   ./tests/container.sh --fresh    first removes what earlier runs built
+#
+# Writes one line a check, passed, failed or skipped and its name, to build/container/results.txt, and `ended` last.
+# shellcheck disable=SC2016,SC2317  # $(ORIGIN) is for apt-get; functions are called through check
+set -uo pipefail
+cd "$(dirname "$0")/.." || exit
+exec < /dev/null
+
+store=$PWD/build/container
+results=$store/results.txt
+log=$store/log.txt
+image=localhost/locus
+base=localhost/debian:12-slim
+
+case "${1-}" in
+  "") ;;
+  --fresh) rm -rf "$store" ;;
+  *) sed -n '2,9s/^# \{0,1\}//p' "$0"; [ "$1" = --help ]; exit ;;
+esac
+mkdir -p "$store" && : > "$results" && : > "$log" || exit
+
+containers=()
+composed=no
+work=$(mktemp -d /tmp/locus-container.XXXXXX) || exit
+
+clean_up() {
+  if [ "$composed" = yes ]; then compose down --volumes; podman network rm "$(basename "$work" | tr -d .)_default"; fi
+  for id in ${containers[@]+"${containers[@]}"}; do podman rm --force --volumes --time 1 "$id"; done
+  rm -rf "$work"
+} >> "$log" 2>&1
+trap clean_up EXIT
+
+finish() {
+  echo ended >> "$results"
+  printf '%s passed, %s failed, %s skipped\n' "$(grep -c ^passed "$results")" "$(grep -c ^failed "$results")" \
+    "$(grep -c ^skipped "$results")"
+  ! grep -q ^failed "$results" && grep -q ^passed "$results"
+  exit
+}
+
+report() { echo "$1 $2" | tee -a "$results"; }
+
+# check NAME COMMAND...: passes when the command does. What it prints goes to the log, and is shown if it fails.
+check() {
+  local name=$1 outcome=failed
+  shift
+  "$@" > "$work/output" 2>&1 && outcome=passed
+  report $outcome "$name"
+  [ $outcome = passed ] || tail -n 40 "$work/output" | sed 's/^/    /'
+  { echo "--- $name: $outcome"; cat "$work/output"; } >> "$log"
+}
+
+skip() { report skipped "$1"; echo "    SKIP: $2"; }
+
+# Without this the checks that follow make no sense.
+need() {
+  local before
+  before=$(grep -c ^failed "$results")
+  check "$@"
+  [ "$(grep -c ^failed "$results")" = "$before" ] || finish
+}
+
+# Storage and settings of our own. runc rather than crun, and limits no higher than a process without CAP_SYS_RESOURCE
+# may set: containers run inside containers this way.
+set_up_podman() {
+  local driver=overlay
+  [ "$(stat -f -c %T "$store")" = overlayfs ] && driver=vfs
+  cat > "$work/containers.conf" << TEXT
+[containers]
+default_ulimits = ["nofile=1024:1024", "nproc=1024:1024"]
+[engine]
+runtime = "runc"
+cgroup_manager = "cgroupfs"
+events_logger = "file"
+[network]
+network_config_dir = "$work/networks"
+TEXT
+  cat > "$work/storage.conf" << TEXT
+[storage]
+driver = "$driver"
+graphroot = "$store/storage"
+runroot = "$work/run"
+TEXT
+  export CONTAINERS_CONF=$work/containers.conf CONTAINERS_STORAGE_CONF=$work/storage.conf
+  podman info
+}
+
+# A minimal Debian from the sources that apt on this machine knows.
+make_base() {
+  if buildah inspect "$base" > /dev/null 2>&1; then echo "there already"; return 0; fi
+  mkdir -p "$work/base"
+  apt-get indextargets --format '$(ORIGIN) deb $(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' \
+    | sed -n 's/^Debian deb/deb/p' | sort -u > "$work/base.list"
+  mmdebstrap --variant=minbase bookworm "$work/base/rootfs.tar" "$work/base.list" || return
+  printf 'FROM scratch\nADD rootfs.tar /\n' > "$work/base/Dockerfile"
+  buildah build --isolation chroot --tag "$base" "$work/base"
+}
+
+build_image() {
+  buildah build --isolation chroot --format docker --layers --build-arg BASE="$base" --file deploy/Dockerfile \
+    --ignorefile deploy/Dockerfile.dockerignore --tag "$image" .
+}
+
+# Starts a container with the given options and waits until it answers; sets `id`. Hardened as compose.yaml has it.
+start() {
+  # conmon notes where it stands when the kernel ends a container for want of memory.
+  id=$(cd "$work" && podman run --detach --read-only --cap-drop all --security-opt no-new-privileges --env LOCUS_INSECURE=1 \
+    --publish 127.0.0.1::7575 "$@" "$image") || return
+  containers+=("$id")
+  for _ in $(seq 100); do
+    podman exec "$id" locus health && return
+    sleep 0.2
+  done
+  podman logs "$id"
+  return 1
+}
+
+# In the container itself.
+inside() { podman exec --interactive "$id" "$@"; }
+# A client of its own: another container, through the port that is published on this machine's loopback.
+client() {
+  podman run --rm --interactive --network host --env LOCUS_ADDRESS="$(podman port "$id" 7575/tcp)" --entrypoint locus "$image" "$@"
+}
+compose() {
+  LOCUS_PORT=$compose_port podman-compose --project-name "$(basename "$work" | tr -d .)" --file deploy/compose.yaml "$@"
+}
+
+free_port() { /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
+refuses_without_a_word() {
+  local output code
+  output=$(podman run --rm "$image" 2>&1)
+  code=$?
+  printf '%s\n' "$output"
+  [ "$code" = 2 ] && grep -q LOCUS_INSECURE=1 <<< "$output" && grep -q "proxy in front that ends TLS" <<< "$output"
+}
+holds_no_tools() {
+  podman run --rm --entrypoint sh "$image" -c '
+    for tool in cc c++ gcc g++ ld make cmake ninja git python3 protoc; do command -v $tool && exit 1; done
+    dpkg-query -W -f "\${Package}\n" | grep -E -- "-dev$|^(gcc|g[+][+]|cpp|clang)(-[0-9]+)?$" && exit 1; exit 0'
+}
+finds_its_libraries() {
+  podman run --rm --entrypoint sh "$image" -c 'ldd /usr/local/bin/locusd /usr/local/bin/locus | grep "not found" && exit 1; exit 0'
+}
+runs_as_nobody_else() { [ "$(podman run --rm --entrypoint id "$image" -u):$(inside id -g)" = 10001:10001 ]; }
+says_its_version() {
+  local label
+  label=$(podman image inspect --format '{{index .Labels "org.opencontainers.image.version"}}' "$image")
+  [ "$(podman run --rm "$image" --version)" = "locusd $label" ]
+}
+root_is_read_only() { ! inside touch /file && inside touch /var/lib/locus/file; }
+has_no_capability() { [ "$(inside sed -n 's/^Cap[A-Z][a-z]*:\t//p;s/^NoNewPrivs:\t//p' /proc/1/status | tr '\n' ' ')" = \
+  "0000000000000000 0000000000000000 0000000000000000 0000000000000000 0000000000000000 1 " ]; }
+is_healthy() { podman healthcheck run "$id"; }
+started_with() { podman logs "$id" 2>&1 | grep " serving " | grep -w -- "$1"; }
+lists_its_memory() { client -o ndjson limits | grep '"memory_bytes"' | grep -w 201326592; }
+# A mesh whose tree would not fit: refused, and nothing is lost.
+refuses_what_does_not_fit() {
+  local output code
+  client scene create full || return
+  output=$(client generate city --triangles 3000000 --seed 1 --scene full 2>&1)
+  code=$?
+  printf '%s\n' "$output"
+  [ "$code" != 0 ] && grep -q memory_bytes <<< "$output" && client scene describe full
+}
+answers_inside() { inside locus run - < "$1"; }
+answers_outside() { client run - < "$1"; }
+ends_in_order() {
+  podman stop --time 20 "$id" && [ "$(podman inspect --format '{{.State.ExitCode}}' "$id")" = 0 ] \
+    && podman logs "$id" 2>&1 | grep " ended"
+}
+compose_starts() {
+  compose up --detach || return
+  for _ in $(seq 100); do
+    podman run --rm --network host --env LOCUS_ADDRESS=127.0.0.1:"$compose_port" --entrypoint locus "$image" health && return
+    sleep 0.2
+  done
+  return 1
+}
+unit_is_correct() {
+  local output
+  sed 's#/usr/local/bin/locusd#/bin/true#' deploy/locusd.service > "$work/locusd.service"
+  # It ends well whatever it complains about.
+  output=$(systemd-analyze verify --man=no "$work/locusd.service" 2>&1) || return
+  printf '%s' "$output"
+  [ -z "$output" ]
+}
+# Exposure in tenths: 0 is none, 100 all.
+unit_is_hardened() { systemd-analyze security --offline=true --threshold=15 deploy/locusd.service; }
+
+check_image() {
+  check "the image holds no tools" holds_no_tools
+  check "the image holds all libraries" finds_its_libraries
+  check "the image's label is the daemon's version" says_its_version
+  check "without LOCUS_INSECURE=1 it refuses and explains both ways out" refuses_without_a_word
+}
+
+check_container() {
+  need "a hardened container with limits answers" start --memory 256m --cpus 1
+  check "its health check passes" is_healthy
+  check "it runs as user 10001" runs_as_nobody_else
+  check "its root is read-only, its folder is not" root_is_read_only
+  check "it has no capability and can gain none" has_no_capability
+  check "its threads follow the processor time it is given" started_with threads=1
+  check "its memory follows the limit it is given" started_with memory_bytes=201326592
+  check "locus limits lists its memory" lists_its_memory
+  check "it answers the example script from inside" answers_inside client/cli/script/examples/first_steps.locus
+  check "it answers the example script through its port" answers_outside client/cli/script/examples/first_steps.locus
+  check "it refuses a mesh that would not fit and lives on" refuses_what_does_not_fit
+  check "it ends in order when it is stopped" ends_in_order
+  if [ "$(nproc)" -gt 1 ]; then
+    need "a container on one processor answers" start --cpuset-cpus 0
+    check "its threads follow the processors it may use" started_with threads=1
+  else
+    skip "threads follow the processors" "this machine has one"
+  fi
+}
+
+if [ "$(id -u)" != 0 ]; then
+  skip "image and container" "building and running them needs root"
+  finish
+fi
+need "packages" ./deploy/packages.sh container
+check "the systemd unit is correct" unit_is_correct
+check "the systemd unit's exposure is at most 1.5 of 10" unit_is_hardened
+need "podman is set up" set_up_podman
+need "base image" make_base
+need "image" build_image
+check_image
+check_container
+compose_port=$(free_port)
+composed=yes
+check "compose starts it on this machine's loopback" compose_starts
+finish
