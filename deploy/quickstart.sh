@@ -30,14 +30,14 @@ entry=maps/delta.bsp
 say() { printf '\n== %s\n' "$*"; }
 
 say "1/5 packages"
-./deploy/packages.sh build
+./deploy/packages.sh build python
 
 say "2/5 build into $build"
 if [ ! -f "$build/build.ninja" ]; then
   cmake --preset release -DLOCUS_TESTS=OFF > build.log.$$ 2>&1 || { cat build.log.$$; rm -f build.log.$$; exit 1; }
   rm -f build.log.$$
 fi
-cmake --build "$build" --target locusd locus
+cmake --build "$build" --target locusd locus locus_python
 
 # The level's package is downloaded and unpacked, never installed.
 download_level() {

@@ -12,24 +12,24 @@ from __future__ import annotations
 import re
 import sys
 import textwrap
-from typing import Dict, Iterator, List, Tuple
+from typing import Any, Dict, Iterator, List, Tuple
 
 try:
-    from google.protobuf import descriptor_pb2
+    from google.protobuf import descriptor_pb2  # type: ignore[import]
 except ImportError:
     sys.exit("make_schema.py: Debian's python3-protobuf is missing: run ./deploy/packages.sh python")
 
-Field = descriptor_pb2.FieldDescriptorProto
+Field: Any = descriptor_pb2.FieldDescriptorProto
 FIXED_WIDTH = {Field.TYPE_FLOAT, Field.TYPE_DOUBLE, Field.TYPE_FIXED32, Field.TYPE_FIXED64, Field.TYPE_SFIXED32,
                Field.TYPE_SFIXED64}
 PACKAGE = "locus.v1"
 ENUM_TYPE, ENUM_VALUE = 5, 2  # field numbers in FileDescriptorProto and EnumDescriptorProto, for paths of comments
 
 
-def is_column(field: Field) -> bool:
+def is_column(field: Any) -> bool:
     """True for packed numbers of fixed width. Varints are no columns: their width depends on their value."""
     packed = not field.options.HasField("packed") or field.options.packed
-    return field.label == Field.LABEL_REPEATED and field.type in FIXED_WIDTH and packed
+    return bool(field.label == Field.LABEL_REPEATED and field.type in FIXED_WIDTH and packed)
 
 
 def mirror(files: descriptor_pb2.FileDescriptorSet) -> descriptor_pb2.FileDescriptorSet:

@@ -81,7 +81,7 @@ def report(costs: Sequence[Cost], rays: int, hits: int) -> List[str]:
     encode, wait, decode = (statistics.median(column) / rays for column in zip(*costs))
     own = statistics.median(cost.encode + cost.decode for cost in costs) / rays
     return [f"rays a sweep            {rays}", f"sweeps                  {len(costs)}", f"hits                    {hits}",
-            f"columns                 {'numpy' if locus.columns.numpy else 'array.array'}",
+            f"columns                 {'numpy' if locus.columns.HAS_NUMPY else 'array.array'}",
             f"encode, ns a ray        {encode:.2f}", f"decode, ns a ray        {decode:.2f}",
             f"client time, ns a ray   {own:.2f}", f"wait, ns a ray          {wait:.1f}"]
 

@@ -13,7 +13,7 @@ from .columns import ColumnLike, Values
 from .connection import Retry
 from .enums import Column, Cull, Inside, Precision, RayMode, Reason, SceneState, Source, StaticDetail, Winding
 from .errors import LocusError
-from .meshes import InstanceChange, PlacedInstances
+from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import Block, QueryBatch
 from .query_stream import QueryStream
 from .results import NO_TRIANGLE, BlockResult, QueryResult
@@ -23,8 +23,8 @@ from .values import Ack, ItemError, Limit, Mesh, MeshPart, Revision, Scene, Serv
 
 __all__ = [
     "Ack", "Block", "BlockResult", "Client", "Column", "ColumnLike", "Cull", "DEFAULT_ADDRESS", "Inside",
-    "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshPart", "NO_TRIANGLE", "PlacedInstances",
-    "Precision", "QueryBatch", "QueryResult", "QueryStream", "RayMode", "Reason", "Retry", "Revision", "Scene",
-    "SceneState", "Server", "Source", "StaticDetail", "UpdateBatch", "UpdateStream", "Values", "Winding", "Work",
-    "connect",
+    "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
+    "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream", "RayMode", "Reason", "Retry",
+    "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail", "UpdateBatch", "UpdateStream", "Values",
+    "Winding", "Work", "connect",
 ]

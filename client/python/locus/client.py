@@ -20,7 +20,7 @@ from . import columns, meshes, schema
 from .connection import Connection, Retry, scene_metadata
 from .enums import Winding
 from .errors import LocusError, from_call, parsed
-from .meshes import InstanceChange, PlacedInstances
+from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import QueryBatch
 from .query_stream import QueryStream
 from .results import QueryResult
@@ -130,6 +130,17 @@ class Client:
         except grpc.RpcError as failure:
             raise from_call(failure) from None
         return Mesh.of(parsed(rpc.response, raw).mesh)
+
+    def download_mesh(self, name: str) -> MeshColumns:
+        """An uploaded mesh as it is stored: 3V float32 vertices and 3T uint32 indices."""
+        rpc = _rpc("Scene", "DownloadMesh")
+        call = self._connection.channel.unary_stream(rpc.path)
+        try:
+            pieces = [parsed(rpc.response, raw) for raw in
+                      call(rpc.request(mesh=name).SerializeToString(), timeout=self._connection.long_timeout)]
+        except grpc.RpcError as failure:
+            raise from_call(failure) from None
+        return MeshColumns.of(pieces)
 
     def meshes(self) -> List[Mesh]:
         """All uploaded meshes, ascending by name."""

@@ -1,8 +1,8 @@
 """Columns between Python and the wire: any buffer or list goes in, numpy arrays or array.array come out.
 
 A column is packed little-endian numbers, several to an entry where an entry is a vector: N positions are 3N float32.
-Going in, a buffer of the right type (numpy array of any shape, array.array, memoryview) is copied once, in C order, so
-arrays with gaps are fine; `bytes` and `bytearray` are taken as they are; numbers and (nested) lists are converted.
+Going in, a buffer of the right type (numpy array of any shape, array.array, memoryview) is taken in C order, so arrays
+with gaps are fine; `bytes` and `bytearray` are taken as they are; numbers and (nested) lists are converted.
 Nothing of another type is converted silently: float64 given for float32 would round, int64 for ids would wrap.
 
 Coming out, a column is a numpy array over the received bytes, without a copy and therefore read-only, of shape (R,) or
@@ -13,15 +13,19 @@ from __future__ import annotations
 import array
 import itertools
 import numbers
-from typing import Any, Iterable, Iterator, List, NamedTuple, Optional, Protocol, Union
+from typing import Any, Iterable, Iterator, List, NamedTuple, Protocol, Tuple, Union
 
 try:
     import numpy
 except ImportError:
     numpy = None  # type: ignore[assignment]
 
+HAS_NUMPY = numpy is not None
+
 # What a column can be given as: a buffer, bytes, one number, a list of numbers or a list of vectors.
 ColumnLike = Any
+# A column's bytes, little-endian.
+Raw = Union[bytes, bytearray, memoryview]
 
 
 class Values(Protocol):
@@ -41,14 +45,15 @@ class Kind(NamedTuple):
     name: str
     code: str
     size: int
-    formats: str
+    formats: Tuple[str, ...]
 
 
-FLOAT32 = Kind("float32", "f", 4, "f")
-FLOAT64 = Kind("float64", "d", 8, "d")
-UINT32 = Kind("uint32", "I", 4, "IL")
-UINT64 = Kind("uint64", "Q", 8, "QL")
-UINT8 = Kind("uint8", "B", 1, "B")
+FLOAT32 = Kind("float32", "f", 4, ("f",))
+FLOAT64 = Kind("float64", "d", 8, ("d",))
+UINT32 = Kind("uint32", "I", 4, ("I", "L"))
+UINT64 = Kind("uint64", "Q", 8, ("Q", "L"))
+UINT8 = Kind("uint8", "B", 1, ("B",))
+_DTYPES = {} if numpy is None else {kind.code: numpy.dtype(kind.name) for kind in (FLOAT32, FLOAT64, UINT32, UINT64, UINT8)}
 _NAMES = {"e": "float16", "f": "float32", "d": "float64", "?": "bool"}
 
 
@@ -63,11 +68,14 @@ def _name_of(view: memoryview) -> str:
     return f"'{view.format}'"
 
 
-def _from_buffer(path: str, view: memoryview, kind: Kind) -> bytes:
-    same = view.itemsize == kind.size and view.format.lstrip("@=<") in tuple(kind.formats)
-    if not same:
+def _from_buffer(path: str, view: memoryview, kind: Kind) -> Raw:
+    """The view's bytes in C order, borrowed where they lie so already."""
+    format = view.format
+    if view.itemsize != kind.size or (format not in kind.formats and format.lstrip("@=<") not in kind.formats):
         raise TypeError(f"{path}: holds {_name_of(view)}, but {kind.name} is wanted: convert it, "
                         f"for example with .astype('{kind.name}')")
+    if view.c_contiguous and len(format) == 1:
+        return view.cast("B")
     return view.tobytes()
 
 
@@ -86,16 +94,17 @@ def _from_numbers(path: str, value: Any, kind: Kind) -> bytes:
         raise TypeError(f"{path}: {error}: give {kind.name} numbers, as a list or a buffer") from error
 
 
-def encode(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> bytes:
-    """The column as it goes over the wire; None is an empty one.
+def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
+    """The column as it goes over the wire; None is an empty one. A buffer is not copied: it is read when it is sent.
 
     `path` names the column in errors. TypeError for numbers of another type, ValueError if there are not `width`
-    numbers for each entry. One copy of a buffer; linear for lists.
+    numbers for each entry. Linear for lists and for arrays with gaps.
     """
     if value is None:
         return b""
+    raw: Raw
     if isinstance(value, (bytes, bytearray)):
-        raw = bytes(value)
+        raw = value
     elif isinstance(value, (float, int, list, tuple)):
         raw = _from_numbers(path, value, kind)
     else:
@@ -111,34 +120,42 @@ def encode(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> bytes:
     return raw
 
 
-def entries(raw: bytes, kind: Kind, width: int = 1) -> int:
+def entries(raw: Raw, kind: Kind, width: int = 1) -> int:
     """Number of entries of an encoded column."""
     return len(raw) // (kind.size * width)
 
 
-def encode_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> bytes:
-    """Like encode(), for a column that holds `count` entries, one for all, or none; ValueError otherwise."""
-    raw = encode(path, value, kind, width)
+def borrow_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> Raw:
+    """Like borrow(), for a column that holds `count` entries, one for all, or none; ValueError otherwise."""
+    raw = borrow(path, value, kind, width)
     found = entries(raw, kind, width)
     if found not in (0, 1, count):
         raise ValueError(f"{path}: has {found} entries: give {count}, one for all, or none")
     return raw
 
 
-def decode(raw: Union[bytes, memoryview], kind: Kind, width: int = 1) -> Values:
+def encode(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> bytes:
+    """Like borrow(), but copied."""
+    return bytes(borrow(path, value, kind, width))
+
+
+def encode_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> bytes:
+    """Like borrow_for(), but copied."""
+    return bytes(borrow_for(path, value, kind, count, width))
+
+
+def decode(raw: Raw, kind: Kind, width: int = 1) -> Values:
     """The received column as an array: see the module. `raw` holds whole entries."""
     if numpy is None:
         column = array.array(kind.code)
         column.frombytes(raw)
         return column
-    flat = numpy.frombuffer(raw, dtype=kind.name)
+    flat = numpy.frombuffer(raw, _DTYPES[kind.code])
     return flat if width == 1 else flat.reshape(-1, width)
 
 
-def vector(path: str, value: Optional[ColumnLike]) -> Optional[List[float]]:
-    """Three Python floats from anything that holds three numbers, for frames; None stays None."""
-    if value is None:
-        return None
+def vector(path: str, value: ColumnLike) -> List[float]:
+    """Three Python floats from anything that holds three numbers, for frames."""
     items = [float(number) for number in value]
     if len(items) != 3:
         raise ValueError(f"{path}: has {len(items)} numbers: give x, y and z")

@@ -9,7 +9,8 @@ from typing import Any, Callable, Iterator, Optional, Sequence, Tuple
 
 from . import columns, schema
 from .columns import FLOAT32, FLOAT64, UINT32, UINT64, ColumnLike, Values
-from .values import MeshPart
+from .errors import unreadable
+from .values import Mesh, MeshPart
 
 _Change = schema.message("ChangeInstancesRequest")
 _Upload = schema.message("UploadMeshRequest")
@@ -84,6 +85,25 @@ class PlacedInstances:
         """From the protocol's ChangeInstancesResponse."""
         revision = message.revision if message.HasField("revision") else None
         return cls(columns.decode(message.ids, UINT64), message.change, message.epoch, revision)
+
+
+@dataclasses.dataclass(frozen=True)
+class MeshColumns:
+    """A mesh with its columns: `vertices` 3V float32 in mesh axes, `indices` 3T uint32, both as uploaded."""
+
+    mesh: Mesh
+    vertices: Values
+    indices: Values
+
+    @classmethod
+    def of(cls, pieces: Sequence[Any]) -> "MeshColumns":
+        """From all of the protocol's DownloadMeshResponse. LocusError DATA_LOSS if they do not hold what they announce."""
+        vertices = b"".join(piece.vertices for piece in pieces)
+        indices = b"".join(piece.indices for piece in pieces)
+        mesh = Mesh.of(pieces[0].mesh) if pieces else None
+        if mesh is None or mesh_sha256(vertices, indices) != mesh.sha256:
+            raise unreadable("the mesh is not whole")
+        return cls(mesh, columns.decode(vertices, FLOAT32, 3), columns.decode(indices, UINT32, 3))
 
 
 def mesh_sha256(vertices: bytes, indices: bytes) -> bytes:

@@ -1,16 +1,17 @@
 """Query batches: blocks of rays, balls, boxes and lookups in columns, answered together at one revision."""
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-from typing import Any, Iterator, Optional, Sequence
+from typing import Optional, Sequence
 
-from . import columns, schema
+from . import columns, schema, wire
 from .columns import FLOAT32, UINT32, UINT64, ColumnLike
 from .enums import Column, Cull, Inside, Precision, RayMode, Source, StaticDetail
 from .values import Revision
 
-_Request = schema.message("QueryRequest")
+_REQUEST, _BATCH, _VIEW = schema.numbers("QueryRequest"), schema.numbers("QueryBatch"), schema.numbers("View")
+_BLOCK = schema.numbers("QueryBlock")
+_KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "lookup")}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,19 +39,27 @@ class Block:
     max_results: int = 0
     after_id: int = 0
 
-    def write(self, message: Any, path: str, count: int) -> None:
-        """Into the protocol's QueryBlock of `count` queries, called `path` in errors."""
-        message.source = self.source
-        message.precision = self.precision
-        message.columns.extend(self.columns)
-        message.masks = columns.encode_for(path + "masks", self.masks, UINT32, count)
-        message.ignore_groups = columns.encode_for(path + "ignore_groups", self.ignore_groups, UINT64, count)
-        message.ignore_ids = columns.encode(path + "ignore_ids", self.ignore_ids, UINT64)
-        message.max_results = self.max_results
-        message.after_id = self.after_id
-        origin = columns.vector(path + "frame", self.frame)
-        if origin is not None:
-            message.frame.x, message.frame.y, message.frame.z = origin
+    def write(self, block: wire.Parts, path: str, count: int) -> None:
+        """Into the protocol's QueryBlock of `count` queries, called `path` in errors. Defaults cost nothing."""
+        if self.frame is not None:
+            block.add(_BLOCK["frame"], wire.vector(columns.vector(path + "frame", self.frame)))
+        if self.source:
+            block.add_varint(_BLOCK["source"], self.source)
+        if self.precision:
+            block.add_varint(_BLOCK["precision"], self.precision)
+        for column in self.columns:
+            block.add_varint(_BLOCK["columns"], column)
+        if self.masks is not None:
+            block.add(_BLOCK["masks"], columns.borrow_for(path + "masks", self.masks, UINT32, count))
+        if self.ignore_groups is not None:
+            groups = columns.borrow_for(path + "ignore_groups", self.ignore_groups, UINT64, count)
+            block.add(_BLOCK["ignore_groups"], groups)
+        if self.ignore_ids is not None:
+            block.add(_BLOCK["ignore_ids"], columns.borrow(path + "ignore_ids", self.ignore_ids, UINT64))
+        if self.max_results:
+            block.add_varint(_BLOCK["max_results"], self.max_results)
+        if self.after_id:
+            block.add_fixed64(_BLOCK["after_id"], self.after_id)
 
 
 class QueryBatch:
@@ -64,23 +73,29 @@ class QueryBatch:
     Reason.SCENE_RESTARTED if the scene started over. `max_work`: a budget in nodes, cells and tests; `explain`: report
     the work done; `max_reply_bytes`: the answer's largest size, 0 = 4,000,000.
 
-    Columns are checked for type and length here (TypeError and ValueError name the column), values by the server.
-    Methods return the batch, so that calls chain. Not for several threads at once.
+    Columns are checked for type and length here (TypeError and ValueError name the column), values by the server. Buffers
+    are borrowed: leave them unchanged until the batch was sent. It may be sent again. Methods return the batch, so that
+    calls chain. Not for several threads at once.
     """
 
     def __init__(self, *, at_least: Optional[Revision] = None, exactly: Optional[Revision] = None, max_work: int = 0,
                  explain: bool = False, max_reply_bytes: int = 0) -> None:
         if at_least is not None and exactly is not None:
             raise ValueError("give at_least or exactly, not both")
-        # Within a request from the start: putting a batch into one later would copy it.
-        self._request = _Request()
-        self.message = self._request.batch
-        self.message.max_work, self.message.explain = max_work, explain
-        self.message.max_reply_bytes = max_reply_bytes
-        if at_least is not None:
-            self.message.view.at_least, self.message.view.epoch = at_least.revision, at_least.epoch
-        elif exactly is not None:
-            self.message.view.exactly, self.message.view.epoch = exactly.revision, exactly.epoch
+        self._parts = wire.Parts()
+        moment = at_least or exactly
+        if moment is not None:
+            view = wire.Parts()
+            view.add_fixed64(_VIEW["exactly" if at_least is None else "at_least"], moment.revision)
+            view.add_fixed64(_VIEW["epoch"], moment.epoch)
+            self._parts.add_parts(_BATCH["view"], view)
+        if max_work:
+            self._parts.add_fixed64(_BATCH["max_work"], max_work)
+        if explain:
+            self._parts.add_varint(_BATCH["explain"], 1)
+        if max_reply_bytes:
+            self._parts.add_fixed32(_BATCH["max_reply_bytes"], max_reply_bytes)
+        self._blocks = 0
 
     def rays(self, origins: ColumnLike, directions: ColumnLike, *, t_max: ColumnLike = None,
              mode: RayMode = RayMode.FIRST, cull: Cull = Cull.NONE, inside: Inside = Inside.SOLID,
@@ -88,77 +103,90 @@ class QueryBatch:
         """What do N rays hit? `origins`: 3N float32; `directions`: 3N float32 or three, of any length but zero, never
         made unit: t counts in this length; `t_max`: N float32 or one, included, +infinity by default.
         """
-        with self._new_block("rays", block, origins, 3) as new:
-            new.kind.origins = new.first
-            new.kind.directions = new.column("directions", directions, FLOAT32, 3)
-            new.kind.t_max = new.column("t_max", t_max, FLOAT32)
-            new.kind.mode, new.kind.cull, new.kind.inside = mode, cull, inside
-        return self
+        new = _NewBlock(self._blocks, "rays")
+        new.first("origins", origins, FLOAT32, 3)
+        new.column("directions", directions, FLOAT32, 3)
+        new.column("t_max", t_max, FLOAT32)
+        if mode is not RayMode.FIRST or cull is not Cull.NONE or inside is not Inside.SOLID:
+            new.options(mode=mode, cull=cull, inside=inside)
+        return self._add(new, block)
 
     def balls(self, centers: ColumnLike, radii: ColumnLike, *, detail: StaticDetail = StaticDetail.INSTANCES,
               block: Block = Block()) -> "QueryBatch":
         """What touches N balls? `centers`: 3N float32; `radii`: N float32 or one, 0 .. 1e9."""
-        with self._new_block("balls", block, centers, 3) as new:
-            new.kind.centers = new.first
-            new.kind.radii = new.column("radii", radii, FLOAT32)
-            new.kind.detail = detail
-        return self
+        new = _NewBlock(self._blocks, "balls")
+        new.first("centers", centers, FLOAT32, 3)
+        new.column("radii", radii, FLOAT32)
+        new.options(detail=detail)
+        return self._add(new, block)
 
     def boxes(self, centers: ColumnLike, half_extents: ColumnLike, *, rotations: ColumnLike = None,
               detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
         """What touches N boxes? `centers`: 3N float32; `half_extents`: 3N float32 or three, along the box's own axes;
         `rotations`: 4N float32 or four, unit quaternions x, y, z, w, none = axis-aligned.
         """
-        with self._new_block("boxes", block, centers, 3) as new:
-            new.kind.centers = new.first
-            new.kind.half_extents = new.column("half_extents", half_extents, FLOAT32, 3)
-            new.kind.rotations = new.column("rotations", rotations, FLOAT32, 4)
-            new.kind.detail = detail
-        return self
+        new = _NewBlock(self._blocks, "boxes")
+        new.first("centers", centers, FLOAT32, 3)
+        new.column("half_extents", half_extents, FLOAT32, 3)
+        new.column("rotations", rotations, FLOAT32, 4)
+        new.options(detail=detail)
+        return self._add(new, block)
 
     def lookup(self, ids: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
         """Where are these objects and instances? N uint64 ids: one row each, in this order; id 0 for an unknown one."""
-        with self._new_block("lookup", block, ids, 1, UINT64, "ids") as new:
-            new.kind.ids = new.first
-        return self
+        new = _NewBlock(self._blocks, "lookup")
+        new.first("ids", ids, UINT64)
+        return self._add(new, block)
 
     def lookup_groups(self, groups: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
         """What belongs to these groups? N uint64 groups, not 0: all their objects and instances, ascending by id."""
-        with self._new_block("lookup", block, groups, 1, UINT64, "groups") as new:
-            new.kind.groups = new.first
-        return self
+        new = _NewBlock(self._blocks, "lookup")
+        new.first("groups", groups, UINT64)
+        return self._add(new, block)
 
     def request_bytes(self, scene: str) -> bytes:
-        """The whole request for Query, as it goes over the wire."""
-        self._request.scene = scene
-        return bytes(self._request.SerializeToString())
+        """The whole request for Query, as it goes over the wire. Columns are read now."""
+        request = wire.Parts()
+        request.add(_REQUEST["scene"], scene.encode())
+        request.add_parts(_REQUEST["batch"], self._parts)
+        return b"".join(request.pieces)
 
-    @contextlib.contextmanager
-    def _new_block(self, kind: str, block: Block, first: ColumnLike, width: int, number: columns.Kind = FLOAT32,
-                   name: str = "") -> Iterator["_NewBlock"]:
-        """Adds a block to fill; one with a column that is refused is taken out again."""
-        path = f"blocks[{len(self.message.blocks)}]."
-        message = self.message.blocks.add()
-        try:
-            getattr(message, kind).SetInParent()
-            name = name or ("origins" if kind == "rays" else "centers")
-            raw = columns.encode(f"{path}{kind}.{name}", first, number, width)
-            count = columns.entries(raw, number, width)
-            block.write(message, path, count)
-            yield _NewBlock(getattr(message, kind), f"{path}{kind}.", raw, count)
-        except Exception:
-            del self.message.blocks[-1]
-            raise
+    def batch_bytes(self) -> bytes:
+        """The protocol's QueryBatch, as it goes over the wire. Columns are read now."""
+        return b"".join(self._parts.pieces)
+
+    def _add(self, new: _NewBlock, settings: Block) -> QueryBatch:
+        """Only a block without faults becomes part of the batch."""
+        block = wire.Parts()
+        settings.write(block, new.path, new.count)
+        block.add_parts(_BLOCK[new.name], new.kind)
+        self._parts.add_parts(_BATCH["blocks"], block)
+        self._blocks += 1
+        return self
 
 
-@dataclasses.dataclass(frozen=True)
 class _NewBlock:
-    """The kind of a block that is being filled, and its first column."""
+    """The kind of a block that is being filled."""
 
-    kind: Any
-    path: str
-    first: bytes
-    count: int
+    def __init__(self, blocks_before: int, name: str) -> None:
+        self.path = f"blocks[{blocks_before}]."
+        self.name = name
+        self.kind = wire.Parts()
+        self.count = 0
 
-    def column(self, name: str, value: ColumnLike, number: columns.Kind, width: int = 1) -> bytes:
-        return columns.encode_for(self.path + name, value, number, self.count, width)
+    def first(self, name: str, value: ColumnLike, number: columns.Kind, width: int = 1) -> None:
+        """The column that tells how many queries there are."""
+        raw = columns.borrow(f"{self.path}{self.name}.{name}", value, number, width)
+        self.count = columns.entries(raw, number, width)
+        self.kind.add(_KINDS[self.name][name], raw)
+
+    def column(self, name: str, value: ColumnLike, number: columns.Kind, width: int = 1) -> None:
+        if value is not None:
+            path = f"{self.path}{self.name}.{name}"
+            self.kind.add(_KINDS[self.name][name], columns.borrow_for(path, value, number, self.count, width))
+
+    def options(self, **fields: int) -> None:
+        """Fields of the kind that are no columns."""
+        for name, value in fields.items():
+            if value:
+                self.kind.add_varint(_KINDS[self.name][name], value)

@@ -30,14 +30,14 @@ class QueryStream(PipelinedStream[QueryResult]):
     def send(self, batch: QueryBatch) -> "Future[QueryResult]":
         """Asks; blocks while `max_in_flight` batches are unanswered.
 
-        The future gets the answer, or the LocusError of this batch. The batch is copied and may be used again.
+        The future gets the answer, or the LocusError of this batch. The batch is read now and may be used again.
         LocusError if the stream has ended. 8 batches of 1,024 queries, or 2 of 8,192, keep a local server busy.
         """
-        return self._send(batch.message.SerializeToString())
+        return self._send(batch.batch_bytes())
 
     def _request_of(self, item: Item[QueryResult]) -> bytes:
-        head = _METHOD.request(scene=self._scene, sequence=item.sequence).SerializeToString()
-        return b"".join((head, *wire.delimited(_BATCH, item.batch)))
+        numbers = _METHOD.request(scene=self._scene, sequence=item.sequence).SerializeToString()
+        return b"".join((numbers, wire.head(_BATCH, len(item.batch)), item.batch))
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
         found = wire.fields(memoryview(response))

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple, Union, overload
 
 import grpc
 
@@ -15,17 +15,47 @@ from .values import Revision, Work
 _Work = schema.message("Work")
 NO_TRIANGLE = 0xFFFFFFFF
 
-
-def _numbers(message: str) -> Dict[str, int]:
-    return {field.name: field.number for field in schema.message(message).DESCRIPTOR.fields}
-
-
-_RESULT = _numbers("QueryResult")
-_BLOCK = _numbers("BlockResult")
-_IN_RESPONSE = _numbers("QueryResponse")["result"]
+_RESULT = schema.numbers("QueryResult")
+_BLOCK = schema.numbers("BlockResult")
+_IN_RESPONSE = schema.numbers("QueryResponse")["result"]
 # Bytes a row of each column that tells how many rows there are; the two wanted most often first.
-_ROW_BYTES = {"ids": 8, "t": 4, "triangles": 4, "uvs": 8, "normals": 12, "points": 12, "groups": 8, "tags": 8,
-              "layers": 4, "positions": 24}
+_COUNTS = _BLOCK["counts"]
+_ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
+    ("ids", 8), ("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
+    ("layers", 4), ("positions", 24)))
+
+
+class _Column:
+    """A column of a BlockResult: made when first read, then an ordinary attribute of it."""
+
+    def __init__(self, doc: str, kind: columns.Kind, width: int = 1, *, by_row: bool = True) -> None:
+        self.__doc__ = doc
+        self._kind = kind
+        self._width = width
+        self._by_row = by_row
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+        self._number = _BLOCK[name]
+
+    @overload
+    def __get__(self, block: None, owner: type) -> _Column: ...
+
+    @overload
+    def __get__(self, block: BlockResult, owner: type) -> Values: ...
+
+    def __get__(self, block: Optional[BlockResult], owner: type) -> Union[_Column, Values]:
+        if block is None:
+            return self
+        raw = wire.column(block._fields, self._number)
+        if self._by_row:
+            if raw and len(raw) != block.rows * self._kind.size * self._width:
+                raise _contradiction(f"{self._name} has {len(raw)} bytes for {block.rows} rows")
+        elif len(raw) % self._kind.size:
+            raise _contradiction(f"{self._name} has {len(raw)} bytes")
+        values = columns.decode(raw, self._kind, self._width)
+        block.__dict__[self._name] = values
+        return values
 
 
 class BlockResult:
@@ -37,76 +67,26 @@ class BlockResult:
 
     def __init__(self, message: memoryview) -> None:
         self._fields = wire.fields(message)
+        self._rows: Optional[int] = None
 
-    @functools.cached_property
-    def counts(self) -> Values:
-        """N uint32: rows of each query; empty where each has one (rays FIRST, lookups of ids) or none (rays ANY)."""
-        return self._list("counts", UINT32)
-
-    @functools.cached_property
-    def truncated(self) -> Values:
-        """uint32 numbers of the queries that had more rows than they report, ascending."""
-        return self._list("truncated", UINT32)
-
-    @functools.cached_property
-    def hits(self) -> Values:
-        """Rays ANY: N uint8, 1 where something is hit, else 0."""
-        return self._list("hits", UINT8)
-
-    @functools.cached_property
-    def t(self) -> Values:
-        """R float32, in lengths of the ray's direction; +infinity for a miss."""
-        return self._column("t", FLOAT32)
-
-    @functools.cached_property
-    def ids(self) -> Values:
-        """R uint64 ids of objects and instances; 0 for a miss."""
-        return self._column("ids", UINT64)
-
-    @functools.cached_property
-    def triangles(self) -> Values:
-        """R uint32 positions in the mesh's index list; NO_TRIANGLE for a miss, an object, or an instance's own row."""
-        return self._column("triangles", UINT32)
-
-    @functools.cached_property
-    def uvs(self) -> Values:
-        """2R float32: the weights of the triangle's second and third vertex at the hit."""
-        return self._column("uvs", FLOAT32, 2)
-
-    @functools.cached_property
-    def normals(self) -> Values:
-        """3R float32: the unit normal at the hit, in world axes."""
-        return self._column("normals", FLOAT32, 3)
-
-    @functools.cached_property
-    def points(self) -> Values:
-        """3R float32: where the hit is, relative to the block's frame."""
-        return self._column("points", FLOAT32, 3)
-
-    @functools.cached_property
-    def groups(self) -> Values:
-        """R uint64 groups; 0 for none and for a miss."""
-        return self._column("groups", UINT64)
-
-    @functools.cached_property
-    def tags(self) -> Values:
-        """R uint64 tags; 0 for a miss."""
-        return self._column("tags", UINT64)
-
-    @functools.cached_property
-    def layers(self) -> Values:
-        """R uint32 sets of layer bits; 0 for a miss."""
-        return self._column("layers", UINT32)
-
-    @functools.cached_property
-    def positions(self) -> Values:
-        """3R float64: an object's centre or an instance's translation, absolute; 0 for a miss."""
-        return self._column("positions", FLOAT64, 3)
-
-    @functools.cached_property
-    def rotations(self) -> Values:
-        """4R float32: the rotation as stored, x, y, z, w; 0 for a miss."""
-        return self._column("rotations", FLOAT32, 4)
+    counts = _Column("Rows of each query: N uint32; empty where each has one (rays FIRST, lookups of ids) or none (rays ANY).",
+                     UINT32, by_row=False)
+    truncated = _Column("Numbers of the queries that had more rows than they report: uint32, ascending.",
+                        UINT32, by_row=False)
+    hits = _Column("Rays ANY: N uint8, 1 where something is hit, else 0.", UINT8, by_row=False)
+    t = _Column("R float32, in lengths of the ray's direction; +infinity for a miss.", FLOAT32)
+    ids = _Column("R uint64 ids of objects and instances; 0 for a miss.", UINT64)
+    triangles = _Column("R uint32 positions in the mesh's index list; NO_TRIANGLE for a miss, an object, or the row of a "
+                        "whole instance.", UINT32)
+    uvs = _Column("2R float32: the weights of the triangle's second and third vertex at the hit.", FLOAT32, 2)
+    normals = _Column("3R float32: the unit normal at the hit, in world axes.", FLOAT32, 3)
+    points = _Column("3R float32: where the hit is, relative to the block's frame.", FLOAT32, 3)
+    groups = _Column("R uint64 groups; 0 for none and for a miss.", UINT64)
+    tags = _Column("R uint64 tags; 0 for a miss.", UINT64)
+    layers = _Column("R uint32 sets of layer bits; 0 for a miss.", UINT32)
+    positions = _Column("3R float64: an object's centre or an instance's translation, absolute; 0 for a miss.",
+                        FLOAT64, 3)
+    rotations = _Column("4R float32: the rotation as stored, x, y, z, w; 0 for a miss.", FLOAT32, 4)
 
     @property
     def work(self) -> Optional[Work]:
@@ -126,28 +106,19 @@ class BlockResult:
             begins.append(begins[-1] + count)
         return begins
 
-    @functools.cached_property
+    @property
     def rows(self) -> int:
         """R, the number of rows."""
-        if _BLOCK["counts"] in self._fields:
-            return self._begins[-1]
-        return next((len(self._raw(name)) // size for name, size in _ROW_BYTES.items() if _BLOCK[name] in self._fields), 0)
-
-    def _raw(self, name: str) -> memoryview:
-        return wire.column(self._fields, _BLOCK[name])
-
-    def _column(self, name: str, kind: columns.Kind, width: int = 1) -> Values:
-        raw = self._raw(name)
-        if raw and len(raw) != self.rows * kind.size * width:
-            raise _contradiction(f"{name} has {len(raw)} bytes for {self.rows} rows")
-        return columns.decode(raw, kind, width)
-
-    def _list(self, name: str, kind: columns.Kind) -> Values:
-        """A column that does not go by rows."""
-        raw = self._raw(name)
-        if len(raw) % kind.size:
-            raise _contradiction(f"{name} has {len(raw)} bytes")
-        return columns.decode(raw, kind)
+        if self._rows is None:
+            if _COUNTS in self._fields:
+                self._rows = self._begins[-1]
+            else:
+                self._rows = 0
+                for number, size in _ROW_BYTES:
+                    if number in self._fields:
+                        self._rows = len(wire.column(self._fields, number)) // size
+                        break
+        return self._rows
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -165,9 +136,9 @@ class QueryResult(Revision):
     def of(cls, message: memoryview) -> "QueryResult":
         """From the protocol's QueryResult in its wire form, which is kept as long as a column of it is."""
         found = wire.fields(message)
-        epoch, revision, tick = (wire.fixed64(found, _RESULT[name]) for name in ("epoch", "revision", "tick"))
         blocks = tuple(map(BlockResult, wire.views(found, _RESULT["blocks"])))
-        return cls(epoch, revision, tick, blocks, _work_in(found, _RESULT["work"]))
+        return cls(wire.fixed64(found, _RESULT["epoch"]), wire.fixed64(found, _RESULT["revision"]),
+                   wire.fixed64(found, _RESULT["tick"]), blocks, _work_in(found, _RESULT["work"]))
 
     @classmethod
     def from_bytes(cls, response: bytes) -> "QueryResult":

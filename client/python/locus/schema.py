@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pathlib
 import sys
-from typing import Any, NamedTuple
+from typing import Any, Dict, NamedTuple
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory  # type: ignore[import]
 from google.protobuf.message import DecodeError as DecodeError  # type: ignore[import]
@@ -44,6 +44,11 @@ else:
 def message(name: str) -> Any:
     """The class of a message of locus.v1."""
     return _class_of(POOL.FindMessageTypeByName("locus.v1." + name))
+
+
+def numbers(name: str) -> Dict[str, int]:
+    """The field numbers of a message of locus.v1, by name."""
+    return {field.name: field.number for field in message(name).DESCRIPTOR.fields}
 
 
 def method(service: str, name: str) -> Method:

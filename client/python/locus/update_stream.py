@@ -58,7 +58,7 @@ class UpdateStream(PipelinedStream[Ack]):
         # The batch stands there twice, which makes one of both: its columns, then its numbers.
         numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
         numbers.batch.writer, numbers.batch.batch = self.writer, item.number
-        return b"".join((*wire.delimited(_BATCH, item.batch), numbers.SerializeToString()))
+        return b"".join((wire.head(_BATCH, len(item.batch)), item.batch, numbers.SerializeToString()))
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
         message = parsed(_METHOD.response, response)

@@ -39,9 +39,9 @@ class UpdateBatch:
         self.message.restart_ticks, self.message.writer, self.message.batch = restart_ticks, writer, number
         if tick is not None:
             self.message.tick = tick
-        origin = columns.vector("frame", frame)
-        if origin is not None:
-            self.message.frame.x, self.message.frame.y, self.message.frame.z = origin
+        if frame is not None:
+            origin = self.message.frame
+            origin.x, origin.y, origin.z = columns.vector("frame", frame)
 
     def remove(self, ids: ColumnLike) -> "UpdateBatch":
         """Removes objects: N uint64 ids, after those of earlier calls."""

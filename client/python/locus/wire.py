@@ -6,14 +6,19 @@ answer costs a client. Here a column is a view of the received bytes. Everything
 """
 from __future__ import annotations
 
-from typing import Any, Dict, List, Tuple, Union
+import struct
+from typing import Any, Dict, List, Sequence, Tuple, Union
 
+from . import schema
+from .columns import Raw
 from .errors import unreadable
 
 Fields = Dict[int, List[Any]]
 _VARINT, _FIXED64, _DELIMITED, _FIXED32 = 0, 1, 2, 5
 _MOST_VARINT_BYTES = 10
 _NOTHING = memoryview(b"")
+_VECTOR = struct.Struct("<BdBdBd")
+_AXES = tuple(number << 3 | _FIXED64 for number in schema.numbers("Vec3d").values())
 
 
 def _varint(data: memoryview, position: int) -> Tuple[int, int]:
@@ -84,12 +89,67 @@ def fixed64(found: Fields, number: int) -> int:
     return int.from_bytes(pieces[-1], "little") if pieces else 0
 
 
-def delimited(number: int, content: bytes) -> Tuple[bytes, bytes]:
-    """What to join into a message so that `content` is its field `number`."""
-    head = bytearray()
-    for value in (number << 3 | _DELIMITED, len(content)):
-        while value > 127:
-            head.append(value & 127 | 128)
-            value >>= 7
-        head.append(value)
-    return bytes(head), content
+def _encoded(value: int) -> bytes:
+    if value < 128:
+        return _SMALL[value]
+    result = bytearray()
+    while value > 127:
+        result.append(value & 127 | 128)
+        value >>= 7
+    result.append(value)
+    return bytes(result)
+
+
+_SMALL = tuple(bytes((value,)) for value in range(128))
+
+
+def head(number: int, size: int) -> bytes:
+    """What stands before the content of field `number` that has so many bytes: a message, a string or a column."""
+    return _encoded(number << 3 | _DELIMITED) + _encoded(size)
+
+
+def vector(xyz: Sequence[float]) -> bytes:
+    """The protocol's Vec3d."""
+    x, y, z = _AXES
+    return _VECTOR.pack(x, xyz[0], y, xyz[1], z, xyz[2])
+
+
+class Parts:
+    """A message in pieces to be joined: columns are borrowed until then, and so copied once in all."""
+
+    def __init__(self) -> None:
+        self.pieces: List[Raw] = []
+        self.size = 0
+
+    def add(self, number: int, content: Raw) -> None:
+        """Field `number` with this content; nothing for an empty column, which is an absent one."""
+        size = len(content)
+        if size:
+            before = head(number, size)
+            self.pieces += (before, content)
+            self.size += len(before) + size
+
+    def add_parts(self, number: int, parts: Parts) -> None:
+        """Field `number` with this message, which may be empty."""
+        before = head(number, parts.size)
+        self.pieces.append(before)
+        self.pieces += parts.pieces
+        self.size += len(before) + parts.size
+
+    def add_fixed64(self, number: int, value: int) -> None:
+        """Field `number`, a fixed64. OverflowError for a value that is none."""
+        self._put(_encoded(number << 3 | _FIXED64) + value.to_bytes(8, "little"))
+
+    def add_fixed32(self, number: int, value: int) -> None:
+        """Field `number`, a fixed32."""
+        self._put(_encoded(number << 3 | _FIXED32) + value.to_bytes(4, "little"))
+
+    def add_varint(self, number: int, value: int) -> None:
+        """Field `number`, a bool, an enum or a uint32."""
+        if not 0 <= value < 1 << 32:
+            raise OverflowError(f"{value} is no uint32")
+        self._put(_encoded(number << 3 | _VARINT) + _encoded(value))
+
+    def _put(self, field: bytes) -> None:
+        self.pieces.append(field)
+        self.size += len(field)

@@ -1,8 +1,12 @@
-"""Runs what README.md shows against a fresh locusd and compares the output: python3 readme_test.py README BIN_DIRECTORY.
+"""Runs what README.md shows against a fresh locusd and compares the output:
+
+    python3 readme_test.py README BIN_DIRECTORY [PYTHON_DIRECTORY]
 
 Blocks marked console hold `$ command` lines, each followed by its output; a block marked grpcurl holds one call, which is
 made with json_call in its place. EPOCH stands for the scene's random epoch. The block marked cpp was compiled as
-readme_example; its last comment says what it prints. Blocks marked text are for reading: only their programs are looked for.
+readme_example; its last comment says what it prints. Blocks marked python, here and in client/python/README.md, are
+scripts for the package in PYTHON_DIRECTORY (without which they are skipped); their last comments say likewise. The
+address in them is replaced by that of the daemon. Blocks marked text are for reading: only their programs are looked for.
 """
 
 import os
@@ -15,11 +19,14 @@ import time
 import unittest
 
 README, BIN = sys.argv[1], os.path.abspath(sys.argv[2])
+PYTHON = os.path.abspath(sys.argv[3]) if len(sys.argv) > 3 else None
+PYTHON_README = os.path.join(os.path.dirname(os.path.abspath(README)), "client/python/README.md")
+DEFAULT_ADDRESS = "127.0.0.1:7575"
 START_SECONDS = 30
 
 
-def blocks(kind):
-    with open(README, encoding="utf-8") as file:
+def blocks(kind, readme=README):
+    with open(readme, encoding="utf-8") as file:
         return re.findall(r"^```%s\n(.*?)^```" % kind, file.read(), re.MULTILINE | re.DOTALL)
 
 
@@ -74,7 +81,7 @@ class ReadmeTest(unittest.TestCase):
         ((command, output),) = commands(blocks("grpcurl")[0])
         words = shlex.split(command)
         self.assertEqual(words[:3], ["grpcurl", "-plaintext", "-d"])
-        self.assertEqual(words[4], "127.0.0.1:7575")
+        self.assertEqual(words[4], DEFAULT_ADDRESS)
         call = ["json_call", self.address, words[5], words[3]]
         self.assertEqual(masked(self.run_shell(shlex.join(call))), masked(output))
 
@@ -82,7 +89,21 @@ class ReadmeTest(unittest.TestCase):
         (wanted,) = re.findall(r"//\s*(hit .*)$", blocks("cpp")[0], re.MULTILINE)
         self.assertEqual(self.run_shell("readme_example " + self.address).strip(), wanted)
 
-    def test_4_programs_to_read_about_exist(self):
+    @unittest.skipUnless(PYTHON, "the Python package is not built")
+    def test_4_scripts_print_what_they_say(self):
+        of_the_package = blocks("python", PYTHON_README)
+        self.assertEqual(len(of_the_package), 1)
+        for script in blocks("python") + of_the_package:
+            (wanted,) = re.findall(r"#\s*(hit .*)$", script, re.MULTILINE)
+            self.assertLessEqual(script.count("\n"), 25)
+            self.assertEqual(script.count(DEFAULT_ADDRESS), 1)
+            path = os.path.join(self.folder.name, "script.py")
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(script.replace(DEFAULT_ADDRESS, self.address))
+            command = shlex.join(["env", "PYTHONPATH=" + PYTHON, "/usr/bin/python3", "-B", path])
+            self.assertEqual(self.run_shell(command).strip(), wanted)
+
+    def test_5_programs_to_read_about_exist(self):
         top = os.path.dirname(os.path.abspath(README))
         programs = [command.split()[0] for block in blocks("text") for command, _ in commands(block)]
         self.assertEqual(programs, ["./deploy/quickstart.sh", "./tests/run.sh"])

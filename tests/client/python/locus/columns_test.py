@@ -115,7 +115,6 @@ class DecodeTest(unittest.TestCase):
 class VectorTest(unittest.TestCase):
     def test_three_numbers_make_a_vector(self):
         self.assertEqual(columns.vector("frame", array.array("f", [1, 2, 3])), [1.0, 2.0, 3.0])
-        self.assertIsNone(columns.vector("frame", None))
 
     def test_another_number_of_them_is_refused(self):
         with self.assertRaisesRegex(ValueError, "^frame: has 2 numbers: give x, y and z"):

@@ -43,6 +43,22 @@ class MeshesTest(DaemonTest):
         (block,) = self.ask(QueryBatch().rays([[0.75, 0.25, 1], [squares - 0.25, 0.25, 1]], [0, 0, -1]))
         self.assertEqual(listed(block.triangles), [0, 2 * squares - 2])
 
+    def test_a_mesh_comes_back_as_it_went(self):
+        vertices, indices = strip(60_000)
+        mesh = self.client.upload_mesh("back", vertices, indices)
+        found = self.client.download_mesh("back")
+        self.assertEqual((found.mesh.sha256, found.mesh.triangles), (mesh.sha256, len(indices) // 3))
+        self.assertEqual((listed(found.vertices), listed(found.indices)), (vertices.tolist(), indices.tolist()))
+        with self.assertRaises(locus.LocusError) as raised:
+            self.client.download_mesh("nothing")
+        self.assertRefused(raised.exception, "NOT_FOUND", "NOT_FOUND")
+
+    def test_a_mesh_with_a_piece_missing_is_data_loss(self):
+        piece = locus.schema.message("DownloadMeshResponse")(vertices=bytes(36), indices=bytes(12))
+        for pieces in ([], [piece]):
+            with self.assertRaisesRegex(locus.LocusError, "the mesh is not whole.*DATA_LOSS"):
+                locus.MeshColumns.of(pieces)
+
     def test_pieces_are_whole_triples_below_the_limit(self):
         messages = list(meshes.upload_messages("strip", *strip(60_000), parts=(), progress=None))
         sizes = [len(message.vertices) + len(message.indices) for message in messages]

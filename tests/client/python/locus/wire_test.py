@@ -38,17 +38,17 @@ class WireTest(unittest.TestCase):
 
     def test_a_column_in_pieces_is_joined_as_protobuf_would(self):
         one, two = (schema.message("BlockResult")(ids=number.to_bytes(8, "little")).SerializeToString() for number in (5, 6))
-        result = b"".join(wire.delimited(4, one + two))
-        response = b"".join(wire.delimited(1, result))
+        result = wire.head(4, len(one + two)) + one + two
+        response = wire.head(1, len(result)) + result
         (block,) = QueryResult.from_bytes(response).blocks
         self.assertEqual(listed(block.ids), [5, 6])
 
     def test_a_field_framed_by_hand_is_what_protobuf_writes(self):
         for size in (0, 1, 127, 128, 16383, 16384, 3_000_000):
             content = bytes(size)
-            block = schema.message("QueryBlock").FromString(b"".join(wire.delimited(5, content)))
+            block = schema.message("QueryBlock").FromString(wire.head(5, size) + content)
             self.assertEqual(block.masks, content)
-            in_high_number = b"".join(wire.delimited(3000, content))
+            in_high_number = wire.head(3000, size) + content
             self.assertEqual(wire.fields(memoryview(in_high_number)), {3000: [content]})
 
     def test_cut_bytes_are_refused(self):
