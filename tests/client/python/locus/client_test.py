@@ -71,14 +71,13 @@ class ClientTest(DaemonTest):
                 self.client.query(name, QueryBatch())
             self.assertRefused(raised.exception, "INVALID_ARGUMENT", "MALFORMED", "scene")
 
-    def test_a_call_that_takes_too_long_is_a_deadline_with_a_hint(self):
+    def test_a_call_that_takes_too_long_is_a_deadline(self):
         built = self.apply(UpdateBatch().insert_points(1, [0, 0, 0]))
         later = locus.Revision(built.epoch, built.revision + 1)
         with locus.connect(self.daemon.address, timeout=0.2) as hasty:
             with self.assertRaises(locus.LocusError) as raised:
                 hasty.query(self.scene, QueryBatch(at_least=later).lookup(1))
         self.assertEqual(raised.exception.code, grpc.StatusCode.DEADLINE_EXCEEDED)
-        self.assertIn("give it more time", str(raised.exception))
 
     def test_a_query_waits_for_the_revision_it_names(self):
         built = self.apply(UpdateBatch().insert_points(1, [0, 0, 0]))

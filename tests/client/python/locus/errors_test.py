@@ -41,6 +41,8 @@ class ErrorsTest(unittest.TestCase):
     def test_where_the_server_did_not_speak_a_hint_does(self):
         error = errors.from_call(Call(grpc.StatusCode.UNAVAILABLE, "broken pipe"))
         self.assertEqual(str(error), "broken pipe [UNAVAILABLE] (try again when the server answers)")
+        late = errors.from_call(Call(grpc.StatusCode.DEADLINE_EXCEEDED, "Deadline Exceeded"))
+        self.assertIn("give it more time (timeout)", str(late))
         self.assertIsNone(error.index)
         self.assertFalse(error.refused)
 
