@@ -101,6 +101,10 @@ class InstallTest(unittest.TestCase):
                 for folder in (OPTIONS.build, OPTIONS.source + "/"):
                     self.assertNotIn(folder, text, path)
 
+    def test_the_unit_starts_the_daemon_where_it_was_installed(self):
+        with open(os.path.join(self.tree, "lib/systemd/system/locusd.service"), encoding="utf-8") as file:
+            self.assertIn(f"\nExecStart={os.path.join(OPTIONS.folder, 'first')}/bin/locusd\n", file.read())
+
     def test_a_packager_can_stage_the_tree_elsewhere(self):
         stage = os.path.join(OPTIONS.folder, "stage")
         install(None, "/usr", DESTDIR=stage)
