@@ -23,7 +23,7 @@ uint64_t resident_bytes() {
   uint64_t mapped = 0;
   uint64_t resident = 0;
   std::ifstream("/proc/self/statm") >> mapped >> resident;
-  static const auto page = static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+  const auto page = static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
   return resident * page;
 }
 
