@@ -23,7 +23,7 @@ TEXT
 
 # The compiler and what find_package and pkg-config look for.
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libssl-dev"
+  libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
 # binutils gives nm to the house test; zsh and fish run the completions; mandoc reads the manual pages.
 test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc"
@@ -31,7 +31,7 @@ lint_packages="clang-tidy mypy"
 # systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
 # The libraries that the programs name themselves; these bring their own.
-runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libssl3 libstdc++6"
+runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6"
 
 action=install
 packages=

@@ -5,7 +5,8 @@
 #
 # Installs what is missing from Debian (as root or with sudo), builds Release into build/release, fetches a level, starts
 # locusd on a free loopback port, and runs `locus demo` against it: moves objects while clients ask, and compares the
-# answers with brute force. Exits 1 on any difference. --keep leaves the daemon running.
+# answers with brute force. Then takes a picture of it all, build/quickstart.png. Exits 1 on any difference. --keep leaves
+# the daemon running.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,7 +18,7 @@ while [ $# -gt 0 ]; do
     --seconds) seconds=$2; shift 2 ;;
     --objects) objects=$2; shift 2 ;;
     --keep) keep=yes; shift ;;
-    -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "quickstart: unknown option $1; see --help" >&2; exit 2 ;;
   esac
 done
@@ -29,10 +30,10 @@ entry=maps/delta.bsp
 
 say() { printf '\n== %s\n' "$*"; }
 
-say "1/5 packages"
+say "1/6 packages"
 ./deploy/packages.sh build python
 
-say "2/5 build into $build"
+say "2/6 build into $build"
 if [ ! -f "$build/build.ninja" ]; then
   cmake --preset release -DLOCUS_TESTS=OFF > build.log.$$ 2>&1 || { cat build.log.$$; rm -f build.log.$$; exit 1; }
   rm -f build.log.$$
@@ -65,16 +66,18 @@ fetch_level() {
   [ -f "$levels/pak1-maps.pk3" ]
 }
 
-say "3/5 level"
+say "3/6 level"
 level=()
+camera=()
 if fetch_level; then
   echo "OpenArena level $entry from Debian's package $package"
   level=("$levels/pak1-maps.pk3" --entry "$entry")
+  camera=(--eye 1300,-1500,2000 --look-at 2250,700,560)
 else
   echo "THE PACKAGE $package COULD NOT BE HAD (see $levels/fetch.log): USING THE GENERATED CITY, NOT A REAL LEVEL"
 fi
 
-say "4/5 start locusd"
+say "4/6 start locusd"
 run=$(mktemp -d)
 pids=()
 stop() {
@@ -103,8 +106,12 @@ start check 1
 check=$address
 echo "locusd at $main (2 threads), and at $check (1 thread) to compare with"
 
-say "5/5 demo"
+say "5/6 demo"
 "$build/bin/locus" --address "$main" demo "${level[@]}" --objects "$objects" --seconds "$seconds" --compare "$check"
+
+say "6/6 picture"
+"$build/bin/locus" --address "$main" render demo build/quickstart.png --size 800x450 --samples 4 "${camera[@]}"
+echo "the level with its moving objects, by four rays a pixel: build/quickstart.png"
 
 cat << TEXT
 

@@ -16,6 +16,7 @@ void add_move_command(CLI::App& parent, Context& context);
 void add_remove_command(CLI::App& parent, Context& context);
 void add_query_command(CLI::App& parent, Context& context);
 void add_get_command(CLI::App& parent, Context& context);
+void add_render_command(CLI::App& parent, Context& context);
 void add_demo_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
 void add_health_command(CLI::App& parent, Context& context);

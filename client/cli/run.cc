@@ -93,6 +93,7 @@ void build_cli(CLI::App& app, Context& context) {
   add_remove_command(app, context);
   add_query_command(app, context);
   add_get_command(app, context);
+  add_render_command(app, context);
   add_demo_command(app, context);
   add_limits_command(app, context);
   add_health_command(app, context);

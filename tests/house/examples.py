@@ -130,6 +130,8 @@ BAD_EXAMPLES = {
     "TopLevelIsClosed": [{"notes.txt": "x\n"}, {"scripts/a.sh": "x\n"}, {"LICENSE": None}],
     "RoomsHaveShortReadmes": [{"deploy/README.md": None}, {"core/README.md": "x\n" * 61}, {"README.md": "x\n" * 151},
                               {"core/index/README.md": "x\n" * 61}],
+    "PicturesAreFewAndSmall": [{"deploy/other.png": "x"}, {"core/logo.jpg": "x"},
+                               {"deploy/quickstart.png": "x" * (300 * 1024 + 1)}],
     "NothingIsLeftUnfinished": [source("// TO" + "DO: later\n"), {"deploy/run.sh": "# FIX" + "ME\n"},
                                 {"proto/README.md": "XX" + "X\n"}],
     "NoPathOfAMachine": [{"deploy/run.sh": "cd /wo" + "rk/main\n"}, {"README.md": "see ../sha" + "red/design\n"},

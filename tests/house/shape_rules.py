@@ -87,6 +87,17 @@ def rooms_have_short_readmes(tree):
     return problems
 
 
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".gif", ".webp", ".bmp", ".ico")
+PICTURES = {"deploy/quickstart.png": 300 * 1024}  # bytes at most; what a clone takes is small
+
+
+def pictures_are_few_and_small(tree):
+    pictures = [path for path in sorted(tree.files) if path.endswith(PICTURE_ENDINGS)]
+    return [f"{path}: a picture that is not listed" for path in pictures if path not in PICTURES] + \
+        [f"{path}: {tree.size(path)} bytes, at most {PICTURES[path]} are allowed" for path in pictures
+         if path in PICTURES and tree.size(path) > PICTURES[path]]
+
+
 # Written in pieces, so that this file does not hold what it forbids.
 UNFINISHED = re.compile(r"\b(" + "|".join(("TO" + "DO", "FIX" + "ME", "XX" + "X", "HA" + "CK")) + r")\b")
 MACHINE_PATH = re.compile(r"(?<![\w.}/-])/(?:" + "|".join(("wo" + "rk", "ro" + "ot", "ho" + "me", "Us" + "ers")) +
@@ -95,7 +106,8 @@ MACHINE_PATH = re.compile(r"(?<![\w.}/-])/(?:" + "|".join(("wo" + "rk", "ro" + "
 
 def each_line(tree, pattern, message):
     return [f"{path}:{number}: {message}: {match.group()}" for path, text in sorted(tree.files.items())
-            if path != "LICENSE" for number, line in enumerate(text.split("\n"), 1) for match in pattern.finditer(line)]
+            if path != "LICENSE" and not path.endswith(PICTURE_ENDINGS)
+            for number, line in enumerate(text.split("\n"), 1) for match in pattern.finditer(line)]
 
 
 def nothing_is_left_unfinished(tree):
@@ -162,6 +174,7 @@ RULES = {
     "HeadersOpenWithAParagraph": headers_open_with_a_paragraph,
     "TopLevelIsClosed": top_level_is_closed,
     "RoomsHaveShortReadmes": rooms_have_short_readmes,
+    "PicturesAreFewAndSmall": pictures_are_few_and_small,
     "NothingIsLeftUnfinished": nothing_is_left_unfinished,
     "NoPathOfAMachine": no_path_of_a_machine,
     "TestsMirrorTheSources": tests_mirror_the_sources,

@@ -13,8 +13,13 @@ SKIPPED_FOLDERS = {".git", "build", ".cache", "__pycache__", "node_modules"}
 class Tree:
     """Files by path from the project's root, '/' between folders."""
 
-    def __init__(self, files):
+    def __init__(self, files, sizes=None):
         self.files = dict(files)
+        self.sizes = dict(sizes or {})
+
+    def size(self, path):
+        """Bytes on the disk; of an example, its text's."""
+        return self.sizes.get(path, len(self.files[path].encode()))
 
     def code(self, *rooms):
         """Paths of headers and sources, all or those below one of the given folders."""
@@ -41,13 +46,14 @@ def listed_by_walk(root):
 
 def read_tree(root):
     paths = listed_by_git(root) if os.path.exists(os.path.join(root, ".git")) else None
-    files = {}
+    files, sizes = {}, {}
     for path in paths if paths is not None else listed_by_walk(root):
         full_path = os.path.join(root, path)
         if os.path.isfile(full_path):
             with open(full_path, encoding="utf-8", errors="replace") as file:
                 files[path] = file.read()
-    return Tree(files)
+            sizes[path] = os.path.getsize(full_path)
+    return Tree(files, sizes)
 
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
