@@ -1,8 +1,7 @@
 """Query batches: blocks of rays, balls, boxes and lookups in columns, answered together at one revision."""
 from __future__ import annotations
 
-import dataclasses
-from typing import Optional, Sequence
+from typing import NamedTuple, Optional, Sequence
 
 from . import columns, schema, wire
 from .columns import FLOAT32, UINT32, UINT64, ColumnLike
@@ -14,8 +13,7 @@ _BLOCK = schema.numbers("QueryBlock")
 _KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "lookup")}
 
 
-@dataclasses.dataclass(frozen=True)
-class Block:
+class Block(NamedTuple):
     """Settings that every kind of block has, N queries to a block. All optional.
 
     - `frame`: three floats, added to every position of the block; positions in its result are relative to it.

@@ -121,7 +121,7 @@ class BlockResult:
         return self._rows
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, init=False)
 class QueryResult(Revision):
     """The answer to a batch, all at one revision: `blocks` in the order of the request, `tick` the scene's.
 
@@ -136,9 +136,13 @@ class QueryResult(Revision):
     def of(cls, message: memoryview) -> "QueryResult":
         """From the protocol's QueryResult in its wire form, which is kept as long as a column of it is."""
         found = wire.fields(message)
-        blocks = tuple(map(BlockResult, wire.views(found, _RESULT["blocks"])))
-        return cls(wire.fixed64(found, _RESULT["epoch"]), wire.fixed64(found, _RESULT["revision"]),
-                   wire.fixed64(found, _RESULT["tick"]), blocks, _work_in(found, _RESULT["work"]))
+        result = cls.__new__(cls)
+        # All at once: a frozen class sets attribute by attribute, which shows in what an answer costs.
+        result.__dict__.update(
+            epoch=wire.fixed64(found, _RESULT["epoch"]), revision=wire.fixed64(found, _RESULT["revision"]),
+            tick=wire.fixed64(found, _RESULT["tick"]), work=_work_in(found, _RESULT["work"]),
+            blocks=tuple(map(BlockResult, wire.views(found, _RESULT["blocks"]))))
+        return result
 
     @classmethod
     def from_bytes(cls, response: bytes) -> "QueryResult":
