@@ -25,8 +25,9 @@ TEXT
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
-# binutils gives nm to the house test; zsh and fish run the completions; mandoc reads the manual pages.
-test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc"
+# binutils gives nm to the house test; zsh and fish run the completions; groff and mandoc read the manual.
+test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc
+  groff-base"
 lint_packages="clang-tidy mypy"
 # systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"

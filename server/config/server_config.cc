@@ -12,6 +12,7 @@
 #include "absl/strings/str_replace.h"
 #include "server/config/listen_address.h"
 #include "server/config/machine.h"
+#include "server/config/server_parser.h"
 #include "server/config/version.h"
 
 namespace locus::server {
@@ -93,10 +94,6 @@ void describe(CLI::App& app) {
   app.allow_config_extras(CLI::config_extras_mode::error);
 }
 
-std::string variable_of(const std::string& option) {
-  return absl::StrCat("LOCUS_", absl::AsciiStrToUpper(absl::StrReplaceAll(option, {{"-", "_"}})));
-}
-
 // CLI11 takes its arguments last first.
 void parse(CLI::App& app, std::vector<std::string> arguments) {
   std::reverse(arguments.begin(), arguments.end());
@@ -117,7 +114,7 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
   for (const CLI::Option* option : std::as_const(app).get_options()) {
     if (option->count() > 0 || option->get_lnames().empty() || !option->get_configurable()) continue;
     const std::string& name = option->get_lnames().front();
-    const std::optional<std::string> value = environment(variable_of(name));
+    const std::optional<std::string> value = environment(environment_variable(name));
     if (value && !value->empty()) all.push_back(absl::StrCat("--", name, "=", *value));
   }
   return all;
@@ -152,9 +149,7 @@ Invocation parse_all(const std::vector<std::string>& arguments, const Environmen
   Invocation invocation;
   ServerConfig config;
   CLI::App app;
-  describe(app);
-  add_options(app, config);
-  app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
+  build_parser(app, config);
   parse(app, with_environment(arguments, environment));
   if (const absl::Status status = check_config(config); !status.ok()) return mistake(status.message());
   follow_machine(config);
@@ -165,15 +160,23 @@ Invocation parse_all(const std::vector<std::string>& arguments, const Environmen
 Invocation help() {
   ServerConfig config;
   CLI::App app;
-  describe(app);
-  add_options(app, config);
-  app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
+  build_parser(app, config);
   Invocation invocation;
   invocation.text = app.help();
   return invocation;
 }
 
 }  // namespace
+
+void build_parser(CLI::App& app, ServerConfig& config) {
+  describe(app);
+  add_options(app, config);
+  app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
+}
+
+std::string environment_variable(const std::string& option) {
+  return absl::StrCat("LOCUS_", absl::AsciiStrToUpper(absl::StrReplaceAll(option, {{"-", "_"}})));
+}
 
 std::optional<std::string> process_environment(const std::string& name) {
   const char* value = std::getenv(name.c_str());

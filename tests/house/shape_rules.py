@@ -124,7 +124,7 @@ MIRROR_EXCEPTIONS = {
     "tests/core/geometry/shape_ray_test.cc": "ray tests of every shape, whose predicates stand in one file a pair",
     "tests/core/geometry/watertight_test.cc": "leaks between neighbouring triangles, a matter of several files",
 }
-MIRRORED = ("tests/core", "tests/server", "tests/client")
+MIRRORED = ("tests/core", "tests/server", "tests/client", "tests/deploy")
 
 
 def subjects(path):

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 
-ROOMS = ("core/", "server/", "client/")
+ROOMS = ("core/", "server/", "client/", "deploy/")
 BAD_EXAMPLE = "class Wrong_name {};\nint Function() { return 0; }\n"
 FINDING = re.compile(r"(error|warning): ")
 

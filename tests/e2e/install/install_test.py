@@ -56,8 +56,8 @@ class InstallTest(unittest.TestCase):
     @classmethod
     def start_daemon(cls):
         port_file = os.path.join(OPTIONS.folder, "port")
-        cls.daemon = subprocess.Popen([os.path.join(cls.tree, "bin/locusd"), "--listen", "127.0.0.1:0", "--port-file", port_file],
-                                      stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        command = [os.path.join(cls.tree, "bin/locusd"), "--listen", "127.0.0.1:0", "--port-file", port_file]
+        cls.daemon = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + START_SECONDS
         while not os.path.exists(port_file):
             if cls.daemon.poll() is not None or time.monotonic() > deadline:
@@ -85,7 +85,10 @@ class InstallTest(unittest.TestCase):
 
     def test_everything_a_user_looks_for_is_there(self):
         for path in ("bin/locus", "bin/locusd", "share/doc/locus/README.md", "share/doc/locus/LICENSE",
-                     "share/doc/locus/locusd.conf.example", "share/locus/proto/locus/v1/query_service.proto",
+                     "share/man/man1/locus.1", "share/man/man1/locus-query-ray.1", "share/man/man8/locusd.8",
+                     "share/bash-completion/completions/locus", "share/zsh/site-functions/_locus",
+                     "share/fish/vendor_completions.d/locus.fish", "share/doc/locus/locusd.conf.example",
+                     "share/locus/proto/locus/v1/query_service.proto",
                      "include/locus/client/lib/client.h", "include/locus/locus/v1/query_service.grpc.pb.h"):
             self.assertIn(path, self.files)
 

@@ -1,0 +1,135 @@
+#include "deploy/manual/manual_page.h"
+
+#include <algorithm>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_replace.h"
+#include "absl/strings/str_split.h"
+#include "deploy/manual/roff.h"
+
+namespace locus::manual {
+namespace {
+
+using cli::CommandWords;
+using cli::OptionWords;
+
+// A footer's indented lines below "Examples:", and everything else.
+struct Footer {
+  std::string notes;
+  std::vector<std::string> examples;
+};
+
+Footer parts_of(const std::string& footer) {
+  Footer parts;
+  bool in_examples = false;
+  for (const absl::string_view line : absl::StrSplit(footer, '\n')) {
+    if (line == "Examples:") {
+      in_examples = true;
+    } else if (in_examples && absl::StartsWith(line, "  ")) {
+      parts.examples.emplace_back(line.substr(2));
+    } else {
+      in_examples = false;
+      absl::StrAppend(&parts.notes, std::string(line), "\n");
+    }
+  }
+  return parts;
+}
+
+std::string page_name(const std::string& path) { return absl::StrReplaceAll(path, {{" ", "-"}}); }
+
+std::string markup_of(const OptionWords& option) {
+  const std::string value = option.value.empty() ? "" : italic(option.value);
+  if (option.names.empty()) return value;
+  std::vector<std::string> names;
+  for (const std::string& name : option.names) names.push_back(bold(name));
+  return absl::StrCat(absl::StrJoin(names, ", "), value.empty() ? "" : " ", value);
+}
+
+// The description as a sentence, and after it what the parser knows beside it.
+std::string text_of(const OptionWords& option) {
+  std::string text = absl::StrCat(option.description, ".");
+  const bool names_choices = std::all_of(option.choices.begin(), option.choices.end(), [&](const std::string& choice) {
+    return absl::StrContains(option.description, choice);
+  });
+  if (!names_choices) absl::StrAppend(&text, " One of ", absl::StrJoin(option.choices, ", "), ".");
+  if (!option.default_text.empty()) absl::StrAppend(&text, " Default: ", option.default_text, ".");
+  if (option.required && !option.names.empty()) absl::StrAppend(&text, " Required.");
+  if (option.repeatable) absl::StrAppend(&text, " May be repeated.");
+  return text;
+}
+
+void add_synopsis(const CommandWords& command, RoffPage& page) {
+  std::vector<std::string> parts;
+  for (const OptionWords& option : command.options) {
+    if (option.required) parts.push_back(absl::StrCat(bold(option.names.back()), " ", italic(option.value)));
+  }
+  parts.push_back(absl::StrCat("[", italic("OPTION"), "]..."));
+  for (const OptionWords& option : command.positionals) {
+    parts.push_back(option.required ? italic(option.value) : absl::StrCat("[", italic(option.value), "]"));
+  }
+  if (!command.commands.empty()) parts.push_back(absl::StrCat(italic("COMMAND"), " ..."));
+  page.heading("SYNOPSIS").synopsis(bold(command.path), absl::StrJoin(parts, " "));
+}
+
+void add_options(const CommandWords& command, const std::string& program, const Manual& manual, RoffPage& page) {
+  page.heading("OPTIONS");
+  for (const OptionWords& option : command.positionals) page.item(markup_of(option), text_of(option));
+  for (const OptionWords& option : command.options) page.item(markup_of(option), text_of(option));
+  if (command.path != program) {
+    page.text(absl::StrCat("\nThe options of ", program, "(", manual.section, ") may stand here too."));
+  }
+}
+
+void add_commands(const CommandWords& command, const Manual& manual, RoffPage& page) {
+  if (command.commands.empty()) return;
+  page.heading("COMMANDS");
+  for (const CommandWords& below : command.commands) {
+    page.item(absl::StrCat(bold(page_name(below.path)), "(", manual.section, ")"),
+              absl::StrCat(below.description, "."));
+  }
+}
+
+void add_explained(const std::string& heading, const Explained& words, RoffPage& page) {
+  if (words.empty()) return;
+  page.heading(heading);
+  for (const auto& [word, text] : words) page.item(bold(word), text);
+}
+
+std::string roff_of(const CommandWords& command, const std::string& program, const Manual& manual) {
+  const Footer footer = parts_of(command.footer);
+  RoffPage page(absl::AsciiStrToUpper(page_name(command.path)), manual.section,
+                absl::StrCat(program, " ", manual.version));
+  // What whatis(1) indexes: one line.
+  const std::string first_line(command.description.substr(0, command.description.find('\n')));
+  page.heading("NAME").text(absl::StrCat(page_name(command.path), " - ", first_line));
+  add_synopsis(command, page);
+  page.heading("DESCRIPTION").text(absl::StrCat(command.description, ".\n\n", footer.notes));
+  add_commands(command, manual, page);
+  add_options(command, program, manual, page);
+  page.heading("EXAMPLES").literal(footer.examples);
+  add_explained("EXIT STATUS", manual.exit_statuses, page);
+  add_explained("ENVIRONMENT", manual.variables, page);
+  std::vector<std::string> others = manual.see_also;
+  if (command.path != program) others.insert(others.begin(), absl::StrCat(program, "(", manual.section, ")"));
+  page.heading("SEE ALSO").text(absl::StrJoin(others, ",\n"));
+  return page.roff();
+}
+
+void add_pages(const CommandWords& command, const std::string& program, const Manual& manual,
+               std::vector<Page>& pages) {
+  pages.push_back({absl::StrCat(page_name(command.path), ".", manual.section), roff_of(command, program, manual)});
+  for (const CommandWords& below : command.commands) add_pages(below, program, manual, pages);
+}
+
+}  // namespace
+
+std::vector<Page> manual_pages(const CommandWords& program, const Manual& manual) {
+  std::vector<Page> pages;
+  add_pages(program, program.path, manual, pages);
+  return pages;
+}
+
+}  // namespace locus::manual

@@ -1,0 +1,57 @@
+#include "deploy/manual/programs.h"
+
+#include <sstream>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/run.h"
+#include "server/config/server_config.h"
+#include "server/config/server_parser.h"
+#include "server/config/version.h"
+
+namespace locus::manual {
+
+std::vector<Page> pages_of_locus() {
+  std::ostringstream nowhere;
+  cli::Context context(nowhere, nowhere, cli::Progress::kSilent);
+  CLI::App app;
+  cli::build_cli(app, context);
+  const Manual manual = {
+      .section = "1",
+      .version = LOCUS_VERSION,
+      .exit_statuses = {{"0", "The command was carried out."},
+                        {"1", "It failed; standard error says why."},
+                        {"2", "The line was not understood, or does not fit together."},
+                        {"3", "No server answers at the address."},
+                        {"4", "The server denied it."},
+                        {"5", "The scene, mesh, object or file is not there."}},
+      .variables = {{"LOCUS_ADDRESS", "Where locusd listens, if --address is not given."},
+                    {"LOCUS_SCENE", "The scene of commands that are given none."}},
+      .see_also = {"locusd(8)"},
+  };
+  return manual_pages(cli::words_of(app), manual);
+}
+
+std::vector<Page> pages_of_locusd() {
+  server::ServerConfig config;
+  CLI::App app;
+  server::build_parser(app, config);
+  const cli::CommandWords words = cli::words_of(app);
+  Manual manual = {
+      .section = "8",
+      .version = server::kVersion,
+      .exit_statuses = {{"0", "It drained and ended as it was told to, or printed its help or version."},
+                        {"1", "It could not serve; standard error says why."},
+                        {"2", "Its options, environment or file are wrong."},
+                        {"130", "A second signal ended it at once."}},
+      .variables = {},
+      .see_also = {"locus(1)", "locus-health(1)", "locus-limits(1)"},
+  };
+  for (const cli::OptionWords& option : words.options) {
+    const std::string name = option.names.back().substr(option.names.back().find_first_not_of('-'));
+    if (name == "help" || name == "version") continue;
+    manual.variables.emplace_back(server::environment_variable(name), absl::StrCat("Like --", name, "."));
+  }
+  return manual_pages(words, manual);
+}
+
+}  // namespace locus::manual
