@@ -2,9 +2,11 @@
 import array
 import math
 import random
+import struct
+import unittest
 
 import locus
-from locus import Block, Column, QueryBatch, RayMode, StaticDetail, wire
+from locus import Block, Column, QueryBatch, RayMode, StaticDetail, schema, wire
 from support import DaemonTest, floats, listed, number
 
 SEED = 11
@@ -235,3 +237,53 @@ class RefusalTest(DaemonTest):
             self.ask(QueryBatch().lookup(1).rays([[0, 0, 0]] * 3, [[0, 0, 1], [0, 0, 1], [0, 0, 0]]))
         self.assertRefused(raised.exception, "INVALID_ARGUMENT", "OUT_OF_RANGE", "blocks[1].rays.directions")
         self.assertEqual(raised.exception.index, 2)
+
+
+class RequestBytesTest(unittest.TestCase):
+    """Batches are framed by hand; protobuf says what they hold."""
+
+    def test_every_field_stands_where_the_schema_puts_it(self):
+        settings = Block(frame=(1.5, 0, -2), source=locus.Source.STATIC, precision=locus.Precision.CONSERVATIVE,
+                         columns=[Column.ID, Column.LAYERS], masks=[1, 2], ignore_groups=[3], ignore_ids=[4, 5], max_results=600,
+                         after_id=2**63)
+        batch = QueryBatch(at_least=locus.Revision(7, 8), max_work=9, explain=True, max_reply_bytes=10)
+        batch.rays([0] * 6, [1, 0, 0], t_max=[5, 6], mode=RayMode.ALL, cull=locus.Cull.BACK, inside=locus.Inside.SKIP,
+                   block=settings)
+        batch.balls([1, 2, 3], 4, detail=StaticDetail.TRIANGLES)
+        batch.boxes([1, 2, 3], [4, 5, 6], rotations=[0, 0, 0, 1]).lookup([7, 8]).lookup_groups(9)
+        found = schema.message("QueryRequest").FromString(batch.request_bytes("arena"))
+        wanted = schema.message("QueryRequest")(scene="arena")
+        view, blocks = wanted.batch.view, wanted.batch.blocks
+        view.epoch, view.at_least = 7, 8
+        wanted.batch.max_work, wanted.batch.explain, wanted.batch.max_reply_bytes = 9, True, 10
+        first = blocks.add(source=2, precision=2, columns=[2, 9], masks=struct.pack("<2I", 1, 2), max_results=600,
+                           ignore_groups=struct.pack("<Q", 3), ignore_ids=struct.pack("<2Q", 4, 5), after_id=2**63)
+        first.frame.x, first.frame.y, first.frame.z = 1.5, 0, -2
+        first.rays.MergeFrom(schema.message("Rays")(origins=bytes(24), directions=struct.pack("<3f", 1, 0, 0),
+                                                    t_max=struct.pack("<2f", 5, 6), mode=3, cull=2, inside=3))
+        blocks.add().balls.MergeFrom(schema.message("Balls")(
+            centers=struct.pack("<3f", 1, 2, 3), radii=struct.pack("<f", 4), detail=2))
+        blocks.add().boxes.MergeFrom(schema.message("Boxes")(
+            centers=struct.pack("<3f", 1, 2, 3), half_extents=struct.pack("<3f", 4, 5, 6),
+            rotations=struct.pack("<4f", 0, 0, 0, 1), detail=1))
+        blocks.add().lookup.ids = struct.pack("<2Q", 7, 8)
+        blocks.add().lookup.groups = struct.pack("<Q", 9)
+        self.assertEqual(found, wanted)
+        self.assertEqual(schema.message("QueryBatch").FromString(batch.batch_bytes()), wanted.batch)
+
+    def test_a_block_of_no_queries_keeps_its_kind(self):
+        found = schema.message("QueryRequest").FromString(QueryBatch().balls([], []).request_bytes("arena"))
+        self.assertEqual(found.batch.blocks[0].WhichOneof("kind"), "balls")
+
+    def test_buffers_are_read_when_the_batch_is_sent(self):
+        origins = array.array("f", [0, 0, 0])
+        batch = QueryBatch().rays(origins, [0, 0, -1])
+        origins[2] = 9
+        found = schema.message("QueryRequest").FromString(batch.request_bytes("arena"))
+        self.assertEqual(found.batch.blocks[0].rays.origins, struct.pack("<3f", 0, 0, 9))
+
+    def test_settings_that_do_not_fit_their_field_are_refused(self):
+        for make in (lambda: QueryBatch(max_work=-1), lambda: QueryBatch(max_reply_bytes=2**32),
+                     lambda: QueryBatch().lookup(1, block=Block(max_results=-1))):
+            with self.assertRaises(OverflowError):
+                make()
