@@ -144,6 +144,13 @@ class InstallTest(unittest.TestCase):
         run(OPTIONS.compiler, "-std=c++20", PROGRAM, "-o", program, *self.flags("--cflags", "--libs"))
         self.assertEqual(run(program, self.address, "through-pkg-config"), WANTED)
 
+    def test_the_python_package_works_where_it_is_installed(self):
+        folders = glob.glob(os.path.join(self.tree, "lib/python3*/dist-packages"))
+        if not folders:
+            self.skipTest("built without the Python package")
+        script = f"import locus; print(locus.connect({self.address!r}).healthy())"
+        self.assertEqual(run("/usr/bin/python3", "-B", "-c", script, PYTHONPATH=folders[0]), "True\n")
+
     def test_both_say_the_version_of_the_program(self):
         version = self.flags("--modversion")
         self.assertEqual(run(os.path.join(self.tree, "bin/locus"), "--version").split(), ["locus", *version])
