@@ -93,7 +93,7 @@ absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const 
     for (size_t row = range.begin; row < range.end; ++row) {
       Json json = Json::object();
       const bool hit = rows->ids().empty() || rows->ids()[row] != 0;
-      if (!layout.query.empty()) json[layout.query] = query;
+      if (!layout.query.empty()) json[layout.query] = layout.first_query + query;
       if (layout.dense) json["hit"] = hit;
       for (const v1::Column column : layout.columns) add_column(*rows, row, hit, column, layout.frame, json);
       result.push_back(std::move(json));
@@ -102,16 +102,17 @@ absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const 
   return result;
 }
 
+Json work_json(const v1::Work& work) {
+  return {
+      {"nodes", work.nodes()}, {"cells", work.cells()}, {"tests", work.tests()}, {"nanoseconds", work.nanoseconds()}};
+}
+
 Json result_head(const v1::QueryResult& result) {
   Json head = {{"epoch", id_json(result.epoch())}, {"revision", result.revision()}, {"tick", result.tick()}};
   for (const v1::BlockResult& block : result.blocks()) {
     for (const uint32_t query : block.truncated()) head["truncated"].push_back(query);
   }
-  if (result.has_work()) {
-    const v1::Work& work = result.work();
-    head["work"] = {
-        {"nodes", work.nodes()}, {"cells", work.cells()}, {"tests", work.tests()}, {"nanoseconds", work.nanoseconds()}};
-  }
+  if (result.has_work()) head["work"] = work_json(result.work());
   return head;
 }
 

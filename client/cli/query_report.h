@@ -16,6 +16,7 @@ struct RowLayout {
   std::string query = {};                // what a query is called: "ray", "ball"; empty = rows do not name their query
   std::vector<v1::Column> columns = {};  // what was asked for, in the order to show
   client::Double3 frame = {};            // of the block: points are shown absolute
+  uint64_t first_query = 0;              // the number of the block's first query
   bool dense = false;                    // one row a query, with a `hit` that may be false
 };
 
@@ -25,6 +26,8 @@ absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const 
 
 // The keys of such rows, in their order.
 std::vector<std::string> row_keys(const RowLayout& layout);
+
+Json work_json(const v1::Work& work);
 
 // Epoch, revision and tick, the queries that were cut, and the work if it was reported.
 Json result_head(const v1::QueryResult& result);

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "client/cli/arguments.h"
+#include "client/cli/bulk_update.h"
 #include "client/cli/commands.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
@@ -14,12 +15,30 @@ namespace {
 
 struct RemoveOptions {
   std::string scene;
+  BulkOptions bulk;
   std::vector<Number64> ids;
   std::vector<Number64> groups;
   bool all = false;
 };
 
+absl::Status remove_rows(const RemoveOptions& options, Context& context) {
+  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  if (!options.ids.empty() || !options.groups.empty() || options.all) {
+    return usage_error("give --id, --group or --all, or an input of ids, not both");
+  }
+  const BulkUpdate update = {.schema = {{.name = "id", .kind = FieldKind::kId, .required = true}},
+                             .check_row = {},
+                             .batch_of = [](const RowBatch& batch) {
+                               client::UpdateBuilder builder;
+                               builder.remove(batch.columns[0].integers);
+                               return builder.build();
+                             }};
+  return run_bulk_update(update, options.scene, options.bulk, context);
+}
+
 absl::Status remove(const RemoveOptions& options, Context& context) {
+  if (options.bulk.given()) return remove_rows(options, context);
+  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
   if (options.ids.empty() && options.groups.empty() && !options.all) {
     return usage_error("nothing to remove: give --id, --group or --all");
   }
@@ -39,11 +58,15 @@ void add_remove_command(CLI::App& parent, Context& context) {
   locus remove arena --id 7
   locus remove arena --id 7 --id 8
   locus remove arena --group 3
-  locus remove arena --all)");
+  locus remove arena --all
+  locus remove arena --from-csv ids.csv
+
+Rows: a column id, or {"id": "7"} a line. Each batch is one revision.)");
   add_scene_argument(command, options->scene);
   add_repeatable(command, "--id", options->ids, "ID", "An object");
   add_repeatable(command, "--group", options->groups, "GROUP", "All objects of a group");
   command.add_flag("--all", options->all, "Every object");
+  add_bulk_options(command, options->bulk);
   run_when_chosen(command, options, context, remove);
 }
 

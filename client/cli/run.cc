@@ -20,6 +20,8 @@ constexpr char kExamples[] = R"(Examples:
   locus insert arena ball --id 7 --at 1,2,3 --radius 0.5
   locus query ray arena --from 0,1,0 --dir 0,0,-1
   locus -o json query ball arena --at 0,0,0 --radius 10
+  locus -o csv query ray arena --from-csv rays.csv > hits.csv
+  generator | locus move arena --from-ndjson -
   locus -a unix:/run/locus.sock health
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.

@@ -32,6 +32,7 @@ ALLOWED = {
     "deploy/manual": ["client/cli", "server/config"],
     "client/cli/import": ["client/cli/import/*", "core/geometry", "core/base"],
     "client/cli/import/quake": ["client/cli/import", "core/geometry", "core/base"],
+    "client/cli/bulk": ["core/base"],
     "client/cli/generate": ["client/cli/import", "core/geometry", "core/base"],
 }
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
