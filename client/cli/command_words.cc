@@ -11,7 +11,7 @@ namespace {
 
 ValueKind kind_of(const OptionWords& option, char delimiter) {
   if (!option.choices.empty()) return delimiter == ',' ? ValueKind::kListOfChoices : ValueKind::kChoice;
-  if (option.value == "FILE") return ValueKind::kFile;
+  if (option.value == "FILE" || option.value == "OUT") return ValueKind::kFile;
   if (option.value == "SCENE") return ValueKind::kScene;
   if (option.value == "ADDRESS") return ValueKind::kAddress;
   return ValueKind::kAnything;

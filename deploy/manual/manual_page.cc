@@ -8,6 +8,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "deploy/manual/roff.h"
 
 namespace locus::manual {
@@ -48,9 +49,18 @@ std::string markup_of(const OptionWords& option) {
   return absl::StrCat(absl::StrJoin(names, ", "), value.empty() ? "" : " ", value);
 }
 
+// With one full stop at its end.
+std::string sentence(const std::string& text) { return absl::StrCat(absl::StripSuffix(text, "."), "."); }
+
+// What whatis(1) indexes: the first sentence, on one line.
+std::string summary(const std::string& description) {
+  const std::string line = absl::StrReplaceAll(description, {{"\n", " "}});
+  return std::string(absl::StripSuffix(line.substr(0, line.find(". ")), "."));
+}
+
 // The description as a sentence, and after it what the parser knows beside it.
 std::string text_of(const OptionWords& option) {
-  std::string text = absl::StrCat(option.description, ".");
+  std::string text = sentence(option.description);
   const bool names_choices = std::all_of(option.choices.begin(), option.choices.end(), [&](const std::string& choice) {
     return absl::StrContains(option.description, choice);
   });
@@ -87,8 +97,7 @@ void add_commands(const CommandWords& command, const Manual& manual, RoffPage& p
   if (command.commands.empty()) return;
   page.heading("COMMANDS");
   for (const CommandWords& below : command.commands) {
-    page.item(absl::StrCat(bold(page_name(below.path)), "(", manual.section, ")"),
-              absl::StrCat(below.description, "."));
+    page.item(absl::StrCat(bold(page_name(below.path)), "(", manual.section, ")"), sentence(below.description));
   }
 }
 
@@ -102,11 +111,9 @@ std::string roff_of(const CommandWords& command, const std::string& program, con
   const Footer footer = parts_of(command.footer);
   RoffPage page(absl::AsciiStrToUpper(page_name(command.path)), manual.section,
                 absl::StrCat(program, " ", manual.version));
-  // What whatis(1) indexes: one line.
-  const std::string first_line(command.description.substr(0, command.description.find('\n')));
-  page.heading("NAME").text(absl::StrCat(page_name(command.path), " - ", first_line));
+  page.heading("NAME").text(absl::StrCat(page_name(command.path), " - ", summary(command.description)));
   add_synopsis(command, page);
-  page.heading("DESCRIPTION").text(absl::StrCat(command.description, ".\n\n", footer.notes));
+  page.heading("DESCRIPTION").text(absl::StrCat(sentence(command.description), "\n\n", footer.notes));
   add_commands(command, manual, page);
   add_options(command, program, manual, page);
   page.heading("EXAMPLES").literal(footer.examples);

@@ -57,6 +57,13 @@ TEST(ManualPageTest, ExamplesStandApartFromTheOtherNotes) {
   EXPECT_THAT(roff, HasSubstr("Draw something.\n.PP\nIt takes a while.\n.PP\nSee the book.\n"));
 }
 
+TEST(ManualPageTest, ADescriptionOfSeveralSentencesIsIndexedByItsFirst) {
+  const cli::CommandWords tool{.path = "tool", .description = "Draws balls\nand boxes. Slowly."};
+  const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).roff;
+  EXPECT_THAT(roff, HasSubstr(".SH NAME\ntool \\- Draws balls and boxes\n"));
+  EXPECT_THAT(roff, HasSubstr(".SH DESCRIPTION\nDraws balls\nand boxes. Slowly.\n"));
+}
+
 TEST(ManualPageTest, WhatTheParserDoesNotKnowIsOnEveryPage) {
   const std::string roff = page_of_draw().roff;
   EXPECT_THAT(roff, HasSubstr(".SH EXIT STATUS\n.TP\n\\fB0\\fR\nIt went well.\n"));
