@@ -1,7 +1,7 @@
 #include "client/cli/render/thing_bounds.h"
 
 #include <algorithm>
-#include <array>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -15,8 +15,8 @@ constexpr int kSections = 16;
 constexpr int kCuts = kSections - 1;  // of each side
 constexpr int kSides = 6;             // lower and upper of each axis: side = 2 axis + (1 if upper)
 constexpr int kMostRounds = 16;       // sixteen to this power is beyond what doubles tell apart
-constexpr double kGoodEnough = 1.0 / 32;
-constexpr double kWidening = 1e-6;  // for slabs are rounded to floats when they are sent
+constexpr double kFlat = 1e-4;        // against the longest side
+constexpr double kWidening = 1e-6;    // for slabs are rounded to floats when they are sent
 
 absl::Status not_found(const std::string& scene, uint64_t id, absl::string_view why) {
   return absl::NotFoundError(absl::StrCat("scene ", scene, " has no object or instance ", id, why));
@@ -98,6 +98,17 @@ Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   return widened(result);
 }
 
+// Whether a side came in by a slab. Axes along which the box is all but flat do not count: widening undoes what they
+// do.
+bool moved(const Aabbd& before, const Aabbd& after) {
+  const Vec3d old_extent = before.extent(), new_extent = after.extent();
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool flat = old_extent[axis] < kFlat * max_component(old_extent);
+    if (!flat && new_extent[axis] < old_extent[axis] * (1 - 0.5 / kSections)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 absl::StatusOr<Aabbd> thing_bounds(const client::Client& client, const std::string& scene,
@@ -110,10 +121,8 @@ absl::StatusOr<Aabbd> thing_bounds(const client::Client& client, const std::stri
     const bool seen = std::find(reached->begin(), reached->end(), true) != reached->end();
     if (!seen && round == 0) return not_found(scene, id, " that queries see: it is hidden (layers 0)");
     if (!seen) break;
-    const Aabbd next = narrowed(box, *reached);
-    const double gap = max_component(box.extent()) / kSections;
-    box = next;
-    if (gap <= kGoodEnough * max_component(box.extent())) break;
+    const Aabbd before = std::exchange(box, narrowed(box, *reached));
+    if (!moved(before, box)) break;
   }
   return box;
 }

@@ -13,12 +13,11 @@
 
 namespace locus::cli {
 
-// Bounds of what has `id` at `revision`, which is kept, within `scene_bounds`: outer bounds, too wide by at most a
-// thirty-second of the thing's own extent on each side. NOT_FOUND if the scene has no such id, or if queries cannot see
-// it (layers 0).
-// Method: each side is moved in by a sixteenfold section with box queries, which tell by `after_id` = id - 1 and
-// `max_results` = 1 whether this very thing reaches into a slab. Cost: one batch of 90 boxes a round, two rounds for a
-// thing as large as the scene, one more for each factor of sixteen that it is smaller.
+// Bounds of what has `id` at `revision`, which is kept, within `scene_bounds`: outer bounds, too wide on each side by
+// at most a twelfth of the thing's extent along that axis. NOT_FOUND if the scene has no such id, or if queries cannot
+// see it (layers 0). Method: each side is moved in by a sixteenfold section with box queries, which tell by `after_id`
+// = id - 1 and `max_results` = 1 whether this very thing reaches into a slab. Cost: one batch of 90 boxes a round, a
+// round or two for a thing as large as the scene, one more for each factor of sixteen that it is smaller; at most 16.
 absl::StatusOr<Aabbd> thing_bounds(const client::Client& client, const std::string& scene,
                                    const client::Revision& revision, uint64_t id, const Aabbd& scene_bounds);
 

@@ -67,6 +67,7 @@ TEST(HelpTest, EveryCommandExplainsItselfWithExamples) {
                                                           {"query", "ray"},
                                                           {"query", "ball"},
                                                           {"query", "box"},
+                                                          {"render"},
                                                           {"limits"},
                                                           {"health"},
                                                           {"version"}};
