@@ -2,6 +2,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
 
@@ -56,11 +57,25 @@ RoffPage& RoffPage::heading(const std::string& name) {
   return *this;
 }
 
+namespace {
+
+// Running text, whose long lists without blanks may go on in the next line after a comma. Hyphenation is off.
+std::string running(const std::string& line) {
+  constexpr size_t kLongWord = 30;
+  std::vector<std::string> words = absl::StrSplit(escaped(line), ' ');
+  for (std::string& word : words) {
+    if (word.size() > kLongWord) word = absl::StrReplaceAll(word, {{",", ",\\:"}});
+  }
+  return absl::StrJoin(words, " ");
+}
+
+}  // namespace
+
 RoffPage& RoffPage::text(const std::string& plain) {
   bool paragraph_ends = false;
   for (const absl::string_view line : absl::StrSplit(plain, '\n')) {
     const std::string words(absl::StripAsciiWhitespace(line));
-    if (!words.empty()) absl::StrAppend(&roff_, paragraph_ends ? ".PP\n" : "", escaped(words), "\n");
+    if (!words.empty()) absl::StrAppend(&roff_, paragraph_ends ? ".PP\n" : "", running(words), "\n");
     paragraph_ends = words.empty();
   }
   return *this;

@@ -19,6 +19,11 @@ TEST(RoffTest, AnEmptyLineBeginsAParagraphAndOnlyBetweenTexts) {
   EXPECT_EQ(RoffPage("T", "1", "s").text("a\nb\n\nc\n\n").roff(), RoffPage("T", "1", "s").roff() + "a\nb\n.PP\nc\n");
 }
 
+TEST(RoffTest, ALongListWithoutBlanksMayBreakAfterItsCommas) {
+  EXPECT_THAT(RoffPage("T", "1", "s").text("at 1,2 give center_x,center_y,center_z,half_x").roff(),
+              ::testing::HasSubstr("at 1,2 give center_x,\\:center_y,\\:center_z,\\:half_x\n"));
+}
+
 TEST(RoffTest, LiteralLinesKeepTheirEnds) {
   EXPECT_THAT(RoffPage("T", "1", "s").literal({"a  b", ".c"}).roff(), ::testing::HasSubstr(".nf\na  b\n\\&.c\n.fi\n"));
 }
