@@ -73,7 +73,7 @@ TEST_F(DefaultSceneRunTest, ALineWithASceneKeepsIt) {
 TEST_F(DefaultSceneRunTest, WhatElseIsMissingIsStillNamed) {
   context_.use_scene("arena");
   EXPECT_EQ(run_here({"insert", "ball", "--id", "7"}), ExitCode::kUsage);
-  EXPECT_THAT(err_.str(), HasSubstr("--at is required"));
+  EXPECT_THAT(err_.str(), HasSubstr("give --id and --at, or rows"));
 }
 
 TEST_F(DefaultSceneRunTest, ImportAndGeneratePlaceInTheDefault) {
