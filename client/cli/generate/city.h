@@ -9,6 +9,7 @@
 
 namespace locus::cli {
 
+inline constexpr uint64_t kMinCityTriangles = 12;
 inline constexpr uint64_t kMaxCityTriangles = uint64_t{1} << 27;
 
 // A ground slab whose top is z = 0 and box buildings on it, a third of them towers of two to four steps, on square lots
