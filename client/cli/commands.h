@@ -9,6 +9,7 @@
 namespace locus::cli {
 
 void add_scene_command(CLI::App& parent, Context& context);
+void add_mesh_command(CLI::App& parent, Context& context);
 void add_import_command(CLI::App& parent, Context& context);
 void add_generate_command(CLI::App& parent, Context& context);
 void add_insert_command(CLI::App& parent, Context& context);
@@ -17,6 +18,8 @@ void add_remove_command(CLI::App& parent, Context& context);
 void add_query_command(CLI::App& parent, Context& context);
 void add_get_command(CLI::App& parent, Context& context);
 void add_render_command(CLI::App& parent, Context& context);
+void add_dump_command(CLI::App& parent, Context& context);
+void add_export_command(CLI::App& parent, Context& context);
 void add_demo_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
 void add_health_command(CLI::App& parent, Context& context);

@@ -45,6 +45,7 @@ class Context {
 
   // From here on the last report written is kept as well, for whoever works with its values.
   void keep_reports() { keeps_reports_ = true; }
+  bool keeps_reports() const { return keeps_reports_; }
   // The last report written since the last call; null if there was none.
   std::shared_ptr<const Report> take_report() { return std::move(kept_); }
 

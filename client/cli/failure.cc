@@ -20,7 +20,8 @@ std::string name_of(v1::Reason reason) { return std::string(absl::StripPrefix(v1
 std::string hint_of_reason(v1::Reason reason, absl::string_view message) {
   switch (reason) {
     case v1::REASON_NOT_FOUND:
-      if (absl::StrContains(message, "mesh")) return "upload a mesh with `locus import FILE --scene SCENE`";
+      if (absl::StrContains(message, "mesh"))
+        return "`locus mesh list` shows what there is; `locus import FILE --scene SCENE` uploads one";
       return "`locus scene list` shows what there is; `locus scene create NAME` makes a scene";
     case v1::REASON_LIMIT:
       return "`locus limits` lists every limit of this server";

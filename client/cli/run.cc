@@ -22,6 +22,7 @@ constexpr char kExamples[] = R"(Examples:
   locus -o json query ball arena --at 0,0,0 --radius 10
   locus -o csv query ray arena --from-csv rays.csv > hits.csv
   generator | locus move arena --from-ndjson -
+  locus export arena arena.glb
   locus -a unix:/run/locus.sock health
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
@@ -88,6 +89,7 @@ void build_cli(CLI::App& app, Context& context) {
       ->type_name("FORMAT")
       ->transform(choices(formats));
   add_scene_command(app, context);
+  add_mesh_command(app, context);
   add_import_command(app, context);
   add_generate_command(app, context);
   add_insert_command(app, context);
@@ -96,6 +98,8 @@ void build_cli(CLI::App& app, Context& context) {
   add_query_command(app, context);
   add_get_command(app, context);
   add_render_command(app, context);
+  add_dump_command(app, context);
+  add_export_command(app, context);
   add_demo_command(app, context);
   add_limits_command(app, context);
   add_health_command(app, context);

@@ -78,8 +78,8 @@ class Client {
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
   // The mesh as it is stored, held in memory whole: 12 bytes a vertex and a triangle. Repeated when safe. DATA_LOSS if
-  // what came is not what the server announced: counts, hash, or an index beyond the vertices. Never holds more than
-  // was announced.
+  // what came is not what the server announced (counts, hash) or no mesh (an index beyond the vertices, a vertex that
+  // is not finite, parts out of order). Never holds more than was announced.
   absl::StatusOr<DownloadedMesh> download_mesh(absl::string_view name, const DownloadProgress& progress = {}) const;
   // All pages.
   absl::StatusOr<std::vector<v1::Mesh>> list_meshes() const;

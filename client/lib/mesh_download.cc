@@ -1,6 +1,7 @@
 #include "client/lib/mesh_download.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -48,6 +49,9 @@ class Receiver {
     const size_t vertices = vertex_numbers_ / 3;
     if (std::any_of(mesh_.indices.begin(), mesh_.indices.end(), [=](uint32_t index) { return index >= vertices; }))
       return damaged(name_, "an index is beyond its vertices");
+    if (!std::all_of(mesh_.vertices.begin(), mesh_.vertices.end(), [](float number) { return std::isfinite(number); }))
+      return damaged(name_, "a vertex is not finite");
+    if (!parts_ascend()) return damaged(name_, "its parts do not ascend from triangle 0 within it");
     const Sha256 hash = mesh_sha256(mesh_.vertices, mesh_.indices);
     if (!std::equal(hash.begin(), hash.end(), mesh_.description.sha256().begin(), mesh_.description.sha256().end(),
                     [](uint8_t a, char b) { return a == static_cast<uint8_t>(b); }))
@@ -61,6 +65,15 @@ class Receiver {
     mesh_.description = std::move(*piece.mutable_mesh());
     vertex_numbers_ = size_t{3} * mesh_.description.vertices();
     index_numbers_ = size_t{3} * mesh_.description.triangles();
+  }
+
+  bool parts_ascend() const {
+    for (size_t i = 0; i < mesh_.parts.size(); ++i) {
+      const uint32_t first = mesh_.parts[i].first_triangle();
+      const bool in_order = i == 0 ? first == 0 : first > mesh_.parts[i - 1].first_triangle();
+      if (!in_order || first >= mesh_.description.triangles()) return false;
+    }
+    return true;
   }
 
   const absl::string_view name_;

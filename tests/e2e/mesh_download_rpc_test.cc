@@ -71,9 +71,7 @@ TEST_F(MeshDownloadRpcTest, ASmallMeshIsOnePieceWithEverythingInIt) {
 
 TEST_F(MeshDownloadRpcTest, ALargeMeshWithManyPartsComesInBoundedPiecesThatHaveItsHash) {
   v1::UploadMeshResponse uploaded;
-  ASSERT_TRUE(
-      upload({with_parts(whole_mesh("large", large_mesh()), limits::kMaxMeshParts, limits::kMaxLabelLength)}, &uploaded)
-          .ok());
+  ASSERT_TRUE(upload({with_parts(whole_mesh("large", large_mesh()), kParts, limits::kMaxLabelLength)}, &uploaded).ok());
   const std::vector<v1::DownloadMeshResponse> pieces = pieces_of("large");
   for (const v1::DownloadMeshResponse& piece : pieces) {
     EXPECT_LE(piece.ByteSizeLong(), kMaxPiece);
@@ -82,7 +80,7 @@ TEST_F(MeshDownloadRpcTest, ALargeMeshWithManyPartsComesInBoundedPiecesThatHaveI
     EXPECT_EQ(piece.has_mesh(), &piece == &pieces.front());
   }
   const v1::DownloadMeshResponse all = joined(pieces);
-  EXPECT_EQ(all.parts_size(), static_cast<int>(limits::kMaxMeshParts));
+  EXPECT_EQ(all.parts_size(), static_cast<int>(kParts));
   const Sha256 hash = server::mesh_hash(server::span_of(all.vertices()), server::span_of(all.indices()));
   EXPECT_EQ(std::string(hash.begin(), hash.end()), uploaded.mesh().sha256());
 }

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/client/lib/fake_server.h"
 
 namespace locus::client {
@@ -106,6 +108,21 @@ TEST_F(MeshDownloadTest, LessThanAnnouncedIsDataLoss) {
 TEST_F(MeshDownloadTest, AnIndexBeyondTheVerticesIsDataLoss) {
   pieces()[2].set_indices(0, 4);
   expect_damaged("an index is beyond its vertices");
+}
+
+TEST_F(MeshDownloadTest, AVertexThatIsNotFiniteIsDataLoss) {
+  pieces()[0].set_vertices(0, std::numeric_limits<float>::quiet_NaN());
+  expect_damaged("a vertex is not finite");
+}
+
+TEST_F(MeshDownloadTest, PartsOutOfOrderOrBeyondTheMeshAreDataLoss) {
+  pieces()[0].mutable_parts(0)->set_first_triangle(1);
+  expect_damaged("its parts do not ascend");
+  pieces()[0].mutable_parts(0)->set_first_triangle(0);
+  pieces()[0].add_parts();
+  expect_damaged("its parts do not ascend");
+  pieces()[0].mutable_parts(1)->set_first_triangle(2);
+  expect_damaged("its parts do not ascend");
 }
 
 TEST_F(MeshDownloadTest, BytesOfAnotherHashAreDataLoss) {
