@@ -87,6 +87,8 @@ driver = "$driver"
 graphroot = "$store/storage"
 runroot = "$work/run"
 TEXT
+  # The images of earlier runs stay; what podman remembers beside them names folders that are gone.
+  rm -rf "$store/storage/libpod"
   export CONTAINERS_CONF=$work/containers.conf CONTAINERS_STORAGE_CONF=$work/storage.conf
   podman info
 }
