@@ -21,15 +21,20 @@ void add_render_command(CLI::App& parent, Context& context);
 void add_dump_command(CLI::App& parent, Context& context);
 void add_export_command(CLI::App& parent, Context& context);
 void add_demo_command(CLI::App& parent, Context& context);
+void add_run_command(CLI::App& parent, Context& context);
+void add_wait_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
 void add_health_command(CLI::App& parent, Context& context);
 void add_version_command(CLI::App& parent, Context& context);
 void add_completion_command(CLI::App& parent, Context& context);
 
-// Runs `run(options, context)`, which returns an absl::Status, when `command` was chosen.
+// Runs `run(options, context)`, which returns an absl::Status, when `command` was chosen; does nothing where lines are
+// only checked.
 template <class Options, class Run>
 void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
-  command.callback([options, &context, run] { context.finish(run(*options, context)); });
+  command.callback([options, &context, run] {
+    if (context.lines() != Lines::kScriptCheck) context.finish(run(*options, context));
+  });
 }
 
 }  // namespace locus::cli

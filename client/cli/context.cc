@@ -3,10 +3,14 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/failure.h"
 
 namespace locus::cli {
 
 absl::StatusOr<client::Client*> Context::connect() {
+  if (pending_batch_) {
+    return usage_error("only lines that insert, move and remove stand between begin and commit");
+  }
   if (client_) return client_.get();
   client::ClientOptions options;
   if (options_.timeout_seconds) {

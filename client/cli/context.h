@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cli/output.h"
+#include "client/cli/pending_batch.h"
 #include "client/lib/client.h"
 
 namespace locus::cli {
@@ -27,6 +28,10 @@ struct GlobalOptions {
 // Whether lines that overwrite themselves make sense on `err`.
 enum class Progress { kSilent, kLive };
 
+// What the lines are that run through a context. A script has one connection, chosen before it; while it is checked,
+// commands are parsed but do nothing.
+enum class Lines { kProgram, kScript, kScriptCheck };
+
 class Context {
  public:
   // Borrows the streams.
@@ -37,7 +42,8 @@ class Context {
   std::ostream& err() { return err_; }
   Progress progress() const { return progress_; }
 
-  // Connects to options().address the first time. UNAVAILABLE in words for the command line.
+  // Connects to options().address the first time. UNAVAILABLE in words for the command line; a usage error while a
+  // batch is open, since nothing else is sent meanwhile.
   absl::StatusOr<client::Client*> connect();
 
   // Writes to the output in the chosen format.
@@ -59,6 +65,12 @@ class Context {
   void remember_own(const std::string& scene, client::Revision revision) { own_[scene] = revision; }
   void forget_own(const std::string& scene) { own_.erase(scene); }
 
+  Lines lines() const { return lines_; }
+  void set_lines(Lines lines) { lines_ = lines; }
+
+  // The batch that `begin` opened: update commands add to it instead of sending their own.
+  std::optional<PendingBatch>& pending_batch() { return pending_batch_; }
+
   // The outcome of the command that ran.
   void finish(absl::Status outcome) { outcome_ = std::move(outcome); }
   const absl::Status& outcome() const { return outcome_; }
@@ -74,6 +86,8 @@ class Context {
   std::shared_ptr<const Report> kept_;
   std::string default_scene_;
   std::map<std::string, client::Revision> own_;
+  Lines lines_ = Lines::kProgram;
+  std::optional<PendingBatch> pending_batch_;
 };
 
 }  // namespace locus::cli

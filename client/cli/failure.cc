@@ -13,6 +13,7 @@ namespace locus::cli {
 namespace {
 
 constexpr char kUsagePayload[] = "locus/usage";
+constexpr char kToldPayload[] = "locus/told";
 
 std::string name_of(v1::Reason reason) { return std::string(absl::StripPrefix(v1::Reason_Name(reason), "REASON_")); }
 
@@ -84,6 +85,37 @@ absl::Status usage_error(absl::string_view message) {
   absl::Status status = absl::InvalidArgumentError(message);
   status.SetPayload(kUsagePayload, absl::Cord());
   return status;
+}
+
+absl::Status told(absl::Status status) {
+  status.SetPayload(kToldPayload, absl::Cord());
+  return status;
+}
+
+bool is_told(const absl::Status& status) { return status.GetPayload(kToldPayload).has_value(); }
+
+std::string failure_name(const absl::Status& status) {
+  if (status.GetPayload(kUsagePayload)) return "USAGE";
+  const std::optional<v1::Error> error = client::error_of(status);
+  if (error && error->reason() != v1::REASON_UNSPECIFIED) return name_of(error->reason());
+  return absl::StatusCodeToString(status.code());
+}
+
+bool is_failure_name(const std::string& name) {
+  v1::Reason reason = v1::REASON_UNSPECIFIED;
+  if (name == "USAGE") return true;
+  if (v1::Reason_Parse(absl::StrCat("REASON_", name), &reason)) return reason != v1::REASON_UNSPECIFIED;
+  for (int code = 1; code <= static_cast<int>(absl::StatusCode::kUnauthenticated); ++code) {
+    if (name == absl::StatusCodeToString(static_cast<absl::StatusCode>(code))) return true;
+  }
+  return false;
+}
+
+absl::Status with_place(const absl::Status& status, absl::string_view place) {
+  absl::Status placed(status.code(), absl::StrCat(place, ": ", status.message()));
+  status.ForEachPayload(
+      [&placed](absl::string_view type, const absl::Cord& payload) { placed.SetPayload(type, payload); });
+  return placed;
 }
 
 ExitCode exit_code_of(const absl::Status& status) {

@@ -18,6 +18,19 @@ enum class ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kUnreachable = 3, kDenie
 // A mistake in how the command was written, found after parsing; exits with kUsage.
 absl::Status usage_error(absl::string_view message);
 
+// Marks a failure that was written already: it still decides the exit code.
+absl::Status told(absl::Status status);
+bool is_told(const absl::Status& status);
+
+// One word for a failure: USAGE, the server's reason without "REASON_", or the name of the status code where the server
+// gave none.
+std::string failure_name(const absl::Status& status);
+// Whether any failure has this name.
+bool is_failure_name(const std::string& name);
+
+// The same failure with `place: ` before its message.
+absl::Status with_place(const absl::Status& status, absl::string_view place);
+
 ExitCode exit_code_of(const absl::Status& status);
 
 // One line "error: ..." and one line "hint: ..." where there is one; with json and ndjson instead one object on one

@@ -6,9 +6,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
 #include "client/cli/default_scene.h"
+#include "client/cli/unknown_values.h"
 
 namespace locus::cli {
 namespace {
@@ -35,7 +37,9 @@ struct Refusal {
   int code = 0;
   std::string out;
   std::string err;
+  std::string message;           // what is wrong, without advice
   bool lacks_something = false;  // a required option or argument
+  bool wrong_value = false;
 };
 
 // The parser takes its arguments from the back, and reports by exceptions: this is where they end.
@@ -47,7 +51,13 @@ std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::strin
     std::ostringstream out;
     std::ostringstream err;
     const int code = app.exit(error, out, err);
-    return Refusal{code, out.str(), err.str(), dynamic_cast<const CLI::RequiredError*>(&error) != nullptr};
+    return Refusal{.code = code,
+                   .out = out.str(),
+                   .err = err.str(),
+                   .message = error.what(),
+                   .lacks_something = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr,
+                   .wrong_value = dynamic_cast<const CLI::ValidationError*>(&error) != nullptr ||
+                                  dynamic_cast<const CLI::ConversionError*>(&error) != nullptr};
   }
   return std::nullopt;
 }
@@ -63,6 +73,22 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
   CLI::App second;
   build_cli(second, context);
   return parse_and_run(second, *longer);
+}
+
+// A script's connection is chosen once, before `run`.
+void restrict_to_script(CLI::App& app) {
+  for (const char* name : {"--address", "--timeout"}) {
+    app.get_option(name)->envname("")->check([name](const std::string&) {
+      return absl::StrCat("a script has one connection: give ", name, " before `run`");
+    });
+  }
+}
+
+// The parser does not name what it found in the place of a command.
+std::string in_words(const Refusal& refusal, const std::vector<std::string>& arguments) {
+  if (refusal.message != CLI::RequiredError::Subcommand(1).what()) return refusal.message;
+  constexpr size_t kShownBytes = 60;
+  return absl::StrCat(refusal.message, ", found `", absl::StrJoin(arguments, " ").substr(0, kShownBytes), "`");
 }
 
 }  // namespace
@@ -88,6 +114,11 @@ void build_cli(CLI::App& app, Context& context) {
   app.add_option("-o,--output", options.format, "How to print: table, json, ndjson, csv [table]")
       ->type_name("FORMAT")
       ->transform(choices(formats));
+  if (context.lines() != Lines::kProgram) {
+    restrict_to_script(app);
+  } else {
+    add_run_command(app, context);
+  }
   add_scene_command(app, context);
   add_mesh_command(app, context);
   add_import_command(app, context);
@@ -105,6 +136,8 @@ void build_cli(CLI::App& app, Context& context) {
   add_health_command(app, context);
   add_version_command(app, context);
   add_completion_command(app, context);
+  add_wait_command(app, context);
+  if (context.lines() == Lines::kScriptCheck) accept_unknown_values(app);
 }
 
 ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
@@ -114,8 +147,24 @@ ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
     context.err() << refusal->err;
     return refusal->code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
-  if (!context.outcome().ok()) write_failure(context.err(), context.options().format, context.outcome());
+  if (!context.outcome().ok() && !is_told(context.outcome()))
+    write_failure(context.err(), context.options().format, context.outcome());
   return exit_code_of(context.outcome());
+}
+
+absl::Status run_script_line(const std::vector<std::string>& arguments, Context& context) {
+  const GlobalOptions before = context.options();
+  context.finish(absl::OkStatus());
+  const std::optional<Refusal> refusal = run_with_default_scene(arguments, context);
+  context.options() = before;
+  if (!refusal) return context.outcome();
+  if (refusal->code != 0) {
+    // The value taken for an unknown one need not suit.
+    if (refusal->wrong_value && has_unknown(arguments)) return absl::OkStatus();
+    return usage_error(in_words(*refusal, arguments));
+  }
+  if (context.lines() == Lines::kScript) context.out() << refusal->out;
+  return absl::OkStatus();
 }
 
 }  // namespace locus::cli

@@ -18,6 +18,10 @@ void build_cli(CLI::App& app, Context& context);
 // context's streams. Help and --version count as success.
 ExitCode run_line(const std::vector<std::string>& arguments, Context& context);
 
+// The same for a line of a script: answers are written, what went wrong is returned, a wrong line as a usage error. Its
+// global options hold for that line alone. Where lines are only checked, nothing is run or written.
+absl::Status run_script_line(const std::vector<std::string>& arguments, Context& context);
+
 }  // namespace locus::cli
 
 #endif  // LOCUS_CLIENT_CLI_RUN_H_

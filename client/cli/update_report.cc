@@ -8,6 +8,7 @@
 namespace locus::cli {
 
 absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, Context& context) {
+  if (context.pending_batch()) return context.pending_batch()->add(scene, batch);
   const absl::StatusOr<client::Client*> client = context.connect();
   if (!client.ok()) return client.status();
   const absl::StatusOr<v1::UpdateAck> ack = (*client)->apply(scene, std::move(batch));

@@ -11,7 +11,8 @@
 namespace locus::cli {
 
 // Applies the batch and writes the ack: applied, refused, revision, tick, and a row for each refused item listed. The
-// answer is written even if items were refused; the status then says so.
+// answer is written even if items were refused; the status then says so. While a batch is open, the changes go into it
+// instead and nothing is written.
 absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, Context& context);
 
 }  // namespace locus::cli

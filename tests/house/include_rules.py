@@ -31,6 +31,7 @@ ALLOWED = {
     "client/cli/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
     "deploy/manual": ["client/cli", "server/config"],
     "client/cli/export": ["client/cli", "client/cli/import", "client/lib", "core/geometry", "core/base"],
+    "client/cli/script": ["client/cli"],
     "client/cli/import": ["client/cli/import/*", "core/geometry", "core/base"],
     "client/cli/import/quake": ["client/cli/import", "core/geometry", "core/base"],
     "client/cli/bulk": ["core/base"],

@@ -5,6 +5,7 @@
 
 #include <sstream>
 
+#include "absl/strings/match.h"
 #include "client/lib/status.h"
 
 namespace locus::cli {
@@ -66,6 +67,27 @@ TEST(FailureTest, OnlyUnknownIdsAreNotFoundOtherRefusalsAreFailures) {
               HasSubstr("1 of 2 items refused; the first is moves[0].ids[1], id 8: UNKNOWN_ID"));
   item.set_reason(v1::REASON_NOT_FINITE);
   EXPECT_TRUE(absl::IsFailedPrecondition(refused_items(ack)));
+}
+
+TEST(FailureTest, AFailureHasOneName) {
+  EXPECT_EQ(failure_name(not_finite()), "NOT_FINITE");
+  EXPECT_EQ(failure_name(usage_error("x")), "USAGE");
+  EXPECT_EQ(failure_name(absl::NotFoundError("x")), "NOT_FOUND") << "no reason, so the code";
+  for (const char* name : {"NOT_FINITE", "USAGE", "NOT_FOUND", "UNAUTHENTICATED"}) EXPECT_TRUE(is_failure_name(name));
+  for (const char* name : {"", "OK", "UNSPECIFIED", "not_found", "17"}) EXPECT_FALSE(is_failure_name(name)) << name;
+}
+
+TEST(FailureTest, APlaceLeavesTheFailureWhatItIs) {
+  const absl::Status placed = with_place(not_finite(), "x.locus:3");
+  EXPECT_EQ(failure_name(placed), "NOT_FINITE");
+  EXPECT_TRUE(absl::StartsWith(placed.message(), "x.locus:3: "));
+  EXPECT_EQ(exit_code_of(with_place(usage_error("x"), "y")), ExitCode::kUsage);
+}
+
+TEST(FailureTest, WhatWasToldKeepsItsExitCode) {
+  EXPECT_TRUE(is_told(told(absl::NotFoundError("x"))));
+  EXPECT_FALSE(is_told(absl::NotFoundError("x")));
+  EXPECT_EQ(exit_code_of(told(absl::NotFoundError("x"))), ExitCode::kNotFound);
 }
 
 }  // namespace

@@ -77,6 +77,8 @@ TEST(HelpTest, EveryCommandExplainsItselfWithExamples) {
                                                           {"query", "ball"},
                                                           {"query", "box"},
                                                           {"render"},
+                                                          {"run"},
+                                                          {"wait"},
                                                           {"limits"},
                                                           {"health"},
                                                           {"version"}};

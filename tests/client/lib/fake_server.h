@@ -333,6 +333,12 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
+  // While calls come in.
+  void replace(const v1::Scene& scene) {
+    std::lock_guard lock(mutex_);
+    scenes[scene.name()] = scene;
+  }
+
   static grpc::Status missing(const std::string& name) {
     v1::Error error;
     error.set_reason(v1::REASON_NOT_FOUND);

@@ -1,0 +1,17 @@
+// + - * / % of values. For expressions. A function without state.
+#ifndef LOCUS_CLIENT_CLI_SCRIPT_ARITHMETIC_H_
+#define LOCUS_CLIENT_CLI_SCRIPT_ARITHMETIC_H_
+
+#include "absl/status/statusor.h"
+#include "client/cli/script/value.h"
+
+namespace locus::cli {
+
+// Of two numbers any; of two vectors + and -; of a vector and a number * and /. Unknown if one of them is.
+// INVALID_ARGUMENT naming the values for other pairs, OUT_OF_RANGE for division by zero and results that are not finite
+// or leave 64 bits.
+absl::StatusOr<Value> calculate(char sign, const Value& left, const Value& right);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_SCRIPT_ARITHMETIC_H_

@@ -1,0 +1,256 @@
+#include "client/cli/script/expression.h"
+
+#include <utility>
+#include <vector>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "client/cli/script/arithmetic.h"
+#include "client/cli/script/functions.h"
+#include "client/cli/script/quoted_text.h"
+
+namespace locus::cli {
+namespace {
+
+using Answer = absl::StatusOr<Value>;
+
+Answer read_sum(Cursor& cursor, const Variables& variables);
+
+absl::Status expected(absl::string_view wanted, const Cursor& cursor) {
+  return absl::InvalidArgumentError(absl::StrCat("expected ", wanted, ", found ", cursor.found()));
+}
+
+bool begins_number(const Cursor& cursor, size_t ahead = 0) {
+  if (cursor.peek(ahead) == '-') ++ahead;
+  if (cursor.peek(ahead) == '.') ++ahead;
+  return absl::ascii_isdigit(static_cast<unsigned char>(cursor.peek(ahead)));
+}
+
+absl::StatusOr<Number> read_number(Cursor& cursor) {
+  const size_t begin = cursor.at();
+  cursor.accept("-");
+  while (absl::ascii_isalnum(static_cast<unsigned char>(cursor.peek())) || cursor.peek() == '.') {
+    const char c = cursor.next();
+    const bool hexadecimal = absl::StartsWith(cursor.since(begin), "0x");
+    if ((c == 'e' || c == 'E') && !hexadecimal && (cursor.peek() == '-' || cursor.peek() == '+')) cursor.next();
+  }
+  const std::optional<Number> number = parse_number(cursor.since(begin));
+  if (number) return *number;
+  return absl::InvalidArgumentError(absl::StrCat("`", cursor.since(begin), "` is no number of at most 64 bits"));
+}
+
+// A number, or three or more with commas and without blanks: a list, kept exact. Of two the first stands alone, as in
+// min(1,2).
+Answer read_numbers(Cursor& cursor) {
+  Json numbers = Json::array();
+  size_t behind_first = 0;
+  while (true) {
+    const absl::StatusOr<Number> number = read_number(cursor);
+    if (!number.ok()) return number.status();
+    numbers.push_back(json_of(*number));
+    if (numbers.size() == 1) behind_first = cursor.at();
+    if (cursor.peek() != ',' || !begins_number(cursor, 1)) break;
+    cursor.next();
+  }
+  if (numbers.size() >= 3) return Value::of(std::move(numbers));
+  cursor.move_to(behind_first);
+  return Value::of(std::move(numbers[0]));
+}
+
+// Sums with commas between them, up to `end`, which is read.
+absl::StatusOr<std::vector<Value>> read_arguments(Cursor& cursor, const Variables& variables, char end) {
+  std::vector<Value> values;
+  cursor.skip_blanks();
+  while (cursor.peek() != end) {
+    Answer value = read_sum(cursor, variables);
+    if (!value.ok()) return value.status();
+    values.push_back(*std::move(value));
+    cursor.skip_blanks();
+    if (cursor.peek() != end && !cursor.accept(","))
+      return expected(absl::StrCat("`", std::string(1, end), "`"), cursor);
+    cursor.skip_blanks();
+  }
+  cursor.next();
+  return values;
+}
+
+Answer read_call(Cursor& cursor, const Variables& variables, const std::string& name) {
+  const absl::StatusOr<std::vector<Value>> arguments = read_arguments(cursor, variables, ')');
+  return arguments.ok() ? call_function(name, *arguments) : Answer(arguments.status());
+}
+
+// true, false, null, a call, or a text without quotes.
+Answer read_bare(Cursor& cursor, const Variables& variables) {
+  const std::string name = cursor.read_name();
+  if (name == "true" || name == "false") return Value::of(Json(name == "true"));
+  if (name == "null") return Value::of(Json());
+  if (!cursor.accept("(")) return Value::of(Json(name));
+  const absl::Status opened = cursor.open();
+  if (!opened.ok()) return opened;
+  Answer value = read_call(cursor, variables, name);
+  cursor.close();
+  return value;
+}
+
+// One value as it is; several as a list of numbers.
+Answer list_of(std::vector<Value> values) {
+  if (values.size() == 1) return std::move(values.front());
+  Json list = Json::array();
+  for (const Value& value : values) {
+    if (!value.known()) return Value::unknown();
+    const absl::StatusOr<Number> number = number_of(value);
+    if (!number.ok()) return number.status();
+    list.push_back(json_of(*number));
+  }
+  return Value::of(std::move(list));
+}
+
+Answer read_list(Cursor& cursor, const Variables& variables) {
+  std::vector<Value> values;
+  do {
+    Answer value = read_sum(cursor, variables);
+    if (!value.ok()) return value.status();
+    values.push_back(*std::move(value));
+    cursor.skip_blanks();
+  } while (cursor.accept(","));
+  return list_of(std::move(values));
+}
+
+// The cursor stands on the opening bracket.
+Answer read_enclosed(Cursor& cursor, const Variables& variables) {
+  const absl::string_view end = cursor.next() == '(' ? ")" : "}";
+  const absl::Status opened = cursor.open();
+  if (!opened.ok()) return opened;
+  Answer value = read_list(cursor, variables);
+  cursor.close();
+  if (!value.ok()) return value;
+  cursor.skip_blanks();
+  return cursor.accept(end) ? std::move(value) : Answer(expected(absl::StrCat("`", end, "`"), cursor));
+}
+
+Answer read_primary(Cursor& cursor, const Variables& variables) {
+  cursor.skip_blanks();
+  const char c = cursor.peek();
+  if (begins_number(cursor)) return read_numbers(cursor);
+  if (c == '(' || c == '{') return read_enclosed(cursor, variables);
+  if (c == '"' || c == '\'') return read_quoted_text(cursor, variables);
+  if (begins_name(c)) return read_bare(cursor, variables);
+  if (cursor.accept("$")) return read_variable(cursor, variables);
+  return expected("a value", cursor);
+}
+
+Answer read_unary(Cursor& cursor, const Variables& variables) {
+  bool negative = false;
+  cursor.skip_blanks();
+  while (!begins_number(cursor) && cursor.accept("-")) {
+    negative = !negative;
+    cursor.skip_blanks();
+  }
+  Answer value = read_primary(cursor, variables);
+  if (!value.ok() || !negative) return value;
+  return calculate('*', Value::of(Json(-1)), *value);
+}
+
+// What `read` reads, with any of `signs` between.
+template <class Read>
+Answer read_chain(Cursor& cursor, const Variables& variables, absl::string_view signs, Read read) {
+  Answer left = read(cursor, variables);
+  while (left.ok()) {
+    cursor.skip_blanks();
+    if (cursor.ended() || !absl::StrContains(signs, cursor.peek()) || absl::StartsWith(cursor.rest(), "->")) break;
+    const char sign = cursor.next();
+    const Answer right = read(cursor, variables);
+    if (!right.ok()) return right;
+    left = calculate(sign, *left, *right);
+  }
+  return left;
+}
+
+Answer read_product(Cursor& cursor, const Variables& variables) {
+  return read_chain(cursor, variables, "*/%", read_unary);
+}
+
+Answer read_sum(Cursor& cursor, const Variables& variables) {
+  return read_chain(cursor, variables, "+-", read_product);
+}
+
+// `[index]`; the cursor stands behind the bracket.
+Answer read_entry(Cursor& cursor, const Variables& variables, const Value& value) {
+  const absl::Status opened = cursor.open();
+  if (!opened.ok()) return opened;
+  const Answer index = read_sum(cursor, variables);
+  cursor.close();
+  if (!index.ok()) return index;
+  cursor.skip_blanks();
+  if (!cursor.accept("]")) return expected("`]`", cursor);
+  if (!index->known()) return Value::unknown();
+  const absl::StatusOr<Number> number = number_of(*index);
+  return number.ok() ? entry_of(value, *number) : Answer(number.status());
+}
+
+absl::Status not_defined(const std::string& name) {
+  return absl::NotFoundError(
+      absl::StrCat("$", name, " is not defined: set it with let, `-> ", name, "` or --set ", name, "=VALUE"));
+}
+
+// `.field` and `[index]`, as often as they follow.
+Answer read_path(Cursor& cursor, const Variables& variables, Value value) {
+  while (true) {
+    Answer part = value;
+    if (cursor.peek() == '.' && begins_name(cursor.peek(1))) {
+      cursor.next();
+      part = field_of(value, cursor.read_name());
+    } else if (cursor.accept("[")) {
+      part = read_entry(cursor, variables, value);
+    } else {
+      return value;
+    }
+    if (!part.ok()) return part;
+    value = *std::move(part);
+  }
+}
+
+// Whether a default stands in for the value: a miss, or the column of no rows.
+bool is_missing(const Value& value) {
+  if (value.kind == Value::Kind::kColumn && value.result->rows.empty()) return true;
+  const absl::StatusOr<Json> json = value.known() ? plain(value) : Json(0);
+  return json.ok() && json->is_null();
+}
+
+// `{name.path:-default}`; the cursor stands behind the brace.
+Answer read_braced_variable(Cursor& cursor, const Variables& variables) {
+  const std::string name = cursor.read_name();
+  if (name.empty()) return expected("a name behind `${`", cursor);
+  const Value* const variable = variables.find(name);
+  // What is not there has no path to follow: the path is only read over.
+  const Answer value = read_path(cursor, variables, variable == nullptr ? Value::unknown() : *variable);
+  if (!value.ok()) return value;
+  if (cursor.accept("}")) return variable == nullptr ? Answer(not_defined(name)) : value;
+  if (!cursor.accept(":-")) return expected("`}` or `:-`", cursor);
+  const size_t length = cursor.rest().find('}');
+  if (length == absl::string_view::npos) return absl::InvalidArgumentError("`${` is not closed: } is missing");
+  std::string standby(cursor.rest().substr(0, length));
+  cursor.move_to(cursor.at() + length + 1);
+  return variable == nullptr || is_missing(*value) ? Value::of(Json(std::move(standby))) : value;
+}
+
+}  // namespace
+
+absl::StatusOr<Value> read_expression(Cursor& cursor, const Variables& variables) {
+  return read_list(cursor, variables);
+}
+
+absl::StatusOr<Value> read_braces(Cursor& cursor, const Variables& variables) {
+  return read_enclosed(cursor, variables);
+}
+
+absl::StatusOr<Value> read_variable(Cursor& cursor, const Variables& variables) {
+  if (cursor.accept("{")) return read_braced_variable(cursor, variables);
+  const std::string name = cursor.read_name();
+  if (name.empty()) return expected("a name behind `$`", cursor);
+  const Value* const variable = variables.find(name);
+  if (variable == nullptr) return not_defined(name);
+  return read_path(cursor, variables, *variable);
+}
+
+}  // namespace locus::cli

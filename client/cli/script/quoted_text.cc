@@ -1,0 +1,87 @@
+#include "client/cli/script/quoted_text.h"
+
+#include <utility>
+
+#include "client/cli/script/expression.h"
+#include "client/cli/script/script_limits.h"
+#include "client/cli/unknown_values.h"
+
+namespace locus::cli {
+namespace {
+
+absl::Status not_closed(char quote) {
+  return absl::InvalidArgumentError(absl::StrCat("a text is not closed: ", std::string(1, quote), " is missing"));
+}
+
+absl::StatusOr<Value> read_single_quoted(Cursor& cursor) {
+  const size_t end = cursor.rest().find('\'');
+  if (end == absl::string_view::npos) return not_closed('\'');
+  std::string text(cursor.rest().substr(0, end));
+  cursor.move_to(cursor.at() + end + 1);
+  return Value::of(Json(std::move(text)));
+}
+
+// The cursor stands behind the backslash.
+absl::Status read_escape(Cursor& cursor, std::string& text) {
+  if (cursor.ended()) return not_closed('"');
+  const char c = cursor.next();
+  if (c == 'n' || c == 't') {
+    text += c == 'n' ? '\n' : '\t';
+    return absl::OkStatus();
+  }
+  if (!absl::StrContains("\"\\${}", c)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("\\", std::string(1, c), " means nothing between double quotes: write \\\\ for a backslash"));
+  }
+  text += c;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Value> read_double_quoted(Cursor& cursor, const Variables& variables) {
+  std::string text;
+  bool known = true;
+  while (!cursor.accept("\"")) {
+    if (cursor.ended()) return not_closed('"');
+    if (cursor.peek() == '$' || cursor.peek() == '{') {
+      const absl::StatusOr<Value> value =
+          cursor.accept("$") ? read_variable(cursor, variables) : read_braces(cursor, variables);
+      if (!value.ok()) return value.status();
+      known &= value->known();
+      const absl::Status appended = append_value(text, *value);
+      if (!appended.ok()) return appended;
+    } else if (cursor.accept("\\")) {
+      const absl::Status read = read_escape(cursor, text);
+      if (!read.ok()) return read;
+    } else {
+      text += cursor.next();
+    }
+  }
+  return known ? Value::of(Json(std::move(text))) : Value::unknown();
+}
+
+}  // namespace
+
+absl::Status append_value(std::string& text, const Value& value) {
+  if (!value.known()) {
+    text += kNotKnownYet;
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<std::string> more = text_of(value);
+  if (!more.ok()) return more.status();
+  if (text.size() + more->size() > kMaxTextBytes) {
+    return absl::ResourceExhaustedError(absl::StrCat("a text gets longer than ", kMaxTextBytes, " bytes"));
+  }
+  text += *more;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Value> read_quoted_text(Cursor& cursor, const Variables& variables) {
+  if (cursor.next() == '\'') return read_single_quoted(cursor);
+  const absl::Status opened = cursor.open();
+  if (!opened.ok()) return opened;
+  absl::StatusOr<Value> text = read_double_quoted(cursor, variables);
+  cursor.close();
+  return text;
+}
+
+}  // namespace locus::cli

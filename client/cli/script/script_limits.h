@@ -1,0 +1,29 @@
+// How large a script and what it does may get. For the reader and the runner of scripts; a refusal names the limit.
+#ifndef LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
+#define LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
+
+#include <cstddef>
+#include <cstdint>
+
+namespace locus::cli {
+
+inline constexpr size_t kMaxScriptBytes = size_t{16} << 20;
+inline constexpr size_t kMaxScriptLines = 100'000;
+inline constexpr size_t kMaxLineBytes = 65'536;
+inline constexpr size_t kMaxBlockNesting = 16;
+inline constexpr uint64_t kMaxRepeats = 100'000;
+// Lines run in all, those in loops each time.
+inline constexpr uint64_t kMaxLinesRun = 1'000'000;
+inline constexpr size_t kMaxVariables = 1'000;
+// Of a word or text with everything filled in.
+inline constexpr size_t kMaxTextBytes = size_t{1} << 20;
+// Of parentheses, indexes, calls and quoted texts within each other. The reader of expressions recurses as deep.
+inline constexpr int kMaxExpressionDepth = 64;
+inline constexpr double kMaxSleepSeconds = 3600;
+
+static_assert(kMaxLineBytes <= kMaxTextBytes, "a line without variables fits a text");
+static_assert(kMaxRepeats <= kMaxLinesRun);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
