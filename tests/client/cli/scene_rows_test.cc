@@ -94,7 +94,8 @@ TEST(SceneRowsTest, RowsHaveOnlyKeysOfTheirKinds) {
     ASSERT_TRUE(for_each_thing(one_of_each(), [&](const SceneThing& thing) {
                   if (!is_among(things, thing.kind)) return absl::OkStatus();
                   size_t next = 0;
-                  for (const auto& [key, value] : thing_row(thing, things).items()) {
+                  const Json row = thing_row(thing, things);
+                  for (const auto& [key, value] : row.items()) {
                     const auto found = std::find(keys.begin() + static_cast<ptrdiff_t>(next), keys.end(), key);
                     EXPECT_NE(found, keys.end()) << key << " is unknown or out of order";
                     next = static_cast<size_t>(found - keys.begin());
