@@ -14,8 +14,7 @@
 
 namespace locus {
 
-// Nearest hit before a limit, strictly; the lower id wins at equal distance. The value found is borrowed from the
-// index.
+// Nearest hit before a limit, strictly; the lower id wins at equal distance.
 template <Primitive V>
 class NearestVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -31,24 +30,24 @@ class NearestVisitor {
     if (!t || !wins(*t, value)) return true;
     distance_ = *t;
     limit_ = ray_.to_scaled(*t);
-    best_ = &value;
+    best_ = value;
     return true;
   }
 
-  // Null when nothing was hit before the limit.
-  const V* best() const { return best_; }
+  // Nothing when nothing was hit before the limit.
+  const std::optional<V>& best() const { return best_; }
   // Of the best hit; the limit as given without one.
   S distance() const { return distance_; }
 
  private:
   bool wins(S t, const V& value) const {
-    return t < distance_ || (t == distance_ && best_ != nullptr && Traits::id(value) < Traits::id(*best_));
+    return t < distance_ || (t == distance_ && best_ && Traits::id(value) < Traits::id(*best_));
   }
 
   const typename Traits::RayQuery& ray_;
   S distance_;
   S limit_;
-  const V* best_ = nullptr;
+  std::optional<V> best_;
 };
 
 // Whether anything is hit before a limit, strictly. Ends the visit at the first hit.

@@ -54,7 +54,7 @@ bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, Sc
   internal::WorkSink sink(work);
   NearestVisitor<V> nearest(ray, distance);
   (indices.visit_ray(ray.slabs(), nearest, sink.get()), ...);
-  if (nearest.best() == nullptr) return false;
+  if (!nearest.best()) return false;
   value = *nearest.best();
   distance = nearest.distance();
   return true;

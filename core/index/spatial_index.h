@@ -15,7 +15,8 @@
 namespace locus {
 
 // Takes candidates of a ray. limit(): boxes whose near value exceeds it may be skipped, and only those (not ones that
-// equal it: a lower id may wait there); it may fall during the visit. visit(): false ends the visit.
+// equal it: a lower id may wait there); it may fall during the visit. visit(): false ends the visit;
+// the value may be gone afterwards, unless the structure promises more.
 template <class Visitor, class Value>
 concept RayVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<ScalarOf<Value>>;

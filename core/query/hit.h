@@ -16,7 +16,7 @@ struct Hit {
   float t = std::numeric_limits<float>::infinity();  // in units of the ray's direction
   Id id = kNoId;                                     // 0 = a miss
   uint32_t triangle = kNoTriangle;                   // number in the mesh
-  uint32_t storage = 0;                              // position in the mesh's storage order
+  uint32_t storage = 0;                              // ascends with the mesh's storage order
   const Object* object = nullptr;                    // one of the two, or neither for a miss
   const Instance* instance = nullptr;
 };

@@ -69,7 +69,7 @@ class ObjectRows {
   LowestRows& rows_;
 };
 
-// Rows of one instance: itself once, or each of its triangles found.
+// Rows of one instance: itself once, or each of its triangles found, which come in storage order.
 class InstanceRows {
  public:
   InstanceRows(const Instance& instance, StaticDetail detail, LowestRows& rows)
@@ -80,7 +80,7 @@ class InstanceRows {
     Hit row = hit_on(instance_, 0);
     if (detail_ != StaticDetail::kInstances) {
       row.triangle = triangle.number;
-      row.storage = static_cast<uint32_t>(&triangle - instance_.mesh->tree().values().data());
+      row.storage = found_++;
     }
     rows_.offer(row);
     return detail_ != StaticDetail::kInstances;
@@ -90,6 +90,7 @@ class InstanceRows {
   const Instance& instance_;
   const StaticDetail detail_;
   LowestRows& rows_;
+  uint32_t found_ = 0;
 };
 
 template <class Kind>

@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
+#include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/work.h"
 #include "core/query/query_batch.h"
 #include "core/scene/scene_snapshot.h"
@@ -71,9 +72,18 @@ class QueryTask {
     if (++tests_ % limits::kTestsBetweenChecks != 0) return !ended_;
     return check();
   }
+  // The same for many tests at once.
+  bool count_tests(uint64_t tests) {
+    const uint64_t before = tests_ / limits::kTestsBetweenChecks;
+    tests_ += tests;
+    return tests_ / limits::kTestsBetweenChecks == before ? !ended_ : check();
+  }
   // Looks at the budget and at the end of the batch.
   bool check();
   bool ended() const { return ended_; }
+
+  // Kernels for first and any hits in meshes; null where there are none, or where all values are to be tested.
+  const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
 
   // Every candidate of an index: by its structure, or, for whoever wants to check that, simply all values.
   template <class Index, class Visitor>
@@ -97,10 +107,10 @@ class QueryTask {
     for (const Value& value : index.values())
       if (!visitor.visit(value)) return;
   }
-  template <class Value, class Visitor>
-  static void visit_all(const HashGrid<Value>& index, Visitor& visitor) {
+  template <class Index, class Visitor>
+  static void visit_all(const Index& index, Visitor& visitor) {
     bool more = true;
-    index.for_each([&](const Value& value) { more = more && visitor.visit(value); });
+    index.for_each([&](const auto& value) { more = more && visitor.visit(value); });
   }
 
   const SceneSnapshot& snapshot_;

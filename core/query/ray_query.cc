@@ -187,11 +187,46 @@ class InstanceVisitor {
 
  private:
   void visit_triangles(const Instance& instance, float nearest) {
+    if (request_.mode != RayMode::kAll && ask_kernel(instance, nearest)) return;
     const TriangleRay ray(instance.transform.point_to_mesh(request_.origin),
                           instance.transform.direction_to_mesh(request_.direction), request_.cull);
     TriangleVisitor visitor(task_, ray, slabs_, instance, nearest, collector_);
     task_.visit_ray(instance.mesh->tree(), ray.slabs(), visitor);
   }
+  // False where the triangles have to be asked one by one.
+  bool ask_kernel(const Instance& instance, float nearest) {
+    const RayKernels* const kernels = task_.ray_kernels();
+    const TriangleBvh& tree = instance.mesh->tree();
+    const std::optional<KernelRay> ray = kernel_ray(instance);
+    if (kernels == nullptr || !ray) return false;
+    KernelHit found{};
+    (request_.mode == RayMode::kAny ? kernels->any : kernels->first)(tree.tree(), &*ray, &found, 1);
+    task_.work().nodes += found.nodes;
+    task_.work().tests += found.tests;
+    task_.count_tests(found.tests);
+    if (found.verdict == KernelVerdict::kMiss) return true;
+    if (found.verdict == KernelVerdict::kUndecided || found.t < nearest) return false;
+    Hit hit = hit_on(instance, found.t);
+    hit.triangle = found.number;
+    collector_.offer(hit);
+    return true;
+  }
+
+  // Nothing where the kernels' bounds do not hold.
+  std::optional<KernelRay> kernel_ray(const Instance& instance) const {
+    const Vec3d origin = instance.transform.point_to_mesh(request_.origin);
+    const Vec3d direction = instance.transform.direction_to_mesh(request_.direction);
+    const double longest = max_component(abs(direction));
+    const double reach = max_component(abs(origin)) + double{magnitude(instance.mesh->tree().bounds())};
+    if (!(longest >= kMinKernelDirection && longest <= kMaxKernelDirection)) return std::nullopt;
+    if (!(reach >= kMinKernelReach && reach <= kMaxKernelReach)) return std::nullopt;
+    return KernelRay{{origin.x, origin.y, origin.z},
+                     {direction.x, direction.y, direction.z},
+                     collector_.limit(),
+                     request_.cull != Cull::kFront,
+                     request_.cull != Cull::kBack};
+  }
+
   void visit_bounds(const Instance& instance, float nearest) {
     PlacedBoundsVisitor visitor(task_, slabs_, instance, nearest, collector_);
     task_.visit_region(instance.mesh->tree(), visitor);

@@ -13,7 +13,7 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::build(std::string 
   for (uint32_t number = 0; number < mesh.triangle_count(); ++number) triangles.push_back(mesh.triangle(number));
   BvhOptions options;
   options.cancel = cancel;
-  absl::StatusOr<Bvh<Triangle>> tree = Bvh<Triangle>::build(std::move(triangles), options);
+  absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles, options);
   if (!tree.ok()) return tree.status();
   return std::shared_ptr<const StaticMesh>(new StaticMesh(std::move(name), sha256, std::move(mesh), *std::move(tree)));
 }

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "core/index/bvh/bvh.h"
+#include "core/index/bvh/triangle_bvh.h"
 #include "core/mesh/triangle_mesh.h"
 
 namespace locus {
@@ -25,18 +25,18 @@ class StaticMesh {
   const std::string& name() const { return name_; }
   const Sha256& sha256() const { return sha256_; }
   const TriangleMesh& mesh() const { return mesh_; }
-  // Values in storage order, the order of TRIANGLES rows.
-  const Bvh<Triangle>& tree() const { return tree_; }
+  // Its storage order is the order of TRIANGLES rows.
+  const TriangleBvh& tree() const { return tree_; }
   uint64_t bytes() const { return mesh_.bytes() + tree_.bytes(); }
 
  private:
-  StaticMesh(std::string name, const Sha256& sha256, TriangleMesh mesh, Bvh<Triangle> tree)
+  StaticMesh(std::string name, const Sha256& sha256, TriangleMesh mesh, TriangleBvh tree)
       : name_(std::move(name)), sha256_(sha256), mesh_(std::move(mesh)), tree_(std::move(tree)) {}
 
   std::string name_;
   Sha256 sha256_;
   TriangleMesh mesh_;
-  Bvh<Triangle> tree_;
+  TriangleBvh tree_;
 };
 
 }  // namespace locus

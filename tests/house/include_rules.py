@@ -37,6 +37,8 @@ ALLOWED = {
     "client/cli/bulk": ["core/base"],
     "client/cli/generate": ["client/cli/import", "core/geometry", "core/base"],
 }
+# The kernels are compiled for processors that the rest may not run on: only plain data of the tree goes in.
+ALLOWED["core/index/bvh/kernels"] = ["core/index/bvh", "core/base"]
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
 
 # Third-party headers by the start of their names, and the folders (with those below) that may see them. Tests may see all.

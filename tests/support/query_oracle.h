@@ -22,9 +22,9 @@ class QueryOracle {
       instances_.push_back(&instance);
       std::vector<uint32_t>& storage = storage_[instance.mesh.get()];
       if (!storage.empty()) continue;
-      const auto values = instance.mesh->tree().values();
-      storage.resize(values.size());
-      for (uint32_t i = 0; i < values.size(); ++i) storage[values[i].number] = i;
+      storage.resize(instance.mesh->tree().size());
+      uint32_t position = 0;
+      instance.mesh->tree().for_each([&](const Triangle& triangle) { storage[triangle.number] = position++; });
     }
     snapshot.objects.for_each([this](Id, const Object& object) { objects_.push_back(&object); });
   }

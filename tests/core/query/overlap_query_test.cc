@@ -60,7 +60,8 @@ TEST(OverlapQueryTest, TrianglesComeInStorageOrder) {
   block.settings.source = Source::kStatic;
   const BlockResult result = run_block(*snapshot, block);
   std::vector<uint32_t> storage;
-  for (const Triangle& triangle : snapshot->statics->find(4)->mesh->tree().values()) storage.push_back(triangle.number);
+  snapshot->statics->find(4)->mesh->tree().for_each(
+      [&](const Triangle& triangle) { storage.push_back(triangle.number); });
   ASSERT_EQ(result.triangles.size(), 20u);
   EXPECT_THAT(std::vector<uint32_t>(result.triangles.begin(), result.triangles.begin() + 10),
               ::testing::ElementsAreArray(storage));

@@ -1,0 +1,149 @@
+// The bounding volume hierarchy over one mesh's triangles, in the layout that the vector kernels read. As an index it
+// hands triangles to visitors, like Bvh; whoever only wants a ray's first hit, or whether there is one, asks the
+// kernels of ray_kernels.h for tree().
+//
+// Threads: immutable after build(); every member may run concurrently.
+// Invariants: as Bvh's. Every block's box is its child slot's box, and every box contains its triangles.
+#ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
+#define LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
+
+#include <limits>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+#include "core/base/planted_bug.h"
+#include "core/geometry/triangle.h"
+#include "core/index/bvh/bvh_build.h"
+#include "core/index/bvh/triangle_tree.h"
+#include "core/index/spatial_index.h"
+
+namespace locus {
+
+class TriangleBvh {
+ public:
+  using Value = Triangle;
+
+  // An empty tree.
+  TriangleBvh() = default;
+
+  // Numbers must be unique; no triangles is legal. Errors: as build_bvh_layout().
+  static absl::StatusOr<TriangleBvh> build(absl::Span<const Triangle> triangles, const BvhOptions& options = {});
+
+  size_t size() const { return numbers_.size(); }
+  // The triangle at a position of the storage order, which input and options fix. Position below size().
+  Triangle at(size_t position) const;
+  // Of all triangles; empty for none.
+  const Aabbf& bounds() const { return bounds_; }
+  uint32_t depth() const { return depth_; }
+  size_t node_count() const { return nodes_.size(); }
+  size_t bytes() const;
+  // As Bvh::sah_cost().
+  double sah_cost() const;
+  // Valid while this object stands unmoved. Not for an empty tree.
+  TriangleTree tree() const { return {nodes_.data(), blocks_.data(), numbers_.data(), magnitude_}; }
+
+  // In storage order.
+  template <class Visit>
+  void for_each(Visit visit) const;
+
+  // Near to far by the boxes of nodes. Allocates nothing.
+  template <RayVisitor<Triangle> Visitor>
+  void visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const;
+
+  // In storage order; hands over only triangles whose own bounds overlap. Allocates nothing.
+  template <RegionVisitor<Triangle> Visitor>
+  void visit_region(Visitor& visitor, Work& work) const;
+
+ private:
+  struct Pending {
+    uint32_t child;
+    float near;
+  };
+  class Writer;
+
+  // Boxes that start exactly at the limit are wanted: a lower number may wait there.
+  static bool beyond(float near, float limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
+  static Aabbf box(const TriangleNode& node, int slot) {
+    return {{node.bounds[0][slot], node.bounds[1][slot], node.bounds[2][slot]},
+            {node.bounds[3][slot], node.bounds[4][slot], node.bounds[5][slot]}};
+  }
+  Triangle triangle(const TriangleBlock& block, uint32_t place) const;
+  Interval<float> node_interval(const SlabRay<float>& slabs, const Aabbf& box) const;
+  // Puts the children the ray may hit on the stack, farthest first. Returns the new top.
+  Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
+
+  std::vector<TriangleNode> nodes_;
+  std::vector<TriangleBlock> blocks_;
+  std::vector<uint32_t> numbers_;
+  Aabbf bounds_;
+  float magnitude_ = 0;
+  uint32_t depth_ = 0;
+};
+
+inline Triangle TriangleBvh::triangle(const TriangleBlock& block, uint32_t place) const {
+  const auto vertex = [&](int first) {
+    return Vec3f{block.vertices[first][place], block.vertices[first + 1][place], block.vertices[first + 2][place]};
+  };
+  return {vertex(0), vertex(3), vertex(6), numbers_[block.first + place]};
+}
+
+template <class Visit>
+void TriangleBvh::for_each(Visit visit) const {
+  for (const TriangleBlock& block : blocks_) {
+    for (uint32_t place = 0; place < block.count; ++place) visit(triangle(block, place));
+  }
+}
+
+template <RayVisitor<Triangle> Visitor>
+void TriangleBvh::visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const {
+  if (nodes_.empty()) return;
+  Pending stack[kTreeStack];
+  Pending* top = stack;
+  *top++ = {0, -std::numeric_limits<float>::infinity()};
+  while (top != stack) {
+    const Pending now = *--top;
+    // The limit may have fallen since the push.
+    if (beyond(now.near, visitor.limit())) continue;
+    if ((now.child & kBlockBit) == 0) {
+      ++work.nodes;
+      top = push_hit(nodes_[now.child], slabs, visitor.limit(), top);
+      continue;
+    }
+    const TriangleBlock& block = blocks_[now.child & ~kBlockBit];
+    for (uint32_t place = 0; place < block.count; ++place) {
+      ++work.tests;
+      if (!visitor.visit(triangle(block, place))) return;
+    }
+  }
+}
+
+template <RegionVisitor<Triangle> Visitor>
+void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
+  if (nodes_.empty()) return;
+  uint32_t stack[kTreeStack];
+  uint32_t* top = stack;
+  *top++ = 0;
+  while (top != stack) {
+    const uint32_t now = *--top;
+    if ((now & kBlockBit) == 0) {
+      ++work.nodes;
+      const TriangleNode& node = nodes_[now];
+      for (int slot = kTreeWidth; slot-- > 0;) {
+        if (node.child[slot] != kNoChild && visitor.overlaps(box(node, slot))) *top++ = node.child[slot];
+      }
+      continue;
+    }
+    const TriangleBlock& block = blocks_[now & ~kBlockBit];
+    for (uint32_t place = 0; place < block.count; ++place) {
+      const Triangle candidate = triangle(block, place);
+      if (!visitor.overlaps(bounds_of(candidate))) continue;
+      ++work.tests;
+      if (!visitor.visit(candidate)) return;
+    }
+  }
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
