@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/limits.h"
+#include "core/index/bvh/kernels/dispatch.h"
 #include "server/config/server_config.h"
 #include "server/config/version.h"
 #include "server/observability/log.h"
@@ -62,6 +63,7 @@ void log_start(const Server& server, const ServerConfig& config) {
       {{"addresses", absl::StrJoin(server.addresses(), ",")},
        {"version", kVersion},
        {"threads", absl::StrCat(config.threads)},
+       {"instruction_set", std::string(instruction_set())},
        {"memory_bytes", absl::StrCat(config.memory_limit)},
        {"receive_bytes", absl::StrCat(config.max_receive_bytes)},
        {"streams", absl::StrCat(config.max_streams)},
@@ -73,6 +75,10 @@ int run(const ServerConfig& config) {
   start_logging(config.log_level, config.log_format);
   // A server that does not start says why itself; what gRPC has to say of it helps nobody.
   capture_library_logs(LogLevel::kDebug);
+  if (const absl::Status chosen = use_instruction_set(config.instruction_set); !chosen.ok()) {
+    log(LogLevel::kError, chosen.message());
+    return EXIT_FAILURE;
+  }
   const sigset_t signals = ending_signals();
   // Before any other thread starts, so that all of them leave these signals to this one.
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);

@@ -56,6 +56,8 @@ void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--threads", config.threads, "Threads that may work on one batch; 0 = the cores it may use")
       ->check(CLI::Range(0u, limits::kMaxThreads))
       ->capture_default_str();
+  app.add_option("--instruction-set", config.instruction_set,
+                 "Vector instructions of queries: avx512, avx2 or portable [the widest there are]");
   const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
                                                   {"info", LogLevel::kInfo},
                                                   {"warning", LogLevel::kWarning},

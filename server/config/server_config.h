@@ -31,6 +31,11 @@ struct ServerConfig {
   // affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
   uint32_t threads = 0;
 
+  // The vector instructions that queries use: a name that `locusd` logs at its start, or portable for none; empty = the
+  // widest that the processor has. Answers do not depend on it. Change it to compare, or to rule out a processor's
+  // fault.
+  std::string instruction_set;
+
   // What is logged to standard error. `debug` adds a line for each refused call.
   LogLevel log_level = LogLevel::kInfo;
 

@@ -41,6 +41,21 @@ TEST_F(DaemonTest, ItServesOnAFreePortAndEndsWithZeroOnSigterm) {
   EXPECT_THAT(text_of(log()), HasSubstr("draining"));
 }
 
+TEST_F(DaemonTest, ItNamesTheInstructionSetInUseAndRefusesOneThatTheProcessorLacks) {
+  std::vector<std::string> options = on_free_port();
+  options.insert(options.end(), {"--instruction-set", "portable"});
+  DaemonProcess daemon(options, log());
+  Stubs stubs(address());
+  create_world(stubs);
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+  EXPECT_THAT(text_of(log()), HasSubstr("instruction_set=portable"));
+
+  DaemonProcess refused({"--listen", "127.0.0.1:0", "--instruction-set", "mmx"}, folder_.file("refused"));
+  EXPECT_EQ(refused.wait(), 1);
+  EXPECT_THAT(text_of(folder_.file("refused")), HasSubstr("'mmx'; it runs: "));
+}
+
 TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndCallsInWorkAreAnswered) {
   DaemonProcess daemon(on_free_port(), log());
   Stubs stubs(address());

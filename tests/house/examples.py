@@ -97,7 +97,7 @@ BAD_EXAMPLES = {
         core("core/base/socket.h", "<sys/socket.h>"), core("core/base/call.h", "<grpcpp/grpcpp.h>"),
         core("core/base/proto.h", '"locus/v1/geometry.pb.h"'), core("core/base/log.h", '"spdlog/spdlog.h"'),
         core("core/base/config.h", '"server/config/server_config.h"'),
-        {"core/base/odd.cc": "  #  include <iostream>\n"},
+        {"core/base/odd.cc": "  #  include <iostream>\n"}, core("core/index/bvh/bvh.h", "<immintrin.h>"),
     ],
     "CoreReadsNoClock": [core("core/query/options.h", "<chrono>"), core("core/scene/scene_writer.h", "<chrono>")],
     "LibrariesStayInTheirRooms": [
@@ -147,5 +147,8 @@ BAD_EXAMPLES = {
 
 GOOD_SYMBOLS = ["                 U absl::Status::ToString() const", "0000 T locus::grpc_free()", "                 U memcpy"]
 BAD_SYMBOLS = ["                 U grpc::Status::OK"]
+GOOD_KERNEL = ["0010 T locus::kernels()", "0020 t locus::(anonymous namespace)::trace()", "0030 r .LC1"]
+BAD_KERNELS = [[], GOOD_KERNEL + ["0040 W std::min(float, float)"], GOOD_KERNEL + ["0040 V locus::table"],
+               GOOD_KERNEL + ["0040 T locus::other()"], GOOD_KERNEL + ["0040 u locus::unique"]]
 GOOD_SOURCE = "int twice(int value) { return 2 * value; }\n"
 BAD_SOURCE = "int twice( int value ){return 2*value;}\n"

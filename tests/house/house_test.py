@@ -17,7 +17,8 @@ import include_rules
 import python_rules
 import shape_rules
 import tool_rules
-from examples import BAD_EXAMPLES, BAD_SOURCE, BAD_SYMBOLS, GOOD_EXAMPLE, GOOD_SOURCE, GOOD_SYMBOLS
+from examples import (BAD_EXAMPLES, BAD_KERNELS, BAD_SOURCE, BAD_SYMBOLS, GOOD_EXAMPLE, GOOD_KERNEL, GOOD_SOURCE,
+                      GOOD_SYMBOLS)
 from source_tree import Tree, read_tree
 
 SKIPPED = 77
@@ -47,6 +48,12 @@ def check_symbols(options):
     return problems + tool_rules.pure_libraries_refer_to_no_grpc(None, options.build)
 
 
+def check_kernels(options):
+    problems = ["the rule does not see its bad example" for bad in BAD_KERNELS if not tool_rules.faults_of_a_kernel(bad)]
+    problems += [f"the rule refuses a good example: {fault}" for fault in tool_rules.faults_of_a_kernel(GOOD_KERNEL)]
+    return problems + tool_rules.kernels_export_one_symbol(options.build)
+
+
 def check_format(options):
     problems = [] if tool_rules.is_formatted(GOOD_SOURCE, options.root) else ["the rule refuses a formatted example"]
     problems += ["the rule does not see its bad example"] if tool_rules.is_formatted(BAD_SOURCE, options.root) else []
@@ -61,6 +68,7 @@ def check_exceptions(options):
 
 OTHER_RULES = {
     "PureLibrariesReferToNoGrpc": check_symbols,
+    "KernelsExportOneSymbol": check_kernels,
     "SourcesAreFormatted": check_format,
     "ExceptionsOfTheMirrorExist": check_exceptions,
 }

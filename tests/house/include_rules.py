@@ -54,6 +54,8 @@ THIRD_PARTY = {
     "png.h": ["client/cli/render"],
 }
 FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
+INTRINSICS = "immintrin.h"
+KERNELS = "core/index/bvh/kernels/"
 CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/scene\.(h|cc)")
 
 # A folder and the folder that holds it, where both are one room that was divided for its size only.
@@ -110,6 +112,8 @@ def core_stands_alone(tree):
         for quoted, target in includes(tree.files[path]):
             if quoted and not target.startswith(("core/", "absl/")):
                 problems.append(f"{path}: the core includes {target}")
+            elif not quoted and target == INTRINSICS and path.startswith(KERNELS):
+                continue
             elif not quoted and ("/" in target or target.endswith(".h") or target in FORBIDDEN_IN_CORE):
                 problems.append(f"{path}: the core includes <{target}>, which is neither computation nor C++20")
     return problems

@@ -32,6 +32,31 @@ def pure_libraries_refer_to_no_grpc(tree, build):
     return problems
 
 
+def faults_of_a_kernel(lines):
+    """What an object compiled for one instruction set may not have: more than one exported symbol, or one that the linker
+    may merge with another object's, from the output of nm --demangle."""
+    exported = [line.split(" T ", 1)[1] for line in lines if " T " in line]
+    merged = [line for line in lines if any(f" {kind} " in line for kind in "VvWwu")]
+    problems = [] if len(exported) == 1 else [f"exports {len(exported)} symbols, not one: {', '.join(exported)}"]
+    return problems + [f"has a symbol that may be merged with another object's: {line.strip()}" for line in merged]
+
+
+def kernels_export_one_symbol(build):
+    if build is None:
+        raise Skip("no build folder was given")
+    objects = [os.path.join(folder, name) for folder, _, names in os.walk(os.path.join(build, "core"))
+               for name in names if name.startswith("ray_kernels_") and name.endswith(".o")]
+    with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as cache:
+        settings = cache.read()
+    if not objects or "CMAKE_BUILD_TYPE:STRING=Release" not in settings:
+        raise Skip("no kernels as they are shipped: not a Release build, or a processor without them")
+    problems = []
+    for path in sorted(objects):
+        answer = subprocess.run(["nm", "--demangle", path], capture_output=True, text=True)
+        problems += [f"{os.path.basename(path)}: {problem}" for problem in faults_of_a_kernel(answer.stdout.splitlines())]
+    return problems
+
+
 def formatter():
     program = shutil.which("clang-format")
     if program is None:
