@@ -67,7 +67,8 @@ class ReadmeTest(unittest.TestCase):
 
     def run_shell(self, command):
         environment = dict(os.environ, PATH=BIN + ":" + os.environ["PATH"], LOCUS_ADDRESS=self.address)
-        done = subprocess.run(command, shell=True, env=environment, capture_output=True, text=True, timeout=60)
+        done = subprocess.run(command, shell=True, env=environment, cwd=os.path.dirname(os.path.abspath(README)),
+                              capture_output=True, text=True, timeout=60)
         self.assertEqual(done.returncode, 0, f"{command}\n{done.stdout}{done.stderr}")
         return done.stdout
 
