@@ -105,6 +105,19 @@ TEST_F(SceneFilesTest, ADumpPrintsInEveryFormat) {
   EXPECT_THAT(text_of({"-o", "csv", "dump", "world"}), HasSubstr("kind,id,shape,mesh,at.x,at.y,at.z,rotation.x"));
 }
 
+TEST_F(SceneFilesTest, DumpedObjectsCanBeInsertedElsewhere) {
+  fill_world();
+  ASSERT_TRUE(create("copy").ok());
+  for (const std::string format : {"ndjson", "csv"}) {
+    const std::string rows = path_ + "." + format;
+    std::ofstream(rows) << text_of({"-o", format, "dump", "world", "--objects"});
+    text_of({"insert", "copy", "mixed", "--from-" + format, rows, "--upsert"});
+    unlink(rows.c_str());
+    EXPECT_EQ(json_of({"dump", "copy", "--objects"})["things"], json_of({"dump", "world", "--objects"})["things"]);
+    text_of({"remove", "copy", "--all"});
+  }
+}
+
 TEST_F(SceneFilesTest, ManyObjectsAreDumpedInOrder) {
   constexpr uint64_t kObjects = 40'000;
   ASSERT_TRUE(apply(insert_balls(1, kObjects)).ok());

