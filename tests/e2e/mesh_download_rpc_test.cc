@@ -7,6 +7,7 @@ namespace locus::test {
 namespace {
 
 constexpr size_t kMaxPiece = 4'000'000;
+constexpr uint32_t kParts = 30'000;
 
 class MeshDownloadRpcTest : public RpcTest {
  protected:
