@@ -5,6 +5,7 @@
 
 #include "CLI/CLI.hpp"
 #include "client/cli/context.h"
+#include "client/cli/failure.h"
 
 namespace locus::cli {
 
@@ -34,6 +35,17 @@ template <class Options, class Run>
 void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {
     if (context.lines() != Lines::kScriptCheck) context.finish(run(*options, context));
+  });
+}
+
+// The same for a command that touches nothing before it connects: where lines are only checked it runs up to there,
+// which finds options that do not go together.
+template <class Options, class Run>
+void run_or_check_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
+  command.callback([options, &context, run] {
+    const absl::Status outcome = run(*options, context);
+    const bool checked = context.lines() == Lines::kScriptCheck && exit_code_of(outcome) != ExitCode::kUsage;
+    context.finish(checked ? absl::OkStatus() : outcome);
   });
 }
 

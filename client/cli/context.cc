@@ -8,6 +8,7 @@
 namespace locus::cli {
 
 absl::StatusOr<client::Client*> Context::connect() {
+  if (lines_ == Lines::kScriptCheck) return absl::CancelledError("lines are only checked");
   if (pending_batch_) {
     return usage_error("only lines that insert, move and remove stand between begin and commit");
   }

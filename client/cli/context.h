@@ -29,7 +29,7 @@ struct GlobalOptions {
 enum class Progress { kSilent, kLive };
 
 // What the lines are that run through a context. A script has one connection, chosen before it; while it is checked,
-// commands are parsed but do nothing.
+// commands are parsed but nothing is sent.
 enum class Lines { kProgram, kScript, kScriptCheck };
 
 class Context {
@@ -43,7 +43,7 @@ class Context {
   Progress progress() const { return progress_; }
 
   // Connects to options().address the first time. UNAVAILABLE in words for the command line; a usage error while a
-  // batch is open, since nothing else is sent meanwhile.
+  // batch is open, since nothing else is sent meanwhile; CANCELLED where lines are only checked.
   absl::StatusOr<client::Client*> connect();
 
   // Writes to the output in the chosen format.

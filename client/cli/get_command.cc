@@ -94,7 +94,7 @@ void add_get_command(CLI::App& parent, Context& context) {
   add_scene_argument(command, options->scene);
   add_repeatable(command, "--id", options->ids, "ID", "An object or instance");
   add_repeatable(command, "--group", options->groups, "GROUP", "Everything in a group");
-  run_when_chosen(command, options, context, get);
+  run_or_check_when_chosen(command, options, context, get);
 }
 
 }  // namespace locus::cli

@@ -235,7 +235,7 @@ mixed rows have a column shape; an option given once stands for a column. Each b
   add_bulk_options(command, options->bulk);
   command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");
   command.add_flag("--upsert", options->upsert, "Replace an object that has the id");
-  run_when_chosen(command, options, context, insert);
+  run_or_check_when_chosen(command, options, context, insert);
 }
 
 }  // namespace locus::cli

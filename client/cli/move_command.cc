@@ -104,7 +104,7 @@ revision, and ends when it is full or the input pauses.)");
   add_bulk_options(command, options->bulk);
   command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");
   command.add_flag("--teleport", options->teleport, "It jumped: it was never in between");
-  run_when_chosen(command, options, context, move);
+  run_or_check_when_chosen(command, options, context, move);
 }
 
 }  // namespace locus::cli

@@ -157,7 +157,7 @@ column. All rows are answered at one revision; see --follow.)");
   add_repeatable(command, "--at", options->at, "X,Y,Z", "Its centre; repeat for more balls");
   add_repeatable(command, "--radius", options->radii, "R", "Its radius, one for each or one for all");
   add_overlap_options(command, *options);
-  run_when_chosen(command, options, context, query_ball);
+  run_or_check_when_chosen(command, options, context, query_ball);
 }
 
 void add_query_box(CLI::App& parent, Context& context) {
@@ -177,7 +177,7 @@ Rows: at.x,at.y,at.z,half.x,half.y,half.z[,rotation.x,rotation.y,rotation.z,rota
                  "Half its size along its own axes, one for each or one for all");
   add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Unit quaternion [0,0,0,1]");
   add_overlap_options(command, *options);
-  run_when_chosen(command, options, context, query_box);
+  run_or_check_when_chosen(command, options, context, query_box);
 }
 
 }  // namespace locus::cli

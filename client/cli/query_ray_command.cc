@@ -144,7 +144,7 @@ an option given once stands for a column. All rows are answered at one revision;
   add_ray_options(command, *options);
   add_bulk_query_options(command, options->bulk);
   add_query_options(command, options->query);
-  run_when_chosen(command, options, context, query_ray);
+  run_or_check_when_chosen(command, options, context, query_ray);
 }
 
 }  // namespace locus::cli

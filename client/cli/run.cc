@@ -157,10 +157,11 @@ absl::Status run_script_line(const std::vector<std::string>& arguments, Context&
   context.finish(absl::OkStatus());
   const std::optional<Refusal> refusal = run_with_default_scene(arguments, context);
   context.options() = before;
-  if (!refusal) return context.outcome();
+  // While lines are checked, what is taken for an unknown value need not suit, nor go with the others.
+  const bool guessed = context.lines() == Lines::kScriptCheck && has_unknown(arguments);
+  if (!refusal) return guessed ? absl::OkStatus() : context.outcome();
   if (refusal->code != 0) {
-    // The value taken for an unknown one need not suit.
-    if (refusal->wrong_value && has_unknown(arguments)) return absl::OkStatus();
+    if (refusal->wrong_value && guessed) return absl::OkStatus();
     return usage_error(in_words(*refusal, arguments));
   }
   if (context.lines() == Lines::kScript) context.out() << refusal->out;

@@ -107,13 +107,36 @@ void add_explained(const std::string& heading, const Explained& words, RoffPage&
   for (const auto& [word, text] : words) page.item(bold(word), text);
 }
 
+// Indented lines stay as they stand, the others run on.
+void add_notes(const std::string& notes, RoffPage& page) {
+  std::string running;
+  std::vector<std::string> kept;
+  const auto flush = [&] {
+    if (!running.empty()) page.text(running);
+    if (!kept.empty()) page.literal(kept);
+    running.clear();
+    kept.clear();
+  };
+  for (const absl::string_view line : absl::StrSplit(notes, '\n')) {
+    const bool indented = absl::StartsWith(line, "  ");
+    if (indented == kept.empty()) flush();
+    if (indented) {
+      kept.emplace_back(line.substr(2));
+    } else {
+      absl::StrAppend(&running, std::string(line), "\n");
+    }
+  }
+  flush();
+}
+
 std::string roff_of(const CommandWords& command, const std::string& program, const Manual& manual) {
   const Footer footer = parts_of(command.footer);
   RoffPage page(absl::AsciiStrToUpper(page_name(command.path)), manual.section,
                 absl::StrCat(program, " ", manual.version));
   page.heading("NAME").text(absl::StrCat(page_name(command.path), " - ", summary(command.description)));
   add_synopsis(command, page);
-  page.heading("DESCRIPTION").text(absl::StrCat(sentence(command.description), "\n\n", footer.notes));
+  page.heading("DESCRIPTION");
+  add_notes(absl::StrCat(sentence(command.description), "\n\n", footer.notes), page);
   add_commands(command, manual, page);
   add_options(command, program, manual, page);
   page.heading("EXAMPLES").literal(footer.examples);

@@ -20,14 +20,17 @@ namespace {
 constexpr char kReference[] = R"(Lines of a script (one statement each, quotes as in a shell, # begins a comment):
   query ray --from 0,0,9 --dir 0,0,-1 -> shot   any line of locus without the word; -> keeps its result
   use arena                                     the scene of lines that name none
-  let aim = $shot.point + (0, 0, 1)             numbers, vectors, texts; + - * / % and functions
+  let aim = $shot.point + (0, 0, 1)             a number, a vector or a text
   begin --tick 7 ... commit -> ack              insert, move, remove lines as one batch, one revision
   repeat 10 as i ... end                        i counts from 0
   expect $shot.t == 8.5 within 0.001            also != < <= > >= contains
   expect-error UNKNOWN_ID move --id 9 --to 0,0,0
   wait, echo TEXT, sleep SECONDS
-Values in lines: $shot.revision (a fact), $shot.id[0] (a row of a column; one row needs no [0]), $near.count,
-  ${name:-default}, {$i * 2 + 1}. Functions: abs cos cross dot floor len length max min radians round sin sqrt unit.
+Values in lines:
+  $shot.revision, $shot.id[0]                   a fact of a result; a row of a column, one row needs no [0]
+  $near.count, ${name:-other}                   the number of rows; other where there is no value
+  {$i * 2 + 1}                                  + - * / % on numbers and vectors, and functions: abs cos cross
+                                                dot floor len length max min radians round sin sqrt unit
 Queries see the script's own last ack. Every line is checked before the first runs.
 Exit codes: 1 an expectation failed, 2 a mistake in the script, else that of the line that failed.
 Examples:

@@ -39,7 +39,7 @@ TEST_F(UnknownValuesTest, AnyOptionTakesAnUnknownValue) {
 }
 
 TEST_F(UnknownValuesTest, OtherMistakesAreFoundAllTheSame) {
-  EXPECT_THAT(std::string(check({"query", "ray", "a", "--from", kMark}).message()), HasSubstr("--dir is required"));
+  EXPECT_THAT(std::string(check({"insert", "a", "--id", kMark}).message()), HasSubstr("SHAPE is required"));
   EXPECT_EQ(exit_code_of(check({"query", "ray", "a", "--from", kMark, "--dir", kMark, "--nope"})), ExitCode::kUsage);
   EXPECT_EQ(exit_code_of(check({"query", kMark})), ExitCode::kUsage) << "a command is never unknown";
 }

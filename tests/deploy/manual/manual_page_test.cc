@@ -57,6 +57,13 @@ TEST(ManualPageTest, ExamplesStandApartFromTheOtherNotes) {
   EXPECT_THAT(roff, HasSubstr("Draw something.\n.PP\nIt takes a while.\n.PP\nSee the book.\n"));
 }
 
+TEST(ManualPageTest, IndentedNotesStayAsTheyStand) {
+  const cli::CommandWords tool{
+      .path = "tool", .description = "Draws.", .footer = "Shapes:\n  ball   round\n  box\nLast."};
+  const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).roff;
+  EXPECT_THAT(roff, HasSubstr("Shapes:\n.RS 2\n.nf\nball   round\nbox\n.fi\n.RE\nLast.\n"));
+}
+
 TEST(ManualPageTest, ADescriptionOfSeveralSentencesIsIndexedByItsFirst) {
   const cli::CommandWords tool{.path = "tool", .description = "Draws balls\nand boxes. Slowly."};
   const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).roff;

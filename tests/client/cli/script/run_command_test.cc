@@ -127,7 +127,7 @@ TEST_F(RunCommandTest, AMistakeInTheLastLineStopsTheFirst) {
   const Outcome outcome = run({"run", file_with("echo never\nquery ray arena\n")});
   EXPECT_EQ(outcome.code, ExitCode::kUsage);
   EXPECT_THAT(outcome.out, IsEmpty());
-  EXPECT_THAT(outcome.err, HasSubstr(".locus:2: --from is required"));
+  EXPECT_THAT(outcome.err, HasSubstr(".locus:2: give --from and --dir"));
 }
 
 TEST_F(RunCommandTest, WhatABatchMeansIsWhatItsLinesMean) {

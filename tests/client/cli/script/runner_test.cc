@@ -205,9 +205,11 @@ TEST_F(RunnerTest, EchoAndSleepDoWhatTheySay) {
 
 TEST_F(RunnerTest, ACheckFindsEveryKindOfMistakeAndSendsNothing) {
   for (const auto& [line, message] : std::vector<std::pair<std::string, std::string>>{
-           {"query ray arena --from 0,0,0", "--dir is required"},
+           {"query ray arena --from 0,0,0", "give --from and --dir"},
            {"query ray --from 0,0,0 --dir 0,0,1", "SCENE is required"},
            {"query ray arena --from 0,0 --dir 0,0,1", "--from"},
+           {"insert arena ball --id 1 --at 0,0,0", "a ball needs --radius"},
+           {"get arena", "nothing to get"},
            {"no-such-command", "no-such-command"},
            {"run x.locus", "run"},
            {"-a 127.0.0.1:1 scene list", "a script has one connection: give --address before `run`"},
