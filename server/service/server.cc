@@ -49,12 +49,12 @@ absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& co
 
 // Before the first ServerBuilder of the process, once.
 void enable_extras() {
-  static const bool done = [] {
+  static const bool kDone = [] {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     return true;
   }();
-  static_cast<void>(done);
+  static_cast<void>(kDone);
 }
 
 void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
