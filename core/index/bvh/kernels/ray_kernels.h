@@ -27,7 +27,7 @@ inline constexpr double kMinKernelDirection = 0x1p-20;
 inline constexpr double kMaxKernelDirection = 0x1p20;
 // So must the largest |coordinate| of the origin plus the largest of the mesh within these: elsewhere the products of
 // the bounds would vanish or overflow.
-inline constexpr double kMinKernelReach = 0x1p-30;
+inline constexpr double kMinKernelReach = 0x1p-24;
 inline constexpr double kMaxKernelReach = 0x1p33;
 // A ray that has met this many triangles is left undecided, so that a call ends soon.
 inline constexpr uint32_t kMaxKernelTests = 4096;

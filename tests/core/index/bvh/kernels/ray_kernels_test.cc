@@ -115,7 +115,7 @@ std::vector<Question> random_questions(const Aabbf& bounds, size_t count, uint64
     Question question;
     for (int axis = 0; axis < 3; ++axis)
       question.origin[axis] = random.between(bounds.min[axis] - 0.1 * size, bounds.max[axis] + 0.1 * size);
-    question.direction = random.unit_vector() * random.magnitude(-15, 15);
+    question.direction = random.unit_vector() * random.magnitude(-19, 19);
     if (random.chance(0.5))
       question.limit = static_cast<float>(0.2 * size / std::sqrt(squared_length(question.direction)));
     if (random.chance(0.3)) question.cull = random.chance(0.5) ? Cull::kBack : Cull::kFront;
@@ -146,7 +146,7 @@ TEST_P(RayKernelsTest, DecideRandomRaysAsAllTrianglesDo) {
 
 TEST_P(RayKernelsTest, DecideTinyHugeAndFarMeshesAsAllTrianglesDo) {
   const std::vector<Triangle> sphere = bumpy_sphere(10, 0.1, 1);
-  for (const float scale : {0x1p-20f, 1e-3f, 1e6f}) {
+  for (const float scale : {0x1p-23f, 0x1p-20f, 1e-3f, 1e6f, 0x1p30f}) {
     const std::vector<Triangle> mesh = moved(sphere, scale, {});
     judge(mesh, random_questions(bounds_of_all(mesh), scaled_count(2'000), 2));
     ASSERT_FALSE(HasFailure());
