@@ -55,6 +55,7 @@ class TriangleBvh::Writer {
 
   void write() {
     tree_.nodes_.reserve(layout_.nodes.size());
+    tree_.ranges_.reserve(layout_.nodes.size());
     tree_.numbers_.reserve(triangles_.size());
     size_t blocks = 0;
     for (const BvhNode<float>& node : layout_.nodes)
@@ -65,6 +66,8 @@ class TriangleBvh::Writer {
       Open& now = path_.back();
       const BvhNode<float>& from = layout_.nodes[now.from];
       if (now.next == from.child_count) {
+        NodeRange& range = tree_.ranges_[now.to];
+        range.count = static_cast<uint32_t>(tree_.numbers_.size()) - range.first;
         path_.pop_back();
         continue;
       }
@@ -92,6 +95,7 @@ class TriangleBvh::Writer {
     for (uint32_t slot = 0; slot < node.child_count; ++slot) opened.slots[slot] = slot;
     std::stable_sort(opened.slots.begin(), opened.slots.begin() + node.child_count,
                      [&](uint32_t a, uint32_t b) { return half_area(node.bounds[a]) < half_area(node.bounds[b]); });
+    tree_.ranges_.push_back({static_cast<uint32_t>(tree_.numbers_.size()), 0});
     TriangleNode& written = tree_.nodes_.emplace_back();
     std::array<Aabbf, kTreeWidth> boxes;
     for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
@@ -155,8 +159,8 @@ Triangle TriangleBvh::at(size_t position) const {
 }
 
 size_t TriangleBvh::bytes() const {
-  return nodes_.capacity() * sizeof(TriangleNode) + blocks_.capacity() * sizeof(TriangleBlock) +
-         numbers_.capacity() * sizeof(uint32_t);
+  return nodes_.capacity() * sizeof(TriangleNode) + ranges_.capacity() * sizeof(NodeRange) +
+         blocks_.capacity() * sizeof(TriangleBlock) + numbers_.capacity() * sizeof(uint32_t);
 }
 
 double TriangleBvh::sah_cost() const {

@@ -41,7 +41,7 @@ class TriangleBvh {
   // As Bvh::sah_cost().
   double sah_cost() const;
   // Valid while this object stands unmoved. Not for an empty tree.
-  TriangleTree tree() const { return {nodes_.data(), blocks_.data(), numbers_.data(), magnitude_}; }
+  TriangleTree tree() const { return {nodes_.data(), ranges_.data(), blocks_.data(), numbers_.data(), magnitude_}; }
 
   // In storage order.
   template <class Visit>
@@ -74,6 +74,7 @@ class TriangleBvh {
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
 
   std::vector<TriangleNode> nodes_;
+  std::vector<NodeRange> ranges_;
   std::vector<TriangleBlock> blocks_;
   std::vector<uint32_t> numbers_;
   Aabbf bounds_;

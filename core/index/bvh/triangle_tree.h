@@ -37,9 +37,16 @@ struct alignas(64) TriangleBlock {
 };
 static_assert(sizeof(TriangleBlock) == 320);
 
+// The triangles below a node, by their positions in storage order.
+struct NodeRange {
+  uint32_t first;
+  uint32_t count;
+};
+
 // A whole tree, borrowed. Node 0 is the root; nodes, blocks and triangles stand in depth-first order.
 struct TriangleTree {
   const TriangleNode* nodes;
+  const NodeRange* ranges;  // by node
   const TriangleBlock* blocks;
   const uint32_t* numbers;  // by position: the triangle's number in the uploaded index list
   float magnitude;          // the largest |coordinate| of any vertex

@@ -92,6 +92,22 @@ TEST(TriangleBvhTest, ChildrenStandByRisingAreaAndOrdersNameEverySlotOnce) {
   }
 }
 
+TEST(TriangleBvhTest, EveryNodesRangeIsThoseOfItsChildrenInTurn) {
+  const TriangleBvh built = build(box_city(12, 3));
+  const TriangleTree tree = built.tree();
+  EXPECT_EQ(tree.ranges[0].count, built.size());
+  for (size_t number = 0; number < built.node_count(); ++number) {
+    uint32_t next = tree.ranges[number].first;
+    for (const uint32_t child : tree.nodes[number].child) {
+      if (child == kNoChild) continue;
+      const bool is_block = (child & kBlockBit) != 0;
+      ASSERT_EQ(is_block ? tree.blocks[child & ~kBlockBit].first : tree.ranges[child].first, next);
+      next += is_block ? tree.blocks[child & ~kBlockBit].count : tree.ranges[child].count;
+    }
+    ASSERT_EQ(next, tree.ranges[number].first + tree.ranges[number].count);
+  }
+}
+
 // As good as the tree of values it is made from, which has ceilings of its own.
 TEST(TriangleBvhTest, CostsWhatTheTreeOfValuesCosts) {
   const std::vector<Triangle> triangles = bumpy_sphere(64, 0.02, 1);
