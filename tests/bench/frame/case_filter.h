@@ -1,0 +1,31 @@
+// Which cases run: those whose names a regular expression matches somewhere. For every suite. Copies are cheap and
+// share; const members may run concurrently.
+#ifndef LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_
+#define LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_
+
+#include <regex.h>
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace locus::bench {
+
+class CaseFilter {
+ public:
+  // Wants every case.
+  CaseFilter() = default;
+
+  // POSIX extended syntax. INVALID_ARGUMENT with what is wrong.
+  static absl::StatusOr<CaseFilter> create(const std::string& pattern);
+
+  bool wants(const std::string& case_name) const;
+
+ private:
+  std::shared_ptr<const regex_t> pattern_;
+};
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_

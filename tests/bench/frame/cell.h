@@ -1,0 +1,31 @@
+// What a benchmark says: cells, each our figure beside a peer's, and the sentences that belong to them. For every
+// suite. Plain data.
+#ifndef LOCUS_TESTS_BENCH_FRAME_CELL_H_
+#define LOCUS_TESTS_BENCH_FRAME_CELL_H_
+
+#include <string>
+#include <vector>
+
+namespace locus::bench {
+
+struct Cell {
+  std::string suite;
+  std::string case_name;
+  std::string metric;  // what `ours` and `peer` count, for example "ns/ray"; orientation only
+  double ours = 0;
+  double peer = 0;
+  std::string peer_name;
+  double ratio = 0;   // above 1 means ours is better; the median over the rounds
+  double spread = 0;  // of the rounds' ratios: the largest less the smallest, over the median
+  std::string results_hash;
+};
+
+struct Report {
+  std::vector<Cell> cells;
+  std::vector<std::string> notes;          // what the reader has to know: a peer that is not there, rays that differ
+  std::vector<std::string> disagreements;  // what nobody has explained; one is enough for exit status 1
+};
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_FRAME_CELL_H_

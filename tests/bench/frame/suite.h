@@ -1,0 +1,26 @@
+// A suite of benchmarks: a folder of its own with one function, and one line in main.cc. Plain data.
+#ifndef LOCUS_TESTS_BENCH_FRAME_SUITE_H_
+#define LOCUS_TESTS_BENCH_FRAME_SUITE_H_
+
+#include <functional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "tests/bench/frame/cell.h"
+#include "tests/bench/frame/options.h"
+
+namespace locus::bench {
+
+// For a person who waits: what is under way, on standard error.
+using Progress = std::function<void(const std::string& sentence)>;
+
+struct Suite {
+  std::string name;
+  std::string description;
+  // Errors: what keeps the suite from running at all, for example a mesh that cannot be read.
+  absl::StatusOr<Report> (*run)(const Options& options, const Progress& progress);
+};
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_FRAME_SUITE_H_

@@ -1,0 +1,103 @@
+// The program `locus-bench`: one suite of benchmarks against its peers, as a table and as JSON.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "tests/bench/frame/report.h"
+#include "tests/bench/frame/suite.h"
+#include "tests/bench/static/static_suite.h"
+
+namespace locus::bench {
+namespace {
+
+// Every suite is one line here and one folder beside this file.
+std::vector<Suite> suites() {
+  return {
+      {"static", "rays, balls, boxes, builds and memory of one level, beside Embree and others", run_static_suite},
+  };
+}
+
+constexpr char kExamples[] = R"(Examples:
+  locus-bench static --quick
+  locus-bench static --json static.json
+  locus-bench static --filter '^ray/.*/first' --mesh level.obj
+  locus-bench static --mesh city:200000:9 --mesh build/levels/pak1-maps.pk3#maps/delta.bsp
+  locus-bench static --filter '^(build|memory)/' --rounds 9
+
+A MESH is a file that `locus import` reads (FILE, or FILE#ENTRY for a level in a .pk3), or a made-up one: KIND:TRIANGLES
+or KIND:TRIANGLES:SEED, where KIND is city, terrain or blob. Levels of Debian packages: tests/bench/fetch_levels.sh.
+Exit codes: 0 ok, 1 failed or results disagree, 2 usage.)";
+
+std::string described_suites() {
+  return absl::StrCat("One of: ", absl::StrJoin(suites(), "; ", [](std::string* out, const Suite& suite) {
+                        absl::StrAppend(out, suite.name, " (", suite.description, ")");
+                      }));
+}
+
+void add_options(CLI::App& app, Options& options, std::string& filter) {
+  std::vector<std::string> names;
+  for (const Suite& suite : suites()) names.push_back(suite.name);
+  app.description("Benchmarks of locus beside its peers: ratios, with results that must agree.");
+  app.footer(kExamples);
+  app.add_option("SUITE", options.suite, described_suites())->required()->check(CLI::IsMember(names));
+  app.add_option("--json", options.json, "Also write the cells to this file")->type_name("FILE");
+  app.add_flag("--quick", options.quick, "Every case in small, in under 20 s");
+  app.add_option("--filter", filter, "Only cases whose names match")->type_name("REGEX");
+  app.add_option("--rounds", options.rounds, "Rounds that count, after one that does not [5; quick: 3]")
+      ->type_name("N")
+      ->check(CLI::Range(kMinRounds, kMaxRounds));
+  app.add_option("--mesh", options.meshes, "In place of the suite's own; may be repeated")
+      ->type_name("MESH")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--threads", options.threads, "Threads of the cases that use several [2]")
+      ->type_name("N")
+      ->check(CLI::Range(2, kMaxThreads));
+  app.add_option("--levels", options.levels, "Where fetched levels are kept [build/levels]")->type_name("FOLDER");
+}
+
+int fail(const absl::Status& status, int code) {
+  std::cerr << "locus-bench: " << status.message() << "\n";
+  return code;
+}
+
+int run(const Options& options) {
+  const std::vector<Suite> all = suites();
+  const auto suite = std::find_if(all.begin(), all.end(), [&](const Suite& one) { return one.name == options.suite; });
+  const Progress progress = [](const std::string& sentence) { std::cerr << sentence << std::endl; };
+  const absl::StatusOr<Report> report = suite->run(options, progress);
+  if (!report.ok()) return fail(report.status(), 1);
+  write_table(*report, std::cout);
+  if (!options.json.empty()) {
+    const absl::Status written = write_json(*report, options.json);
+    if (!written.ok()) return fail(written, 1);
+  }
+  return exit_status(*report);
+}
+
+}  // namespace
+}  // namespace locus::bench
+
+int main(int argc, char** argv) {
+  using locus::bench::CaseFilter;
+  CLI::App app;
+  app.name("locus-bench");
+  locus::bench::Options options;
+  options.levels = "build/levels";
+  std::string filter;
+  locus::bench::add_options(app, options, filter);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (options.quick && app.count("--rounds") == 0) options.rounds = locus::bench::kMinRounds;
+  const absl::StatusOr<CaseFilter> cases = CaseFilter::create(filter);
+  if (!cases.ok()) return locus::bench::fail(cases.status(), 2);
+  options.filter = *cases;
+  return locus::bench::run(options);
+}

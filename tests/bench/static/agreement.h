@@ -1,0 +1,74 @@
+// Whether a peer's answers and ours are the same, and who is right where they are not: that is decided by asking every
+// triangle with the predicates of core/geometry. Ours have to be right everywhere. A peer may differ within the limits
+// below, which is noted, or where it names its fault; anything else is a disagreement. Writes into a report; pure
+// otherwise.
+#ifndef LOCUS_TESTS_BENCH_STATIC_AGREEMENT_H_
+#define LOCUS_TESTS_BENCH_STATIC_AGREEMENT_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/types/span.h"
+#include "tests/bench/frame/cell.h"
+#include "tests/bench/static/mesh_run.h"
+#include "tests/bench/static/peer.h"
+
+namespace locus::bench {
+
+// Rays differ where only one of both hits, or where the hits are further apart than this part of the diagonal.
+inline constexpr double kSameHit = 1e-4;
+// At most so many rays in so many may differ (silhouettes that a ray skims), and the part of all ids that may (float
+// tests that round).
+inline constexpr size_t kDifferingRays = 20;
+inline constexpr size_t kDifferingRaysOf = 500'000;
+inline constexpr double kDifferingIds = 1e-3;
+
+// `ours` has the answers to all of a case's rays, `theirs` those to the asked ones.
+void compare_first(const std::string& case_name, const BenchMesh& mesh, const Peer& peer, Task task,
+                   const Asked<RayQuery>& asked, absl::Span<const RayAnswer> ours, absl::Span<const RayAnswer> theirs,
+                   Report& report);
+void compare_any(const std::string& case_name, const BenchMesh& mesh, const Peer& peer, const Asked<RayQuery>& asked,
+                 absl::Span<const uint8_t> ours, absl::Span<const uint8_t> theirs, Report& report);
+
+// Ids of one query, of both, in any order.
+struct RegionTally {
+  size_t queries = 0;            // that differ
+  size_t ids = 0;                // that differ
+  size_t all_ids = 0;            // of ours in all queries
+  std::string first_difference;  // in words
+};
+// `overlaps` decides by core/geometry. Counts what the peer has wrong; what we have wrong is reported at once.
+template <class Overlaps>
+void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vector<uint32_t> theirs, Overlaps overlaps,
+                 RegionTally& tally, Report& report);
+
+// After the last query.
+void judge(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report);
+
+template <class Overlaps>
+void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vector<uint32_t> theirs, Overlaps overlaps,
+                 RegionTally& tally, Report& report) {
+  std::sort(ours.begin(), ours.end());
+  std::sort(theirs.begin(), theirs.end());
+  if (std::adjacent_find(ours.begin(), ours.end()) != ours.end())
+    report.disagreements.push_back(absl::StrCat(where, ": we gave a triangle twice"));
+  std::vector<uint32_t> different;
+  std::set_symmetric_difference(ours.begin(), ours.end(), theirs.begin(), theirs.end(), std::back_inserter(different));
+  if (different.empty()) return;
+  ++tally.queries;
+  for (const uint32_t id : different) {
+    ++tally.ids;
+    const bool is_ours = std::binary_search(ours.begin(), ours.end(), id);
+    if (overlaps(id) != is_ours)
+      report.disagreements.push_back(
+          absl::StrCat(where, ": we ", is_ours ? "gave triangle " : "left out triangle ", id, " wrongly"));
+    if (tally.first_difference.empty())
+      tally.first_difference =
+          absl::StrCat(where, ", triangle ", id, is_ours ? ", which it left out" : ", which it added");
+  }
+}
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_STATIC_AGREEMENT_H_

@@ -1,0 +1,156 @@
+#include "tests/bench/static/ours.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "core/base/check.h"
+#include "core/index/bvh/kernels/dispatch.h"
+#include "core/index/index_queries.h"
+#include "tests/bench/frame/results_hash.h"
+
+namespace locus::bench {
+namespace {
+
+constexpr size_t kBatch = 256;  // rays given to the kernels at once
+
+using AskKernel = void (*)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
+
+std::shared_ptr<const StaticMesh> static_mesh(const BenchMesh& mesh) {
+  absl::StatusOr<TriangleMesh> valid = TriangleMesh::create(mesh.vertices, mesh.indices, {});
+  LOCUS_CHECK(valid.ok());
+  auto built = StaticMesh::build(mesh.name, {}, *std::move(valid));
+  LOCUS_CHECK(built.ok());
+  return *built;
+}
+
+KernelRay kernel_ray(const RayQuery& ray) {
+  return {{ray.origin.x, ray.origin.y, ray.origin.z},
+          {ray.direction.x, ray.direction.y, ray.direction.z},
+          ray.t_max,
+          true,
+          true};
+}
+
+// The workloads' directions are of length one: only the reach can leave what the kernels' bounds hold for.
+bool kernels_hold(const RayQuery& ray, float magnitude) {
+  const double reach = double{max_component(abs(ray.origin))} + double{magnitude};
+  return reach >= kMinKernelReach && reach <= kMaxKernelReach;
+}
+
+TriangleRay triangle_ray(const RayQuery& ray) { return {to_double(ray.origin), to_double(ray.direction)}; }
+
+// The questions below end before a distance, those of the workloads with it.
+float just_beyond(float t) { return std::nextafter(t, std::numeric_limits<float>::infinity()); }
+
+RayAnswer first_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {
+  Triangle nearest;
+  RayAnswer answer{just_beyond(ray.t_max), kNoTriangle};
+  if (first_ray(tree, triangle_ray(ray), nearest, answer.t)) answer.triangle = nearest.number;
+  return answer;
+}
+
+bool any_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {
+  return any_ray(tree, triangle_ray(ray), just_beyond(ray.t_max));
+}
+
+// Asks the kernels batch by batch; `settled` and `unsettled` get each ray's place.
+template <class Settled, class Unsettled>
+void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQuery> rays, Settled settled,
+                 Unsettled unsettled) {
+  std::array<KernelRay, kBatch> batch;
+  std::array<KernelHit, kBatch> hits;
+  const float magnitude = tree.tree().magnitude;
+  for (size_t begin = 0; begin < rays.size(); begin += kBatch) {
+    const size_t count = std::min(kBatch, rays.size() - begin);
+    for (size_t i = 0; i < count; ++i) batch[i] = kernel_ray(rays[begin + i]);
+    ask(tree.tree(), batch.data(), hits.data(), count);
+    for (size_t i = 0; i < count; ++i) {
+      if (hits[i].verdict == KernelVerdict::kUndecided || !kernels_hold(rays[begin + i], magnitude))
+        unsettled(begin + i);
+      else
+        settled(begin + i, hits[i]);
+    }
+  }
+}
+
+class OurBuilder : public Builder {
+ public:
+  explicit OurBuilder(const BenchMesh& mesh) : Builder("locus"), mesh_(mesh) {}
+  void prepare() override { tree_ = TriangleBvh(); }
+  void build() override {
+    absl::StatusOr<TriangleBvh> built = TriangleBvh::build(mesh_.triangles);
+    LOCUS_CHECK(built.ok());
+    tree_ = *std::move(built);
+  }
+  uint64_t bytes() override { return static_mesh(mesh_)->bytes(); }
+
+ private:
+  const BenchMesh& mesh_;
+  TriangleBvh tree_;
+};
+
+}  // namespace
+
+Ours::Ours(const BenchMesh& mesh) : Peer("locus"), mesh_(static_mesh(mesh)) {}
+
+void Ours::first(absl::Span<const RayQuery> rays, RayAnswer* answers) {
+  const TriangleBvh& tree = mesh_->tree();
+  const auto by_triangles = [&](size_t i) { answers[i] = first_by_triangles(tree, rays[i]); };
+  const RayKernels* const kernels = active_ray_kernels();
+  if (kernels == nullptr) {
+    for (size_t i = 0; i < rays.size(); ++i) by_triangles(i);
+    return;
+  }
+  const auto settled = [&](size_t i, const KernelHit& hit) {
+    answers[i] = {hit.t, hit.verdict == KernelVerdict::kHit ? hit.number : kNoTriangle};
+  };
+  ask_kernels(tree, kernels->first, rays, settled, by_triangles);
+}
+
+void Ours::any(absl::Span<const RayQuery> rays, uint8_t* answers) {
+  const TriangleBvh& tree = mesh_->tree();
+  const auto by_triangles = [&](size_t i) { answers[i] = any_by_triangles(tree, rays[i]) ? 1 : 0; };
+  const RayKernels* const kernels = active_ray_kernels();
+  if (kernels == nullptr) {
+    for (size_t i = 0; i < rays.size(); ++i) by_triangles(i);
+    return;
+  }
+  const auto settled = [&](size_t i, const KernelHit& hit) { answers[i] = hit.verdict == KernelVerdict::kHit ? 1 : 0; };
+  ask_kernels(tree, kernels->any, rays, settled, by_triangles);
+}
+
+void Ours::ball_ids(absl::Span<const Ballf> balls, uint32_t* ids, uint32_t* counts) {
+  std::vector<Triangle> found;
+  for (const Ballf& ball : balls) {
+    found.clear();
+    ball_overlap(mesh_->tree(), ball, found);
+    std::transform(found.begin(), found.end(), ids, [](const Triangle& triangle) { return triangle.number; });
+    *counts++ = static_cast<uint32_t>(found.size());
+  }
+}
+
+void Ours::box_ids(absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) {
+  std::vector<Triangle> found;
+  for (const Obbf& box : boxes) {
+    found.clear();
+    box_overlap(mesh_->tree(), box, found);
+    std::transform(found.begin(), found.end(), ids, [](const Triangle& triangle) { return triangle.number; });
+    *counts++ = static_cast<uint32_t>(found.size());
+  }
+}
+
+std::unique_ptr<Builder> our_builder(const BenchMesh& mesh) { return std::make_unique<OurBuilder>(mesh); }
+
+std::string storage_order_hash(const BenchMesh& mesh) {
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(mesh.triangles);
+  LOCUS_CHECK(tree.ok());
+  ResultsHash hash;
+  tree->for_each([&](const Triangle& triangle) { hash.add(triangle.number); });
+  return hash.text();
+}
+
+}  // namespace locus::bench

@@ -1,0 +1,35 @@
+// Locus in the static suite: the one place where it is asked, by the calls that the server's queries make for a mesh.
+// Immutable; any number of threads may ask.
+#ifndef LOCUS_TESTS_BENCH_STATIC_OURS_H_
+#define LOCUS_TESTS_BENCH_STATIC_OURS_H_
+
+#include <memory>
+#include <string>
+
+#include "core/scene/static_mesh.h"
+#include "tests/bench/static/peer.h"
+
+namespace locus::bench {
+
+class Ours : public Peer {
+ public:
+  explicit Ours(const BenchMesh& mesh);
+
+  bool does(Task) const override { return true; }
+  void first(absl::Span<const RayQuery> rays, RayAnswer* answers) override;
+  void any(absl::Span<const RayQuery> rays, uint8_t* answers) override;
+  void ball_ids(absl::Span<const Ballf> balls, uint32_t* ids, uint32_t* counts) override;
+  void box_ids(absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) override;
+
+ private:
+  std::shared_ptr<const StaticMesh> mesh_;
+};
+
+// The tree from triangles, on one thread; bytes() are the whole StaticMesh's, with the uploaded mesh.
+std::unique_ptr<Builder> our_builder(const BenchMesh& mesh);
+// Of the storage order that a build gives: the results of the cases build and memory.
+std::string storage_order_hash(const BenchMesh& mesh);
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_STATIC_OURS_H_

@@ -1,0 +1,86 @@
+// The one interface behind which we and every peer stand: the same queries in the same columns, answers into buffers of
+// the caller. A peer is made from a mesh, which has to outlive it, and is ready then. One thread asks a peer at a time,
+// but for ours.
+#ifndef LOCUS_TESTS_BENCH_STATIC_PEER_H_
+#define LOCUS_TESTS_BENCH_STATIC_PEER_H_
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/types/span.h"
+#include "tests/bench/static/workload.h"
+
+namespace locus::bench {
+
+inline constexpr uint32_t kNoTriangle = 0xFFFFFFFFu;
+
+struct RayAnswer {
+  float t = 0;  // of a hit
+  uint32_t triangle = kNoTriangle;
+};
+
+// What a case asks.
+enum class Task : uint8_t { kFirst, kFirstOfCamera, kAny, kBall, kBox };
+
+class Peer {
+ public:
+  explicit Peer(std::string name) : name_(std::move(name)) {}
+  virtual ~Peer() = default;
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+
+  const std::string& name() const { return name_; }
+  virtual bool does(Task task) const = 0;
+  // Asked only an eighth of the queries, 16 of each 128.
+  virtual bool slow() const { return false; }
+  // Why some of its answers are known to be wrong; empty = they are expected to be right.
+  virtual std::string known_fault(Task) const { return ""; }
+
+  // `answers` holds one for each ray. Only what does() says is called.
+  virtual void first(absl::Span<const RayQuery>, RayAnswer*) {}
+  virtual void any(absl::Span<const RayQuery>, uint8_t*) {}
+  // The numbers of all triangles that the ball or box reaches, in any order, for each query from the start of `ids`
+  // again; `ids` has room for all triangles of the mesh and 64 more, `counts` for one number a query.
+  virtual void ball_ids(absl::Span<const Ballf>, uint32_t* /*ids*/, uint32_t* /*counts*/) {}
+  virtual void box_ids(absl::Span<const Obbf>, uint32_t* /*ids*/, uint32_t* /*counts*/) {}
+
+ private:
+  const std::string name_;
+};
+
+using Peers = std::vector<std::unique_ptr<Peer>>;
+
+// Whether rays, or balls and boxes, are asked at all: what is not is not built.
+struct Needs {
+  bool rays = false;
+  bool regions = false;
+};
+
+// Building, for the cases build and memory.
+class Builder {
+ public:
+  explicit Builder(std::string name) : name_(std::move(name)) {}
+  virtual ~Builder() = default;
+  Builder(const Builder&) = delete;
+  Builder& operator=(const Builder&) = delete;
+
+  const std::string& name() const { return name_; }
+  // What comes before the clock starts.
+  virtual void prepare() = 0;
+  virtual void build() = 0;
+  // Everything that stays resident after a build().
+  virtual uint64_t bytes() = 0;
+
+ private:
+  const std::string name_;
+};
+
+// Where the box of a query begins and ends, for peers that want it so.
+inline Aabbf ends_of(const Obbf& box) { return {box.center - box.half, box.center + box.half}; }
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_STATIC_PEER_H_

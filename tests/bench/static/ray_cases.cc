@@ -1,0 +1,184 @@
+#include "tests/bench/static/ray_cases.h"
+
+#include <thread>
+
+#include "tests/bench/frame/race.h"
+#include "tests/bench/frame/results_hash.h"
+#include "tests/bench/static/agreement.h"
+
+namespace locus::bench {
+namespace {
+
+constexpr size_t kRaysAChunk = 20'000;
+// Large, so that starting threads is nothing beside it.
+constexpr size_t kRaysAThreadsChunk = 125'000;
+constexpr uint64_t kIncoherentSeed = 101;
+constexpr uint64_t kShortSeed = 202;
+constexpr float kShortReach = 0.05f;  // of the diagonal
+
+enum class Rays : uint8_t { kIncoherent, kShort, kCamera };
+struct RayCase {
+  const char* name;
+  Rays rays;
+  Task task;
+};
+constexpr RayCase kCases[] = {{"ray/incoherent/first", Rays::kIncoherent, Task::kFirst},
+                              {"ray/incoherent/any", Rays::kIncoherent, Task::kAny},
+                              {"ray/short/first", Rays::kShort, Task::kFirst},
+                              {"ray/short/any", Rays::kShort, Task::kAny},
+                              {"ray/camera/first", Rays::kCamera, Task::kFirstOfCamera}};
+
+size_t ray_count(const MeshRun& run) {
+  constexpr size_t kManyTriangles = 1'000'000;
+  if (run.options.quick) return 20'000;
+  return run.mesh.triangles.size() > kManyTriangles ? 400'000 : 500'000;
+}
+
+std::vector<RayQuery> rays_of(Rays rays, const MeshRun& run) {
+  switch (rays) {
+    case Rays::kIncoherent:
+      return random_rays(run.mesh, ray_count(run), kIncoherentSeed, kEndless);
+    case Rays::kShort:
+      return random_rays(run.mesh, ray_count(run), kShortSeed, kShortReach * run.mesh.diagonal);
+    case Rays::kCamera:
+      break;
+  }
+  return run.options.quick ? camera_rays(run.mesh, 80, 60) : camera_rays(run.mesh, 1024, 768);
+}
+
+void ask(Peer& peer, absl::Span<const RayQuery> rays, RayAnswer* answers) { peer.first(rays, answers); }
+void ask(Peer& peer, absl::Span<const RayQuery> rays, uint8_t* answers) { peer.any(rays, answers); }
+
+void add(const RayAnswer& answer, ResultsHash& hash) { hash.add(answer.triangle); }
+void add(uint8_t answer, ResultsHash& hash) { hash.add(answer); }
+
+template <class Answer>
+std::string hash_of(const std::vector<Answer>& answers) {
+  ResultsHash hash;
+  for (const Answer& answer : answers) add(answer, hash);
+  return hash.text();
+}
+
+void compare(const std::string& case_name, const MeshRun& run, const Peer& peer, const RayCase& ray_case,
+             const Asked<RayQuery>& asked, const std::vector<RayAnswer>& ours, const std::vector<RayAnswer>& theirs) {
+  compare_first(case_name, run.mesh, peer, ray_case.task, asked, ours, theirs, run.report);
+}
+void compare(const std::string& case_name, const MeshRun& run, const Peer& peer, const RayCase&,
+             const Asked<RayQuery>& asked, const std::vector<uint8_t>& ours, const std::vector<uint8_t>& theirs) {
+  compare_any(case_name, run.mesh, peer, asked, ours, theirs, run.report);
+}
+
+template <class Answer>
+struct Entry {
+  Peer* peer;
+  Asked<RayQuery> asked;
+  std::vector<Answer> answers;
+};
+
+// We first, then those that do it.
+template <class Answer>
+std::vector<Entry<Answer>> entries_of(const MeshRun& run, Task task, const std::vector<RayQuery>& rays) {
+  std::vector<Entry<Answer>> entries;
+  const auto enter = [&](Peer& peer) {
+    entries.push_back({&peer, asked_of(peer, rays), {}});
+    entries.back().answers.resize(entries.back().asked.queries.size());
+  };
+  enter(run.ours);
+  for (const auto& peer : run.peers)
+    if (peer->does(task)) enter(*peer);
+  return entries;
+}
+
+template <class Answer>
+Contestant contestant(Entry<Answer>& entry, size_t chunks) {
+  const size_t count = entry.asked.queries.size();
+  const auto run_chunk = [&entry, count, chunks](size_t chunk) {
+    const size_t begin = chunk_begin(count, chunk, chunks), end = chunk_begin(count, chunk + 1, chunks);
+    ask(*entry.peer, absl::MakeConstSpan(entry.asked.queries).subspan(begin, end - begin),
+        entry.answers.data() + begin);
+  };
+  return {entry.peer->name(), run_chunk, static_cast<double>(count), {}};
+}
+
+template <class Answer>
+void run_case(const MeshRun& run, const RayCase& ray_case) {
+  const std::string name = case_of(ray_case.name, run.mesh);
+  const std::vector<RayQuery> rays = rays_of(ray_case.rays, run);
+  const size_t chunks = chunks_for(rays.size(), kRaysAChunk);
+  std::vector<Entry<Answer>> entries = entries_of<Answer>(run, ray_case.task, rays);
+  std::vector<Contestant> contestants;
+  for (Entry<Answer>& entry : entries) contestants.push_back(contestant(entry, chunks));
+  const auto times = race(contestants, chunks, run.options.rounds, thread_seconds);
+  Cell cell;
+  cell.suite = "static";
+  cell.case_name = name;
+  cell.metric = "ns/ray";
+  cell.results_hash = hash_of(entries.front().answers);
+  add_cells(contestants, times, cell, run.report);
+  for (size_t i = 1; i < entries.size(); ++i)
+    compare(name, run, *entries[i].peer, ray_case, entries[i].asked, entries[0].answers, entries[i].answers);
+}
+
+std::string threads_case(const MeshRun& run) { return case_of(absl::StrCat("threads", run.options.threads), run.mesh); }
+
+// Each of `threads` asks a part of its own.
+void ask_in_parallel(Peer& peer, absl::Span<const RayQuery> rays, RayAnswer* answers, size_t threads) {
+  const auto part = [&](size_t i) {
+    const size_t begin = chunk_begin(rays.size(), i, threads), end = chunk_begin(rays.size(), i + 1, threads);
+    peer.first(rays.subspan(begin, end - begin), answers + begin);
+  };
+  std::vector<std::thread> others;
+  for (size_t i = 1; i < threads; ++i) others.emplace_back(part, i);
+  part(0);
+  for (std::thread& other : others) other.join();
+}
+
+}  // namespace
+
+bool wants_ray_peers(const Options& options, const BenchMesh& mesh) {
+  return std::any_of(std::begin(kCases), std::end(kCases),
+                     [&](const RayCase& one) { return options.filter.wants(case_of(one.name, mesh)); });
+}
+
+void run_ray_cases(const MeshRun& run) {
+  for (const RayCase& ray_case : kCases) {
+    const std::string name = case_of(ray_case.name, run.mesh);
+    if (!run.options.filter.wants(name)) continue;
+    run.progress(name);
+    if (ray_case.task == Task::kAny)
+      run_case<uint8_t>(run, ray_case);
+    else
+      run_case<RayAnswer>(run, ray_case);
+  }
+}
+
+void run_threads_case(const MeshRun& run) {
+  const std::string name = threads_case(run);
+  if (!run.options.filter.wants(name)) return;
+  run.progress(name);
+  const std::vector<RayQuery> rays = rays_of(Rays::kIncoherent, run);
+  const size_t chunks = chunks_for(rays.size(), kRaysAThreadsChunk);
+  const auto by = [&](std::vector<RayAnswer>& answers, size_t threads) {
+    answers.resize(rays.size());
+    return [&, threads](size_t chunk) {
+      const size_t begin = chunk_begin(rays.size(), chunk, chunks), end = chunk_begin(rays.size(), chunk + 1, chunks);
+      ask_in_parallel(run.ours, absl::MakeConstSpan(rays).subspan(begin, end - begin), answers.data() + begin, threads);
+    };
+  };
+  std::vector<RayAnswer> together, alone;
+  const auto count = static_cast<double>(rays.size());
+  const std::vector<Contestant> contestants = {
+      {"locus", by(together, static_cast<size_t>(run.options.threads)), count, {}},
+      {"one_thread", by(alone, 1), count, {}}};
+  const auto times = race(contestants, chunks, run.options.rounds, wall_seconds);
+  Cell cell;
+  cell.suite = "static";
+  cell.case_name = name;
+  cell.metric = "ns/ray";
+  cell.results_hash = hash_of(together);
+  add_cells(contestants, times, cell, run.report);
+  if (hash_of(alone) != cell.results_hash)
+    run.report.disagreements.push_back(absl::StrCat(name, ": one thread gives other hits than ", run.options.threads));
+}
+
+}  // namespace locus::bench
