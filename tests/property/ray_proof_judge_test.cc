@@ -1,0 +1,138 @@
+// The judge of the ray proof is judged: its tree against the plain list of triangles, and its verdicts on answers that
+// were spoilt on purpose.
+#include <gtest/gtest.h>
+
+#include "tests/support/proof/ray_proof.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+struct Nearest {
+  Real t = std::numeric_limits<Real>::infinity();
+  uint32_t number = 0xFFFFFFFF;
+  friend bool operator==(const Nearest&, const Nearest&) = default;
+
+  void offer(uint32_t candidate, const Meeting& meeting) {
+    if (meeting.inset < 0) return;
+    if (meeting.t < t || (meeting.t == t && candidate < number)) *this = {meeting.t, candidate};
+  }
+};
+
+Nearest by_tree(const ReferenceTree& reference, const RealRay& ray) {
+  Nearest nearest;
+  reference.visit(ray, nearest.t, [&](uint32_t number, const Meeting& meeting) { nearest.offer(number, meeting); });
+  return nearest;
+}
+
+Nearest by_list(const ReferenceTree& reference, const RealRay& ray) {
+  Nearest nearest;
+  for (uint32_t number = 0; number < reference.size(); ++number)
+    if (const std::optional<Meeting> meeting = reference.triangle(number).meet(ray, nearest.t))
+      nearest.offer(number, *meeting);
+  return nearest;
+}
+
+TEST(RayProofJudgeTest, TheReferencesTreeFindsWhatItsListFinds) {
+  constexpr uint64_t kSeed = 11;
+  Random random(kSeed);
+  uint64_t hits = 0;
+  const std::vector<Triangle> city = box_city(5, kSeed), sphere = bumpy_sphere(8, 0.1, kSeed);
+  const std::shared_ptr<const ProofMesh> meshes[] = {
+      proof_mesh(city, 0.5), proof_mesh(internal::moved(city, 1, {65'536, -131'072, 32'768}), 0.5),
+      proof_mesh(internal::moved(sphere, 1e-3, {})), proof_mesh(internal::slivers(200, kSeed)),
+      proof_mesh(internal::soup(200, kSeed))};
+  for (uint64_t i = 0; i < scaled_count(100'000); ++i) {
+    const ProofMesh& mesh = *meshes[i % std::size(meshes)];
+    const internal::MeshRay aim = random.pick(internal::kRayFamilies)(mesh, random);
+    const Vec3r origin = to_real(aim.origin);
+    const RealRay ray = {origin, (to_real(aim.target) - origin) * random.magnitude(-20, 20)};
+    const Nearest expected = by_list(mesh.reference, ray);
+    ASSERT_EQ(by_tree(mesh.reference, ray), expected) << "seed " << kSeed << ", ray " << i;
+    hits += expected.number != 0xFFFFFFFF;
+  }
+  EXPECT_GT(hits, scaled_count(100'000) / 3);
+}
+
+class SpoiltAnswersTest : public ::testing::Test {
+ protected:
+  SpoiltAnswersTest() : scene_(proof_scenes(12)[6]), random_(12), block_(proof_rays(scene_, 4'000, random_)) {
+    answer_ = run_block(*scene_.snapshot, block_);
+  }
+  // Spoils every hit.
+  template <class Spoil>
+  RayTally judge_spoilt(Spoil spoil) {
+    BlockResult spoilt = answer_;
+    for (size_t i = 0; i < spoilt.t.size(); ++i)
+      if (spoilt.ids[i] != kNoId) spoil(spoilt, i);
+    return judge_rays(scene_, block_, spoilt);
+  }
+  uint64_t most() { return judge_rays(scene_, block_, answer_).hits * 9 / 10; }
+
+  ProofScene scene_;
+  Random random_;
+  OwnedBlock block_;
+  BlockResult answer_;
+};
+
+TEST_F(SpoiltAnswersTest, UnspoiltOnesAreClean) {
+  const RayTally tally = judge_rays(scene_, block_, answer_);
+  EXPECT_TRUE(tally.clean()) << absl::StrJoin(tally.faults, "\n");
+  EXPECT_GT(tally.hits, tally.rays / 2);
+}
+
+TEST_F(SpoiltAnswersTest, ALostHitIsAMiss) {
+  const RayTally tally = judge_spoilt([](BlockResult& result, size_t i) {
+    result.t[i] = std::numeric_limits<float>::infinity();
+    result.ids[i] = kNoId;
+  });
+  EXPECT_GT(tally.misses, most());
+}
+
+TEST_F(SpoiltAnswersTest, AHitInFrontOfItsTriangleOrBehindItIsFalse) {
+  for (const float factor : {0.99f, 1.01f}) {
+    const RayTally tally = judge_spoilt([&](BlockResult& result, size_t i) { result.t[i] *= factor; });
+    EXPECT_GT(tally.false_hits, most() * 8 / 10) << factor;  // hits at 0 stay where they are
+  }
+}
+
+TEST_F(SpoiltAnswersTest, AHitOfAnotherTriangleOrInstanceIsFalse) {
+  EXPECT_GT(judge_spoilt([](BlockResult& result, size_t i) { result.triangles[i] ^= 16; }).false_hits, most());
+  EXPECT_GT(judge_spoilt([](BlockResult& result, size_t i) { result.ids[i] = 4 - result.ids[i]; }).false_hits,
+            most() / 2);
+}
+
+TEST_F(SpoiltAnswersTest, AHitBeyondTheLimitIsFalse) {
+  block_.extras.assign(block_.extras.size(), 0.0f);
+  EXPECT_GT(judge_spoilt([](BlockResult&, size_t) {}).false_hits, most() * 8 / 10);
+}
+
+// Half of the triangles taken away by culling that the answer does not know of.
+TEST_F(SpoiltAnswersTest, AHitOfTheCulledSideIsFalse) {
+  rays_of(block_).cull = Cull::kNone;
+  block_.extras.assign(block_.extras.size(), std::numeric_limits<float>::infinity());
+  answer_ = run_block(*scene_.snapshot, block_);
+  rays_of(block_).cull = Cull::kFront;
+  EXPECT_GT(judge_spoilt([](BlockResult&, size_t) {}).false_hits, most() / 4);
+}
+
+TEST_F(SpoiltAnswersTest, AFartherHitThanTheNearestIsAMiss) {
+  rays_of(block_).mode = RayMode::kAll;
+  const BlockResult all = run_block(*scene_.snapshot, block_);
+  uint64_t spoilt = 0;
+  for (size_t i = 0, row = 0; i < all.counts.size(); row += all.counts[i++]) {
+    if (all.counts[i] < 2) continue;
+    const size_t last = row + all.counts[i] - 1;
+    answer_.t[i] = all.t[last];
+    answer_.ids[i] = all.ids[last];
+    answer_.triangles[i] = all.triangles[last];
+    spoilt += all.t[last] > all.t[row] * 1.1f;
+  }
+  const RayTally tally = judge_rays(scene_, block_, answer_);
+  EXPECT_EQ(tally.false_hits, 0u);
+  EXPECT_GT(tally.misses, spoilt * 8 / 10);
+  EXPECT_GT(spoilt, tally.rays / 10);
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,142 @@
+// The scenes of the proof that no ray misses: meshes of several kinds and sizes, each placed as it is, moved, far away,
+// turned and scaled, and several times over. Immutable; safe from any thread.
+#ifndef LOCUS_TESTS_SUPPORT_PROOF_PROOF_SCENES_H_
+#define LOCUS_TESTS_SUPPORT_PROOF_PROOF_SCENES_H_
+
+#include <memory>
+#include <vector>
+
+#include "tests/support/generated_meshes.h"
+#include "tests/support/proof/reference_tree.h"
+#include "tests/support/query_world.h"
+
+namespace locus::test {
+
+struct ProofMesh {
+  std::vector<Triangle> triangles;
+  StaticMeshPtr stored;
+  ReferenceTree reference;
+  Real extent;         // the largest |coordinate|
+  double size;         // the longest side of its bounds
+  double lattice = 0;  // all corners are multiples of it; 0: they are not
+};
+
+struct ProofInstance {
+  Id id;
+  std::shared_ptr<const ProofMesh> mesh;
+  Transform transform;  // as stored
+};
+
+struct ProofScene {
+  SnapshotPtr snapshot;
+  std::vector<ProofInstance> instances;
+};
+
+inline std::shared_ptr<const ProofMesh> proof_mesh(std::vector<Triangle> triangles, double lattice = 0) {
+  number_in_order(triangles);
+  StaticMeshPtr stored = mesh_of(triangles);
+  const Aabbf bounds = stored->mesh().bounds();
+  ReferenceTree reference(triangles);
+  return std::make_shared<const ProofMesh>(ProofMesh{std::move(triangles), std::move(stored), std::move(reference),
+                                                     Real{magnitude(bounds)}, double{max_component(bounds.extent())},
+                                                     lattice});
+}
+
+namespace internal {
+
+// Scaled, then moved: each vertex rounded once, so that what was closed stays closed.
+inline std::vector<Triangle> moved(std::vector<Triangle> triangles, double scale, Vec3d by) {
+  for (Triangle& triangle : triangles)
+    for (Vec3f* vertex : {&triangle.a, &triangle.b, &triangle.c}) *vertex = to_float(to_double(*vertex) * scale + by);
+  return triangles;
+}
+
+// Long thin triangles across each other, down to a hundred thousandth of their length.
+inline std::vector<Triangle> slivers(uint32_t count, uint64_t seed) {
+  Random random(seed);
+  std::vector<Triangle> triangles;
+  while (triangles.size() < count) {
+    const Vec3d a = random.vector(1), along = random.unit_vector() * random.magnitude(-3, 0);
+    const Vec3d across = random.unit_vector() * random.magnitude(-17, -3);
+    triangles.push_back({to_float(a), to_float(a + along), to_float(a + along * random.unit() + across)});
+  }
+  return triangles;
+}
+
+// Triangles of all sizes through each other, each tenth one a copy of one before.
+inline std::vector<Triangle> soup(uint32_t count, uint64_t seed) {
+  Random random(seed);
+  std::vector<Triangle> triangles;
+  while (triangles.size() < count) {
+    if (triangles.size() % 10 == 9) {
+      triangles.push_back(random.pick(triangles));
+      continue;
+    }
+    const Vec3d a = random.vector(1);
+    const double size = random.magnitude(-7, -1);
+    triangles.push_back({to_float(a), to_float(a + random.vector(size)), to_float(a + random.vector(size))});
+  }
+  return triangles;
+}
+
+inline std::vector<PlacedMesh> proof_placements(Random& random) {
+  std::vector<PlacedMesh> placements(6);
+  placements[1].translation = {1'024, -2'048, 512.5};
+  placements[2].translation = {1'048'576, -999'424, 524'288};
+  placements[3].translation = random.vector(100);
+  placements[4].translation = random.vector(1e6);
+  placements[4].scale = 1e-3f;
+  placements[5].translation = random.vector(1e6);
+  placements[5].scale = 1e3f;
+  for (size_t i = 3; i < placements.size(); ++i) placements[i].rotation = random.rotation();
+  return placements;
+}
+
+inline ProofScene proof_scene(const std::shared_ptr<const ProofMesh>& mesh, std::vector<PlacedMesh> placements) {
+  QueryWorld world;
+  for (size_t i = 0; i < placements.size(); ++i) {
+    placements[i].id = static_cast<Id>(i + 1);
+    placements[i].mesh = mesh->stored;
+  }
+  world.instances = std::move(placements);
+  ProofScene scene{snapshot_of(world), {}};
+  for (const PlacedMesh& placed : world.instances)
+    scene.instances.push_back({placed.id, mesh, scene.snapshot->statics->find(placed.id)->transform});
+  return scene;
+}
+
+}  // namespace internal
+
+inline std::vector<std::shared_ptr<const ProofMesh>> proof_meshes(uint64_t seed) {
+  const std::vector<Triangle> city = box_city(18, seed), sphere = bumpy_sphere(32, 0.1, seed);
+  return {proof_mesh(city, 0.5),
+          proof_mesh(internal::moved(box_city(6, seed + 1), 1.0 / 512, {}), 1.0 / 1024),
+          proof_mesh(internal::moved(city, 1, {65'536, -131'072, 32'768}), 0.5),
+          proof_mesh(sphere),
+          proof_mesh(internal::moved(sphere, 1e-3, {})),
+          proof_mesh(internal::moved(sphere, 1e3, {20'000, 0, -50'000})),
+          proof_mesh(internal::slivers(2'000, seed)),
+          proof_mesh(internal::soup(4'000, seed)),
+          proof_mesh(bumpy_sphere(100, 0.02, seed))};
+}
+
+// Every mesh at every placement, and three of it through each other.
+inline std::vector<ProofScene> proof_scenes(uint64_t seed) {
+  Random random(seed);
+  std::vector<ProofScene> scenes;
+  for (const std::shared_ptr<const ProofMesh>& mesh : proof_meshes(seed)) {
+    for (const PlacedMesh& placement : internal::proof_placements(random))
+      scenes.push_back(internal::proof_scene(mesh, {placement}));
+    std::vector<PlacedMesh> several(3);
+    several[1].translation = random.vector(mesh->size / 2);
+    several[2].translation = random.vector(mesh->size / 2);
+    several[2].rotation = random.rotation();
+    several[2].scale = 0.75f;
+    scenes.push_back(internal::proof_scene(mesh, several));
+  }
+  return scenes;
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_PROOF_PROOF_SCENES_H_

@@ -1,0 +1,157 @@
+// The proof that no ray misses, as a run of as many rays as one has time for: the same rays for the same seed, on any
+// number of threads, whatever the processor; the instruction sets it has share them.
+#ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_PROOF_H_
+#define LOCUS_TESTS_SUPPORT_PROOF_RAY_PROOF_H_
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "core/index/bvh/kernels/dispatch.h"
+#include "tests/support/proof/proof_rays.h"
+#include "tests/support/proof/ray_judge.h"
+
+namespace locus::test {
+
+namespace internal {
+
+inline constexpr size_t kBlockRays = 2'000;
+
+// The first hits once more, asked in other ways that leave no choice.
+inline void repeat(const ProofScene& scene, OwnedBlock block, const BlockResult& first, uint64_t way, RayTally& tally) {
+  const auto compare = [&](size_t ray, bool same) {
+    ++tally.repeats;
+    if (same) return;
+    ++tally.differing_repeats;
+    tally.note(absl::StrFormat("differs when repeated in way %d: %s", way,
+                               describe(block, ray, {Real{first.t[ray]}, first.ids[ray], first.triangles[ray]})));
+  };
+  const size_t count = first.t.size();
+  const auto is_hit = [&](size_t i) { return first.ids[i] != kNoId; };
+  if (way == 0) {
+    rays_of(block).mode = RayMode::kAny;
+    const BlockResult any = run_block(*scene.snapshot, block);
+    for (size_t i = 0; i < count; ++i) compare(i, (any.hits[i] != '\0') == is_hit(i));
+  } else if (way == 1) {
+    rays_of(block).mode = RayMode::kAll;
+    block.settings.max_results = 1;
+    const BlockResult all = run_block(*scene.snapshot, block);
+    for (size_t i = 0, row = 0; i < count; row += all.counts[i++])
+      compare(i, (all.counts[i] == 1) == is_hit(i) &&
+                     (!is_hit(i) || (all.t[row] == first.t[i] && all.ids[row] == first.ids[i] &&
+                                     all.triangles[row] == first.triangles[i])));
+  } else {  // a limit exactly at the hit keeps it, one just before it loses it
+    const bool at = way == 2;
+    for (size_t i = 0; i < count; ++i)
+      if (is_hit(i)) block.extras[i] = at ? first.t[i] : std::max(0.0f, std::nextafter(first.t[i], -1.0f));
+    const BlockResult limited = run_block(*scene.snapshot, block);
+    for (size_t i = 0; i < count; ++i) {
+      const bool kept =
+          limited.t[i] == first.t[i] && limited.ids[i] == first.ids[i] && limited.triangles[i] == first.triangles[i];
+      const bool starts_there = first.t[i] == 0;
+      compare(i, at || starts_there || !is_hit(i) ? kept : limited.ids[i] == kNoId);
+    }
+  }
+}
+
+}  // namespace internal
+
+class RayProof {
+ public:
+  RayProof(uint64_t rays, uint64_t seed, unsigned threads)
+      : blocks_((rays + internal::kBlockRays - 1) / internal::kBlockRays), seed_(seed), threads_(threads) {}
+
+  // Leaves the widest instruction set in use.
+  RayTally run() {
+    for (uint64_t begin = 0; begin < blocks_; begin += kRoundBlocks) {
+      scenes_ = proof_scenes(seed_ + begin);
+      run_round(begin, std::min(kRoundBlocks, blocks_ - begin));
+    }
+    LOCUS_CHECK(use_instruction_set("").ok());
+    return tally_;
+  }
+
+  // What the run says in one line.
+  std::string line() const {
+    return absl::StrFormat(
+        "proof: %d rays, %d hits, %d misses, %d false hits, %d undecidable within the allowance; %d repeats, %d "
+        "differing; instruction sets %s; seed %d",
+        tally_.rays, tally_.hits, tally_.misses, tally_.false_hits, tally_.undecidable, tally_.repeats,
+        tally_.differing_repeats, absl::StrJoin(instruction_sets(), ", "), seed_);
+  }
+
+ private:
+  static constexpr uint64_t kRoundBlocks = 5'000;  // between new scenes
+  // In eighths: at least one for the portable code, the rest for those with kernels alike.
+  static constexpr uint64_t kShares = 8;
+  static uint64_t share_before(size_t set, size_t sets) {
+    if (set == sets) return kShares;
+    return sets == 1 ? 0 : (kShares - 1) * set / (sets - 1);
+  }
+
+  // Of `count` blocks, by one instruction set after the other.
+  void run_round(uint64_t begin, uint64_t count) {
+    const std::vector<std::string> sets = instruction_sets();
+    for (size_t i = 0; i < sets.size(); ++i) {
+      LOCUS_CHECK(use_instruction_set(sets[i]).ok());
+      run_blocks(begin + count * share_before(i, sets.size()) / kShares,
+                 begin + count * share_before(i + 1, sets.size()) / kShares, sets[i]);
+    }
+  }
+
+  void run_blocks(uint64_t begin, uint64_t end, const std::string& set) {
+    std::atomic<uint64_t> next{begin};
+    const auto work = [&] {
+      for (uint64_t block; (block = next++) < end;) {
+        const RayTally part = run_one(block);
+        const std::lock_guard<std::mutex> lock(mutex_);
+        tally_.add(part);
+        show_progress(set);
+      }
+    };
+    std::vector<std::thread> others;
+    for (unsigned i = 1; i < threads_; ++i) others.emplace_back(work);
+    work();
+    for (std::thread& other : others) other.join();
+  }
+
+  RayTally run_one(uint64_t block) const {
+    Random random(seed_ * 0x9E3779B97F4A7C15u + block);
+    random = Random(random.next());
+    const ProofScene& scene = scenes_[block % scenes_.size()];
+    const OwnedBlock rays = proof_rays(scene, internal::kBlockRays, random);
+    const BlockResult first = run_block(*scene.snapshot, rays);
+    RayTally tally = judge_rays(scene, rays, first);
+    internal::repeat(scene, rays, first, random.below(4), tally);
+    for (std::string& fault : tally.faults) fault = absl::StrFormat("block %d: %s", block, fault);
+    return tally;
+  }
+
+  void show_progress(const std::string& set) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - shown_ < std::chrono::seconds(10)) return;
+    shown_ = now;
+    std::fprintf(stderr, "%s: %llu of %llu rays, %llu misses, %llu false hits\n", set.c_str(),
+                 static_cast<unsigned long long>(tally_.rays),
+                 static_cast<unsigned long long>(blocks_ * internal::kBlockRays),
+                 static_cast<unsigned long long>(tally_.misses), static_cast<unsigned long long>(tally_.false_hits));
+  }
+
+  const uint64_t blocks_, seed_;
+  const unsigned threads_;
+  std::vector<ProofScene> scenes_;
+  std::mutex mutex_;
+  RayTally tally_;
+  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_PROOF_RAY_PROOF_H_

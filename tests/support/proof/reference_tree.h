@@ -1,0 +1,134 @@
+// A tree of its own over triangles in long double, for judging more rays than a plain list could: median splits, double
+// boxes inflated far beyond any rounding of their test. For the proof that no ray misses; itself held against the list.
+// Immutable after construction; safe from any thread.
+#ifndef LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
+#define LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
+
+#include <array>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "core/geometry/aabb.h"
+#include "tests/support/proof/real_triangle.h"
+
+namespace locus::test {
+
+class ReferenceTree {
+ public:
+  // Numbers are positions in `triangles`, which is not empty.
+  explicit ReferenceTree(const std::vector<Triangle>& triangles) : order_(triangles.size()) {
+    std::vector<Aabbd> boxes;
+    for (const Triangle& triangle : triangles) {
+      triangles_.emplace_back(triangle);
+      boxes.push_back(to_double(bounds_of(triangle)));
+    }
+    std::iota(order_.begin(), order_.end(), 0u);
+    build(boxes);
+    magnitude_ = locus::magnitude(nodes_[0].box);
+  }
+
+  const RealTriangle& triangle(uint32_t number) const { return triangles_[number]; }
+  uint32_t size() const { return static_cast<uint32_t>(triangles_.size()); }
+
+  // Calls visit(number, meeting) for every triangle that the ray meets within its border at 0 <= t <= limit, and for
+  // some that it meets outside, whose inset is negative. The visitor may lower `limit`.
+  template <class Visit>
+  void visit(const RealRay& ray, const Real& limit, Visit visit) const {
+    const Slabs slabs(ray, magnitude_);
+    std::array<uint32_t, kMaxDepth> waiting;
+    size_t count = 0;
+    waiting[count++] = 0;
+    while (count != 0) {
+      const Node& node = nodes_[waiting[--count]];
+      if (!slabs.meet(node.box, static_cast<double>(limit))) continue;
+      if (node.count == 0) {
+        waiting[count++] = node.first;
+        waiting[count++] = node.first + 1;
+      }
+      for (uint32_t i = 0; i < node.count; ++i) {
+        const uint32_t number = order_[node.first + i];
+        if (const std::optional<Meeting> meeting = triangles_[number].meet(ray, limit)) visit(number, *meeting);
+      }
+    }
+  }
+
+ private:
+  static constexpr size_t kMaxDepth = 64;  // halves leave at most 32 levels
+  static constexpr uint32_t kLeafSize = 4;
+
+  struct Node {
+    Aabbd box;
+    uint32_t first;  // of `order_` in a leaf, else the first of two children
+    uint32_t count;  // of a leaf, else 0
+  };
+
+  // A ray in double. Its rounding and that of the test move it by some 2^-51 of its reach, the pad is 2^-30 of it.
+  struct Slabs {
+    Slabs(const RealRay& ray, double magnitude) {
+      double reach = magnitude, longest = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        origin[axis] = static_cast<double>(ray.origin[axis]);
+        reach = std::max(reach, std::abs(origin[axis]) + magnitude);
+        longest = std::max(longest, std::abs(static_cast<double>(ray.direction[axis])));
+      }
+      pad = 0x1p-30 * reach;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double component = static_cast<double>(ray.direction[axis]);
+        // Over the whole of its reach such a ray leaves the slab's plane by less than the pad.
+        parallel[axis] = std::abs(component) < 1e-25 * longest;
+        inverse[axis] = parallel[axis] ? 0 : 1 / component;
+      }
+    }
+
+    bool meet(const Aabbd& box, double limit) const {
+      double near = 0, far = limit * (1 + 0x1p-40);
+      for (int axis = 0; axis < 3; ++axis) {
+        const double low = box.min[axis] - pad - origin[axis], high = box.max[axis] + pad - origin[axis];
+        if (parallel[axis]) {
+          if (low > 0 || high < 0) return false;
+          continue;
+        }
+        near = std::max(near, std::min(low * inverse[axis], high * inverse[axis]));
+        far = std::min(far, std::max(low * inverse[axis], high * inverse[axis]));
+      }
+      return near <= far;
+    }
+
+    double origin[3], inverse[3], pad;
+    bool parallel[3];
+  };
+
+  void build(const std::vector<Aabbd>& boxes) {
+    nodes_.push_back({{}, 0, size()});
+    for (size_t i = 0; i < nodes_.size(); ++i) {
+      const uint32_t first = nodes_[i].first, count = nodes_[i].count;
+      Aabbd centers;
+      for (uint32_t k = first; k < first + count; ++k) {
+        const Aabbd& box = boxes[order_[k]];
+        nodes_[i].box = merge(nodes_[i].box, box);
+        centers = merge(centers, box.min + box.max);
+      }
+      if (count <= kLeafSize) continue;
+      const Vec3d extent = centers.extent();
+      const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+      const auto begin = order_.begin() + first;
+      std::nth_element(begin, begin + count / 2, begin + count, [&](uint32_t a, uint32_t b) {
+        return boxes[a].min[axis] + boxes[a].max[axis] < boxes[b].min[axis] + boxes[b].max[axis];
+      });
+      nodes_[i].first = static_cast<uint32_t>(nodes_.size());
+      nodes_[i].count = 0;
+      nodes_.push_back({{}, first, count / 2});
+      nodes_.push_back({{}, first + count / 2, count - count / 2});
+    }
+  }
+
+  std::vector<RealTriangle> triangles_;
+  std::vector<uint32_t> order_;
+  std::vector<Node> nodes_;
+  double magnitude_ = 0;
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
