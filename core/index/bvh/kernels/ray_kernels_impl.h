@@ -65,6 +65,17 @@ static inline void spread(__m128 three, Floats8* to) {
   to[2].v = _mm256_broadcastss_ps(_mm_shuffle_ps(three, three, _MM_SHUFFLE(2, 2, 2, 2)));
 }
 
+// The axis of the largest component, the first of equals, as TriangleRay chooses. `candidates`: those that float cannot
+// tell apart.
+static inline int largest_axis(const double* direction, uint32_t candidates) {
+  int axis = __builtin_ctz(candidates);
+  for (uint32_t rest = candidates & (candidates - 1u); rest != 0; rest &= rest - 1u) {
+    const int other = __builtin_ctz(rest);
+    if (size_of(direction[other]) > size_of(direction[axis])) axis = other;
+  }
+  return axis;
+}
+
 inline Traveller::Traveller(const KernelRay& given, float magnitude) : limit(given.limit), ray(&given) {
   const __m128 sign = _mm_set1_ps(-0.0f);
   const __m128 from = to_floats(given.origin), along = to_floats(given.direction);
@@ -87,7 +98,7 @@ inline Traveller::Traveller(const KernelRay& given, float magnitude) : limit(giv
     far_row[axis] = axis + 3 - negative;
   }
   _mm_storeu_ps(origin, from);
-  z = __builtin_ctz(static_cast<uint32_t>(_mm_movemask_ps(_mm_cmpge_ps(sizes, longest))) & 7u);
+  z = largest_axis(given.direction, static_cast<uint32_t>(_mm_movemask_ps(_mm_cmpge_ps(sizes, longest))) & 7u);
   x = z == 2 ? 0 : z + 1;
   y = x == 2 ? 0 : x + 1;
   if ((octant >> z & 1u) != 0) {  // keeps the winding: seen along the ray, x to y always turns the same way

@@ -176,6 +176,25 @@ TEST_P(RayKernelsTest, DecideRaysOfALatticeAsAllTrianglesDo) {
   judge(city, questions);
 }
 
+// Only double can tell the components apart. From just off the surface, the axis chosen to project along shows in t.
+TEST_P(RayKernelsTest, DecideNearDiagonalsAsAllTrianglesDo) {
+  const std::vector<Triangle> sphere = bumpy_sphere(14, 0.1, 1);
+  Random random(9);
+  std::vector<Question> questions;
+  while (questions.size() < scaled_count(4'000)) {
+    const Triangle& triangle = random.pick(sphere);
+    const double u = random.unit(), v = random.unit() * (1 - u);
+    Question question;
+    question.direction = random.whole_vector(1);
+    if (question.direction == Vec3d{}) continue;
+    for (int axis = 0; axis < 3; ++axis) question.direction[axis] *= 1 + random.between(-1, 1) * 0x1p-26;
+    question.origin = to_double(triangle.a) * (1 - u - v) + to_double(triangle.b) * u + to_double(triangle.c) * v -
+                      question.direction * random.magnitude(-40, -20);
+    questions.push_back(question);
+  }
+  judge(sphere, questions);
+}
+
 TEST_P(RayKernelsTest, DecideRaysAimedAtVerticesAndEdgesAsAllTrianglesDo) {
   const std::vector<Triangle> sphere = bumpy_sphere(14, 0.1, 1);
   Random random(5);
