@@ -1,0 +1,14 @@
+// Boost.Geometry's R-tree as a peer of the static suite: the boxes of triangles, packed, 16 a node. Only where
+// libboost-dev is; see peers.h.
+#ifndef LOCUS_TESTS_BENCH_STATIC_BOOST_RTREE_H_
+#define LOCUS_TESTS_BENCH_STATIC_BOOST_RTREE_H_
+
+#include "tests/bench/static/peer.h"
+
+namespace locus::bench {
+
+void add_boost_peer(const BenchMesh& mesh, Needs needs, Peers& peers);
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_STATIC_BOOST_RTREE_H_

@@ -1,0 +1,14 @@
+// CGAL's AABB tree in float as a peer of the static suite: rays and boxes. Its balls are surfaces, which leave out the
+// triangles inside, so they are not asked. Only where libcgal-dev is; see peers.h.
+#ifndef LOCUS_TESTS_BENCH_STATIC_CGAL_H_
+#define LOCUS_TESTS_BENCH_STATIC_CGAL_H_
+
+#include "tests/bench/static/peer.h"
+
+namespace locus::bench {
+
+void add_cgal_peer(const BenchMesh& mesh, Needs needs, Peers& peers);
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_STATIC_CGAL_H_
