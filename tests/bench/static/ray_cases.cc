@@ -1,6 +1,8 @@
 #include "tests/bench/static/ray_cases.h"
 
+#include <barrier>
 #include <thread>
+#include <utility>
 
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/results_hash.h"
@@ -11,7 +13,7 @@ namespace {
 
 constexpr size_t kRaysAChunk = 20'000;
 // Large, so that starting threads is nothing beside it.
-constexpr size_t kRaysAThreadsChunk = 125'000;
+constexpr size_t kRaysAThreadsChunk = 60'000;
 constexpr uint64_t kIncoherentSeed = 101;
 constexpr uint64_t kShortSeed = 202;
 constexpr float kShortReach = 0.05f;  // of the diagonal
@@ -121,17 +123,76 @@ void run_case(const MeshRun& run, const RayCase& ray_case) {
 
 std::string threads_case(const MeshRun& run) { return case_of(absl::StrCat("threads", run.options.threads), run.mesh); }
 
-// Each of `threads` asks a part of its own.
-void ask_in_parallel(Peer& peer, absl::Span<const RayQuery> rays, RayAnswer* answers, size_t threads) {
-  const auto part = [&](size_t i) {
-    const size_t begin = chunk_begin(rays.size(), i, threads), end = chunk_begin(rays.size(), i + 1, threads);
-    peer.first(rays.subspan(begin, end - begin), answers + begin);
-  };
-  std::vector<std::thread> others;
-  for (size_t i = 1; i < threads; ++i) others.emplace_back(part, i);
-  part(0);
-  for (std::thread& other : others) other.join();
-}
+// Threads that wait for the next chunk: starting one can take longer than a chunk.
+class Team {
+ public:
+  // `work` gets a member's number, from 0; member 0 is whoever calls run().
+  Team(size_t members, std::function<void(size_t member)> work)
+      : work_(std::move(work)), begin_(static_cast<ptrdiff_t>(members)), end_(static_cast<ptrdiff_t>(members)) {
+    for (size_t member = 1; member < members; ++member) {
+      others_.emplace_back([this, member] {
+        for (begin_.arrive_and_wait(); !over_; begin_.arrive_and_wait()) {
+          work_(member);
+          end_.arrive_and_wait();
+        }
+      });
+    }
+  }
+  ~Team() {
+    over_ = true;
+    begin_.arrive_and_wait();
+    for (std::thread& other : others_) other.join();
+  }
+  Team(const Team&) = delete;
+  Team& operator=(const Team&) = delete;
+
+  void run() {
+    begin_.arrive_and_wait();
+    work_(0);
+    end_.arrive_and_wait();
+  }
+
+ private:
+  std::function<void(size_t)> work_;
+  std::barrier<> begin_, end_;
+  bool over_ = false;
+  std::vector<std::thread> others_;
+};
+
+// The same rays by several threads, each a part of every chunk.
+class SharedRays {
+ public:
+  SharedRays(Peer& peer, const std::vector<RayQuery>& rays, size_t chunks, size_t threads)
+      : peer_(peer),
+        rays_(rays),
+        chunks_(chunks),
+        threads_(threads),
+        answers_(rays.size()),
+        team_(threads, [this](size_t member) { ask_part(member); }) {}
+
+  Contestant contestant(std::string name) {
+    const auto run_chunk = [this](size_t chunk) {
+      chunk_ = chunk;
+      team_.run();
+    };
+    return {std::move(name), run_chunk, static_cast<double>(rays_.size()), {}};
+  }
+  const std::vector<RayAnswer>& answers() const { return answers_; }
+
+ private:
+  void ask_part(size_t member) {
+    const size_t part = chunk_ * threads_ + member, parts = chunks_ * threads_;
+    const size_t begin = chunk_begin(rays_.size(), part, parts), end = chunk_begin(rays_.size(), part + 1, parts);
+    peer_.first(absl::MakeConstSpan(rays_).subspan(begin, end - begin), answers_.data() + begin);
+  }
+
+  Peer& peer_;
+  const std::vector<RayQuery>& rays_;
+  const size_t chunks_, threads_;
+  std::vector<RayAnswer> answers_;
+  size_t chunk_ = 0;
+  Team team_;
+};
 
 }  // namespace
 
@@ -158,26 +219,17 @@ void run_threads_case(const MeshRun& run) {
   run.progress(name);
   const std::vector<RayQuery> rays = rays_of(Rays::kIncoherent, run);
   const size_t chunks = chunks_for(rays.size(), kRaysAThreadsChunk);
-  const auto by = [&](std::vector<RayAnswer>& answers, size_t threads) {
-    answers.resize(rays.size());
-    return [&, threads](size_t chunk) {
-      const size_t begin = chunk_begin(rays.size(), chunk, chunks), end = chunk_begin(rays.size(), chunk + 1, chunks);
-      ask_in_parallel(run.ours, absl::MakeConstSpan(rays).subspan(begin, end - begin), answers.data() + begin, threads);
-    };
-  };
-  std::vector<RayAnswer> together, alone;
-  const auto count = static_cast<double>(rays.size());
-  const std::vector<Contestant> contestants = {
-      {"locus", by(together, static_cast<size_t>(run.options.threads)), count, {}},
-      {"one_thread", by(alone, 1), count, {}}};
+  SharedRays together(run.ours, rays, chunks, static_cast<size_t>(run.options.threads));
+  SharedRays alone(run.ours, rays, chunks, 1);
+  const std::vector<Contestant> contestants = {together.contestant("locus"), alone.contestant("one_thread")};
   const auto times = race(contestants, chunks, run.options.rounds, wall_seconds);
   Cell cell;
   cell.suite = "static";
   cell.case_name = name;
   cell.metric = "ns/ray";
-  cell.results_hash = hash_of(together);
+  cell.results_hash = hash_of(together.answers());
   add_cells(contestants, times, cell, run.report);
-  if (hash_of(alone) != cell.results_hash)
+  if (hash_of(alone.answers()) != cell.results_hash)
     run.report.disagreements.push_back(absl::StrCat(name, ": one thread gives other hits than ", run.options.threads));
 }
 

@@ -4,9 +4,11 @@
 
 #include "core/index/bvh/kernels/dispatch.h"
 #include "tests/bench/static/bench_mesh.h"
+#include "tests/bench/static/build_cases.h"
 #include "tests/bench/static/ours.h"
 #include "tests/bench/static/peers.h"
 #include "tests/bench/static/ray_cases.h"
+#include "tests/bench/static/region_cases.h"
 
 namespace locus::bench {
 namespace {
@@ -42,11 +44,14 @@ std::vector<std::string> meshes_of(const Options& options, Report& report) {
 void run_mesh(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report) {
   Needs needs;
   needs.rays = wants_ray_peers(options, mesh);
+  needs.regions = wants_region_peers(options, mesh);
   Ours ours(mesh);
   const Peers peers = all_peers(mesh, needs);
   const MeshRun run{options, progress, mesh, ours, peers, report};
   run_ray_cases(run);
   run_threads_case(run);
+  run_region_cases(run);
+  run_build_cases(run);
 }
 
 }  // namespace

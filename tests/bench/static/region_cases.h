@@ -1,0 +1,17 @@
+// The cases of balls and boxes of 0.5, 2 and 10 % of the mesh's diagonal: the numbers of all triangles that they reach.
+#ifndef LOCUS_TESTS_BENCH_STATIC_REGION_CASES_H_
+#define LOCUS_TESTS_BENCH_STATIC_REGION_CASES_H_
+
+#include "tests/bench/static/mesh_run.h"
+
+namespace locus::bench {
+
+// Whether the filter wants one of them.
+bool wants_region_peers(const Options& options, const BenchMesh& mesh);
+
+// ball/0.5, ball/2, ball/10, box/0.5, box/2, box/10.
+void run_region_cases(const MeshRun& run);
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_STATIC_REGION_CASES_H_
