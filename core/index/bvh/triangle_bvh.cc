@@ -1,173 +1,86 @@
 #include "core/index/bvh/triangle_bvh.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/index/bvh/binary_tree.h"
 
 namespace locus {
 
-static_assert(kBvhWidth == kTreeWidth && kBvhLeafSize == kTreeWidth);
 static_assert(kTreeStack == limits::kMaxBvhDepth * (kTreeWidth - 1) + 1 + kTreeWidth);
 
 namespace {
 
-// Coordinates of a box that no slab test meets.
-constexpr float kNowhere = 1e30f;
+// Triangles whose boxes one thread takes at once.
+constexpr size_t kPieceTriangles = 1u << 14;
 
-float corner_toward(const Aabbf& box, uint32_t octant) {
-  float sum = 0;
-  for (int axis = 0; axis < 3; ++axis) sum += (octant >> axis & 1u) != 0 ? -box.max[axis] : box.min[axis];
-  return sum;
+// False for a triangle that is not finite.
+bool refer(const Triangle& triangle, uint32_t index, BoxReference<float>& reference) {
+  const Quad<float> a = Quad<float>::of(triangle.a.x, triangle.a.y, triangle.a.z, 0);
+  const Quad<float> b = Quad<float>::of(triangle.b.x, triangle.b.y, triangle.b.z, 0);
+  const Quad<float> c = Quad<float>::of(triangle.c.x, triangle.c.y, triangle.c.z, 0);
+  reference = BoxReference<float>::of({lesser(lesser(a, b), c), greater(greater(a, b), c)}, index);
+  // No other numbers are not 0 when taken from themselves.
+  const Quad<float> nothing = (a - a) + (b - b) + (c - c);
+  return nothing[0] + nothing[1] + nothing[2] == 0;
 }
 
-// Slots from far to near along the diagonal of each octant of directions.
-void write_order(absl::Span<const Aabbf> boxes, TriangleNode& node) {
-  for (uint32_t octant = 0; octant < 8; ++octant) {
-    std::array<uint32_t, kTreeWidth> slots{};
-    for (uint32_t slot = 0; slot < kTreeWidth; ++slot) slots[slot] = slot;
-    const auto farther = [&](uint32_t a, uint32_t b) {
-      const bool a_empty = a >= boxes.size(), b_empty = b >= boxes.size();
-      if (a_empty || b_empty) return a_empty && !b_empty;
-      return corner_toward(boxes[a], octant) > corner_toward(boxes[b], octant);
-    };
-    std::stable_sort(slots.begin(), slots.end(), farther);
-    node.order[octant] = 0;
-    for (int place = 0; place < kTreeWidth; ++place)
-      node.order[octant] |= slots[static_cast<size_t>(place)] << (3 * place);
-  }
-}
-
-float rounded_up_extent(const Aabbf& box) {
-  return std::nextafter(max_component(box.extent()), std::numeric_limits<float>::infinity());
+// Fills one reference a triangle. Errors: the first triangle that is not finite; CANCELLED.
+absl::Status refer_all(absl::Span<const Triangle> triangles, const BvhOptions& options,
+                       BoxReference<float>* references) {
+  std::vector<size_t> bad((triangles.size() + kPieceTriangles - 1) / kPieceTriangles, triangles.size());
+  for_each(options, bad.size(), [&](size_t piece) {
+    const size_t end = std::min(triangles.size(), (piece + 1) * kPieceTriangles);
+    for (size_t i = piece * kPieceTriangles; i < end && !cancelled(options); ++i)
+      if (!refer(triangles[i], static_cast<uint32_t>(i), references[i])) bad[piece] = std::min(bad[piece], i);
+  });
+  if (cancelled(options)) return cancelled_build();
+  const size_t first = *std::min_element(bad.begin(), bad.end());
+  return first == triangles.size() ? absl::OkStatus() : refuse_bounds(first);
 }
 
 }  // namespace
 
-// Turns the builder's layout into nodes and blocks, children by rising area, everything depth-first.
-class TriangleBvh::Writer {
- public:
-  Writer(absl::Span<const Triangle> triangles, const BvhLayout<float>& layout, TriangleBvh& tree)
-      : triangles_(triangles), layout_(layout), tree_(tree) {}
-
-  void write() {
-    tree_.nodes_.reserve(layout_.nodes.size());
-    tree_.ranges_.reserve(layout_.nodes.size());
-    tree_.numbers_.reserve(triangles_.size());
-    size_t blocks = 0;
-    for (const BvhNode<float>& node : layout_.nodes)
-      for (uint32_t slot = 0; slot < node.child_count; ++slot) blocks += node.children[slot].is_leaf() ? 1 : 0;
-    tree_.blocks_.reserve(blocks);
-    open(0);
-    while (!path_.empty()) {
-      Open& now = path_.back();
-      const BvhNode<float>& from = layout_.nodes[now.from];
-      if (now.next == from.child_count) {
-        NodeRange& range = tree_.ranges_[now.to];
-        range.count = static_cast<uint32_t>(tree_.numbers_.size()) - range.first;
-        path_.pop_back();
-        continue;
-      }
-      const uint32_t slot = now.next++;
-      const uint32_t source = now.slots[slot];
-      const BvhChild& child = from.children[source];
-      const uint32_t to = now.to;
-      tree_.nodes_[to].child[slot] = child.is_leaf() ? add_block(child, from.bounds[source]) : open(child.first);
-    }
-  }
-
- private:
-  struct Open {
-    uint32_t from, to;  // the node of the layout, and of the tree
-    uint32_t next = 0;  // slot to fill
-    std::array<uint32_t, kTreeWidth> slots{};
-  };
-
-  uint32_t open(uint32_t from) {
-    const BvhNode<float>& node = layout_.nodes[from];
-    const auto to = static_cast<uint32_t>(tree_.nodes_.size());
-    Open& opened = path_.emplace_back();
-    opened.from = from;
-    opened.to = to;
-    for (uint32_t slot = 0; slot < node.child_count; ++slot) opened.slots[slot] = slot;
-    std::stable_sort(opened.slots.begin(), opened.slots.begin() + node.child_count,
-                     [&](uint32_t a, uint32_t b) { return half_area(node.bounds[a]) < half_area(node.bounds[b]); });
-    tree_.ranges_.push_back({static_cast<uint32_t>(tree_.numbers_.size()), 0});
-    TriangleNode& written = tree_.nodes_.emplace_back();
-    std::array<Aabbf, kTreeWidth> boxes;
-    for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
-      const bool used = slot < node.child_count;
-      if (used) boxes[slot] = node.bounds[opened.slots[slot]];
-      written.child[slot] = kNoChild;
-      for (int axis = 0; axis < 3; ++axis) {
-        written.bounds[axis][slot] = used ? boxes[slot].min[axis] : kNowhere;
-        written.bounds[3 + axis][slot] = used ? boxes[slot].max[axis] : -kNowhere;
-      }
-    }
-    write_order(absl::MakeSpan(boxes).subspan(0, node.child_count), written);
-    return to;
-  }
-
-  uint32_t add_block(const BvhChild& leaf, const Aabbf& bounds) {
-    const auto number = static_cast<uint32_t>(tree_.blocks_.size());
-    TriangleBlock& block = tree_.blocks_.emplace_back();
-    block = {};
-    block.first = static_cast<uint32_t>(tree_.numbers_.size());
-    block.count = leaf.count;
-    block.extent = rounded_up_extent(bounds);
-    for (uint32_t place = 0; place < kTreeWidth; ++place) {
-      const Triangle& triangle = triangles_[layout_.order[leaf.first + std::min(place, leaf.count - 1)]];
-      int row = 0;
-      for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
-        for (int axis = 0; axis < 3; ++axis) block.vertices[row++][place] = vertex[axis];
-      if (place < leaf.count) tree_.numbers_.push_back(triangle.number);
-    }
-    return kBlockBit | number;
-  }
-
-  const absl::Span<const Triangle> triangles_;
-  const BvhLayout<float>& layout_;
-  TriangleBvh& tree_;
-  std::vector<Open> path_;
-};
-
 absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triangles, const BvhOptions& options) {
-  std::vector<Aabbf> boxes;
-  boxes.reserve(triangles.size());
-  for (const Triangle& triangle : triangles) boxes.push_back(bounds_of(triangle));
-  absl::StatusOr<BvhLayout<float>> layout = build_bvh_layout<float>(boxes, options);
-  if (!layout.ok()) return layout.status();
-  TriangleBvh tree;
-  if (triangles.empty()) return tree;
-  Writer(triangles, *layout, tree).write();
-  tree.bounds_ = layout->bounds;
-  tree.magnitude_ = magnitude(layout->bounds);
-  tree.depth_ = layout->depth;
-  LOCUS_CHECK_EQ(tree.numbers_.size(), triangles.size());
-  return tree;
+  if (absl::Status status = check_build(triangles.size(), options); !status.ok()) return status;
+  TriangleBvh built;
+  if (triangles.empty()) return built;
+  auto references = std::make_unique_for_overwrite<BoxReference<float>[]>(triangles.size());
+  if (absl::Status status = refer_all(triangles, options, references.get()); !status.ok()) return status;
+  const auto count = static_cast<uint32_t>(triangles.size());
+  absl::StatusOr<BinaryTree<float>> tree = BinaryTree<float>::build(std::move(references), count, options);
+  if (!tree.ok()) return tree.status();
+  built.arrays_ = TriangleWriter(triangles, *tree, options).write();
+  if (cancelled(options)) return cancelled_build();
+  built.bounds_ = tree->root().bounds;
+  built.magnitude_ = magnitude(built.bounds_);
+  LOCUS_CHECK_EQ(built.size(), triangles.size());
+  LOCUS_CHECK_LE(built.depth(), limits::kMaxBvhDepth);
+  return built;
 }
 
 Triangle TriangleBvh::at(size_t position) const {
   LOCUS_CHECK_LT(position, size());
-  const auto behind = std::upper_bound(blocks_.begin(), blocks_.end(), position,
+  const auto behind = std::upper_bound(blocks().begin(), blocks().end(), position,
                                        [](size_t wanted, const TriangleBlock& block) { return wanted < block.first; });
   const TriangleBlock& block = *(behind - 1);
   return triangle(block, static_cast<uint32_t>(position - block.first));
 }
 
 size_t TriangleBvh::bytes() const {
-  return nodes_.capacity() * sizeof(TriangleNode) + ranges_.capacity() * sizeof(NodeRange) +
-         blocks_.capacity() * sizeof(TriangleBlock) + numbers_.capacity() * sizeof(uint32_t);
+  return node_count() * (sizeof(TriangleNode) + sizeof(NodeRange)) + blocks().size() * sizeof(TriangleBlock) +
+         size() * sizeof(uint32_t);
 }
 
 double TriangleBvh::sah_cost() const {
-  if (nodes_.empty()) return 0;
+  if (size() == 0) return 0;
   const double whole = double{half_area(bounds_)};
   double sum = 1;
-  for (const TriangleNode& node : nodes_) {
+  for (const TriangleNode& node : nodes()) {
     for (int slot = 0; slot < kTreeWidth; ++slot) {
       if (node.child[slot] != kNoChild) sum += whole > 0 ? double{half_area(box(node, slot))} / whole : 1;
     }

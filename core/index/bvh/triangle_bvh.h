@@ -8,7 +8,6 @@
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
 
 #include <limits>
-#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
@@ -16,6 +15,7 @@
 #include "core/geometry/triangle.h"
 #include "core/index/bvh/bvh_build.h"
 #include "core/index/bvh/triangle_tree.h"
+#include "core/index/bvh/triangle_writer.h"
 #include "core/index/spatial_index.h"
 
 namespace locus {
@@ -30,18 +30,20 @@ class TriangleBvh {
   // Numbers must be unique; no triangles is legal. Errors: as build_bvh_layout().
   static absl::StatusOr<TriangleBvh> build(absl::Span<const Triangle> triangles, const BvhOptions& options = {});
 
-  size_t size() const { return numbers_.size(); }
+  size_t size() const { return arrays_.triangle_count; }
   // The triangle at a position of the storage order, which input and options fix. Position below size().
   Triangle at(size_t position) const;
   // Of all triangles; empty for none.
   const Aabbf& bounds() const { return bounds_; }
-  uint32_t depth() const { return depth_; }
-  size_t node_count() const { return nodes_.size(); }
+  uint32_t depth() const { return arrays_.depth; }
+  size_t node_count() const { return arrays_.node_count; }
   size_t bytes() const;
   // As Bvh::sah_cost().
   double sah_cost() const;
   // Valid while this object stands unmoved. Not for an empty tree.
-  TriangleTree tree() const { return {nodes_.data(), ranges_.data(), blocks_.data(), numbers_.data(), magnitude_}; }
+  TriangleTree tree() const {
+    return {arrays_.nodes.get(), arrays_.ranges.get(), arrays_.blocks.get(), arrays_.numbers.get(), magnitude_};
+  }
 
   // In storage order.
   template <class Visit>
@@ -60,7 +62,6 @@ class TriangleBvh {
     uint32_t child;
     float near;
   };
-  class Writer;
 
   // Boxes that start exactly at the limit are wanted: a lower number may wait there.
   static bool beyond(float near, float limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
@@ -73,32 +74,31 @@ class TriangleBvh {
   // Puts the children the ray may hit on the stack, farthest first. Returns the new top.
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
 
-  std::vector<TriangleNode> nodes_;
-  std::vector<NodeRange> ranges_;
-  std::vector<TriangleBlock> blocks_;
-  std::vector<uint32_t> numbers_;
+  absl::Span<const TriangleNode> nodes() const { return {arrays_.nodes.get(), arrays_.node_count}; }
+  absl::Span<const TriangleBlock> blocks() const { return {arrays_.blocks.get(), arrays_.block_count}; }
+
+  TriangleArrays arrays_;
   Aabbf bounds_;
   float magnitude_ = 0;
-  uint32_t depth_ = 0;
 };
 
 inline Triangle TriangleBvh::triangle(const TriangleBlock& block, uint32_t place) const {
   const auto vertex = [&](int first) {
     return Vec3f{block.vertices[first][place], block.vertices[first + 1][place], block.vertices[first + 2][place]};
   };
-  return {vertex(0), vertex(3), vertex(6), numbers_[block.first + place]};
+  return {vertex(0), vertex(3), vertex(6), arrays_.numbers[block.first + place]};
 }
 
 template <class Visit>
 void TriangleBvh::for_each(Visit visit) const {
-  for (const TriangleBlock& block : blocks_) {
+  for (const TriangleBlock& block : blocks()) {
     for (uint32_t place = 0; place < block.count; ++place) visit(triangle(block, place));
   }
 }
 
 template <RayVisitor<Triangle> Visitor>
 void TriangleBvh::visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const {
-  if (nodes_.empty()) return;
+  if (size() == 0) return;
   Pending stack[kTreeStack];
   Pending* top = stack;
   *top++ = {0, -std::numeric_limits<float>::infinity()};
@@ -108,10 +108,10 @@ void TriangleBvh::visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work&
     if (beyond(now.near, visitor.limit())) continue;
     if ((now.child & kBlockBit) == 0) {
       ++work.nodes;
-      top = push_hit(nodes_[now.child], slabs, visitor.limit(), top);
+      top = push_hit(arrays_.nodes[now.child], slabs, visitor.limit(), top);
       continue;
     }
-    const TriangleBlock& block = blocks_[now.child & ~kBlockBit];
+    const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];
     for (uint32_t place = 0; place < block.count; ++place) {
       ++work.tests;
       if (!visitor.visit(triangle(block, place))) return;
@@ -121,7 +121,7 @@ void TriangleBvh::visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work&
 
 template <RegionVisitor<Triangle> Visitor>
 void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
-  if (nodes_.empty()) return;
+  if (size() == 0) return;
   uint32_t stack[kTreeStack];
   uint32_t* top = stack;
   *top++ = 0;
@@ -129,13 +129,13 @@ void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
     const uint32_t now = *--top;
     if ((now & kBlockBit) == 0) {
       ++work.nodes;
-      const TriangleNode& node = nodes_[now];
+      const TriangleNode& node = arrays_.nodes[now];
       for (int slot = kTreeWidth; slot-- > 0;) {
         if (node.child[slot] != kNoChild && visitor.overlaps(box(node, slot))) *top++ = node.child[slot];
       }
       continue;
     }
-    const TriangleBlock& block = blocks_[now & ~kBlockBit];
+    const TriangleBlock& block = arrays_.blocks[now & ~kBlockBit];
     for (uint32_t place = 0; place < block.count; ++place) {
       const Triangle candidate = triangle(block, place);
       if (!visitor.overlaps(bounds_of(candidate))) continue;

@@ -1,0 +1,211 @@
+#include "core/index/bvh/triangle_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace locus {
+
+static_assert(kBvhWidth == kTreeWidth && kBvhLeafSize == kTreeWidth);
+
+namespace {
+
+// What lies below a node of up to so many triangles is written in one go. A constant, though nothing depends on it.
+constexpr uint32_t kPieceTriangles = 8192;
+
+// Coordinates of a box that no slab test meets.
+constexpr float kNowhere = 1e30f;
+
+using Orders = std::array<uint32_t, 8>;  // one for each octant of directions
+
+// How far each octant meets a box along its diagonal. A quarter of each coordinate, so that sums stay finite.
+std::array<float, 8> corners_toward(const Aabbf& box) {
+  std::array<float, 8> result;
+  for (uint32_t octant = 0; octant < 8; ++octant) {
+    float sum = 0;
+    for (int axis = 0; axis < 3; ++axis) sum += 0.25f * ((octant >> axis & 1u) != 0 ? -box.max[axis] : box.min[axis]);
+    result[octant] = sum;
+  }
+  return result;
+}
+
+// Slots from far to near along the diagonal of each octant, equal ones by number, behind those without a child. A
+// slot's place is the number of slots that stand before it: all octants are ranked at once, without a branch.
+Orders orders_of(const WideChildren<float>& children) {
+  std::array<std::array<float, 8>, kTreeWidth> corners;
+  std::array<Orders, kTreeWidth> places{};
+  const uint32_t used = children.size();
+  for (uint32_t slot = 0; slot < used; ++slot) {
+    corners[slot] = corners_toward(children[slot].bounds);
+    for (uint32_t before = 0; before < slot; ++before) {
+      for (size_t octant = 0; octant < 8; ++octant) {
+        const uint32_t farther = corners[slot][octant] > corners[before][octant] ? 1 : 0;
+        places[before][octant] += farther;
+        places[slot][octant] += 1 - farther;
+      }
+    }
+  }
+  Orders orders{};
+  for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
+    const uint32_t empty = kTreeWidth - used;
+    for (size_t octant = 0; octant < 8; ++octant) {
+      const uint32_t place = slot < used ? empty + places[slot][octant] : slot - used;
+      orders[octant] |= slot << (3 * place);
+    }
+  }
+  return orders;
+}
+
+float rounded_up_extent(const Aabbf& box) {
+  return std::nextafter(max_component(box.extent()), std::numeric_limits<float>::infinity());
+}
+
+WideChildren<float> children_by_area(const BinaryNode<float>& root) {
+  WideChildren<float> children(root);
+  children.sort_by_area();
+  return children;
+}
+
+}  // namespace
+
+TriangleArrays TriangleWriter::write() {
+  std::vector<Piece> pieces = cut();
+  std::vector<Place> sizes(pieces.size());
+  for_each(options_, pieces.size(), [&](size_t i) { sizes[i] = count(pieces[i]); });
+  Place end;
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    pieces[i].start = end;
+    end = {end.node + sizes[i].node, end.block + sizes[i].block, end.position + sizes[i].position};
+    arrays_.depth = std::max(arrays_.depth, pieces[i].depth);
+  }
+  arrays_.node_count = end.node;
+  arrays_.block_count = end.block;
+  arrays_.triangle_count = end.position;
+  arrays_.nodes = std::make_unique_for_overwrite<TriangleNode[]>(end.node);
+  arrays_.ranges = std::make_unique_for_overwrite<NodeRange[]>(end.node);
+  arrays_.blocks = std::make_unique_for_overwrite<TriangleBlock[]>(end.block);
+  arrays_.numbers = std::make_unique_for_overwrite<uint32_t[]>(end.position);
+  for_each(options_, pieces.size(), [&](size_t i) {
+    if (!cancelled(options_) && pieces[i].whole) write_whole(pieces[i]);
+  });
+  write_top(pieces);
+  return std::move(arrays_);
+}
+
+// Depth-first: the single nodes of the top, and the pieces below them.
+std::vector<TriangleWriter::Piece> TriangleWriter::cut() const {
+  std::vector<Piece> pieces;
+  std::vector<Waiting> waiting = {{&tree_.root(), 0, 0, 1}};
+  while (!waiting.empty()) {
+    const Waiting now = waiting.back();
+    waiting.pop_back();
+    const auto number = static_cast<uint32_t>(pieces.size());
+    const bool whole = now.node->count <= kPieceTriangles;
+    pieces.push_back({now.node, whole, now.parent, now.slot, now.depth, {}});
+    if (whole) continue;
+    const WideChildren<float> children = children_by_area(*now.node);
+    for (uint32_t slot = children.size(); slot-- > 0;)
+      waiting.push_back({&children[slot], number, slot, now.depth + 1});
+  }
+  return pieces;
+}
+
+// A leaf of the top; the root of the tree is opened even where it is a leaf.
+bool TriangleWriter::is_block(const Piece& piece) const { return piece.root->is_leaf() && piece.root != &tree_.root(); }
+
+TriangleWriter::Place TriangleWriter::count(Piece& piece) const {
+  if (!piece.whole) return {1, 0, 0};
+  if (is_block(piece)) return {0, 1, piece.root->count};
+  Place size{0, 0, piece.root->count};
+  std::vector<Waiting> waiting = {{piece.root, 0, 0, piece.depth}};
+  while (!waiting.empty()) {
+    const Waiting now = waiting.back();
+    waiting.pop_back();
+    ++size.node;
+    piece.depth = std::max(piece.depth, now.depth);
+    const WideChildren<float> children(*now.node);
+    for (uint32_t slot = 0; slot < children.size(); ++slot) {
+      if (children[slot].is_leaf()) {
+        ++size.block;
+      } else {
+        waiting.push_back({&children[slot], 0, 0, now.depth + 1});
+      }
+    }
+  }
+  return size;
+}
+
+// After the pieces below have their places.
+void TriangleWriter::write_top(const std::vector<Piece>& pieces) {
+  for (const Piece& piece : pieces)
+    if (!piece.whole)
+      write_node(children_by_area(*piece.root), {piece.start.position, piece.root->count}, piece.start.node);
+  for (size_t i = 1; i < pieces.size(); ++i) {
+    const Piece& piece = pieces[i];
+    arrays_.nodes[pieces[piece.parent].start.node].child[piece.slot] =
+        is_block(piece) ? kBlockBit | piece.start.block : piece.start.node;
+  }
+}
+
+void TriangleWriter::write_whole(const Piece& piece) {
+  if (is_block(piece)) return write_block(*piece.root, piece.start);
+  Place next = piece.start;
+  std::vector<Waiting> waiting;
+  const auto open = [&](const BinaryNode<float>& node) {
+    const WideChildren<float> children = children_by_area(node);
+    write_node(children, {next.position, node.count}, next.node);
+    // Backwards, so that the first child is the next to be taken: depth-first order.
+    for (uint32_t slot = children.size(); slot-- > 0;) waiting.push_back({&children[slot], next.node, slot, 0});
+    ++next.node;
+  };
+  open(*piece.root);
+  while (!waiting.empty()) {
+    const Waiting now = waiting.back();
+    waiting.pop_back();
+    uint32_t& child = arrays_.nodes[now.parent].child[now.slot];
+    if (now.node->is_leaf()) {
+      child = kBlockBit | next.block;
+      write_block(*now.node, next);
+      ++next.block;
+      next.position += now.node->count;
+    } else {
+      child = next.node;
+      open(*now.node);
+    }
+  }
+}
+
+// All but the numbers of its children.
+void TriangleWriter::write_node(const WideChildren<float>& children, NodeRange range, uint32_t number) {
+  arrays_.ranges[number] = range;
+  TriangleNode& node = arrays_.nodes[number];
+  for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
+    const bool used = slot < children.size();
+    node.child[slot] = kNoChild;
+    for (int axis = 0; axis < 3; ++axis) {
+      node.bounds[axis][slot] = used ? children[slot].bounds.min[axis] : kNowhere;
+      node.bounds[3 + axis][slot] = used ? children[slot].bounds.max[axis] : -kNowhere;
+    }
+  }
+  const Orders orders = orders_of(children);
+  std::copy(orders.begin(), orders.end(), node.order);
+}
+
+void TriangleWriter::write_block(const BinaryNode<float>& leaf, const Place& place) {
+  TriangleBlock& block = arrays_.blocks[place.block];
+  block.first = place.position;
+  block.count = leaf.count;
+  block.extent = rounded_up_extent(leaf.bounds);
+  std::fill(std::begin(block.unused), std::end(block.unused), 0);
+  for (uint32_t lane = 0; lane < kTreeWidth; ++lane) {
+    const Triangle& triangle = triangles_[tree_.index(leaf.first + std::min(lane, leaf.count - 1))];
+    int row = 0;
+    for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
+      for (int axis = 0; axis < 3; ++axis) block.vertices[row++][lane] = vertex[axis];
+    if (lane < leaf.count) arrays_.numbers[place.position + lane] = triangle.number;
+  }
+}
+
+}  // namespace locus
