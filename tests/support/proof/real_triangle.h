@@ -12,6 +12,12 @@
 
 namespace locus::test {
 
+// Along v; zero for zero.
+inline Vec3r unit(Vec3r v) {
+  const Real size = length(v);
+  return size == 0 ? Vec3r{} : v * (1 / size);
+}
+
 struct RealRay {
   Vec3r origin, direction;
 };
@@ -57,10 +63,6 @@ class RealTriangle {
   }
 
  private:
-  static Vec3r unit(Vec3r v) {
-    const Real size = length(v);
-    return size == 0 ? Vec3r{} : v * (1 / size);
-  }
   Real inset(Vec3r point) const {
     return std::min({dot(point - corners_[0], inward_[0]), dot(point - corners_[1], inward_[1]),
                      dot(point - corners_[2], inward_[2])});

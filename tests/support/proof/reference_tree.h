@@ -21,6 +21,7 @@ class ReferenceTree {
     std::vector<Aabbd> boxes;
     for (const Triangle& triangle : triangles) {
       triangles_.emplace_back(triangle);
+      rough_.push_back(rough(triangle));
       boxes.push_back(to_double(bounds_of(triangle)));
     }
     std::iota(order_.begin(), order_.end(), 0u);
@@ -35,19 +36,20 @@ class ReferenceTree {
   // some that it meets outside, whose inset is negative. The visitor may lower `limit`.
   template <class Visit>
   void visit(const RealRay& ray, const Real& limit, Visit visit) const {
-    const Slabs slabs(ray, magnitude_);
+    const RoughRay rough_ray(ray, magnitude_);
     std::array<uint32_t, kMaxDepth> waiting;
     size_t count = 0;
     waiting[count++] = 0;
     while (count != 0) {
       const Node& node = nodes_[waiting[--count]];
-      if (!slabs.meet(node.box, static_cast<double>(limit))) continue;
+      if (!rough_ray.meet(node.box, static_cast<double>(limit))) continue;
       if (node.count == 0) {
         waiting[count++] = node.first;
         waiting[count++] = node.first + 1;
       }
       for (uint32_t i = 0; i < node.count; ++i) {
         const uint32_t number = order_[node.first + i];
+        if (!rough_ray.may_meet(rough_[number], static_cast<double>(limit))) continue;
         if (const std::optional<Meeting> meeting = triangles_[number].meet(ray, limit)) visit(number, *meeting);
       }
     }
@@ -63,21 +65,27 @@ class ReferenceTree {
     uint32_t count;  // of a leaf, else 0
   };
 
+  // A triangle in double: points p of its plane have normal . p = level, and within it inward[i] . p >= border[i].
+  struct Rough {
+    Vec3d normal, inward[3];
+    double level, border[3];
+  };
+
   // A ray in double. Its rounding and that of the test move it by some 2^-51 of its reach, the pad is 2^-30 of it.
-  struct Slabs {
-    Slabs(const RealRay& ray, double magnitude) {
-      double reach = magnitude, longest = 0;
+  struct RoughRay {
+    RoughRay(const RealRay& ray, double magnitude) {
+      double reach = magnitude;
       for (int axis = 0; axis < 3; ++axis) {
         origin[axis] = static_cast<double>(ray.origin[axis]);
+        direction[axis] = static_cast<double>(ray.direction[axis]);
         reach = std::max(reach, std::abs(origin[axis]) + magnitude);
-        longest = std::max(longest, std::abs(static_cast<double>(ray.direction[axis])));
+        longest = std::max(longest, std::abs(direction[axis]));
       }
       pad = 0x1p-30 * reach;
       for (int axis = 0; axis < 3; ++axis) {
-        const double component = static_cast<double>(ray.direction[axis]);
         // Over the whole of its reach such a ray leaves the slab's plane by less than the pad.
-        parallel[axis] = std::abs(component) < 1e-25 * longest;
-        inverse[axis] = parallel[axis] ? 0 : 1 / component;
+        parallel[axis] = std::abs(direction[axis]) < 1e-25 * longest;
+        inverse[axis] = parallel[axis] ? 0 : 1 / direction[axis];
       }
     }
 
@@ -95,9 +103,38 @@ class ReferenceTree {
       return near <= far;
     }
 
-    double origin[3], inverse[3], pad;
+    // False only where the hit is out of the question: at more than 2^-20 of a right angle the place where the ray
+    // meets the plane is off by some 2^-30 of the reach, and four pads are 2^-28.
+    bool may_meet(const Rough& triangle, double limit) const {
+      const double slope = dot(triangle.normal, direction);
+      if (std::abs(slope) < 0x1p-20 * longest) return true;
+      const double t = (triangle.level - dot(triangle.normal, origin)) / slope, slack = 4 * pad / longest;
+      if (t < -slack || t > limit + slack) return false;
+      const Vec3d point = origin + direction * t;
+      return dot(triangle.inward[0], point) >= triangle.border[0] - 4 * pad &&
+             dot(triangle.inward[1], point) >= triangle.border[1] - 4 * pad &&
+             dot(triangle.inward[2], point) >= triangle.border[2] - 4 * pad;
+    }
+
+    Vec3d origin, direction;
+    double inverse[3], longest = 0, pad;
     bool parallel[3];
   };
+
+  static Rough rough(const Triangle& triangle) {
+    const Vec3r corners[] = {to_real(triangle.a), to_real(triangle.b), to_real(triangle.c)};
+    const Vec3r normal = unit(cross(corners[1] - corners[0], corners[2] - corners[0]));
+    Rough rough{narrowed(normal), {}, static_cast<double>(dot(normal, corners[0])), {}};
+    for (int i = 0; i < 3; ++i) {
+      const Vec3r inward = unit(cross(normal, corners[(i + 1) % 3] - corners[i]));
+      rough.inward[i] = narrowed(inward);
+      rough.border[i] = static_cast<double>(dot(inward, corners[i]));
+    }
+    return rough;
+  }
+  static Vec3d narrowed(Vec3r v) {
+    return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+  }
 
   void build(const std::vector<Aabbd>& boxes) {
     nodes_.push_back({{}, 0, size()});
@@ -124,6 +161,7 @@ class ReferenceTree {
   }
 
   std::vector<RealTriangle> triangles_;
+  std::vector<Rough> rough_;
   std::vector<uint32_t> order_;
   std::vector<Node> nodes_;
   double magnitude_ = 0;
