@@ -1,0 +1,166 @@
+// The families of rays that kernels are tried with: each is known to bring out one kind of mistake. Made from seeds.
+#ifndef LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
+#define LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
+
+#include <string>
+#include <vector>
+
+#include "tests/support/kernel_judge.h"
+
+namespace locus::test {
+
+namespace internal {
+
+inline Aabbf bounds_of_all(const std::vector<Triangle>& triangles) {
+  Aabbf bounds;
+  for (const Triangle& triangle : triangles) bounds = merge(bounds, bounds_of(triangle));
+  return bounds;
+}
+
+inline std::vector<Triangle> scaled_and_moved(std::vector<Triangle> triangles, float scale, Vec3f by) {
+  for (Triangle& triangle : triangles)
+    for (Vec3f* vertex : {&triangle.a, &triangle.b, &triangle.c}) *vertex = *vertex * scale + by;
+  return triangles;
+}
+
+inline Vec3d place_within(const Triangle& triangle, Random& random) {
+  const double u = random.unit(), v = random.unit() * (1 - u);
+  return to_double(triangle.a) * (1 - u - v) + to_double(triangle.b) * u + to_double(triangle.c) * v;
+}
+
+}  // namespace internal
+
+// Half of them short, a third of them culling.
+inline std::vector<KernelQuestion> random_questions(const std::vector<Triangle>& mesh, size_t count, uint64_t seed) {
+  Random random(seed);
+  const Aabbf bounds = internal::bounds_of_all(mesh);
+  const double size = double{max_component(bounds.extent())};
+  std::vector<KernelQuestion> questions(count);
+  for (KernelQuestion& question : questions) {
+    for (int axis = 0; axis < 3; ++axis)
+      question.origin[axis] = random.between(bounds.min[axis] - 0.1 * size, bounds.max[axis] + 0.1 * size);
+    question.direction = random.unit_vector() * random.magnitude(-19, 19);
+    if (random.chance(0.5))
+      question.limit = static_cast<float>(0.2 * size / std::sqrt(squared_length(question.direction)));
+    if (random.chance(0.3)) question.cull = random.chance(0.5) ? Cull::kBack : Cull::kFront;
+  }
+  return questions;
+}
+
+inline KernelTrial random_trial(std::string name, const std::vector<Triangle>& mesh, size_t count, uint64_t seed) {
+  return KernelTrial(std::move(name), mesh, random_questions(mesh, count, seed));
+}
+
+inline std::vector<KernelTrial> ordinary_trials() {
+  std::vector<KernelTrial> trials;
+  trials.push_back(random_trial("sphere", bumpy_sphere(14, 0.1, 1), scaled_count(4'000), 1));
+  trials.push_back(random_trial("city", box_city(6, 1), scaled_count(4'000), 1));
+  trials.push_back(random_trial("house", box_city(1, 2), scaled_count(4'000), 1));
+  for (const float scale : {0x1p-23f, 0x1p-20f, 1e-3f, 1e6f, 0x1p30f})
+    trials.push_back(random_trial(absl::StrCat("sphere times ", scale),
+                                  internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), scale, {}), scaled_count(2'000),
+                                  2));
+  return trials;
+}
+
+// Here float knows little, and double decides.
+inline std::vector<KernelTrial> far_trials() {
+  std::vector<KernelTrial> trials;
+  for (const float distance : {1e3f, 1e5f, 1e7f})
+    trials.push_back(
+        random_trial(absl::StrCat("sphere at ", distance),
+                     internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), 1, {distance, -2 * distance, distance / 2}),
+                     scaled_count(2'000), 3));
+  return trials;
+}
+
+// Along axes and diagonals from corners, edges and walls, where many triangles are edge-on or equally near.
+inline KernelTrial lattice_trial() {
+  Random random(4);
+  std::vector<KernelQuestion> questions;
+  while (questions.size() < scaled_count(6'000)) {
+    KernelQuestion question;
+    question.origin =
+        Vec3d{double(random.whole(-2, 100)), double(random.whole(-2, 100)), double(random.whole(-2, 44))} * 0.5;
+    question.direction = random.whole_vector(1);
+    if (question.direction == Vec3d{}) continue;
+    questions.push_back(question);
+  }
+  return KernelTrial("lattice", box_city(5, 1), questions);
+}
+
+// Only double can tell the components apart. From just off the surface, the axis chosen to project along shows in t.
+inline KernelTrial near_diagonal_trial() {
+  const std::vector<Triangle> sphere = bumpy_sphere(14, 0.1, 1);
+  Random random(9);
+  std::vector<KernelQuestion> questions;
+  while (questions.size() < scaled_count(4'000)) {
+    KernelQuestion question;
+    question.direction = random.whole_vector(1);
+    if (question.direction == Vec3d{}) continue;
+    for (int axis = 0; axis < 3; ++axis) question.direction[axis] *= 1 + random.between(-1, 1) * 0x1p-26;
+    question.origin =
+        internal::place_within(random.pick(sphere), random) - question.direction * random.magnitude(-40, -20);
+    questions.push_back(question);
+  }
+  return KernelTrial("near diagonals", sphere, questions);
+}
+
+inline KernelTrial border_trial() {
+  const std::vector<Triangle> sphere = bumpy_sphere(14, 0.1, 1);
+  Random random(5);
+  std::vector<KernelQuestion> questions(scaled_count(6'000));
+  for (KernelQuestion& question : questions) {
+    const Triangle& triangle = random.pick(sphere);
+    const double along = random.chance(0.3) ? 0 : random.unit();
+    question.origin = random.vector(0.3);
+    question.direction = to_double(triangle.a) * (1 - along) + to_double(triangle.b) * along - question.origin;
+  }
+  return KernelTrial("corners and edges", sphere, questions);
+}
+
+inline KernelTrial surface_trial() {
+  const std::vector<Triangle> sphere = bumpy_sphere(14, 0.1, 1);
+  Random random(6);
+  std::vector<KernelQuestion> questions(scaled_count(4'000));
+  for (KernelQuestion& question : questions) {
+    question.origin = internal::place_within(random.pick(sphere), random);
+    question.direction = random.unit_vector();
+  }
+  return KernelTrial("from the surface", sphere, questions);
+}
+
+// A tenth of the triangles has no area, a fifth of the rays lies in a triangle's plane.
+inline KernelTrial sliver_trial() {
+  Random random(7);
+  std::vector<Triangle> slivers;
+  for (int i = 0; i < 300; ++i) {
+    const Vec3f a = random.float_vector(1), along = random.float_vector(1);
+    const Vec3f off = random.float_vector(random.magnitude(-40, -4));
+    slivers.push_back({a, a + along, a + along * 0.5f + (random.chance(0.1) ? Vec3f{} : off)});
+  }
+  number_in_order(slivers);
+  std::vector<KernelQuestion> questions(scaled_count(6'000));
+  for (KernelQuestion& question : questions) {
+    const Triangle& triangle = random.pick(slivers);
+    question.origin = random.vector(2);
+    question.direction = to_double(triangle.a) * 0.5 + to_double(triangle.b) * 0.5 - question.origin;
+    if (random.chance(0.2)) question.direction = to_double(triangle.b) - to_double(triangle.a);
+  }
+  return KernelTrial("slivers", slivers, questions);
+}
+
+// Everything five times: of equal hits the lowest number wins.
+inline KernelTrial copies_trial() {
+  std::vector<Triangle> copies;
+  for (int copy = 0; copy < 5; ++copy)
+    for (const Triangle& triangle : bumpy_sphere(6, 0.1, 1)) copies.push_back(triangle);
+  number_in_order(copies);
+  Random random(8);
+  random.shuffle(copies);
+  return random_trial("copies", copies, scaled_count(1'000), 8);
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
