@@ -5,6 +5,8 @@
 //   e / |direction|.
 // - false hit: the answer names a triangle that is farther than e from the answer's place on the ray, or one that is
 //   culled, or a t beyond t_max.
+// An answer with all hits misses a triangle so met that it does not name.
+//
 // - undecidable: the answer differs from what the reference finds without e, and neither of these two. It also holds
 //   hits at less than 2^-28 of a right angle, where the rounding of the ray itself to double, 2^-50 of the reach, moves
 //   the hit by more than e may allow.
@@ -26,7 +28,7 @@ struct RayTally {
   uint64_t misses = 0;
   uint64_t false_hits = 0;
   uint64_t undecidable = 0;
-  uint64_t repeats = 0;             // the same rays by ANY, by ALL, with limits at their hits
+  uint64_t repeats = 0;             // of the same rays by other modes and limits
   uint64_t differing_repeats = 0;   // that answered otherwise
   std::vector<std::string> faults;  // the first few, described
 
@@ -46,33 +48,52 @@ struct RayTally {
   bool clean() const { return misses == 0 && false_hits == 0 && differing_repeats == 0; }
 };
 
-struct RayAnswerRow {
-  Real t;  // +inf: no hit
+// A hit as an answer gives it. No hit: id kNoId, t +inf.
+struct RayRow {
+  Real t;
   Id id;
   uint32_t triangle;
 };
 
+inline RayRow ray_row(const BlockResult& result, size_t row) {
+  return {Real{result.t[row]}, result.ids[row], result.triangles[row]};
+}
+
 // One ray of a block against the instances of a scene.
 class RayJudge {
  public:
-  RayJudge(const ProofScene& scene, const OwnedBlock& block, size_t ray, RayAnswerRow answer)
-      : scene_(scene), answer_(answer), t_max_(block.extras.empty() ? kForever : Real{block.extras[ray]}) {
+  RayJudge(const ProofScene& scene, const OwnedBlock& block, size_t ray)
+      : scene_(scene), t_max_(block.extras[ray]), cull_(std::get<RayColumns>(block.settings.kind).cull) {
     const auto column = [ray](const std::vector<float>& c) {
       return Vec3d{c[3 * ray], c[3 * ray + 1], c[3 * ray + 2]};
     };
     // A position is frame plus offset, rounded once.
     ray_ = {to_real(block.settings.frame + column(block.points)), to_real(column(block.sizes))};
-    cull_ = std::get<RayColumns>(block.settings.kind).cull;
   }
 
-  enum class Verdict { kRight, kMiss, kFalseHit, kUndecidable };
-  Verdict judge() const {
-    const bool hit = answer_.t < kForever;
-    Verdict verdict = hit ? judge_hit() : Verdict::kRight;
+  // The worse, the greater.
+  enum class Verdict { kRight, kUndecidable, kFalseHit, kMiss };
+
+  // Of an answer with the first hit.
+  Verdict judge_first(const RayRow& answer) const {
+    const bool hit = answer.id != kNoId;
+    Verdict verdict = hit ? judge_row(answer) : Verdict::kRight;
+    for (const ProofInstance& instance : scene_.instances)
+      verdict = std::max(verdict, judge_before(instance, hit ? answer.t : kForever));
+    return verdict;
+  }
+
+  // Of rows begin to end (exclusive) with all hits: each is right and none is missing.
+  Verdict judge_all(const BlockResult& answer, size_t begin, size_t end) const {
+    Verdict verdict = Verdict::kRight;
+    for (size_t row = begin; row < end; ++row) verdict = std::max(verdict, judge_row(ray_row(answer, row)));
     for (const ProofInstance& instance : scene_.instances) {
-      if (verdict == Verdict::kMiss || verdict == Verdict::kFalseHit) return verdict;
-      const Verdict before = judge_before(instance);
-      if (before != Verdict::kRight) verdict = before;
+      const Placed in = placed(instance);
+      instance.mesh->reference.visit(in.ray, t_max_, [&](uint32_t number, const Meeting& meeting) {
+        for (size_t row = begin; row < end; ++row)
+          if (answer.ids[row] == instance.id && answer.triangles[row] == number) return;
+        verdict = std::max(verdict, judge_missing(in, meeting, t_max_));
+      });
     }
     return verdict;
   }
@@ -93,71 +114,83 @@ class RayJudge {
   }
   bool culled(Real slope) const { return cull_ != Cull::kNone && (cull_ == Cull::kBack) == (slope > 0); }
 
-  // The triangle that the answer names.
-  Verdict judge_hit() const {
+  // The triangle that the row names.
+  Verdict judge_row(const RayRow& row) const {
     const auto instance = std::find_if(scene_.instances.begin(), scene_.instances.end(),
-                                       [this](const ProofInstance& i) { return i.id == answer_.id; });
-    if (instance == scene_.instances.end() || answer_.triangle >= instance->mesh->reference.size())
+                                       [&](const ProofInstance& i) { return i.id == row.id; });
+    if (instance == scene_.instances.end() || row.triangle >= instance->mesh->reference.size())
       return Verdict::kFalseHit;
-    if (!(answer_.t >= 0 && answer_.t <= t_max_)) return Verdict::kFalseHit;
+    if (!(row.t >= 0 && row.t <= t_max_)) return Verdict::kFalseHit;
     const Placed in = placed(*instance);
-    const RealTriangle& triangle = instance->mesh->reference.triangle(answer_.triangle);
+    const RealTriangle& triangle = instance->mesh->reference.triangle(row.triangle);
     const Real slope = triangle.slope(in.ray);
     if (std::fabs(slope) < kLeastSine * in.speed) return Verdict::kUndecidable;
-    if (culled(slope) || triangle.distance(in.ray.origin + in.ray.direction * answer_.t) > in.e)
-      return Verdict::kFalseHit;
+    if (culled(slope) || triangle.distance(in.ray.origin + in.ray.direction * row.t) > in.e) return Verdict::kFalseHit;
     const std::optional<Meeting> meeting = triangle.meet(in.ray, kForever);
     return meeting && meeting->inset >= 0 ? Verdict::kRight : Verdict::kUndecidable;
   }
 
-  // What the reference hits so much before the answer that the answer is late.
-  Verdict judge_before(const ProofInstance& instance) const {
+  // A triangle that the reference meets, the answer's rows up to `end` do not.
+  Verdict judge_missing(const Placed& in, const Meeting& meeting, Real end) const {
+    if (meeting.inset < 0 || culled(meeting.slope)) return Verdict::kRight;
+    const bool within = meeting.inset >= in.e && meeting.t + in.e / in.speed < end;
+    const bool clear = std::fabs(meeting.slope) >= kLeastSine * in.speed;
+    return within && clear ? Verdict::kMiss : Verdict::kUndecidable;
+  }
+
+  // What the reference hits so much before `t` that an answer there is late.
+  Verdict judge_before(const ProofInstance& instance, Real t) const {
     const Placed in = placed(instance);
-    const Real allowance = in.e / in.speed;
-    const Real end = std::min(answer_.t, t_max_);
+    const Real limit = t < kForever ? t - in.e / in.speed : t_max_;
     Verdict verdict = Verdict::kRight;
-    const Real limit = answer_.t < kForever ? end - allowance : end;
     instance.mesh->reference.visit(in.ray, limit, [&](uint32_t, const Meeting& meeting) {
-      if (meeting.inset < 0 || culled(meeting.slope) || verdict == Verdict::kMiss) return;
-      const bool within = meeting.inset >= in.e && meeting.t + allowance < end;
-      const bool clear = std::fabs(meeting.slope) >= kLeastSine * in.speed;
-      verdict = within && clear ? Verdict::kMiss : Verdict::kUndecidable;
+      verdict = std::max(verdict, judge_missing(in, meeting, std::min(t, t_max_)));
     });
     return verdict;
   }
 
   const ProofScene& scene_;
-  const RayAnswerRow answer_;
   const Real t_max_;
+  const Cull cull_;
   RealRay ray_;
-  Cull cull_;
 };
 
 namespace internal {
 
-inline std::string describe(const OwnedBlock& block, size_t ray, const RayAnswerRow& row) {
+inline std::string describe(const OwnedBlock& block, size_t ray) {
   const float *o = &block.points[3 * ray], *d = &block.sizes[3 * ray];
   const Vec3d frame = block.settings.frame;
-  return absl::StrFormat("frame %a %a %a, origin %a %a %a, direction %a %a %a, t_max %a: t %a, id %d, triangle %d",
-                         frame.x, frame.y, frame.z, o[0], o[1], o[2], d[0], d[1], d[2], block.extras[ray],
-                         static_cast<double>(row.t), row.id, row.triangle);
+  return absl::StrFormat("frame %a %a %a, origin %a %a %a, direction %a %a %a, t_max %a", frame.x, frame.y, frame.z,
+                         o[0], o[1], o[2], d[0], d[1], d[2], block.extras[ray]);
+}
+
+inline void count(RayJudge::Verdict verdict, const OwnedBlock& block, size_t ray, RayTally& tally) {
+  ++tally.rays;
+  tally.misses += verdict == RayJudge::Verdict::kMiss;
+  tally.false_hits += verdict == RayJudge::Verdict::kFalseHit;
+  tally.undecidable += verdict == RayJudge::Verdict::kUndecidable;
+  if (verdict == RayJudge::Verdict::kMiss) tally.note("miss: " + describe(block, ray));
+  if (verdict == RayJudge::Verdict::kFalseHit) tally.note("false hit: " + describe(block, ray));
 }
 
 }  // namespace internal
 
 // Judges the answer to a block of rays of mode kFirst.
-inline RayTally judge_rays(const ProofScene& scene, const OwnedBlock& block, const BlockResult& result) {
+inline RayTally judge_first_hits(const ProofScene& scene, const OwnedBlock& block, const BlockResult& result) {
   RayTally tally;
   for (size_t i = 0; i < result.t.size(); ++i) {
-    const RayAnswerRow row = {Real{result.t[i]}, result.ids[i], result.triangles[i]};
-    const RayJudge::Verdict verdict = RayJudge(scene, block, i, row).judge();
-    ++tally.rays;
-    tally.hits += row.id != kNoId;
-    tally.misses += verdict == RayJudge::Verdict::kMiss;
-    tally.false_hits += verdict == RayJudge::Verdict::kFalseHit;
-    tally.undecidable += verdict == RayJudge::Verdict::kUndecidable;
-    if (verdict == RayJudge::Verdict::kMiss) tally.note("miss: " + internal::describe(block, i, row));
-    if (verdict == RayJudge::Verdict::kFalseHit) tally.note("false hit: " + internal::describe(block, i, row));
+    internal::count(RayJudge(scene, block, i).judge_first(ray_row(result, i)), block, i, tally);
+    tally.hits += result.ids[i] != kNoId;
+  }
+  return tally;
+}
+
+// Judges the answer to a block of rays of mode kAll, of which none was cut.
+inline RayTally judge_all_hits(const ProofScene& scene, const OwnedBlock& block, const BlockResult& result) {
+  RayTally tally;
+  for (size_t i = 0, row = 0; i < result.counts.size(); row += result.counts[i++]) {
+    internal::count(RayJudge(scene, block, i).judge_all(result, row, row + result.counts[i]), block, i, tally);
+    tally.hits += result.counts[i] != 0;
   }
   return tally;
 }

@@ -17,49 +17,13 @@
 #include "core/index/bvh/kernels/dispatch.h"
 #include "tests/support/proof/proof_rays.h"
 #include "tests/support/proof/ray_judge.h"
+#include "tests/support/proof/ray_repeats.h"
 
 namespace locus::test {
 
 namespace internal {
 
 inline constexpr size_t kBlockRays = 2'000;
-
-// The first hits once more, asked in other ways that leave no choice.
-inline void repeat(const ProofScene& scene, OwnedBlock block, const BlockResult& first, uint64_t way, RayTally& tally) {
-  const auto compare = [&](size_t ray, bool same) {
-    ++tally.repeats;
-    if (same) return;
-    ++tally.differing_repeats;
-    tally.note(absl::StrFormat("differs when repeated in way %d: %s", way,
-                               describe(block, ray, {Real{first.t[ray]}, first.ids[ray], first.triangles[ray]})));
-  };
-  const size_t count = first.t.size();
-  const auto is_hit = [&](size_t i) { return first.ids[i] != kNoId; };
-  if (way == 0) {
-    rays_of(block).mode = RayMode::kAny;
-    const BlockResult any = run_block(*scene.snapshot, block);
-    for (size_t i = 0; i < count; ++i) compare(i, (any.hits[i] != '\0') == is_hit(i));
-  } else if (way == 1) {
-    rays_of(block).mode = RayMode::kAll;
-    block.settings.max_results = 1;
-    const BlockResult all = run_block(*scene.snapshot, block);
-    for (size_t i = 0, row = 0; i < count; row += all.counts[i++])
-      compare(i, (all.counts[i] == 1) == is_hit(i) &&
-                     (!is_hit(i) || (all.t[row] == first.t[i] && all.ids[row] == first.ids[i] &&
-                                     all.triangles[row] == first.triangles[i])));
-  } else {  // a limit exactly at the hit keeps it, one just before it loses it
-    const bool at = way == 2;
-    for (size_t i = 0; i < count; ++i)
-      if (is_hit(i)) block.extras[i] = at ? first.t[i] : std::max(0.0f, std::nextafter(first.t[i], -1.0f));
-    const BlockResult limited = run_block(*scene.snapshot, block);
-    for (size_t i = 0; i < count; ++i) {
-      const bool kept =
-          limited.t[i] == first.t[i] && limited.ids[i] == first.ids[i] && limited.triangles[i] == first.triangles[i];
-      const bool starts_there = first.t[i] == 0;
-      compare(i, at || starts_there || !is_hit(i) ? kept : limited.ids[i] == kNoId);
-    }
-  }
-}
 
 }  // namespace internal
 
@@ -128,8 +92,8 @@ class RayProof {
     const ProofScene& scene = scenes_[block % scenes_.size()];
     const OwnedBlock rays = proof_rays(scene, internal::kBlockRays, random);
     const BlockResult first = run_block(*scene.snapshot, rays);
-    RayTally tally = judge_rays(scene, rays, first);
-    internal::repeat(scene, rays, first, random.below(4), tally);
+    RayTally tally = judge_first_hits(scene, rays, first);
+    tally.add(repeat_rays(scene, rays, first, random));
     for (std::string& fault : tally.faults) fault = absl::StrFormat("block %d: %s", block, fault);
     return tally;
   }
