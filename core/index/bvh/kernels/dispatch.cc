@@ -11,9 +11,6 @@ std::vector<const RayKernels*> available() {
 #ifdef LOCUS_X86_KERNELS
   const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
                     __builtin_cpu_supports("bmi2");
-  const bool avx512 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-                      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
-  if (avx512) kernels.push_back(&ray_kernels_avx512());
   if (avx2) kernels.push_back(&ray_kernels_avx2());
 #endif
   return kernels;

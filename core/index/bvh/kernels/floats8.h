@@ -17,6 +17,7 @@ struct Floats8 {
 
   static inline Floats8 all(float value) { return {_mm256_set1_ps(value)}; }
   static inline Floats8 load(const float* from) { return {_mm256_load_ps(from)}; }
+  static inline Floats8 load_any(const float* from) { return {_mm256_loadu_ps(from)}; }
   inline void store(float* to) const { _mm256_storeu_ps(to, v); }
 
   friend inline Floats8 operator+(Floats8 a, Floats8 b) { return {_mm256_add_ps(a.v, b.v)}; }
@@ -32,23 +33,27 @@ static inline Floats8 smaller(Floats8 a, Floats8 b) { return {_mm256_min_ps(a.v,
 static inline Floats8 larger(Floats8 a, Floats8 b) { return {_mm256_max_ps(a.v, b.v)}; }
 static inline Floats8 size_of(Floats8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v)}; }
 
-// One bit a lane. False for NaN.
-static inline uint32_t at_most(Floats8 a, Floats8 b) {
-#ifdef __AVX512VL__
-  return _mm256_cmp_ps_mask(a.v, b.v, _CMP_LE_OQ);
-#else
-  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
-#endif
+static inline Floats8 bits_of(uint32_t bits) {
+  return {_mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int>(bits)))};
 }
-static inline uint32_t below(Floats8 a, Floats8 b) {
-#ifdef __AVX512VL__
-  return _mm256_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ);
-#else
-  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
-#endif
+static inline Floats8 both(Floats8 a, Floats8 b) { return {_mm256_and_ps(a.v, b.v)}; }
+static inline Floats8 either(Floats8 a, Floats8 b) { return {_mm256_or_ps(a.v, b.v)}; }
+static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
+// Lanes whose sign bit is set where a >= b.
+static inline Floats8 where_at_least(Floats8 a, Floats8 b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_GE_OQ)}; }
+// By the sign bit of `where`.
+static inline Floats8 choose(Floats8 where, Floats8 yes, Floats8 no) {
+  return {_mm256_blendv_ps(no.v, yes.v, where.v)};
 }
 
-#ifndef __AVX512VL__
+// One bit a lane. False for NaN.
+static inline uint32_t at_most(Floats8 a, Floats8 b) {
+  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
+}
+static inline uint32_t below(Floats8 a, Floats8 b) {
+  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
+}
+
 // For each set of lanes their numbers, packed to the front. Made by the compiler.
 struct PackTable {
   alignas(64) uint8_t lanes[256][8];
@@ -65,38 +70,66 @@ static constexpr PackTable kPack;
 static inline __m256i packing(uint32_t set) {
   return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kPack.lanes[set])));
 }
-#endif
 
-// Writes the children whose bits are set, in the order of their slots; eight places are written.
-static inline void pack_children(const TriangleNode& node, uint32_t set, uint32_t* children) {
+// Writes the children that are entered no later than left, in the order of their slots, and returns how many; eight
+// places are written.
+static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t* children) {
+  const uint32_t set = at_most(near, far);
   const __m256i all = _mm256_load_si256(reinterpret_cast<const __m256i*>(node.child));
-#ifdef __AVX512VL__
-  const __m256i packed = _mm256_maskz_compress_epi32(static_cast<__mmask8>(set), all);
-#else
   const __m256i packed = _mm256_permutevar8x32_epi32(all, packing(set));
-#endif
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(children), packed);
+  return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
-// Writes the children whose bits are set and how near they are, from far to near for that octant of directions.
-static inline void pack_sorted(const TriangleNode& node, uint32_t set, Floats8 near, uint32_t octant,
-                               uint32_t* children, float* nears) {
+// Likewise from far to near for that octant of directions, and how near they are.
+static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
+                                   uint32_t* children, float* nears) {
   const __m256i shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
   const __m256i order = _mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(node.order[octant])), shifts);
   const __m256i child =
       _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(node.child)), order);
   const __m256 sorted = _mm256_permutevar8x32_ps(near.v, order);
-  const __m256i slot = _mm256_and_si256(order, _mm256_set1_epi32(7));
-  const __m256i bits = _mm256_slli_epi32(_mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(set)), slot), 31);
-#ifdef __AVX512VL__
-  const __mmask8 chosen = _mm256_movepi32_mask(bits);
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(children), _mm256_maskz_compress_epi32(chosen, child));
-  _mm256_storeu_ps(nears, _mm256_maskz_compress_ps(chosen, sorted));
-#else
-  const __m256i packed = packing(static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(bits))));
+  const __m256 met = _mm256_permutevar8x32_ps(_mm256_cmp_ps(near.v, far.v, _CMP_LE_OQ), order);
+  const auto set = static_cast<uint32_t>(_mm256_movemask_ps(met));
+  const __m256i packed = packing(set);
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(children), _mm256_permutevar8x32_epi32(child, packed));
   _mm256_storeu_ps(nears, _mm256_permutevar8x32_ps(sorted, packed));
-#endif
+  return static_cast<uint32_t>(__builtin_popcount(set));
+}
+
+// Moves the entries of a pair of columns whose bits are set to `to`, which is not behind `from`; eight places are read
+// and written.
+static inline void pack_entries(uint32_t* children, float* nears, uint32_t from, uint32_t set, uint32_t to) {
+  const __m256i packed = packing(set);
+  const __m256i child = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(children + from));
+  const __m256 near = _mm256_loadu_ps(nears + from);
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(children + to), _mm256_permutevar8x32_epi32(child, packed));
+  _mm256_storeu_ps(nears + to, _mm256_permutevar8x32_ps(near, packed));
+}
+
+static inline __m128 rounded_three(const double* from) {
+  return _mm256_cvtpd_ps(_mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(from)), _mm_load_sd(from + 2), 1));
+}
+
+// Eight rows of three numbers as three columns, rounded.
+static inline void transpose_three(const double* const* rows, Floats8* columns) {
+  __m256 pairs[4];
+  for (int i = 0; i < 4; ++i) {
+    const __m256 low = _mm256_castps128_ps256(rounded_three(rows[i]));
+    pairs[i] = _mm256_insertf128_ps(low, rounded_three(rows[i + 4]), 1);
+  }
+  const __m256 xy01 = _mm256_unpacklo_ps(pairs[0], pairs[1]), xy23 = _mm256_unpacklo_ps(pairs[2], pairs[3]);
+  const __m256 z01 = _mm256_unpackhi_ps(pairs[0], pairs[1]), z23 = _mm256_unpackhi_ps(pairs[2], pairs[3]);
+  columns[0].v = _mm256_shuffle_ps(xy01, xy23, _MM_SHUFFLE(1, 0, 1, 0));
+  columns[1].v = _mm256_shuffle_ps(xy01, xy23, _MM_SHUFFLE(3, 2, 3, 2));
+  columns[2].v = _mm256_shuffle_ps(z01, z23, _MM_SHUFFLE(1, 0, 1, 0));
+}
+
+// Three doubles, one for each vertex of a triangle; the fourth is not used.
+typedef double Doubles __attribute__((vector_size(32)));
+
+static inline Doubles widened(float a, float b, float c) {
+  return reinterpret_cast<Doubles>(_mm256_cvtps_pd(_mm_setr_ps(a, b, c, c)));
 }
 
 }  // namespace

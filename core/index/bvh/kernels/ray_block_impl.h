@@ -1,0 +1,158 @@
+// One ray against the eight triangles of a block: which of them float cannot rule out, and what double says of those.
+// The error bounds, with R = max |origin| + max |vertex|, E = the block's extent, and lengths along the shear divided
+// by the direction's largest component d:
+//
+// - A sheared coordinate is off by at most 10 * 2^-24 R: rounding the origin, the differences, the shear, the product,
+//   the sum. A ray that meets the block's box passes within 2^-20 R of it, so sheared coordinates are at most
+//   2 E + 2^-18 R, and an edge function, two products and a difference, is off by less than
+//   edge = 2^-17 R E + 2^-36 R^2.
+// - t is an average of vertex depths with the edge functions as weights. It is off by at most
+//   (6 edge E / |determinant| + 2^-20 R) / |d| where |determinant| > 8 edge. A ray that starts on a triangle hits it
+//   although rounding puts it behind by up to 2^-42 R^3 / |determinant / d|, which the interval of t includes.
+//   Products that underflow add at most 2^-150 / |determinant|, within the 2^-20 R / |d| for R from 2^-25 and |d| to
+//   2^20.
+// - The same in double is smaller by 2^-29. Where it moves a hit by less than 2^-24 of its own coordinates, the hit
+//   lies in the padded slabs of its own box, so that TriangleRay's and the placed bounds' clamps leave t as it is.
+//
+// Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013.
+#ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
+#define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
+
+#include "core/index/bvh/kernels/floats8.h"
+#include "core/index/bvh/kernels/ray_kernels.h"
+#include "core/index/bvh/kernels/ray_setup_impl.h"
+
+namespace locus {
+namespace {
+
+static inline double larger(double a, double b) { return a < b ? b : a; }
+static inline double smaller(double a, double b) { return b < a ? b : a; }
+
+// The eight triangles in the projection along the ray, from the ray's start: every coordinate with its sign turned,
+// which changes no edge function.
+struct Projected {
+  Floats8 weight_a, weight_b, weight_c;  // edge functions
+  Floats8 a_z, b_z, c_z;                 // depths
+};
+
+static inline Projected project(const TriangleBlock& block, PreparedRay ray) {
+  const float(*const xs)[kTreeWidth] = block.vertices + ray.whole(kAxisX);
+  const float(*const ys)[kTreeWidth] = block.vertices + ray.whole(kAxisY);
+  const float(*const zs)[kTreeWidth] = block.vertices + ray.whole(kAxisZ);
+  const Floats8 from_x = ray.spread(kFromX), from_y = ray.spread(kFromY), from_z = ray.spread(kFromZ);
+  const Floats8 shear_x = ray.spread(kShearX), shear_y = ray.spread(kShearY);
+  Projected p;
+  p.a_z = from_z - Floats8::load(zs[0]);
+  p.b_z = from_z - Floats8::load(zs[3]);
+  p.c_z = from_z - Floats8::load(zs[6]);
+  const Floats8 a_x = subtract_product(from_x - Floats8::load(xs[0]), shear_x, p.a_z);
+  const Floats8 a_y = subtract_product(from_y - Floats8::load(ys[0]), shear_y, p.a_z);
+  const Floats8 b_x = subtract_product(from_x - Floats8::load(xs[3]), shear_x, p.b_z);
+  const Floats8 b_y = subtract_product(from_y - Floats8::load(ys[3]), shear_y, p.b_z);
+  const Floats8 c_x = subtract_product(from_x - Floats8::load(xs[6]), shear_x, p.c_z);
+  const Floats8 c_y = subtract_product(from_y - Floats8::load(ys[6]), shear_y, p.c_z);
+  p.weight_a = multiply_subtract(c_x, b_y, c_y * b_x);
+  p.weight_b = multiply_subtract(a_x, c_y, a_y * c_x);
+  p.weight_c = multiply_subtract(b_x, a_y, b_y * a_x);
+  return p;
+}
+
+// What float can tell of a block, a bit for each triangle.
+struct BlockMet {
+  uint32_t open;  // may be hit within the limit
+  uint32_t sure;  // is hit within the limit
+  float edge;     // the bound of the edge functions
+};
+
+template <bool kAny>
+static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
+  const Projected p = project(block, ray);
+  const float edge = ray.number(kEdgeScale) * block.extent + ray.number(kEdgeFloor);
+  const Floats8 bound = Floats8::all(edge), minus_bound = Floats8::all(-edge), zero = Floats8::all(0);
+  const Floats8 least = smaller(p.weight_a, smaller(p.weight_b, p.weight_c));
+  const Floats8 most = larger(p.weight_a, larger(p.weight_b, p.weight_c));
+  const uint32_t inside = (at_most(minus_bound, least) | at_most(most, bound)) & ((1u << block.count) - 1u);
+  const Floats8 determinant = p.weight_a + p.weight_b + p.weight_c;
+  const Floats8 inverse = Floats8::all(1) / determinant;
+  const Floats8 behind = multiply_add(p.weight_a, p.a_z, multiply_add(p.weight_b, p.b_z, p.weight_c * p.c_z));
+  const float noise = edge * block.extent * ray.number(kEdgeNoise) + ray.number(kStartNoise);
+  const Floats8 t = behind * Floats8::all(-ray.number(kReciprocalZ)) * inverse;
+  const Floats8 off = multiply_add(Floats8::all(noise), size_of(inverse), ray.spread(kTFloor));
+  const Floats8 earliest = t - off, latest = t + off, limit8 = Floats8::all(limit);
+  const uint32_t edge_on = at_most(size_of(determinant), Floats8::all(8 * edge));
+  BlockMet met;
+  met.open = inside & (edge_on | (at_most(earliest, limit8) & at_most(zero, latest)));
+  met.sure = 0;
+  met.edge = edge;
+  if constexpr (kAny) {
+    const uint32_t front = given.accept_front ? ~0u : 0u, back = given.accept_back ? ~0u : 0u;
+    met.sure = inside & ~edge_on & below(zero, earliest) & at_most(latest, limit8) &
+               ((front & below(bound, least)) | (back & below(most, minus_bound)));
+  }
+  return met;
+}
+
+static inline Doubles spread(double value) { return Doubles{value, value, value, value}; }
+// Of the three vertices.
+static inline Doubles coordinates(const TriangleBlock& block, uint32_t axis, int place) {
+  const float(*const rows)[kTreeWidth] = block.vertices + axis;
+  return widened(rows[0][place], rows[3][place], rows[6][place]);
+}
+
+struct Verdict {
+  KernelVerdict what;
+  float t;
+};
+
+// Whether rounding moves a hit on this triangle by so little that no clamp can move it further. `size`: of the
+// determinant.
+static bool lies_clear(const TriangleBlock& block, int place, const KernelRay& ray, Doubles depths, double size,
+                       double noise) {
+  double reach = 0, origin = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    origin = larger(origin, __builtin_fabs(ray.origin[axis]));
+    for (int vertex = 0; vertex < 3; ++vertex)
+      reach = larger(reach, __builtin_fabs(double{block.vertices[3 * vertex + axis][place]}));
+  }
+  const double span =
+      larger(depths[0], larger(depths[1], depths[2])) - smaller(depths[0], smaller(depths[1], depths[2]));
+  return size > 16 * noise && 6 * noise * span < size * 0x1p-24 * (reach + origin);
+}
+
+// One triangle in double: TriangleRay::edge_test() without its scaling, which changes no bit within the directions and
+// distances accepted here. `edge`: the bound of the edge functions in float.
+static inline Verdict decide(const TriangleBlock& block, int place, const KernelRay& ray, PreparedRay prepared,
+                             double edge) {
+  typedef int64_t Places __attribute__((vector_size(32)));
+  const uint32_t axis_x = prepared.whole(kAxisX), axis_y = prepared.whole(kAxisY), axis_z = prepared.whole(kAxisZ);
+  const double along = ray.direction[axis_z];
+  const Doubles z = coordinates(block, axis_z, place) - spread(ray.origin[axis_z]);
+  const Doubles x = (coordinates(block, axis_x, place) - spread(ray.origin[axis_x])) * spread(along) -
+                    z * spread(ray.direction[axis_x]);
+  const Doubles y = (coordinates(block, axis_y, place) - spread(ray.origin[axis_y])) * spread(along) -
+                    z * spread(ray.direction[axis_y]);
+  const Places before = {2, 0, 1, 3}, after = {1, 2, 0, 3};
+  const Doubles weights = __builtin_shuffle(x, before) * __builtin_shuffle(y, after) -
+                          __builtin_shuffle(y, before) * __builtin_shuffle(x, after);
+  const double a = weights[0], b = weights[1], c = weights[2];
+  if (smaller(a, smaller(b, c)) < 0 && larger(a, larger(b, c)) > 0) return {KernelVerdict::kMiss, 0};
+  const double determinant = a + b + c;
+  if (determinant == 0 || !(determinant > 0 ? ray.accept_front : ray.accept_back)) return {KernelVerdict::kMiss, 0};
+  const double unit = along * along, size = __builtin_fabs(determinant);
+  if (size < 0.5 * edge * unit && !lies_clear(block, place, ray, z, size, edge * 0x1p-29 * unit))
+    return {KernelVerdict::kUndecided, 0};
+  const Doubles shares = weights * z;
+  const double t = (shares[0] + shares[1] + shares[2]) / (determinant * along);
+  if (t < 0) {
+    // Just behind the start is for TriangleRay::depth_noise() to judge; what is far behind, is not hit.
+    const double noise = double{prepared.number(kStartNoise)} * unit / size + double{prepared.number(kTFloor)};
+    return {t < -noise ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
+  }
+  if ((t > 0 && t < 1e-30) || !(t < 1e30)) return {KernelVerdict::kUndecided, 0};
+  return {KernelVerdict::kHit, static_cast<float>(t) + 0.0f};
+}
+
+}  // namespace
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
