@@ -12,6 +12,7 @@ sets:
   build      what configuring and building locusd and locus needs
   python     what building and using the Python package needs
   test       what tests/run.sh needs on top of build
+  bench      the libraries that build/release/bin/locus-bench compares with
   lint       what tests/run.sh --long needs on top of these
   container  what tests/container.sh needs to build and run the image without a registry or a daemon
   runtime    what locusd and locus need to run once they are built; the image has nothing else
@@ -28,6 +29,7 @@ python_packages="python3 python3-grpcio python3-protobuf"
 # binutils gives nm to the house test; zsh and fish run the completions; groff and mandoc read the manual.
 test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc
   groff-base"
+bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev"
 lint_packages="clang-tidy mypy"
 # systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
@@ -41,6 +43,7 @@ for argument in "$@"; do
     build) packages="$packages $build_packages" ;;
     python) packages="$packages $python_packages" ;;
     test) packages="$packages $test_packages" ;;
+    bench) packages="$packages $bench_packages" ;;
     lint) packages="$packages $lint_packages" ;;
     container) packages="$packages $container_packages" ;;
     runtime) packages="$packages $runtime_packages" ;;

@@ -104,7 +104,7 @@ run_suite() {
 }
 
 say "packages"
-sets=(build python test)
+sets=(build python test bench)
 if [ "$long" = yes ]; then sets+=(lint); fi
 ./deploy/packages.sh "${sets[@]}" || { fail "install packages"; finish; }
 

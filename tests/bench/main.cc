@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "tests/bench/frame/race.h"
 #include "tests/bench/frame/report.h"
 #include "tests/bench/frame/suite.h"
 #include "tests/bench/static/static_suite.h"
@@ -47,7 +49,7 @@ void add_options(CLI::App& app, Options& options, std::string& filter) {
   app.add_option("--json", options.json, "Also write the cells to this file")->type_name("FILE");
   app.add_flag("--quick", options.quick, "Every case in small, in under 20 s");
   app.add_option("--filter", filter, "Only cases whose names match")->type_name("REGEX");
-  app.add_option("--rounds", options.rounds, "Rounds that count, after one that does not [5; quick: 3]")
+  app.add_option("--rounds", options.rounds, "Rounds that count, after one that does not [3]")
       ->type_name("N")
       ->check(CLI::Range(kMinRounds, kMaxRounds));
   app.add_option("--mesh", options.meshes, "In place of the suite's own; may be repeated")
@@ -68,7 +70,10 @@ int fail(const absl::Status& status, int code) {
 int run(const Options& options) {
   const std::vector<Suite> all = suites();
   const auto suite = std::find_if(all.begin(), all.end(), [&](const Suite& one) { return one.name == options.suite; });
-  const Progress progress = [](const std::string& sentence) { std::cerr << sentence << std::endl; };
+  const double start = wall_seconds();
+  const Progress progress = [start](const std::string& sentence) {
+    std::cerr << absl::StrFormat("[%5.0f s] %s", wall_seconds() - start, sentence) << std::endl;
+  };
   const absl::StatusOr<Report> report = suite->run(options, progress);
   if (!report.ok()) return fail(report.status(), 1);
   write_table(*report, std::cout);
@@ -95,7 +100,6 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  if (options.quick && app.count("--rounds") == 0) options.rounds = locus::bench::kMinRounds;
   const absl::StatusOr<CaseFilter> cases = CaseFilter::create(filter);
   if (!cases.ok()) return locus::bench::fail(cases.status(), 2);
   options.filter = *cases;

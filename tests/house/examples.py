@@ -102,7 +102,7 @@ BAD_EXAMPLES = {
     "CoreReadsNoClock": [core("core/query/options.h", "<chrono>"), core("core/scene/scene_writer.h", "<chrono>")],
     "LibrariesStayInTheirRooms": [
         server("server/service/log.h", '"spdlog/spdlog.h"'), server("server/scheduling/call.h", "<grpcpp/grpcpp.h>"),
-        core("core/base/option.h", '"CLI/CLI.hpp"'),
+        core("core/base/option.h", '"CLI/CLI.hpp"'), server("server/scheduling/tree.h", "<boost/geometry.hpp>"),
         {"client/lib/json.h": header("client/lib/json.h", "locus::client", "<nlohmann/json.hpp>")},
     ],
     "NothingIncludesTests": [core("core/base/ids.h", '"tests/support/random.h"')],

@@ -52,6 +52,11 @@ THIRD_PARTY = {
     "zip.h": ["client/cli/import"],
     "openssl/": ["server/service", "server/security", "client/lib", "client/cli/render"],
     "png.h": ["client/cli/render"],
+    "embree3/": ["tests/bench"],
+    "btBulletCollisionCommon.h": ["tests/bench"],
+    "BulletCollision/": ["tests/bench"],
+    "boost/": ["tests/bench"],
+    "CGAL/": ["tests/bench"],
 }
 FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
 INTRINSICS = "immintrin.h"

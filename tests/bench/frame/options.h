@@ -19,7 +19,7 @@ struct Options {
   std::string json;                 // a file to write; empty = none
   bool quick = false;               // every case in small
   CaseFilter filter;                // the cases to run
-  int rounds = 5;                   // counted ones
+  int rounds = kMinRounds;          // counted ones
   std::vector<std::string> meshes;  // in place of the suite's own
   int threads = 2;                  // of the cases that use several
   std::string levels;               // where fetched levels are kept

@@ -34,9 +34,9 @@ double process_seconds() { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
 double wall_seconds() { return seconds_of(CLOCK_MONOTONIC); }
 
 std::vector<std::vector<double>> race(const std::vector<Contestant>& contestants, size_t chunks, int rounds,
-                                      double (*clock)()) {
+                                      double (*clock)(), WarmUp warm_up) {
   std::vector<std::vector<double>> times(contestants.size());
-  one_round(contestants, chunks, clock);
+  if (warm_up == WarmUp::kOneRound) one_round(contestants, chunks, clock);
   for (int round = 0; round < rounds; ++round) {
     const std::vector<double> seconds = one_round(contestants, chunks, clock);
     for (size_t i = 0; i < contestants.size(); ++i) times[i].push_back(1e9 * seconds[i] / contestants[i].operations);

@@ -4,6 +4,7 @@
 #define LOCUS_TESTS_BENCH_FRAME_RACE_H_
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -24,10 +25,13 @@ struct Contestant {
   std::function<void(size_t chunk)> prepare;  // before the clock starts; may be empty
 };
 
+// kDone: all have just done the same work already.
+enum class WarmUp : uint8_t { kOneRound, kDone };
+
 // Nanoseconds an operation: one row a contestant, one column a round. A round is all contestants at the first chunk,
-// then all at the second and so on; one round to warm up goes before and is not counted.
+// then all at the second and so on; the one to warm up goes before and is not counted.
 std::vector<std::vector<double>> race(const std::vector<Contestant>& contestants, size_t chunks, int rounds,
-                                      double (*clock)());
+                                      double (*clock)(), WarmUp warm_up = WarmUp::kOneRound);
 
 // The first contestant is ours: one cell for each of the others. `cell` has what they share.
 void add_cells(const std::vector<Contestant>& contestants, const std::vector<std::vector<double>>& times,

@@ -10,6 +10,7 @@
 #include "client/cli/generate/city.h"
 #include "client/cli/generate/terrain.h"
 #include "client/cli/import/import_file.h"
+#include "core/mesh/triangle_mesh.h"
 
 namespace locus::bench {
 namespace {
@@ -89,6 +90,8 @@ absl::StatusOr<BenchMesh> bench_mesh(const std::string& name, const std::vector<
   result.name = name;
   for (const cli::ImportedMesh& mesh : meshes) append(mesh, result);
   if (result.triangles.empty()) return absl::InvalidArgumentError(absl::StrCat(name, ": no triangle has an area"));
+  const auto valid = TriangleMesh::create(result.vertices, result.indices, {});
+  if (!valid.ok()) return absl::Status(valid.status().code(), absl::StrCat(name, ": ", valid.status().message()));
   measure(result);
   return result;
 }

@@ -22,7 +22,8 @@ struct BenchMesh {
   float diagonal = 0;  // of the bounds
 };
 
-// All meshes of a level as one. INVALID_ARGUMENT if no triangle has an area.
+// All meshes of a level as one. INVALID_ARGUMENT if no triangle has an area; errors as those of
+// TriangleMesh::create().
 absl::StatusOr<BenchMesh> bench_mesh(const std::string& name, const std::vector<cli::ImportedMesh>& meshes);
 
 // `mesh` as the help of the program describes it. Errors: as import_file(), and INVALID_ARGUMENT for a made-up mesh of

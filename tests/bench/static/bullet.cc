@@ -3,6 +3,7 @@
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 #include <btBulletCollisionCommon.h>
 
+#include "absl/strings/str_cat.h"
 #include "tests/bench/static/scalar_overlap.h"
 
 namespace locus::bench {
@@ -106,8 +107,14 @@ class Bullet : public Peer {
 
 }  // namespace
 
-void add_bullet_peer(const BenchMesh& mesh, Needs needs, Peers& peers) {
-  if (needs.rays || needs.regions) peers.push_back(std::make_unique<Bullet>(mesh));
+void add_bullet_peer(const BenchMesh& mesh, Needs needs, Peers& peers, std::vector<std::string>& notes) {
+  constexpr size_t kMaxTriangles = size_t{1} << (31 - MAX_NUM_PARTS_IN_BITS);
+  if (!needs.rays && !needs.regions) return;
+  if (mesh.triangles.size() < kMaxTriangles)
+    peers.push_back(std::make_unique<Bullet>(mesh));
+  else
+    notes.push_back(
+        absl::StrCat(mesh.name, ": bullet is left out: its trees hold fewer than ", kMaxTriangles, " triangles"));
 }
 
 }  // namespace locus::bench

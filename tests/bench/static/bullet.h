@@ -3,11 +3,15 @@
 #ifndef LOCUS_TESTS_BENCH_STATIC_BULLET_H_
 #define LOCUS_TESTS_BENCH_STATIC_BULLET_H_
 
+#include <string>
+#include <vector>
+
 #include "tests/bench/static/peer.h"
 
 namespace locus::bench {
 
-void add_bullet_peer(const BenchMesh& mesh, Needs needs, Peers& peers);
+// Bullet keeps triangle numbers in 21 bits: meshes of more are not asked, which is noted.
+void add_bullet_peer(const BenchMesh& mesh, Needs needs, Peers& peers, std::vector<std::string>& notes);
 
 }  // namespace locus::bench
 

@@ -16,13 +16,14 @@
 
 namespace locus::bench {
 
-Peers all_peers([[maybe_unused]] const BenchMesh& mesh, [[maybe_unused]] Needs needs) {
+Peers all_peers([[maybe_unused]] const BenchMesh& mesh, [[maybe_unused]] Needs needs,
+                [[maybe_unused]] std::vector<std::string>& notes) {
   Peers peers;
 #ifdef LOCUS_BENCH_EMBREE
   add_embree_peers(mesh, needs, peers);
 #endif
 #ifdef LOCUS_BENCH_BULLET
-  add_bullet_peer(mesh, needs, peers);
+  add_bullet_peer(mesh, needs, peers, notes);
 #endif
 #ifdef LOCUS_BENCH_BOOST
   add_boost_peer(mesh, needs, peers);

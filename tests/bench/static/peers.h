@@ -10,8 +10,8 @@
 
 namespace locus::bench {
 
-// Made from the mesh and ready.
-Peers all_peers(const BenchMesh& mesh, Needs needs);
+// Made from the mesh and ready. A note for each that cannot take this mesh.
+Peers all_peers(const BenchMesh& mesh, Needs needs, std::vector<std::string>& notes);
 
 // Of the cases build and memory.
 std::vector<std::unique_ptr<Builder>> all_builders(const BenchMesh& mesh);

@@ -81,7 +81,7 @@ class RegionRace {
     const size_t chunks = chunks_for(queries_.size(), case_.chunk);
     std::vector<Contestant> contestants;
     for (Entry<Query>& entry : entries_) contestants.push_back(contestant(entry, chunks));
-    const auto times = race(contestants, chunks, run_.options.rounds, thread_seconds);
+    const auto times = race(contestants, chunks, run_.options.rounds, thread_seconds, WarmUp::kDone);
     Cell cell;
     cell.suite = "static";
     cell.case_name = name_;

@@ -1,0 +1,110 @@
+"""locus-bench as it is run: python3 bench_test.py PROGRAM PEER... with the peers that it was configured with."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = os.path.abspath(sys.argv[1])
+PEERS = set(sys.argv[2:])
+FIELDS = {"suite": str, "case": str, "metric": str, "ours": float, "peer": float, "peer_name": str, "ratio": float,
+          "spread": float, "results_hash": str}
+MESHES = ("city-2k", "blob-5k")
+RAYS = {"embree": {"embree_intersect1", "embree_robust", "embree_intersect1m"}, "bullet": {"bullet"}, "cgal": {"cgal"}}
+ANY = {**RAYS, "embree": {"embree_occluded1", "embree_robust"}}
+CAMERA = {**RAYS, "embree": RAYS["embree"] | {"embree_intersect8", "embree_intersect16"}}
+BALLS = {"embree": {"embree_point_query"}, "bullet": {"bullet"}, "boost": {"boost_rtree"}}
+BOXES = {**BALLS, "cgal": {"cgal"}}
+CASES = {"ray/incoherent/first": RAYS, "ray/incoherent/any": ANY, "ray/short/first": RAYS, "ray/short/any": ANY,
+         "ray/camera/first": CAMERA, "ball/0.5": BALLS, "ball/2": BALLS, "ball/10": BALLS, "box/0.5": BOXES,
+         "box/2": BOXES, "box/10": BOXES, "build": {"embree": {"embree_medium"}},
+         "memory": {"embree": {"embree_medium"}}}
+
+
+def run(*arguments):
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600)
+
+
+def expected_cells():
+    cells = {("threads2/" + mesh, "one_thread") for mesh in MESHES}
+    for mesh in MESHES:
+        for case, by_library in CASES.items():
+            for library in PEERS & set(by_library):
+                cells |= {(f"{case}/{mesh}", name) for name in by_library[library]}
+    return cells
+
+
+class BenchTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.answers, cls.lists = [], []
+        for number in range(2):
+            path = os.path.join(cls.folder.name, f"{number}.json")
+            cls.answers.append(run("static", "--quick", "--json", path))
+            with open(path, encoding="utf-8") as file:
+                cls.lists.append(json.load(file))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def test_everything_agrees(self):
+        for answer in self.answers:
+            self.assertEqual(answer.returncode, 0, answer.stdout + answer.stderr)
+            self.assertNotIn("DISAGREEMENT", answer.stdout)
+
+    def test_every_expected_cell_is_there_once(self):
+        found = [(cell["case"], cell["peer_name"]) for cell in self.lists[0]]
+        self.assertEqual(len(found), len(set(found)))
+        self.assertEqual(set(found), expected_cells())
+
+    def test_cells_have_every_field_and_no_other(self):
+        for cell in self.lists[0]:
+            self.assertEqual({name: type(value) for name, value in cell.items()}, FIELDS)
+            self.assertEqual(cell["suite"], "static")
+
+    def test_figures_are_finite_and_positive(self):
+        for cell in self.lists[0]:
+            for field in ("ours", "peer", "ratio"):
+                self.assertTrue(math.isfinite(cell[field]) and cell[field] > 0, cell)
+            self.assertTrue(math.isfinite(cell["spread"]) and cell["spread"] >= 0, cell)
+
+    def test_two_runs_have_the_same_results(self):
+        first, second = ({(cell["case"], cell["peer_name"]): cell["results_hash"] for cell in cells} for cells in self.lists)
+        self.assertEqual(first, second)
+        for value in first.values():
+            self.assertRegex(value, "^[0-9a-f]{16}$")
+
+    def test_missing_peers_are_said(self):
+        said = self.answers[0].stdout.count("a peer is missing")
+        self.assertEqual(said, 4 - len(PEERS & {"embree", "bullet", "boost", "cgal"}))
+
+    def test_a_filter_leaves_the_other_cases_out(self):
+        answer = run("static", "--quick", "--filter", "^threads2/", "--mesh", "city:500")
+        self.assertEqual(answer.returncode, 0)
+        self.assertIn("threads2/city-500", answer.stdout)
+        self.assertNotIn("ray/", answer.stdout)
+
+    def test_wrong_use_is_status_2(self):
+        for arguments in ((), ("unknown",), ("static", "--rounds", "2"), ("static", "--filter", "("), ("static", "--nothing")):
+            answer = run(*arguments)
+            self.assertEqual(answer.returncode, 2, arguments)
+            self.assertNotEqual(answer.stderr, "", arguments)
+
+    def test_a_mesh_that_is_not_there_is_status_1_and_named(self):
+        answer = run("static", "--quick", "--mesh", "/no/such/level.obj")
+        self.assertEqual(answer.returncode, 1)
+        self.assertIn("/no/such/level.obj", answer.stderr)
+
+    def test_help_has_examples(self):
+        answer = run("--help")
+        self.assertEqual(answer.returncode, 0)
+        self.assertIn("locus-bench static --quick", answer.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
