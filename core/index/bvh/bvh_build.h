@@ -18,7 +18,7 @@ struct BvhOptions {
   // Split candidates an axis plus one, 2 to limits::kMaxBvhBins. More bins find slightly better trees and take longer;
   // answers do not depend on them.
   int bins = 32;
-  // When it becomes true the build ends soon with CANCELLED. May be null; must outlive the build.
+  // When it becomes true, to stay so, the build ends soon with CANCELLED. May be null; must outlive the build.
   const std::atomic<bool>* cancel = nullptr;
   // Calls its second argument for each number below the first, on any threads, and returns when all calls have. Trees
   // do not depend on it. [in order, on this thread]

@@ -31,6 +31,9 @@ struct Quad<float> {
   friend Quad lesser(Quad a, Quad b) { return {a.lanes < b.lanes ? a.lanes : b.lanes}; }
   friend Quad greater(Quad a, Quad b) { return {a.lanes > b.lanes ? a.lanes : b.lanes}; }
 
+  // 1 where a <= b, else 0.
+  friend Quad not_above(Quad a, Quad b) { return {a.lanes <= b.lanes ? all(1).lanes : all(0).lanes}; }
+
   // Truncated. Lanes must fit.
   std::array<int32_t, 4> whole() const {
     using Integers = int32_t __attribute__((vector_size(16)));
@@ -70,6 +73,9 @@ struct Quad<double> {
   friend Quad greater(const Quad& a, const Quad& b) {
     return each(a, b, [](double x, double y) { return x > y ? x : y; });
   }
+  friend Quad not_above(const Quad& a, const Quad& b) {
+    return each(a, b, [](double x, double y) { return x <= y ? 1.0 : 0.0; });
+  }
 
   std::array<int32_t, 4> whole() const {
     return {static_cast<int32_t>(lanes[0]), static_cast<int32_t>(lanes[1]), static_cast<int32_t>(lanes[2]),
@@ -77,12 +83,12 @@ struct Quad<double> {
   }
 };
 
-// A box of quads. The spare lane means nothing.
+// A box of quads. The spare lane means nothing. Without defaults: arrays of it are larger than what is used of them.
 template <class S>
 struct QuadBox {
-  Quad<S> min = Quad<S>::all(Aabb<S>::kInfinity);
-  Quad<S> max = Quad<S>::all(-Aabb<S>::kInfinity);
+  Quad<S> min, max;
 
+  static QuadBox empty() { return {Quad<S>::all(Aabb<S>::kInfinity), Quad<S>::all(-Aabb<S>::kInfinity)}; }
   static QuadBox of(const Aabb<S>& box) {
     return {Quad<S>::of(box.min.x, box.min.y, box.min.z, 0), Quad<S>::of(box.max.x, box.max.y, box.max.z, 0)};
   }

@@ -1,0 +1,262 @@
+#include "core/index/bvh/splitter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace locus {
+namespace {
+
+using limits::kMaxBvhBins;
+
+// Up to so many references are sorted instead of binned.
+constexpr size_t kMostSorted = 32;
+// References between two looks at the cancel flag.
+constexpr size_t kReferencesBetweenChecks = 1u << 16;
+
+// Calls `each` for pieces of `references` in turn. False when told to stop.
+template <class S, class Each>
+bool in_pieces(BoxReferences<S> references, const BvhOptions& options, Each each) {
+  while (!references.empty()) {
+    if (cancelled(options)) return false;
+    each(references.subspan(0, kReferencesBetweenChecks));
+    references.remove_prefix(std::min(references.size(), kReferencesBetweenChecks));
+  }
+  return true;
+}
+
+// Maps centres to bins along all axes at once. An axis where all centres coincide, or their spread is beyond the
+// arithmetic, has one bin.
+template <class S>
+class Binning {
+ public:
+  Binning(const QuadBox<S>& centers, uint32_t bins) : low_(centers.min), last_(Quad<S>::all(static_cast<S>(bins - 1))) {
+    std::array<S, 3> scale{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const S wanted = static_cast<S>(bins) / (centers.max[axis] - centers.min[axis]);
+      if (wanted > 0 && std::isfinite(wanted)) scale[static_cast<size_t>(axis)] = wanted;
+    }
+    scale_ = Quad<S>::of(scale[0], scale[1], scale[2], 0);
+  }
+
+  std::array<int32_t, 4> bins_of(const BoxReference<S>& reference) const {
+    const Quad<S> place = (reference.center() - low_) * scale_;
+    return lesser(greater(place, Quad<S>::all(0)), last_).whole();
+  }
+
+ private:
+  Quad<S> low_, last_, scale_;
+};
+
+template <class S>
+struct Bins {
+  std::array<std::array<QuadBox<S>, kMaxBvhBins>, 3> boxes;
+  std::array<std::array<uint32_t, kMaxBvhBins>, 3> counts;
+};
+
+template <class S>
+struct Split {
+  int axis = -1;     // none found
+  uint32_t bin = 0;  // first bin of the right part
+  S cost = std::numeric_limits<S>::infinity();
+  uint32_t imbalance = 0;  // between cuts of equal cost the evener one is better
+};
+
+// Sweeps one axis' bins from both sides; keeps the cheapest cut in `best`.
+template <class S>
+void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uint32_t total, Split<S>& best) {
+  std::array<S, kMaxBvhBins> right_cost;
+  QuadBox<S> sum = QuadBox<S>::empty();
+  uint32_t count = 0;
+  for (size_t i = bin_count - 1; i > 0; --i) {
+    sum.add(bins.boxes[axis][i]);
+    count += bins.counts[axis][i];
+    right_cost[i] = count == 0 ? 0 : half_area(sum) * static_cast<S>(blocks_for(count));
+  }
+  sum = QuadBox<S>::empty();
+  count = 0;
+  for (size_t i = 1; i < bin_count; ++i) {
+    sum.add(bins.boxes[axis][i - 1]);
+    count += bins.counts[axis][i - 1];
+    if (count == 0 || count == total) continue;
+    const S cost = half_area(sum) * static_cast<S>(blocks_for(count)) + right_cost[i];
+    if (cost < best.cost) best = {static_cast<int>(axis), static_cast<uint32_t>(i), cost, 0};
+  }
+}
+
+// The orders of few references along the axes, by centres, equal ones as they stand.
+template <class S>
+class Orders {
+ public:
+  // A reference's place is the number of those before it: all pairs are compared, along all axes at once and without a
+  // branch.
+  explicit Orders(BoxReferences<S> references) {
+    std::array<Quad<S>, kMostSorted> centers, places;
+    for (size_t i = 0; i < references.size(); ++i) {
+      const Quad<S> center = references[i].center();
+      Quad<S> place = Quad<S>::all(0);
+      for (size_t j = 0; j < i; ++j) {
+        const Quad<S> before = not_above(centers[j], center);
+        place = place + before;
+        places[j] = places[j] + (Quad<S>::all(1) - before);
+      }
+      centers[i] = center;
+      places[i] = place;
+    }
+    for (size_t i = 0; i < references.size(); ++i) {
+      const std::array<int32_t, 4> place = places[i].whole();
+      for (size_t axis = 0; axis < 3; ++axis) order_[axis][static_cast<size_t>(place[axis])] = static_cast<uint8_t>(i);
+    }
+  }
+
+  size_t at(size_t axis, size_t place) const { return order_[axis][place]; }
+
+  void apply(size_t axis, BoxReferences<S> references) const {
+    std::array<BoxReference<S>, kMostSorted> ordered;
+    for (size_t i = 0; i < references.size(); ++i) ordered[i] = references[at(axis, i)];
+    std::copy_n(ordered.begin(), references.size(), references.begin());
+  }
+
+ private:
+  std::array<std::array<uint8_t, kMostSorted>, 3> order_;
+};
+
+// Sweeps one axis from both sides; keeps the cheapest cut in `best`, whose bin is the left part's length.
+template <class S>
+void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, size_t axis, Split<S>& best) {
+  const size_t count = references.size();
+  std::array<S, kMostSorted> right_cost;
+  QuadBox<S> sum = QuadBox<S>::empty();
+  for (size_t i = count - 1; i > 0; --i) {
+    sum.add(references[orders.at(axis, i)].box());
+    right_cost[i] = half_area(sum) * static_cast<S>(blocks_for(static_cast<uint32_t>(count - i)));
+  }
+  sum = QuadBox<S>::empty();
+  for (size_t i = 1; i < count; ++i) {
+    sum.add(references[orders.at(axis, i - 1)].box());
+    const S cost = half_area(sum) * static_cast<S>(blocks_for(static_cast<uint32_t>(i))) + right_cost[i];
+    const auto imbalance = static_cast<uint32_t>(std::max(2 * i, count) - std::min(2 * i, count));
+    if (cost < best.cost || (cost == best.cost && imbalance < best.imbalance))
+      best = {static_cast<int>(axis), static_cast<uint32_t>(i), cost, imbalance};
+  }
+}
+
+template <class S>
+void fill(BoxReferences<S> references, const Binning<S>& binning, uint32_t bin_count, const BvhOptions& options,
+          Bins<S>& bins) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    std::fill_n(bins.boxes[axis].begin(), bin_count, QuadBox<S>::empty());
+    std::fill_n(bins.counts[axis].begin(), bin_count, 0u);
+  }
+  in_pieces(references, options, [&](BoxReferences<S> piece) {
+    for (const BoxReference<S>& reference : piece) {
+      const std::array<int32_t, 4> at = binning.bins_of(reference);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const auto bin = static_cast<size_t>(at[axis]);
+        bins.boxes[axis][bin].add(reference.box());
+        ++bins.counts[axis][bin];
+      }
+    }
+  });
+}
+
+// The left part first; finds the extents of centres on the way. Every reference is swapped, whichever way it goes: a
+// branch here would be mispredicted half of the time.
+template <class S>
+Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, const Split<S>& split,
+                    const BvhOptions& options) {
+  const Quad<S> nowhere = Quad<S>::all(Aabb<S>::kInfinity), here = Quad<S>::all(0);
+  const std::array<Quad<S>, 3> away = {nowhere, here, nowhere};
+  const auto bin = static_cast<int32_t>(split.bin);
+  const auto axis = static_cast<size_t>(split.axis);
+  Halves<S> halves;
+  size_t left = 0;
+  in_pieces(references, options, [&](BoxReferences<S> piece) {
+    for (BoxReference<S>& reference : piece) {
+      const BoxReference<S> moving = reference;
+      const size_t goes_left = binning.bins_of(moving)[axis] < bin ? 1 : 0;
+      const Quad<S> center = moving.center();
+      for (size_t part = 0; part < 2; ++part) {
+        QuadBox<S>& centers = halves.parts[part].centers;
+        centers.min = lesser(center + away[part + goes_left], centers.min);
+        centers.max = greater(center - away[part + goes_left], centers.max);
+      }
+      reference = references[left];
+      references[left] = moving;
+      left += goes_left;
+    }
+  });
+  halves.left_count = static_cast<uint32_t>(left);
+  return halves;
+}
+
+// No left part where the heuristic finds nothing.
+template <class S>
+Halves<S> split_binned(BoxReferences<S> references, const Extent<S>& extent, const BvhOptions& options) {
+  const auto count = static_cast<uint32_t>(references.size());
+  const uint32_t bin_count = std::min(static_cast<uint32_t>(options.bins), 4 + count / 16);
+  const Binning<S> binning(extent.centers, bin_count);
+  Bins<S> bins;
+  fill(references, binning, bin_count, options, bins);
+  Split<S> best;
+  for (size_t axis = 0; axis < 3; ++axis) find_cheapest_cut(bins, axis, bin_count, count, best);
+  if (best.axis < 0) return {};
+  Halves<S> halves = partition(references, binning, best, options);
+  const auto axis = static_cast<size_t>(best.axis);
+  for (uint32_t bin = 0; bin < bin_count; ++bin) halves.parts[bin < best.bin ? 0 : 1].bounds.add(bins.boxes[axis][bin]);
+  return halves;
+}
+
+// Tries every cut of the centres' orders along each axis. No left part where areas are beyond the arithmetic.
+template <class S>
+Halves<S> split_sorted(BoxReferences<S> references) {
+  const Orders<S> orders(references);
+  Split<S> best;
+  for (size_t axis = 0; axis < 3; ++axis) find_cheapest_cut(references, orders, axis, best);
+  if (best.axis < 0) return {};
+  orders.apply(static_cast<size_t>(best.axis), references);
+  return {best.bin, {extent_of<S>(references.subspan(0, best.bin)), extent_of<S>(references.subspan(best.bin))}};
+}
+
+template <class S>
+Halves<S> halve(BoxReferences<S> references, const QuadBox<S>& centers) {
+  const Vec3<S> spread = centers.box().extent();
+  const int axis = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
+  const size_t middle = references.size() / 2;
+  // The index decides between equal centres, so that the halves do not depend on the order found here.
+  std::nth_element(references.begin(), references.begin() + middle, references.end(),
+                   [axis](const BoxReference<S>& a, const BoxReference<S>& b) {
+                     const S center_a = a.center()[axis], center_b = b.center()[axis];
+                     return center_a != center_b ? center_a < center_b : a.index() < b.index();
+                   });
+  return {static_cast<uint32_t>(middle),
+          {extent_of<S>(references.subspan(0, middle)), extent_of<S>(references.subspan(middle))}};
+}
+
+}  // namespace
+
+template <class S>
+Extent<S> extent_of(BoxReferences<S> references) {
+  Extent<S> extent;
+  for (const BoxReference<S>& reference : references) {
+    extent.bounds.add(reference.box());
+    extent.centers.add(reference.center());
+  }
+  return extent;
+}
+
+template <class S>
+Halves<S> Splitter<S>::split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const {
+  const auto count = static_cast<uint32_t>(references.size());
+  Halves<S> halves = count <= kMostSorted ? split_sorted(references) : split_binned(references, extent, options_);
+  const bool found = halves.left_count != 0;
+  if (found && balanced_levels(std::max(halves.left_count, count - halves.left_count)) <= levels) return halves;
+  return halve(references, extent.centers);
+}
+
+template Extent<float> extent_of(BoxReferences<float>);
+template Extent<double> extent_of(BoxReferences<double>);
+template class Splitter<float>;
+template class Splitter<double>;
+
+}  // namespace locus

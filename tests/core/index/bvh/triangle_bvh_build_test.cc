@@ -1,0 +1,179 @@
+// What a build of TriangleBvh promises beside right answers: one tree for any threads, an end when cancelled, and trees
+// that cost little. The cost of a tree is a number of its own: a builder that splits badly still answers everything
+// right.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <unordered_set>
+
+#include "core/base/refusal.h"
+#include "core/geometry/ray_triangle.h"
+#include "core/index/bvh/triangle_bvh.h"
+#include "core/index/index_queries.h"
+#include "tests/support/generated_meshes.h"
+#include "tests/support/test_scale.h"
+#include "tests/support/threads.h"
+
+namespace locus::test {
+namespace {
+
+TriangleBvh build(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
+  absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles, options);
+  EXPECT_TRUE(tree.ok()) << tree.status();
+  return tree.ok() ? *std::move(tree) : TriangleBvh();
+}
+
+template <class T>
+bool equal_bytes(const T* a, const T* b, size_t count) {
+  return std::memcmp(a, b, count * sizeof(T)) == 0;
+}
+
+size_t block_count(const TriangleBvh& built) {
+  const TriangleTree tree = built.tree();
+  size_t blocks = 0;
+  for (size_t number = 0; number < built.node_count(); ++number)
+    for (const uint32_t child : tree.nodes[number].child)
+      blocks += child != kNoChild && (child & kBlockBit) != 0 ? 1 : 0;
+  return blocks;
+}
+
+void expect_equal_bytes(const TriangleBvh& a, const TriangleBvh& b) {
+  ASSERT_EQ(a.node_count(), b.node_count());
+  ASSERT_EQ(block_count(a), block_count(b));
+  EXPECT_EQ(a.depth(), b.depth());
+  EXPECT_EQ(a.bounds(), b.bounds());
+  EXPECT_TRUE(equal_bytes(a.tree().nodes, b.tree().nodes, a.node_count()));
+  EXPECT_TRUE(equal_bytes(a.tree().ranges, b.tree().ranges, a.node_count()));
+  EXPECT_TRUE(equal_bytes(a.tree().blocks, b.tree().blocks, block_count(a)));
+  EXPECT_TRUE(equal_bytes(a.tree().numbers, b.tree().numbers, a.size()));
+}
+
+// Large enough for many pieces of work.
+std::vector<Triangle> large_mesh() { return bumpy_sphere(130, 0.05, 6); }
+
+TEST(TriangleBvhBuildTest, AnyNumberOfThreadsGivesTheSameBytes) {
+  const std::vector<Triangle> triangles = large_mesh();
+  const TriangleBvh alone = build(triangles);
+  for (const size_t threads : {1, 2, 3, 8}) {
+    SCOPED_TRACE(threads);
+    BvhOptions options;
+    options.parallel_for = on_threads(threads);
+    expect_equal_bytes(build(triangles, options), alone);
+  }
+  BvhOptions options;
+  options.parallel_for = backwards();
+  expect_equal_bytes(build(triangles, options), alone);
+}
+
+TEST(TriangleBvhBuildTest, CoincidentTrianglesGiveTheSameBytesOnAnyThreadsToo) {
+  std::vector<Triangle> triangles(20'000, Triangle{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  number_in_order(triangles);
+  BvhOptions options;
+  options.parallel_for = on_threads(3);
+  expect_equal_bytes(build(triangles, options), build(triangles));
+}
+
+// Cancelled in its first piece of work, its second, and so on: wherever it stands, it ends with CANCELLED.
+TEST(TriangleBvhBuildTest, ABuildCancelledAnywhereEndsWithCancelled) {
+  const std::vector<Triangle> triangles = large_mesh();
+  size_t pieces = 0;
+  for (size_t fatal = 0; fatal <= pieces; fatal += 7) {
+    std::atomic<bool> cancel = false;
+    size_t done = 0;
+    BvhOptions options;
+    options.cancel = &cancel;
+    options.parallel_for = [&](size_t count, const std::function<void(size_t)>& work) {
+      for (size_t i = 0; i < count; ++i) {
+        if (fatal != 0 && ++done == fatal) cancel = true;
+        if (fatal == 0) ++pieces;
+        work(i);
+      }
+    };
+    const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles, options);
+    EXPECT_EQ(tree.status().code(), fatal == 0 ? absl::StatusCode::kOk : absl::StatusCode::kCancelled) << fatal;
+  }
+  EXPECT_GT(pieces, 30u);
+}
+
+TEST(TriangleBvhBuildTest, TheFirstTriangleThatIsNotFiniteIsNamedByAnyThreads) {
+  std::vector<Triangle> triangles = large_mesh();
+  triangles[60'000].c.z = triangles[20'001].a.x = std::numeric_limits<float>::quiet_NaN();
+  BvhOptions options;
+  for (const ParallelFor& parallel_for : {on_threads(3), backwards()}) {
+    options.parallel_for = parallel_for;
+    const absl::Status status = TriangleBvh::build(triangles, options).status();
+    ASSERT_TRUE(refusal_of(status).has_value());
+    EXPECT_EQ(refusal_of(status)->index, 20'001u);
+  }
+}
+
+// Adds up what first hits open. A block is met when its first triangle is.
+class CountingRay {
+ public:
+  CountingRay(const TriangleRay& ray, const std::unordered_set<uint32_t>& first_of_block, size_t& blocks)
+      : ray_(ray), first_of_block_(first_of_block), blocks_(blocks) {}
+
+  float limit() const { return limit_; }
+  bool visit(const Triangle& triangle) {
+    blocks_ += first_of_block_.count(triangle.number);
+    if (const std::optional<TriangleHit> hit = ray_.hit(triangle)) limit_ = std::min(limit_, hit->t);
+    return true;
+  }
+
+ private:
+  const TriangleRay& ray_;
+  const std::unordered_set<uint32_t>& first_of_block_;
+  size_t& blocks_;
+  float limit_ = std::numeric_limits<float>::infinity();
+};
+
+struct TreeCost {
+  double sah, nodes, blocks, bytes;  // the latter three a ray, a ray, and a triangle
+};
+
+// Of first hits of incoherent rays that start within the tree's bounds.
+TreeCost cost_of(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
+  const TriangleBvh tree = build(triangles, options);
+  std::unordered_set<uint32_t> first_of_block;
+  for (size_t block = 0; block < block_count(tree); ++block)
+    first_of_block.insert(tree.tree().numbers[tree.tree().blocks[block].first]);
+  constexpr int kRays = 2'000;
+  Random random(17);
+  Work work;
+  size_t blocks = 0;
+  for (int i = 0; i < kRays; ++i) {
+    Vec3d origin;
+    for (int axis = 0; axis < 3; ++axis)
+      origin[axis] = random.between(tree.bounds().min[axis], tree.bounds().max[axis]);
+    const TriangleRay ray(origin, random.unit_vector());
+    CountingRay visitor(ray, first_of_block, blocks);
+    tree.visit_ray(ray.slabs(), visitor, work);
+  }
+  return {tree.sah_cost(), static_cast<double>(work.nodes) / kRays, static_cast<double>(blocks) / kRays,
+          static_cast<double>(tree.bytes()) / static_cast<double>(triangles.size())};
+}
+
+void expect_below(const TreeCost& cost, const TreeCost& ceiling) {
+  EXPECT_LT(cost.sah, ceiling.sah);
+  EXPECT_LT(cost.nodes, ceiling.nodes);
+  EXPECT_LT(cost.blocks, ceiling.blocks);
+  EXPECT_LT(cost.bytes, ceiling.bytes);
+}
+
+// Ceilings lie 4 % above what this builder reaches.
+TEST(TriangleBvhBuildTest, ASphereStaysBelowItsCeilings) {
+  expect_below(cost_of(bumpy_sphere(64, 0.02, 1)), {11.3, 5.2, 1.46, 56});
+}
+
+TEST(TriangleBvhBuildTest, ANoisySphereStaysBelowItsCeilings) {
+  expect_below(cost_of(bumpy_sphere(130, 0.2, 3)), {57.1, 8.9, 6.64, 56});
+}
+
+TEST(TriangleBvhBuildTest, ACityStaysBelowItsCeilings) {
+  expect_below(cost_of(box_city(32, 1)), {11.5, 4.48, 1.38, 68});
+}
+
+}  // namespace
+}  // namespace locus::test
