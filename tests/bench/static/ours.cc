@@ -15,7 +15,7 @@
 namespace locus::bench {
 namespace {
 
-constexpr size_t kBatch = 256;  // rays given to the kernels at once
+constexpr size_t kBatch = 1024;  // rays given to the kernels at once
 
 using AskKernel = void (*)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
 
