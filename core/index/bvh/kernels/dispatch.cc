@@ -61,4 +61,12 @@ absl::string_view instruction_set() {
 
 const RayKernels* active_ray_kernels() { return active(); }
 
+const RegionKernels* active_region_kernels() {
+#ifdef LOCUS_X86_KERNELS
+  return active() == nullptr ? nullptr : &region_kernels_avx2();
+#else
+  return nullptr;
+#endif
+}
+
 }  // namespace locus

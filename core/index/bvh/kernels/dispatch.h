@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
+#include "core/index/bvh/kernels/region_kernels.h"
 
 namespace locus {
 
@@ -27,6 +28,7 @@ absl::string_view instruction_set();
 
 // Null for kPortable. Thread-safe.
 const RayKernels* active_ray_kernels();
+const RegionKernels* active_region_kernels();
 
 }  // namespace locus
 

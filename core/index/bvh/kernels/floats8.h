@@ -31,6 +31,7 @@ static inline Floats8 multiply_subtract(Floats8 a, Floats8 b, Floats8 c) { retur
 static inline Floats8 subtract_product(Floats8 c, Floats8 a, Floats8 b) { return {_mm256_fnmadd_ps(a.v, b.v, c.v)}; }
 static inline Floats8 smaller(Floats8 a, Floats8 b) { return {_mm256_min_ps(a.v, b.v)}; }
 static inline Floats8 larger(Floats8 a, Floats8 b) { return {_mm256_max_ps(a.v, b.v)}; }
+static inline Floats8 square_root(Floats8 a) { return {_mm256_sqrt_ps(a.v)}; }
 static inline Floats8 size_of(Floats8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v)}; }
 
 static inline Floats8 bits_of(uint32_t bits) {
@@ -130,6 +131,60 @@ typedef double Doubles __attribute__((vector_size(32)));
 
 static inline Doubles widened(float a, float b, float c) {
   return reinterpret_cast<Doubles>(_mm256_cvtps_pd(_mm_setr_ps(a, b, c, c)));
+}
+
+// The same as PackTable from the last lane to the first.
+struct FallingPackTable {
+  alignas(64) uint8_t lanes[256][8];
+  constexpr FallingPackTable() : lanes() {
+    for (int set = 0; set < 256; ++set) {
+      int count = 0;
+      for (int lane = 8; lane-- > 0;)
+        if ((set >> lane & 1) != 0) lanes[set][count++] = static_cast<uint8_t>(lane);
+    }
+  }
+};
+static constexpr FallingPackTable kFallingPack;
+
+// Writes the children whose bits are set, from the last slot to the first, with `flag` set in those whose bits are set
+// in `flagged`; eight places are written.
+static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
+                                uint32_t* children) {
+  const __m256i lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i bits = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(flagged)), lanes);
+  const __m256i flags = _mm256_and_si256(_mm256_cmpeq_epi32(bits, lanes), _mm256_set1_epi32(static_cast<int>(flag)));
+  const __m256i all = _mm256_or_si256(_mm256_load_si256(reinterpret_cast<const __m256i*>(node.child)), flags);
+  const __m256i order =
+      _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kFallingPack.lanes[set])));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(children), _mm256_permutevar8x32_epi32(all, order));
+}
+
+// Up to eight numbers, of which `count` may be read.
+static inline __m256i load_numbers(const uint32_t* from, uint32_t count) {
+  const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+  const __m256i within = _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(count)), lanes);
+  return _mm256_maskload_epi32(reinterpret_cast<const int*>(from), within);
+}
+
+// Of `count` numbers, at most eight, writes those whose bits are set; eight places are written.
+static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t set, uint32_t* to) {
+  const __m256i all = load_numbers(from, count);
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, packing(set)));
+}
+
+// Copies numbers; up to seven places behind them are written too.
+static inline void copy_numbers(const uint32_t* from, uint32_t count, uint32_t* to) {
+  uint32_t done = 0;
+  for (; count - done >= 8; done += 8)
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + done),
+                        _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from + done)));
+  if (done != count)
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + done), load_numbers(from + done, count - done));
+}
+
+// Asks for the memory of a child before it is needed.
+static inline void prefetch(const void* from, int bytes) {
+  for (int line = 0; line < bytes; line += 64) _mm_prefetch(static_cast<const char*>(from) + line, _MM_HINT_T0);
 }
 
 }  // namespace

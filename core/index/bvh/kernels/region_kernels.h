@@ -1,0 +1,98 @@
+// What the kernels of every instruction set offer: all triangles of one mesh's tree that a ball or a box meets, eight
+// boxes or triangles at a time. They decide in float where float is certain by a written bound, and ask the caller's
+// judge, the predicates of core/geometry/triangle_overlap.h, for the rest, so that their answers are its answers bit
+// for bit. A subtree that lies wholly inside is emitted as it stands. core/query/triangle_search.h is the way to use
+// them. Plain data; functions without state, safe from any thread.
+#ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
+#define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/index/bvh/triangle_tree.h"
+
+namespace locus {
+
+// In mesh axes, like every region here. Finite, and the largest |coordinate| of the centre, plus the radius, plus the
+// tree's magnitude, at most kMaxRegionReach.
+struct KernelBall {
+  float center[3];
+  float radius;
+};
+
+// A box of any orientation. The same limit holds, with the sum of its half extents for the radius.
+struct KernelBox {
+  float center[3];
+  float half[3];
+  float rotation[9];  // rows of the matrix from box axes
+  // Around all that the box reaches in mesh axes, strictly; and, where it is not turned, strictly within it.
+  float outer_min[3], outer_max[3];
+  float inner_min[3], inner_max[3];
+};
+
+// A world's ball or box asked by the bounds of triangles, in axes that are the world's but for a translation and a
+// scale. Each triangle's bounds are grown by a margin first. What the inner numbers find is found, what the outer ones
+// do not is not, and between them the judge decides.
+struct KernelBallOfBounds {
+  float center[3];
+  float inner_radius, outer_radius;
+  float inner_margin, outer_margin;  // outer above inner
+};
+struct KernelBoxOfBounds {
+  float outer_min[3], outer_max[3];  // grown by the margin
+  float inner_min[3], inner_max[3];
+};
+
+inline constexpr float kMaxRegionReach = 0x1p29f;
+// A call ends after so many triangles, for its caller to see whether to go on.
+inline constexpr uint32_t kMaxRegionTests = 4096;
+// The least room for numbers that a call works with.
+inline constexpr size_t kMinRegionRoom = 8;
+// Visits that a call takes.
+inline constexpr size_t kMaxRegionVisits = 16;
+
+// Decides what float leaves open.
+struct RegionJudge {
+  bool (*meets)(const void* region, const TriangleBlock& block, uint32_t place);
+  const void* region;
+};
+
+// A visit of one tree for one region: where it stands between two calls, and where its numbers go.
+struct RegionVisit {
+  RegionJudge judge;
+  uint32_t* numbers;  // where the next call writes to
+  size_t room;        // and how far: at least kMinRegionRoom; all of it may be written to
+  size_t found;       // by the last call: in storage order, behind those of the calls before
+  uint32_t nodes;     // opened by the last call
+  uint32_t tests;     // triangles met by the last call
+  uint32_t judged;    // of these, by the judge
+  uint32_t top;       // of `waiting`
+  NodeRange rest;     // of a subtree that is found, but not yet written
+  alignas(32) uint32_t waiting[kTreeStack];
+
+  void start(const RegionJudge& by) {
+    judge = by;
+    top = 1;
+    rest = {};
+    waiting[0] = 0;
+  }
+  bool over() const { return top == 0 && rest.count == 0; }
+};
+
+// Each goes on with `count` visits, at most kMaxRegionVisits, in turns: a visit that waits for memory does not hold up
+// the others. A visit pauses when it is over, when it has no room left, or after kMaxRegionTests tests.
+struct RegionKernels {
+  const char* name;  // of the instruction set
+  void (*ball)(const TriangleTree&, const KernelBall*, RegionVisit*, size_t count);
+  void (*box)(const TriangleTree&, const KernelBox*, RegionVisit*, size_t count);  // none of them turned
+  void (*turned_box)(const TriangleTree&, const KernelBox*, RegionVisit*, size_t count);
+  void (*ball_of_bounds)(const TriangleTree&, const KernelBallOfBounds*, RegionVisit*, size_t count);
+  void (*box_of_bounds)(const TriangleTree&, const KernelBoxOfBounds*, RegionVisit*, size_t count);
+};
+
+// The exported symbol of the instruction set's object. Only to be called on a processor that has it.
+const RegionKernels& region_kernels_avx2();
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_

@@ -1,0 +1,16 @@
+// Compiled for AVX2 and FMA.
+#include "core/index/bvh/kernels/region_kernels_impl.h"
+
+namespace locus {
+
+const RegionKernels& region_kernels_avx2() {
+  static constexpr RegionKernels kKernels = {"avx2",
+                                             find<BallQuery, KernelBall>,
+                                             find<BoxQuery<false>, KernelBox>,
+                                             find<BoxQuery<true>, KernelBox>,
+                                             find<BallOfBoundsQuery, KernelBallOfBounds>,
+                                             find<BoxOfBoundsQuery, KernelBoxOfBounds>};
+  return kKernels;
+}
+
+}  // namespace locus

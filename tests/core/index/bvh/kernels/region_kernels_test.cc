@@ -1,0 +1,310 @@
+// Every instruction set's kernels against all triangles one by one.
+#include "core/index/bvh/kernels/region_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/index/bvh/kernels/dispatch.h"
+#include "core/query/triangle_search.h"
+#include "tests/support/generated_meshes.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+bool meets(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
+bool meets(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
+
+std::string described(const Ballf& b) {
+  return testing::PrintToString(std::vector<float>{b.center.x, b.center.y, b.center.z, b.radius});
+}
+std::string described(const Obbf& b) {
+  return testing::PrintToString(std::vector<float>{b.center.x, b.center.y, b.center.z, b.half.x, b.half.y, b.half.z});
+}
+
+Aabbf bounds_of_all(const std::vector<Triangle>& triangles) {
+  Aabbf bounds;
+  for (const Triangle& triangle : triangles) bounds = merge(bounds, bounds_of(triangle));
+  return bounds;
+}
+
+std::vector<Triangle> moved(std::vector<Triangle> triangles, float scale, Vec3f by) {
+  for (Triangle& triangle : triangles)
+    for (Vec3f* vertex : {&triangle.a, &triangle.b, &triangle.c}) *vertex = *vertex * scale + by;
+  return triangles;
+}
+
+// What the half extents of a box have to be multiplied by for it to touch a triangle.
+double touching_scale(const Obbf& box, const Triangle& triangle) {
+  const Rotation& r = box.rotation;
+  const Vec3d center = to_double(box.center), half = to_double(box.half);
+  const Vec3d a = r.to_local(to_double(triangle.a) - center), b = r.to_local(to_double(triangle.b) - center),
+              c = r.to_local(to_double(triangle.c) - center);
+  const Vec3d units[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, edges[3] = {b - a, c - b, a - c};
+  std::vector<Vec3d> axes = {units[0], units[1], units[2], cross(edges[0], edges[1])};
+  for (const Vec3d unit : units)
+    for (const Vec3d edge : edges) axes.push_back(cross(unit, edge));
+  double scale = 0;
+  for (const Vec3d axis : axes) {
+    const double p = dot(axis, a), q = dot(axis, b), s = dot(axis, c), reach = dot(abs(axis), half);
+    const double gap = std::max(std::min(p, std::min(q, s)), -std::max(p, std::max(q, s)));
+    if (reach > 0) scale = std::max(scale, gap / reach);
+  }
+  return scale;
+}
+
+// Regions around and on a mesh's triangles, of sizes from nothing to the whole mesh.
+class Regions {
+ public:
+  Regions(const std::vector<Triangle>& triangles, uint64_t seed)
+      : triangles_(triangles), bounds_(bounds_of_all(triangles)), random_(seed) {}
+
+  Ballf ball() { return {center(), static_cast<float>(size())}; }
+  Obbf box(bool turned) {
+    Obbf box{center(), to_float(Vec3d{size(), size(), size()}), {}};
+    if (turned) box.rotation = rotation_of(random_.rotation());
+    return box;
+  }
+  // A ball that touches: its radius is the distance of a triangle to float's precision, give or take a few units.
+  Ballf touching_ball() {
+    Ballf ball{center(), 0};
+    ball.radius = static_cast<float>(std::sqrt(squared_distance(to_double(ball.center), random_.pick(triangles_))));
+    const float toward = random_.chance(0.5) ? 0 : 1e30f;
+    for (int steps = random_.whole(0, 2); steps > 0; --steps) ball.radius = std::nextafter(ball.radius, toward);
+    return ball;
+  }
+  // A box that touches a triangle, give or take a few units.
+  Obbf touching_box(bool turned) {
+    Obbf box = this->box(turned);
+    const auto scale = static_cast<float>(touching_scale(box, random_.pick(triangles_)));
+    if (!(scale < 8)) return box;
+    const float unit = random_.chance(0.5) ? 1 : 1 + 0x1p-23f * static_cast<float>(random_.whole(-3, 3));
+    box.half = box.half * scale * unit;
+    return box;
+  }
+
+ private:
+  Vec3f center() {
+    if (random_.chance(0.2)) return random_.pick(triangles_).b;
+    Vec3f point;
+    for (int axis = 0; axis < 3; ++axis) point[axis] = random_.float_between(bounds_.min[axis], bounds_.max[axis]);
+    if (random_.chance(0.5)) return point;
+    const Triangle& triangle = random_.pick(triangles_);
+    const double u = random_.unit(), v = random_.unit() * (1 - u);
+    return to_float(to_double(triangle.a) * (1 - u - v) + to_double(triangle.b) * u + to_double(triangle.c) * v);
+  }
+  double size() {
+    if (random_.chance(0.05)) return 0;
+    return double{max_component(bounds_.extent())} * random_.magnitude(-10, 1);
+  }
+
+  const std::vector<Triangle>& triangles_;
+  const Aabbf bounds_;
+  Random random_;
+};
+
+class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(use_instruction_set(GetParam()).ok());
+    ASSERT_NE(active_region_kernels(), nullptr);
+  }
+  void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
+
+  // Every kind of region, `count` of each.
+  void judge(const std::vector<Triangle>& triangles, size_t count, uint64_t seed) {
+    const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles);
+    ASSERT_TRUE(tree.ok()) << tree.status();
+    Regions regions(triangles, seed);
+    for (size_t i = 0; i < count && !HasFailure(); ++i) {
+      judge_one(*tree, regions.ball());
+      judge_one(*tree, regions.touching_ball());
+      judge_one(*tree, regions.box(false));
+      judge_one(*tree, regions.box(true));
+      judge_one(*tree, regions.touching_box(false));
+      judge_one(*tree, regions.touching_box(true));
+    }
+  }
+
+  template <class Shape>
+  void judge_one(const TriangleBvh& tree, const Shape& shape) {
+    ASSERT_TRUE(TriangleSearch<Shape>::served(tree, shape));
+    std::vector<uint32_t> expected, found;
+    tree.for_each([&](const Triangle& triangle) {
+      if (meets(shape, triangle)) expected.push_back(triangle.number);
+    });
+    TriangleSearch<Shape> search(tree, shape);
+    while (!search.over()) {
+      uint32_t numbers[64];
+      const size_t count = search.next(numbers, 64);
+      found.insert(found.end(), numbers, numbers + count);
+      tests_ += search.tests();
+      judged_ += search.judged();
+    }
+    EXPECT_EQ(found, expected) << described(shape);
+  }
+
+  // How much was left to the predicates.
+  double judged_share() const { return static_cast<double>(judged_) / static_cast<double>(tests_); }
+
+ private:
+  uint64_t tests_ = 0, judged_ = 0;
+};
+
+TEST_P(RegionKernelsTest, FindInRandomRegionsWhatThePredicatesFind) {
+  judge(bumpy_sphere(14, 0.1, 1), scaled_count(1'500), 1);
+  EXPECT_LT(judged_share(), 0.03);  // touching regions included
+}
+
+TEST_P(RegionKernelsTest, FindOnALatticeWhatThePredicatesFind) {
+  const std::vector<Triangle> city = box_city(4, 1);
+  judge(city, scaled_count(800), 2);
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(city);
+  ASSERT_TRUE(tree.ok());
+  Random random(3);
+  for (size_t i = 0; i < scaled_count(1'500) && !HasFailure(); ++i) {
+    const auto half_units = [&](int low, int high) { return static_cast<float>(random.whole(low, high)) * 0.5f; };
+    const Vec3f center = {half_units(-4, 80), half_units(-4, 80), half_units(-4, 44)};
+    judge_one(*tree, Ballf{center, half_units(0, 20)});
+    judge_one(*tree, Obbf{center, {half_units(0, 20), half_units(0, 20), half_units(0, 20)}, {}});
+  }
+}
+
+TEST_P(RegionKernelsTest, FindInTinyHugeAndFarMeshesWhatThePredicatesFind) {
+  const std::vector<Triangle> sphere = bumpy_sphere(8, 0.1, 1);
+  for (const float scale : {0x1p-60f, 0x1p-40f, 0x1p-20f, 1e-3f, 1e6f, 0x1p22f})
+    judge(moved(sphere, scale, {}), scaled_count(150), 4);
+  for (const float distance : {1e3f, 1e5f, 1e7f})
+    judge(moved(sphere, 1, {distance, -2 * distance, distance / 2}), scaled_count(150), 5);
+}
+
+TEST_P(RegionKernelsTest, FindOfSliversAndTrianglesWithoutAreaWhatThePredicatesFind) {
+  Random random(6);
+  std::vector<Triangle> slivers;
+  for (int i = 0; i < 400; ++i) {
+    const Vec3f a = random.float_vector(1), along = random.float_vector(random.chance(0.2) ? 1e-3 : 1);
+    const Vec3f off = random.float_vector(random.magnitude(-40, -4));
+    slivers.push_back({a, a + along, a + along * 0.5f + (random.chance(0.1) ? Vec3f{} : off)});
+    if (random.chance(0.1)) slivers.back() = {a, a, a};
+  }
+  number_in_order(slivers);
+  judge(slivers, scaled_count(1'000), 7);
+}
+
+// Where the foot of the perpendicular is near an edge, and the triangle's two other edges are near as well.
+TEST_P(RegionKernelsTest, FindWithBallsBesideNarrowTrianglesWhatThePredicatesFind) {
+  Random random(12);
+  for (size_t i = 0; i < scaled_count(20'000) && !HasFailure(); ++i) {
+    const Vec3d a = random.vector(1), along = random.vector(1), aside = random.unit_vector();
+    const double width = random.magnitude(-16, -4);
+    const Triangle narrow{to_float(a), to_float(a + along), to_float(a + along * random.unit() + aside * width), 0};
+    const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build({&narrow, 1});
+    ASSERT_TRUE(tree.ok());
+    const Vec3d beside = a + along * random.unit() + aside * (width * random.between(-0.01, 0.01));
+    const Vec3d above = normalized(cross(along, aside)) * (random.chance(0.3) ? 0 : random.magnitude(-24, -2));
+    Ballf ball{to_float(beside + above), 0};
+    const double distance = std::sqrt(squared_distance(to_double(ball.center), narrow));
+    ball.radius =
+        static_cast<float>(distance * random.pick(std::vector<double>{1, 1, 1 - 0x1p-20, 1 + 0x1p-20, 1 - 0x1p-10}));
+    judge_one(*tree, ball);
+  }
+}
+
+// Coordinates that are nearly zero, as sines and cosines leave them: products of theirs underflow.
+TEST_P(RegionKernelsTest, FindOfNearlyFlatTrianglesWhatThePredicatesFind) {
+  Random random(8);
+  std::vector<Triangle> flat;
+  for (int i = 0; i < 300; ++i) {
+    Triangle triangle{random.float_vector(1), random.float_vector(1), random.float_vector(1)};
+    const int axis = random.whole(0, 2), other = random.whole(0, 2);
+    for (Vec3f* vertex : {&triangle.a, &triangle.b, &triangle.c}) {
+      (*vertex)[axis] = static_cast<float>(random.magnitude(-148, -40));
+      if (random.chance(0.3)) (*vertex)[other] = static_cast<float>(random.magnitude(-148, -100));
+    }
+    flat.push_back(triangle);
+  }
+  number_in_order(flat);
+  judge(flat, scaled_count(1'000), 9);
+}
+
+// Small and large triangles side by side, whose bounds differ by much within a block.
+TEST_P(RegionKernelsTest, FindAmongTrianglesOfManySizesWhatThePredicatesFind) {
+  Random random(10);
+  std::vector<Triangle> mixed;
+  for (int i = 0; i < 600; ++i) {
+    const Vec3f a = random.float_vector(1);
+    const double size = random.magnitude(-12, 1);
+    mixed.push_back({a, a + random.float_vector(size), a + random.float_vector(size)});
+  }
+  number_in_order(mixed);
+  judge(mixed, scaled_count(1'000), 11);
+  EXPECT_LT(judged_share(), 0.05);
+}
+
+TEST_P(RegionKernelsTest, WhatIsWhollyInsideIsNotTested) {
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
+  ASSERT_TRUE(tree.ok());
+  std::vector<uint32_t> numbers(tree->size() + kMinRegionRoom);
+  TriangleSearch<Ballf> search(*tree, Ballf{{0, 0, 0}, 4});
+  EXPECT_EQ(search.next(numbers.data(), numbers.size()), tree->size());
+  EXPECT_TRUE(search.over());
+  EXPECT_EQ(search.tests(), 0u);
+  EXPECT_EQ(search.nodes(), 1u);
+}
+
+TEST_P(RegionKernelsTest, ACallEndsAfterAnAmountOfTests) {
+  std::vector<Triangle> pile;
+  for (uint32_t i = 0; i < 3 * kMaxRegionTests; ++i) {
+    const float x = static_cast<float>(i) * 1e-6f;
+    pile.push_back({{x, -1, -1}, {x, 1, -1}, {x, -1, 1}, i});
+  }
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(pile);
+  ASSERT_TRUE(tree.ok());
+  TriangleSearch<Ballf> search(*tree, Ballf{{0, 0, 0}, 0.5f});
+  std::vector<uint32_t> numbers(tree->size() + kMinRegionRoom);
+  search.next(numbers.data(), numbers.size());
+  EXPECT_FALSE(search.over());
+  EXPECT_GE(search.tests(), kMaxRegionTests);
+  EXPECT_LT(search.tests(), kMaxRegionTests + 8);
+}
+
+TEST_P(RegionKernelsTest, VisitsInTurnsFindWhatTheyFindAlone) {
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(20, 0.1, 1));
+  ASSERT_TRUE(tree.ok());
+  std::vector<uint32_t> numbers(2 * kMaxRegionVisits * tree->size());
+  KernelBall balls[kMaxRegionVisits];
+  RegionVisit visits[kMaxRegionVisits];
+  std::vector<Ballf> shapes;
+  for (size_t i = 0; i < kMaxRegionVisits; ++i)
+    shapes.push_back({{0, 0, static_cast<float>(i) * 0.1f}, 0.1f * static_cast<float>(i)});
+  for (size_t i = 0; i < kMaxRegionVisits; ++i) {
+    balls[i] = kernel_region(shapes[i]);
+    visits[i].start(judge_of(shapes[i]));
+    visits[i].numbers = &numbers[2 * i * tree->size()];
+    visits[i].room = 2 * tree->size();
+  }
+  active_region_kernels()->ball(tree->tree(), balls, visits, kMaxRegionVisits);
+  for (size_t i = 0; i < kMaxRegionVisits; ++i) {
+    ASSERT_TRUE(visits[i].over());
+    std::vector<uint32_t> alone(2 * tree->size());
+    TriangleSearch<Ballf> search(*tree, shapes[i]);
+    alone.resize(search.next(alone.data(), alone.size()));
+    EXPECT_EQ(std::vector<uint32_t>(visits[i].numbers, visits[i].numbers + visits[i].found), alone);
+  }
+}
+
+std::vector<std::string> with_kernels() {
+  std::vector<std::string> names = instruction_sets();
+  names.pop_back();
+  return names;
+}
+
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(RegionKernelsTest);
+INSTANTIATE_TEST_SUITE_P(InstructionSets, RegionKernelsTest, ::testing::ValuesIn(with_kernels()),
+                         [](const auto& instance) { return instance.param; });
+
+}  // namespace
+}  // namespace locus::test
