@@ -13,6 +13,17 @@ enum class PlantedBug {
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
   kUnsignedCellIndex,  // cell indices truncate towards zero instead of flooring
   kUnpaddedNear,       // the near side of the slab test of tree nodes goes without its pad
+  // The ray kernels:
+  kKernelEdgeBound,   // float decides edges without its error bound
+  kKernelTBound,      // float decides t without its error bound
+  kKernelTreePad,     // boxes of nodes go without their pad
+  kKernelEdgeOn,      // triangles seen nearly edge-on are left out instead of decided in double
+  kKernelFloatAxis,   // float chooses the axis of projection, ties and all
+  kKernelWinding,     // rays backwards along their axis see triangles turned over
+  kKernelCull,        // culling takes every triangle for one seen from its front
+  kKernelLimit,       // a hit exactly at the limit is lost
+  kKernelTie,         // of equal hits the highest number wins
+  kKernelPruneEqual,  // boxes that start exactly at the best hit are left out
 };
 
 #ifdef LOCUS_PLANT_BUGS

@@ -161,6 +161,15 @@ inline KernelTrial copies_trial() {
   return random_trial("copies", copies, scaled_count(1'000), 8);
 }
 
+inline std::vector<KernelTrial> all_kernel_trials() {
+  std::vector<KernelTrial> trials = ordinary_trials();
+  for (KernelTrial& trial : far_trials()) trials.push_back(std::move(trial));
+  for (KernelTrial (*const make)() :
+       {lattice_trial, near_diagonal_trial, border_trial, surface_trial, sliver_trial, copies_trial})
+    trials.push_back(make());
+  return trials;
+}
+
 }  // namespace locus::test
 
 #endif  // LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_

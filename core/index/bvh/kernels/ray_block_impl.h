@@ -18,6 +18,7 @@
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
 
+#include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/floats8.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/ray_setup_impl.h"
@@ -67,7 +68,8 @@ struct BlockMet {
 template <bool kAny>
 static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
   const Projected p = project(block, ray);
-  const float edge = ray.number(kEdgeScale) * block.extent + ray.number(kEdgeFloor);
+  const float edge =
+      planted(PlantedBug::kKernelEdgeBound) ? 0 : ray.number(kEdgeScale) * block.extent + ray.number(kEdgeFloor);
   const Floats8 bound = Floats8::all(edge), minus_bound = Floats8::all(-edge), zero = Floats8::all(0);
   const Floats8 least = smaller(p.weight_a, smaller(p.weight_b, p.weight_c));
   const Floats8 most = larger(p.weight_a, larger(p.weight_b, p.weight_c));
@@ -77,11 +79,14 @@ static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, f
   const Floats8 behind = multiply_add(p.weight_a, p.a_z, multiply_add(p.weight_b, p.b_z, p.weight_c * p.c_z));
   const float noise = edge * block.extent * ray.number(kEdgeNoise) + ray.number(kStartNoise);
   const Floats8 t = behind * Floats8::all(-ray.number(kReciprocalZ)) * inverse;
-  const Floats8 off = multiply_add(Floats8::all(noise), size_of(inverse), ray.spread(kTFloor));
+  const Floats8 off = planted(PlantedBug::kKernelTBound)
+                          ? zero
+                          : multiply_add(Floats8::all(noise), size_of(inverse), ray.spread(kTFloor));
   const Floats8 earliest = t - off, latest = t + off, limit8 = Floats8::all(limit);
   const uint32_t edge_on = at_most(size_of(determinant), Floats8::all(8 * edge));
   BlockMet met;
   met.open = inside & (edge_on | (at_most(earliest, limit8) & at_most(zero, latest)));
+  if (planted(PlantedBug::kKernelEdgeOn)) met.open &= ~edge_on;
   met.sure = 0;
   met.edge = edge;
   if constexpr (kAny) {
@@ -137,7 +142,8 @@ static inline Verdict decide(const TriangleBlock& block, int place, const Kernel
   const double a = weights[0], b = weights[1], c = weights[2];
   if (smaller(a, smaller(b, c)) < 0 && larger(a, larger(b, c)) > 0) return {KernelVerdict::kMiss, 0};
   const double determinant = a + b + c;
-  if (determinant == 0 || !(determinant > 0 ? ray.accept_front : ray.accept_back)) return {KernelVerdict::kMiss, 0};
+  if (determinant == 0 || !(determinant > 0 || planted(PlantedBug::kKernelCull) ? ray.accept_front : ray.accept_back))
+    return {KernelVerdict::kMiss, 0};
   const double unit = along * along, size = __builtin_fabs(determinant);
   if (size < 0.5 * edge * unit && !lies_clear(block, place, ray, z, size, edge * 0x1p-29 * unit))
     return {KernelVerdict::kUndecided, 0};

@@ -7,6 +7,7 @@
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_IMPL_H_
 
+#include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/floats8.h"
 #include "core/index/bvh/kernels/ray_block_impl.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
@@ -177,8 +178,10 @@ class Voyage {
       const Verdict verdict = decide(block, place, rays_[flight.index], flight.ray, double{met.block.edge});
       if (verdict.what == KernelVerdict::kUndecided) flight.undecided = true;
       if (verdict.what != KernelVerdict::kHit || verdict.t > flight.limit) continue;
+      if (planted(PlantedBug::kKernelLimit) && !flight.found && verdict.t == flight.limit) continue;
       const uint32_t number = tree_.numbers[block.first + static_cast<uint32_t>(place)];
-      if (flight.found && verdict.t == flight.limit && number >= flight.number) continue;
+      if (flight.found && verdict.t == flight.limit && (number >= flight.number) != planted(PlantedBug::kKernelTie))
+        continue;
       flight.limit = verdict.t;
       flight.number = number;
       flight.found = true;
@@ -192,7 +195,9 @@ class Voyage {
     for (uint32_t from = 1; from < flight.top; from += kTreeWidth) {
       const uint32_t rest = flight.top - from;
       const uint32_t entries = rest >= kTreeWidth ? 255u : (1u << rest) - 1u;
-      const uint32_t keep = at_most(Floats8::load_any(flight.nears + from), limit) & entries;
+      const Floats8 nears = Floats8::load_any(flight.nears + from);
+      const uint32_t keep =
+          (planted(PlantedBug::kKernelPruneEqual) ? below(nears, limit) : at_most(nears, limit)) & entries;
       pack_entries(flight.waiting, flight.nears, from, keep, kept);
       kept += static_cast<uint32_t>(__builtin_popcount(keep));
     }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 
+#include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/floats8.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 
@@ -93,8 +94,8 @@ class Projection {
     is_y_ = where_at_least(y, longest);
     const uint32_t most_x = at_most(longest, x), most_y = at_most(longest, y), most_z = at_most(longest, z);
     const uint32_t ties = (most_x & (most_y | most_z)) | (most_y & most_z);
-    if (ties != 0) decide_ties(ties, rays, count);
-    backwards_ = along(direction[0], direction[1], direction[2]);
+    if (ties != 0 && !planted(PlantedBug::kKernelFloatAxis)) decide_ties(ties, rays, count);
+    backwards_ = planted(PlantedBug::kKernelWinding) ? bits_of(0) : along(direction[0], direction[1], direction[2]);
   }
 
   inline Floats8 along(Floats8 x, Floats8 y, Floats8 z) const { return choose(is_x_, x, choose(is_y_, y, z)); }
@@ -129,7 +130,8 @@ static inline void prepare_slabs(const RayColumns& rays, Floats8 reach, Floats8*
   const Floats8* const d = rays.direction;
   const Floats8 longest = larger(larger(size_of(d[0]), size_of(d[1])), size_of(d[2]));
   // As SlabRay does: a component of zero becomes 1e-18 of the largest.
-  const Floats8 least = longest * Floats8::all(1e-18f), pad = reach * Floats8::all(kTreePad);
+  const Floats8 least = longest * Floats8::all(1e-18f),
+                pad = reach * Floats8::all(planted(PlantedBug::kKernelTreePad) ? 0 : kTreePad);
   Floats8 octant = bits_of(0);
   for (uint32_t axis = 0; axis < 3; ++axis) {
     inverse[axis] = Floats8::all(1) / either(larger(size_of(d[axis]), least), both(bits_of(0x80000000u), d[axis]));
