@@ -7,6 +7,13 @@
 #include "core/query/ray_query.h"
 
 namespace locus {
+namespace {
+
+// Rays that the kernels get at once. Fewer would leave them waiting at the end of each call; more would leave the
+// caches.
+constexpr size_t kRaysAtOnce = 256;
+
+}  // namespace
 
 BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, uint64_t max_bytes)
     : task_(task),
@@ -19,18 +26,23 @@ BlockResult BlockRunner::run(size_t begin, size_t end) {
   const auto* lookup = std::get_if<LookupColumns>(&block_.kind);
   if (lookup != nullptr && !lookup->groups.empty() && !task_.ended())
     groups_ = look_up_groups(task_, lookup->groups, overlap_options(block_, StaticDetail::kInstances));
-  for (size_t i = begin; i < end; ++i) {
-    std::visit([&](const auto& kind) { run_query(kind, i); }, block_.kind);
-    if (!task_.ended()) continue;
-    const auto query = static_cast<uint32_t>(i);
-    if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
-  }
+  std::visit([&](const auto& kind) { run_queries(kind, begin, end); }, block_.kind);
   task_.check();  // books what is not booked yet: many small pieces use up a budget like a large one
   result_.work = task_.work();
   return std::move(result_);
 }
 
-void BlockRunner::append_counted(const std::vector<Hit>& rows, bool truncated, size_t i, const RayRequest* request) {
+template <class Columns>
+void BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end) {
+  for (size_t i = begin; i < end; ++i) {
+    run_query(columns, i);
+    if (!task_.ended()) continue;
+    const auto query = static_cast<uint32_t>(i);
+    if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
+  }
+}
+
+void BlockRunner::append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest* request) {
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
   const Winding winding = task_.snapshot().winding;
   for (size_t row = 0; row < kept; ++row) {
@@ -42,19 +54,26 @@ void BlockRunner::append_counted(const std::vector<Hit>& rows, bool truncated, s
   if (truncated || kept < rows.size()) result_.truncated.push_back(static_cast<uint32_t>(i));
 }
 
-void BlockRunner::run_query(const RayColumns& rays, size_t i) {
+void BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) {
   const Winding winding = task_.snapshot().winding;
-  const RayRequest request = ray_request(block_, rays, winding, i);
-  RayAnswer answer;
-  if (!task_.ended()) answer = run_ray(task_, request, Filter(block_, i));
+  for (size_t first = begin; first < end; first += kRaysAtOnce) {
+    const size_t last = std::min(end, first + kRaysAtOnce);
+    const RayAnswers answers = run_rays(task_, block_, rays, winding, first, last);
+    for (size_t i = first; i < last; ++i)
+      append_ray(rays, answers[i - first], ray_request(block_, rays, winding, i), i);
+  }
+}
+
+void BlockRunner::append_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i) {
   if (rays.mode == RayMode::kAll) return append_counted(answer.hits, answer.truncated, i, &request);
+  if (answer.truncated) result_.truncated.push_back(static_cast<uint32_t>(i));
   if (rays.mode == RayMode::kAny) {
     result_.hits.push_back(answer.hits.empty() ? '\0' : '\1');
     return;
   }
   const Hit hit = answer.hits.empty() ? Hit{} : answer.hits.front();
   append_row(hit, columns_, result_);
-  append_surface(request, block_.frame, hit, winding, columns_, result_);
+  append_surface(request, block_.frame, hit, task_.snapshot().winding, columns_, result_);
 }
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {

@@ -4,6 +4,7 @@
 
 #include "core/query/overlap_query.h"
 #include "core/query/query_task.h"
+#include "core/query/ray_query.h"
 #include "core/query/rows.h"
 
 namespace locus {
@@ -18,11 +19,14 @@ class BlockRunner {
   BlockResult run(size_t begin, size_t end);
 
  private:
-  void run_query(const RayColumns& rays, size_t i);
+  template <class Columns>
+  void run_queries(const Columns& columns, size_t begin, size_t end);
+  void run_queries(const RayColumns& rays, size_t begin, size_t end);
   void run_query(const BallColumns& balls, size_t i);
   void run_query(const BoxColumns& boxes, size_t i);
   void run_query(const LookupColumns& lookup, size_t i);
-  void append_counted(const std::vector<Hit>& rows, bool truncated, size_t i, const RayRequest* request);
+  void append_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i);
+  void append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest* request);
 
   QueryTask& task_;
   const QueryBlock& block_;

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "absl/container/inlined_vector.h"
 #include "core/query/hit.h"
 #include "core/query/query_task.h"
 
@@ -25,11 +26,14 @@ struct RayRequest {
 RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i);
 
 struct RayAnswer {
-  std::vector<Hit> hits;   // kFirst and kAny: at most one; kAll: ascending
-  bool truncated = false;  // kAll: there were more
+  absl::InlinedVector<Hit, 1> hits;  // kFirst and kAny: at most one; kAll: ascending
+  bool truncated = false;            // kAll: there were more; or the batch ended first
 };
+using RayAnswers = std::vector<RayAnswer>;
 
-RayAnswer run_ray(QueryTask& task, const RayRequest& request, const Filter& filter);
+// The answers to queries `begin` to `end` (exclusive) of a block. Many at once are answered faster than one by one.
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, Winding winding, size_t begin,
+                    size_t end);
 
 // Weights of the second and third vertex, and the unit normal to the triangle's front or out of the object, at a hit
 // that run_ray() found with kExact. Recomputed from the stored primitive.

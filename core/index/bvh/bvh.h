@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/inlined_vector.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 #include "core/base/limits.h"
@@ -64,11 +65,35 @@ class Bvh {
   template <RegionVisitor<V> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
- private:
-  struct Pending {
-    BvhChild child;
-    S near;
+  // A ray's way from value to value, for those who cannot answer a visitor at once. Borrows the tree. One thread at a
+  // time.
+  class RayWalk {
+   public:
+    RayWalk(const Bvh& tree, const SlabRay<S>& slabs) : tree_(&tree), slabs_(slabs) {
+      if (!tree.nodes_.empty()) pending_.push_back({{0, 0}, -std::numeric_limits<S>::infinity()});
+    }
+
+    const SlabRay<S>& slabs() const { return slabs_; }
+    // The next value as visit_ray() hands them over, null behind the last. `limit` may fall from call to call.
+    const V* next(S limit, Work& work);
+
+   private:
+    struct Pending {
+      BvhChild child;
+      S near;
+    };
+
+    // Nearest last.
+    void push_hit(const BvhNode<S>& node, S limit);
+
+    const Bvh* tree_;
+    SlabRay<S> slabs_;
+    const V* value_ = nullptr;  // the next of the leaf's values, up to end_
+    const V* end_ = nullptr;
+    absl::InlinedVector<Pending, 16> pending_;  // seldom more, at most kStackSize
   };
+
+ private:
   // Each level leaves at most all but one of its children waiting.
   static constexpr size_t kStackSize = size_t{limits::kMaxBvhDepth} * (kBvhWidth - 1) + 1;
 
@@ -91,9 +116,6 @@ class Bvh {
     return result;
   }
 
-  // Puts the children the ray may hit on the stack, farthest first. Returns the new top.
-  Pending* push_hit(const BvhNode<S>& node, const SlabRay<S>& slabs, S limit, Pending* top) const;
-
   std::vector<BvhNode<S>> nodes_;
   std::vector<V> values_;
   Aabb<S> bounds_;
@@ -114,40 +136,44 @@ double Bvh<V>::sah_cost() const {
 }
 
 template <Bounded V>
-typename Bvh<V>::Pending* Bvh<V>::push_hit(const BvhNode<S>& node, const SlabRay<S>& slabs, S limit,
-                                           Pending* top) const {
-  Pending* const base = top;
-  for (uint32_t slot = 0; slot < node.child_count; ++slot) {
-    const Interval<S> interval = node_interval(slabs, node.bounds[slot]);
-    if (interval.near > interval.far || interval.far < 0 || beyond(interval.near, limit)) continue;
-    Pending* place = top++;
-    for (; place > base && place[-1].near < interval.near; --place) *place = place[-1];
-    *place = {node.children[slot], interval.near};
+const V* Bvh<V>::RayWalk::next(S limit, Work& work) {
+  while (value_ == end_) {
+    if (pending_.empty()) return nullptr;
+    const Pending now = pending_.back();
+    pending_.pop_back();
+    // The limit may have fallen since the push.
+    if (beyond(now.near, limit)) continue;
+    if (now.child.is_leaf()) {
+      value_ = tree_->values_.data() + now.child.first;
+      end_ = value_ + now.child.count;
+    } else {
+      ++work.nodes;
+      push_hit(tree_->nodes_[now.child.first], limit);
+    }
   }
-  return top;
+  ++work.tests;
+  return value_++;
+}
+
+template <Bounded V>
+void Bvh<V>::RayWalk::push_hit(const BvhNode<S>& node, S limit) {
+  const size_t base = pending_.size();
+  for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+    const Interval<S> interval = tree_->node_interval(slabs_, node.bounds[slot]);
+    if (interval.near > interval.far || interval.far < 0 || beyond(interval.near, limit)) continue;
+    size_t place = pending_.size();
+    pending_.emplace_back();
+    for (; place > base && pending_[place - 1].near < interval.near; --place) pending_[place] = pending_[place - 1];
+    pending_[place] = {node.children[slot], interval.near};
+  }
 }
 
 template <Bounded V>
 template <RayVisitor<V> Visitor>
 void Bvh<V>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const {
-  if (nodes_.empty()) return;
-  Pending stack[kStackSize];
-  Pending* top = stack;
-  *top++ = {{0, 0}, -std::numeric_limits<S>::infinity()};
-  while (top != stack) {
-    const Pending now = *--top;
-    // The limit may have fallen since the push.
-    if (beyond(now.near, visitor.limit())) continue;
-    if (!now.child.is_leaf()) {
-      ++work.nodes;
-      top = push_hit(nodes_[now.child.first], slabs, visitor.limit(), top);
-      continue;
-    }
-    for (const V& value : values().subspan(now.child.first, now.child.count)) {
-      ++work.tests;
-      if (!visitor.visit(value)) return;
-    }
-  }
+  RayWalk walk(*this, slabs);
+  while (const V* const value = walk.next(visitor.limit(), work))
+    if (!visitor.visit(*value)) return;
 }
 
 template <Bounded V>

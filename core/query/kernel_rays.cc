@@ -1,0 +1,147 @@
+#include "core/query/kernel_rays.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+
+#include "core/query/instance_rays.h"
+
+namespace locus {
+namespace {
+
+// An instance that a ray has come to.
+struct Stop {
+  uint32_t ray;
+  float nearest;  // where the ray enters its bounds
+  const Instance* instance;
+};
+
+class Round {
+  using InstanceWalk = Bvh<Instance>::RayWalk;
+
+ public:
+  Round(QueryTask& task, std::vector<AskedRay>& rays) : task_(task), rays_(rays) {
+    const Bvh<Instance>& instances = task.snapshot().statics->tree();
+    walks_.reserve(rays.size());
+    for (const AskedRay& ray : rays)
+      walks_.emplace_back(instances, SlabRay<double>(Rayd{ray.request.origin, ray.request.direction}, kInstancePad));
+    stops_.reserve(rays.size());
+  }
+
+  void run() {
+    for (uint32_t ray = 0; ray < rays_.size(); ++ray) walk_on(ray);
+    while (!stops_.empty() && !task_.ended()) {
+      now_.swap(stops_);
+      stops_.clear();
+      sort_by_mesh();
+      for (size_t first = 0; first < now_.size();) first = ask_mesh(first);
+      for (const Stop& stop : now_) walk_on(stop.ray);
+    }
+  }
+
+ private:
+  // To the next instance that the ray's filter accepts and its limit reaches, if there is one.
+  void walk_on(uint32_t number) {
+    AskedRay& ray = rays_[number];
+    InstanceWalk& walk = walks_[number];
+    while (!task_.ended() && !ray.collector.done()) {
+      const Instance* const instance = walk.next(raised(ray.collector.limit()), task_.work());
+      if (instance == nullptr) return;
+      if (!task_.count_test()) return;
+      if (!ray.filter.accepts(*instance)) continue;
+      // Part of the verdict, and hits are no nearer: the tree over instances may cull by it.
+      const std::optional<float> nearest = entry(walk.slabs(), instance->bounds);
+      if (!nearest || *nearest > ray.collector.limit()) continue;
+      return stops_.push_back({number, *nearest, instance});
+    }
+  }
+
+  void sort_by_mesh() {
+    const auto mesh = [](const Stop& stop) { return stop.instance->mesh.get(); };
+    const auto other = [&](const Stop& a, const Stop& b) { return mesh(a) != mesh(b); };
+    if (std::adjacent_find(now_.begin(), now_.end(), other) == now_.end()) return;
+    std::stable_sort(now_.begin(), now_.end(),
+                     [&](const Stop& a, const Stop& b) { return std::less<const StaticMesh*>()(mesh(a), mesh(b)); });
+  }
+
+  // All stops at the mesh of the first of them. Returns the first stop at another.
+  size_t ask_mesh(size_t first) {
+    const StaticMesh& mesh = *now_[first].instance->mesh;
+    kernel_rays_.clear();
+    asked_.clear();
+    size_t last = first;
+    for (; last < now_.size() && now_[last].instance->mesh.get() == &mesh; ++last) {
+      const std::optional<KernelRay> ray = kernel_ray(now_[last]);
+      if (!ray) {
+        ask_triangles(now_[last]);
+        continue;
+      }
+      kernel_rays_.push_back(*ray);
+      asked_.push_back(last);
+    }
+    ask_kernels(mesh.tree().tree());
+    return last;
+  }
+
+  void ask_kernels(const TriangleTree& tree) {
+    if (asked_.empty()) return;
+    hits_.resize(asked_.size());
+    const RayKernels& kernels = *task_.ray_kernels();
+    const bool any = rays_.front().request.mode == RayMode::kAny;
+    (any ? kernels.any : kernels.first)(tree, kernel_rays_.data(), hits_.data(), hits_.size());
+    uint64_t tests = 0;
+    for (size_t i = 0; i < asked_.size(); ++i) {
+      task_.work().nodes += hits_[i].nodes;
+      tests += hits_[i].tests;
+    }
+    task_.work().tests += tests;
+    task_.count_tests(tests);
+    for (size_t i = 0; i < asked_.size(); ++i) take(now_[asked_[i]], hits_[i]);
+  }
+
+  void take(const Stop& stop, const KernelHit& found) {
+    if (found.verdict == KernelVerdict::kMiss) return;
+    if (found.verdict == KernelVerdict::kUndecided || found.t < stop.nearest) return ask_triangles(stop);
+    Hit hit = hit_on(*stop.instance, found.t);
+    hit.triangle = found.number;
+    rays_[stop.ray].collector.offer(hit);
+  }
+
+  void ask_triangles(const Stop& stop) {
+    AskedRay& ray = rays_[stop.ray];
+    ask_instance(task_, ray.request, walks_[stop.ray].slabs(), *stop.instance, stop.nearest, ray.collector);
+  }
+
+  // Nothing where the kernels' bounds do not hold.
+  std::optional<KernelRay> kernel_ray(const Stop& stop) const {
+    const AskedRay& ray = rays_[stop.ray];
+    const Transform& transform = stop.instance->transform;
+    const Vec3d origin = transform.point_to_mesh(ray.request.origin);
+    const Vec3d direction = transform.direction_to_mesh(ray.request.direction);
+    const double longest = max_component(abs(direction));
+    const double reach = max_component(abs(origin)) + double{stop.instance->mesh->tree().tree().magnitude};
+    if (!(longest >= kMinKernelDirection && longest <= kMaxKernelDirection)) return std::nullopt;
+    if (!(reach >= kMinKernelReach && reach <= kMaxKernelReach)) return std::nullopt;
+    return KernelRay{{origin.x, origin.y, origin.z},
+                     {direction.x, direction.y, direction.z},
+                     ray.collector.limit(),
+                     ray.request.cull != Cull::kFront,
+                     ray.request.cull != Cull::kBack};
+  }
+
+  QueryTask& task_;
+  std::vector<AskedRay>& rays_;
+  std::vector<InstanceWalk> walks_;
+  std::vector<Stop> stops_, now_;
+  std::vector<KernelRay> kernel_rays_;
+  std::vector<size_t> asked_;  // which stop each of kernel_rays_ is
+  std::vector<KernelHit> hits_;
+};
+
+}  // namespace
+
+void ask_meshes(QueryTask& task, std::vector<AskedRay>& rays) {
+  if (!rays.empty()) Round(task, rays).run();
+}
+
+}  // namespace locus
