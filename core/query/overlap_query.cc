@@ -5,6 +5,7 @@
 
 #include "core/index/regions.h"
 #include "core/query/placed_triangle.h"
+#include "core/query/triangle_search.h"
 
 namespace locus {
 namespace {
@@ -19,6 +20,7 @@ struct BallShape {
   static Ballf to_mesh(const Balld& ball, const Transform& transform) {
     return {to_float(transform.point_to_mesh(ball.center)), static_cast<float>(ball.radius / transform.scale)};
   }
+  static double size(const Ballf& ball) { return ball.radius; }
   static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
   static bool overlaps_bounds(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
   static bool overlaps_object(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
@@ -35,6 +37,7 @@ struct BoxShape {
     return {to_float(transform.point_to_mesh(box.center)), to_float(box.half * (1.0 / transform.scale)),
             compose(inverse(transform.rotation), box.rotation)};
   }
+  static double size(const Obbf& box) { return max_component(box.half); }
   static double reach(const Obbd& box) { return max_component(abs(box.center)) + max_component(box.half) * 2; }
   static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
@@ -72,8 +75,22 @@ class ObjectRows {
 // Rows of one instance: itself once, or each of its triangles found, which come in storage order.
 class InstanceRows {
  public:
-  InstanceRows(const Instance& instance, StaticDetail detail, LowestRows& rows)
-      : instance_(instance), detail_(detail), rows_(rows) {}
+  InstanceRows(const Instance& instance, const OverlapOptions& options, LowestRows& rows)
+      : instance_(instance), detail_(options.detail), max_results_(options.max_results), rows_(rows) {}
+
+  // Numbers of triangles, in storage order. False when the instance needs no more: what comes behind the most results
+  // would not be kept.
+  bool offer(absl::Span<const uint32_t> numbers) {
+    if (detail_ == StaticDetail::kInstances) {
+      if (!numbers.empty()) rows_.offer(hit_on(instance_, 0));
+      return numbers.empty();
+    }
+    const size_t wanted = detail_ == StaticDetail::kTriangles ? size_t{max_results_} + 1 - found_ : numbers.size();
+    const absl::Span<const uint32_t> kept = numbers.subspan(0, wanted);
+    rows_.offer(hit_on(instance_, 0), kept, found_);
+    found_ += static_cast<uint32_t>(kept.size());
+    return detail_ != StaticDetail::kTriangles || found_ <= max_results_;
+  }
 
   // False when the instance needs no more triangles.
   bool offer(const Triangle& triangle) {
@@ -89,6 +106,7 @@ class InstanceRows {
  private:
   const Instance& instance_;
   const StaticDetail detail_;
+  const uint32_t max_results_;
   LowestRows& rows_;
   uint32_t found_ = 0;
 };
@@ -98,13 +116,8 @@ class ExactTriangles {
  public:
   // `world_shape` is `shape` in world axes.
   ExactTriangles(QueryTask& task, const typename Kind::Mesh& shape, const typename Kind::World& world_shape,
-                 const Instance& instance, InstanceRows rows)
-      : task_(task),
-        shape_(shape),
-        region_(shape),
-        world_shape_(world_shape),
-        placed_(instance, Kind::reach(world_shape)),
-        rows_(rows) {}
+                 const PlacedTriangles& placed, InstanceRows rows)
+      : task_(task), shape_(shape), region_(shape), world_shape_(world_shape), placed_(placed), rows_(rows) {}
 
   Aabbf bounds() const { return region_.bounds(); }
   bool overlaps(const Aabbf& box) const { return region_.overlaps(box); }
@@ -120,7 +133,7 @@ class ExactTriangles {
   const typename Kind::Mesh& shape_;
   typename Kind::MeshRegion region_;
   const typename Kind::World& world_shape_;
-  PlacedTriangles placed_;
+  const PlacedTriangles& placed_;
   InstanceRows rows_;
 };
 
@@ -159,19 +172,45 @@ class InstanceSearch {
     if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
     // Part of the verdict: the tree over instances may cull by it.
     if (!region_.overlaps(instance.bounds)) return true;
-    const InstanceRows rows(instance, options_.detail, rows_);
+    InstanceRows rows(instance, options_, rows_);
     if (options_.precision == Precision::kConservative) {
       PlacedBounds<Kind> visitor(task_, shape_, instance, rows);
       task_.visit_region(instance.mesh->tree(), visitor);
     } else {
-      const typename Kind::Mesh shape = Kind::to_mesh(shape_, instance.transform);
-      ExactTriangles<Kind> visitor(task_, shape, shape_, instance, rows);
-      task_.visit_region(instance.mesh->tree(), visitor);
+      visit_exactly(instance, rows);
     }
     return !task_.ended();
   }
 
  private:
+  void visit_exactly(const Instance& instance, InstanceRows& rows) {
+    const TriangleBvh& tree = instance.mesh->tree();
+    const typename Kind::Mesh shape = Kind::to_mesh(shape_, instance.transform);
+    const PlacedTriangles placed(instance, Kind::reach(shape_));
+    if (task_.searches_triangles() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
+        placed.bounds_follow(to_double(shape.center), Kind::size(shape)))
+      return search(tree, shape, rows);
+    ExactTriangles<Kind> visitor(task_, shape, shape_, placed, rows);
+    task_.visit_region(tree, visitor);
+  }
+
+  void search(const TriangleBvh& tree, const typename Kind::Mesh& shape, InstanceRows& rows) {
+    TriangleSearch<typename Kind::Mesh> search(tree, shape);
+    uint32_t numbers[kNumbersAtOnce];
+    const size_t room = options_.detail == StaticDetail::kInstances ? kMinRegionRoom : kNumbersAtOnce;
+    bool more = true;
+    while (more && !search.over()) {
+      const size_t found = search.next(numbers, room);
+      task_.work().nodes += search.nodes();
+      task_.work().tests += search.tests();
+      more = rows.offer({numbers, found});
+      // What is found untested is work too, for whoever waits for an end of it.
+      more = task_.count_tests(search.tests() + found) && more;
+    }
+  }
+
+  static constexpr size_t kNumbersAtOnce = 2048;
+
   QueryTask& task_;
   const typename Kind::World& shape_;
   typename Kind::WorldRegion region_;
@@ -209,6 +248,18 @@ void LowestRows::offer(const Hit& row) {
   if (answer_.rows.size() > 2 * max_results_) keep_lowest();
 }
 
+void LowestRows::offer(const Hit& head, absl::Span<const uint32_t> triangles, uint32_t storage) {
+  Hit row = head;
+  for (size_t first = 0; first < triangles.size(); first += max_results_) {
+    for (const uint32_t triangle : triangles.subspan(first, max_results_)) {
+      row.triangle = triangle;
+      row.storage = storage++;
+      answer_.rows.push_back(row);
+    }
+    if (answer_.rows.size() > 2 * max_results_) keep_lowest();
+  }
+}
+
 void LowestRows::keep_lowest() {
   if (answer_.rows.size() <= max_results_) return;
   const auto end = answer_.rows.begin() + static_cast<std::ptrdiff_t>(max_results_);
@@ -220,7 +271,10 @@ void LowestRows::keep_lowest() {
 
 OverlapAnswer LowestRows::finish() {
   keep_lowest();
-  std::sort(answer_.rows.begin(), answer_.rows.end(), [this](const Hit& a, const Hit& b) { return before(a, b); });
+  const auto in_order = [this](const Hit& a, const Hit& b) { return before(a, b); };
+  // As they mostly come: in storage order, of one instance or of instances met by ascending id.
+  if (!std::is_sorted(answer_.rows.begin(), answer_.rows.end(), in_order))
+    std::sort(answer_.rows.begin(), answer_.rows.end(), in_order);
   return std::move(answer_);
 }
 

@@ -35,13 +35,15 @@ Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i);
 Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i);
 
 // Keeps the rows that come first in the order of ids (then of triangles), at most a given number. Memory is bounded by
-// twice that number, whatever is offered.
+// three times that number, whatever is offered.
 class LowestRows {
  public:
   explicit LowestRows(uint32_t max_results, bool sorted_triangles)
       : max_results_(max_results), sorted_triangles_(sorted_triangles) {}
 
   void offer(const Hit& row);
+  // Rows like `head` for triangles in storage order, counted from `storage`.
+  void offer(const Hit& head, absl::Span<const uint32_t> triangles, uint32_t storage);
   OverlapAnswer finish();
 
  private:

@@ -13,7 +13,9 @@ class PlacedTriangles {
   // `reach`: the largest coordinate or length of the query that the bounds will be held against; 0 where that test pads
   // by itself.
   explicit PlacedTriangles(const Instance& instance, double reach = 0)
-      : instance_(instance), margin_(kMargin * (magnitude(instance.bounds) + reach) + kPlacing * lever(instance)) {}
+      : instance_(instance),
+        extent_(magnitude(instance.bounds) + reach),
+        margin_(kMargin * extent_ + kPlacing * lever(instance)) {}
 
   const Instance& instance() const { return instance_; }
   Aabbf everything() const { return instance_.mesh->tree().bounds(); }
@@ -23,6 +25,14 @@ class PlacedTriangles {
     for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
       bounds = merge(bounds, instance_.transform.point_to_world(to_double(vertex)));
     return grown(bounds, margin_);
+  }
+
+  // Whether a query of `size` around `center`, in mesh axes, that has a point in common with a triangle there is
+  // certain to meet bounds_of_triangle(): rounding its centre and size to float moves it by less than 2^-24 sqrt(3) of
+  // them, which is half of the margin where they are at most twice what that is made of. The way back is covered by the
+  // rest.
+  bool bounds_follow(Vec3d center, double size) const {
+    return instance_.transform.scale * (max_component(abs(center)) + size) <= 2 * extent_;
   }
 
   // Contains bounds_of_triangle() of every triangle within `box`: its margin is twice as wide.
@@ -40,6 +50,7 @@ class PlacedTriangles {
   }
 
   const Instance& instance_;
+  double extent_;
   double margin_;
 };
 

@@ -85,6 +85,9 @@ class QueryTask {
   // Kernels for first and any hits in meshes; null where there are none, or where all values are to be tested.
   const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
 
+  // Whether ball and box queries may ask the kernels.
+  bool searches_triangles() const { return !brute_force_; }
+
   // Every candidate of an index: by its structure, or, for whoever wants to check that, simply all values.
   template <class Index, class Visitor>
   void visit_ray(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs, Visitor& visitor) {

@@ -31,7 +31,7 @@ std::vector<Obbf> some_boxes(size_t count) {
 class TriangleSearchTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    absl::StatusOr<TriangleBvh> built = TriangleBvh::build(bumpy_sphere(96, 0.1, 1));
+    absl::StatusOr<TriangleBvh> built = TriangleBvh::build(bumpy_sphere(128, 0.1, 1));
     ASSERT_TRUE(built.ok());
     tree_ = *std::move(built);
   }
