@@ -17,7 +17,7 @@ RAYS = {"embree": {"embree_intersect1", "embree_robust", "embree_intersect1m"}, 
 ANY = {**RAYS, "embree": {"embree_occluded1", "embree_robust"}}
 CAMERA = {**RAYS, "embree": RAYS["embree"] | {"embree_intersect8", "embree_intersect16"}}
 BALLS = {"embree": {"embree_point_query"}, "bullet": {"bullet"}, "boost": {"boost_rtree"}}
-BOXES = {**BALLS, "cgal": {"cgal"}}
+BOXES = {**BALLS, "embree": {"embree_point_query", "embree_collide"}, "cgal": {"cgal"}}
 CASES = {"ray/incoherent/first": RAYS, "ray/incoherent/any": ANY, "ray/short/first": RAYS, "ray/short/any": ANY,
          "ray/camera/first": CAMERA, "ball/0.5": BALLS, "ball/2": BALLS, "ball/10": BALLS, "box/0.5": BOXES,
          "box/2": BOXES, "box/10": BOXES, "build": {"embree": {"embree_medium"}},

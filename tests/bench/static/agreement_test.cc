@@ -33,11 +33,11 @@ class Liar : public Peer {
     right_.any(rays, answers);
     if (uint8_t* const hit = std::find(answers, answers + rays.size(), 1); hit != answers + rays.size()) *hit = 0;
   }
-  void ball_ids(absl::Span<const Ballf> balls, uint32_t* ids, uint32_t* counts) override {
+  void ball_ids(absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) override {
     right_.ball_ids(balls, ids, counts);
     if (counts[0] > 0) --counts[0];
   }
-  void box_ids(absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) override {
+  void box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) override {
     right_.box_ids(boxes, ids, counts);
     if (counts[0] > 0) --counts[0];
   }

@@ -29,19 +29,19 @@ class BoostRtree : public Peer {
   bool does(Task task) const override { return task == Task::kBall || task == Task::kBox; }
   bool slow() const override { return true; }
 
-  void ball_ids(absl::Span<const Ballf> balls, uint32_t* ids, uint32_t* counts) override {
+  void ball_ids(absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) override {
     for (const Ballf& ball : balls) {
       const auto test = [&](const Triangle& triangle) {
         return scalar_squared_distance(ball.center, triangle) <= ball.radius * ball.radius;
       };
       const Vec3f reach = {ball.radius, ball.radius, ball.radius};
-      *counts++ = collect({ball.center - reach, ball.center + reach}, ids, test);
+      *counts++ = collect({ball.center - reach, ball.center + reach}, ids.data(), test);
     }
   }
-  void box_ids(absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) override {
+  void box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) override {
     for (const Obbf& box : boxes) {
       const auto test = [&](const Triangle& triangle) { return scalar_box_overlaps(box.center, box.half, triangle); };
-      *counts++ = collect(ends_of(box), ids, test);
+      *counts++ = collect(ends_of(box), ids.data(), test);
     }
   }
 

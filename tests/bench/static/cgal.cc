@@ -42,7 +42,7 @@ class Cgal : public Peer {
       *answers++ = tree_.do_intersect(segment) ? 1 : 0;
     }
   }
-  void box_ids(absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) override {
+  void box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) override {
     for (const Obbf& box : boxes) {
       const Aabbf ends = ends_of(box);
       uint32_t count = 0;

@@ -104,11 +104,14 @@ void set(RTCRayHit& to, const RayQuery& ray) {
   to.hit.primID = kNoTriangle;
 }
 
+constexpr char kLeaks[] = "Embree lets rays pass between triangles where its scene is not RTC_SCENE_FLAG_ROBUST";
+
 // rtcIntersect1 and rtcOccluded1, one ray a call.
 class SingleRays : public Peer {
  public:
-  SingleRays(std::string name, std::shared_ptr<const Scene> scene, std::vector<Task> tasks)
-      : Peer(std::move(name)), scene_(std::move(scene)), tasks_(std::move(tasks)) {}
+  SingleRays(std::string name, std::shared_ptr<const Scene> scene, std::vector<Task> tasks, std::string fault)
+      : Peer(std::move(name)), scene_(std::move(scene)), tasks_(std::move(tasks)), fault_(std::move(fault)) {}
+  std::string known_fault(Task) const override { return fault_; }
   bool does(Task task) const override { return std::find(tasks_.begin(), tasks_.end(), task) != tasks_.end(); }
   void first(absl::Span<const RayQuery> rays, RayAnswer* answers) override {
     RTCIntersectContext context = context_of(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
@@ -132,6 +135,7 @@ class SingleRays : public Peer {
  private:
   std::shared_ptr<const Scene> scene_;
   std::vector<Task> tasks_;
+  std::string fault_;
 };
 
 // rtcIntersect1M, a stream of rays a call; told whether they are coherent.
@@ -139,6 +143,7 @@ class RayStream : public Peer {
  public:
   explicit RayStream(std::shared_ptr<const Scene> scene) : Peer("embree_intersect1m"), scene_(std::move(scene)) {}
   bool does(Task task) const override { return task == Task::kFirst; }
+  std::string known_fault(Task) const override { return kLeaks; }
   void first(absl::Span<const RayQuery> rays, RayAnswer* answers) override {
     ask(rays, answers, RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   }
@@ -183,6 +188,7 @@ class RayPackets : public Peer {
  public:
   RayPackets(std::string name, std::shared_ptr<const Scene> scene) : Peer(std::move(name)), scene_(std::move(scene)) {}
   bool does(Task task) const override { return task == Task::kFirstOfCamera; }
+  std::string known_fault(Task) const override { return kLeaks; }
   void first(absl::Span<const RayQuery> rays, RayAnswer* answers) override {
     RTCIntersectContext context = context_of(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
     for (size_t begin = 0; begin < rays.size(); begin += kWidth) {
@@ -223,19 +229,19 @@ class PointQuery : public Peer {
   PointQuery(const BenchMesh& mesh, std::shared_ptr<const Scene> scene)
       : Peer("embree_point_query"), triangles_(mesh.triangles), scene_(std::move(scene)) {}
   bool does(Task task) const override { return task == Task::kBall || task == Task::kBox; }
-  void ball_ids(absl::Span<const Ballf> balls, uint32_t* ids, uint32_t* counts) override {
+  void ball_ids(absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) override {
     for (const Ballf& ball : balls) {
       const auto test = [&](const Triangle& triangle) {
         return scalar_squared_distance(ball.center, triangle) <= ball.radius * ball.radius;
       };
-      *counts++ = ask(ball, ids, test);
+      *counts++ = ask(ball, ids.data(), test);
     }
   }
-  void box_ids(absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) override {
+  void box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) override {
     constexpr float kAround = 1.00001f;
     for (const Obbf& box : boxes) {
       const auto test = [&](const Triangle& triangle) { return scalar_box_overlaps(box.center, box.half, triangle); };
-      *counts++ = ask({box.center, std::sqrt(squared_length(box.half)) * kAround}, ids, test);
+      *counts++ = ask({box.center, std::sqrt(squared_length(box.half)) * kAround}, ids.data(), test);
     }
   }
 
@@ -291,10 +297,10 @@ void add_embree_peers(const BenchMesh& mesh, Needs needs, Peers& peers) {
   if (needs.rays) {
     const auto robust = committed(mesh, RTC_SCENE_FLAG_ROBUST);
     const std::vector<Task> firsts = {Task::kFirst, Task::kFirstOfCamera};
-    peers.push_back(std::make_unique<SingleRays>("embree_intersect1", usual, firsts));
-    peers.push_back(std::make_unique<SingleRays>("embree_occluded1", usual, std::vector<Task>{Task::kAny}));
-    peers.push_back(std::make_unique<SingleRays>("embree_robust", robust,
-                                                 std::vector<Task>{Task::kFirst, Task::kFirstOfCamera, Task::kAny}));
+    peers.push_back(std::make_unique<SingleRays>("embree_intersect1", usual, firsts, kLeaks));
+    peers.push_back(std::make_unique<SingleRays>("embree_occluded1", usual, std::vector<Task>{Task::kAny}, kLeaks));
+    peers.push_back(std::make_unique<SingleRays>(
+        "embree_robust", robust, std::vector<Task>{Task::kFirst, Task::kFirstOfCamera, Task::kAny}, ""));
     peers.push_back(std::make_unique<RayStream>(usual));
     peers.push_back(std::make_unique<CoherentRayStream>(usual));
     peers.push_back(std::make_unique<RayPackets<RTCRayHit8, 8>>("embree_intersect8", usual));

@@ -10,12 +10,14 @@
 #include "core/base/check.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/index_queries.h"
+#include "core/query/triangle_search.h"
 #include "tests/bench/frame/results_hash.h"
 
 namespace locus::bench {
 namespace {
 
-constexpr size_t kBatch = 1024;  // rays given to the kernels at once
+constexpr size_t kBatch = 1024;      // rays given to the kernels at once
+constexpr size_t kRegionBatch = 16;  // balls or boxes given at once
 
 using AskKernel = void (*)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
 
@@ -77,6 +79,19 @@ void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQue
   }
 }
 
+// Each batch from the start of `ids` again; what does not fit behind the others is asked once more.
+template <class Shape>
+void find_in_batches(const TriangleBvh& tree, absl::Span<const Shape> shapes, absl::Span<uint32_t> ids,
+                     uint32_t* counts) {
+  while (!shapes.empty()) {
+    const absl::Span<const Shape> batch = shapes.subspan(0, kRegionBatch);
+    const size_t done = find_triangles(tree, batch, absl::MakeSpan(counts, batch.size()), ids);
+    LOCUS_CHECK_LT(size_t{0}, done);
+    shapes.remove_prefix(done);
+    counts += done;
+  }
+}
+
 class OurBuilder : public Builder {
  public:
   explicit OurBuilder(const BenchMesh& mesh) : Builder("locus"), mesh_(mesh) {}
@@ -123,24 +138,12 @@ void Ours::any(absl::Span<const RayQuery> rays, uint8_t* answers) {
   ask_kernels(tree, kernels->any, rays, settled, by_triangles);
 }
 
-void Ours::ball_ids(absl::Span<const Ballf> balls, uint32_t* ids, uint32_t* counts) {
-  std::vector<Triangle> found;
-  for (const Ballf& ball : balls) {
-    found.clear();
-    ball_overlap(mesh_->tree(), ball, found);
-    std::transform(found.begin(), found.end(), ids, [](const Triangle& triangle) { return triangle.number; });
-    *counts++ = static_cast<uint32_t>(found.size());
-  }
+void Ours::ball_ids(absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) {
+  find_in_batches(mesh_->tree(), balls, ids, counts);
 }
 
-void Ours::box_ids(absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) {
-  std::vector<Triangle> found;
-  for (const Obbf& box : boxes) {
-    found.clear();
-    box_overlap(mesh_->tree(), box, found);
-    std::transform(found.begin(), found.end(), ids, [](const Triangle& triangle) { return triangle.number; });
-    *counts++ = static_cast<uint32_t>(found.size());
-  }
+void Ours::box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) {
+  find_in_batches(mesh_->tree(), boxes, ids, counts);
 }
 
 std::unique_ptr<Builder> our_builder(const BenchMesh& mesh) { return std::make_unique<OurBuilder>(mesh); }

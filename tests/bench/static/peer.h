@@ -16,6 +16,7 @@
 namespace locus::bench {
 
 inline constexpr uint32_t kNoTriangle = 0xFFFFFFFFu;
+inline constexpr size_t kSpareIds = 65'536;
 
 struct RayAnswer {
   float t = 0;  // of a hit
@@ -42,10 +43,11 @@ class Peer {
   // `answers` holds one for each ray. Only what does() says is called.
   virtual void first(absl::Span<const RayQuery>, RayAnswer*) {}
   virtual void any(absl::Span<const RayQuery>, uint8_t*) {}
-  // The numbers of all triangles that the ball or box reaches, in any order, for each query from the start of `ids`
-  // again; `ids` has room for all triangles of the mesh and 64 more, `counts` for one number a query.
-  virtual void ball_ids(absl::Span<const Ballf>, uint32_t* /*ids*/, uint32_t* /*counts*/) {}
-  virtual void box_ids(absl::Span<const Obbf>, uint32_t* /*ids*/, uint32_t* /*counts*/) {}
+  // The numbers of all triangles that each ball or box reaches, in any order, written to `ids` from its start again
+  // where that is full or the peer works query by query; it has room for all triangles of the mesh and kSpareIds more.
+  // A call with one query leaves that query's numbers at the start. `counts`: how many, query by query.
+  virtual void ball_ids(absl::Span<const Ballf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
+  virtual void box_ids(absl::Span<const Obbf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
 
  private:
   const std::string name_;

@@ -3,6 +3,7 @@
 #include "absl/strings/str_cat.h"
 #ifdef LOCUS_BENCH_EMBREE
 #include "tests/bench/static/embree.h"
+#include "tests/bench/static/embree_collide.h"
 #endif
 #ifdef LOCUS_BENCH_BULLET
 #include "tests/bench/static/bullet.h"
@@ -21,6 +22,7 @@ Peers all_peers([[maybe_unused]] const BenchMesh& mesh, [[maybe_unused]] Needs n
   Peers peers;
 #ifdef LOCUS_BENCH_EMBREE
   add_embree_peers(mesh, needs, peers);
+  add_embree_collide_peer(mesh, needs, peers);
 #endif
 #ifdef LOCUS_BENCH_BULLET
   add_bullet_peer(mesh, needs, peers, notes);

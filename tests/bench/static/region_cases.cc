@@ -8,8 +8,6 @@
 namespace locus::bench {
 namespace {
 
-constexpr size_t kSpareIds = 64;  // room behind the last id, for those who write several at once
-
 struct RegionCase {
   const char* name;
   Task task;
@@ -32,10 +30,10 @@ size_t query_count(const RegionCase& region_case, const MeshRun& run) {
   return run.mesh.triangles.size() > kManyTriangles ? region_case.count / 10 : region_case.count;
 }
 
-void ask(Peer& peer, absl::Span<const Ballf> balls, uint32_t* ids, uint32_t* counts) {
+void ask(Peer& peer, absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) {
   peer.ball_ids(balls, ids, counts);
 }
-void ask(Peer& peer, absl::Span<const Obbf> boxes, uint32_t* ids, uint32_t* counts) {
+void ask(Peer& peer, absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) {
   peer.box_ids(boxes, ids, counts);
 }
 bool overlaps(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
@@ -99,7 +97,7 @@ class RegionRace {
 
   absl::Span<const uint32_t> ids_of(Peer& peer, const Query& query) {
     uint32_t count = 0;
-    ask(peer, absl::MakeConstSpan(&query, 1), ids_.data(), &count);
+    ask(peer, absl::MakeConstSpan(&query, 1), absl::MakeSpan(ids_), &count);
     return absl::MakeConstSpan(ids_.data(), count);
   }
 
@@ -137,7 +135,7 @@ class RegionRace {
     const size_t count = entry.asked.queries.size();
     const auto run_chunk = [this, &entry, count, chunks](size_t chunk) {
       const size_t begin = chunk_begin(count, chunk, chunks), end = chunk_begin(count, chunk + 1, chunks);
-      ask(*entry.peer, absl::MakeConstSpan(entry.asked.queries).subspan(begin, end - begin), ids_.data(),
+      ask(*entry.peer, absl::MakeConstSpan(entry.asked.queries).subspan(begin, end - begin), absl::MakeSpan(ids_),
           entry.counts.data() + begin);
     };
     return {entry.peer->name(), run_chunk, static_cast<double>(count), {}};
