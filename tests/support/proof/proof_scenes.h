@@ -92,6 +92,26 @@ inline std::vector<PlacedMesh> proof_placements(Random& random) {
   return placements;
 }
 
+inline std::vector<PlacedMesh> three_through_each_other(double size, Random& random) {
+  std::vector<PlacedMesh> three(3);
+  three[1].translation = random.vector(size / 2);
+  three[2].translation = random.vector(size / 2);
+  three[2].rotation = random.rotation();
+  three[2].scale = 0.75f;
+  return three;
+}
+
+// So that rays meet several, in one order by their bounds and in another by their hits.
+inline std::vector<PlacedMesh> many_all_over(double size, Random& random) {
+  std::vector<PlacedMesh> many(20);
+  for (PlacedMesh& placed : many) {
+    placed.translation = random.vector(2 * size);
+    if (random.chance(0.7)) placed.rotation = random.rotation();
+    placed.scale = static_cast<float>(random.magnitude(-2, 1));
+  }
+  return many;
+}
+
 inline ProofScene proof_scene(const std::shared_ptr<const ProofMesh>& mesh, std::vector<PlacedMesh> placements) {
   QueryWorld world;
   for (size_t i = 0; i < placements.size(); ++i) {
@@ -120,19 +140,15 @@ inline std::vector<std::shared_ptr<const ProofMesh>> proof_meshes(uint64_t seed)
           proof_mesh(bumpy_sphere(100, 0.02, seed))};
 }
 
-// Every mesh at every placement, and three of it through each other.
+// Every mesh at every placement, three of it through each other, and many.
 inline std::vector<ProofScene> proof_scenes(uint64_t seed) {
   Random random(seed);
   std::vector<ProofScene> scenes;
   for (const std::shared_ptr<const ProofMesh>& mesh : proof_meshes(seed)) {
     for (const PlacedMesh& placement : internal::proof_placements(random))
       scenes.push_back(internal::proof_scene(mesh, {placement}));
-    std::vector<PlacedMesh> several(3);
-    several[1].translation = random.vector(mesh->size / 2);
-    several[2].translation = random.vector(mesh->size / 2);
-    several[2].rotation = random.rotation();
-    several[2].scale = 0.75f;
-    scenes.push_back(internal::proof_scene(mesh, several));
+    scenes.push_back(internal::proof_scene(mesh, internal::three_through_each_other(mesh->size, random)));
+    scenes.push_back(internal::proof_scene(mesh, internal::many_all_over(mesh->size, random)));
   }
   return scenes;
 }
