@@ -40,31 +40,32 @@ inline float scalar_squared_distance(Vec3f point, const Triangle& triangle) {
   return squared_distance_at(ap, ab, ac, vb * whole, vc * whole);
 }
 
-// Whether the axis edge x unit vector of `axis` separates: `v` are the vertices from the box's centre.
-inline bool edge_separates(const Vec3f (&v)[3], Vec3f edge, Vec3f half, int axis) {
-  const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-  const float from_next = -edge[last], from_last = edge[next];
-  const float p0 = from_next * v[0][next] + from_last * v[0][last];
-  const float p1 = from_next * v[1][next] + from_last * v[1][last];
-  const float p2 = from_next * v[2][next] + from_last * v[2][last];
-  const float reach = half[next] * std::fabs(from_next) + half[last] * std::fabs(from_last);
+// Whether an axis separates: `p0`, `p1`, `p2` are the vertices along it, `reach` is the box's half.
+inline bool separates(float p0, float p1, float p2, float reach) {
   return std::min(p0, std::min(p1, p2)) > reach || std::max(p0, std::max(p1, p2)) < -reach;
+}
+
+// The three axes edge x unit vector. The vertices are seen from the box's centre.
+inline bool edge_separates(Vec3f a, Vec3f b, Vec3f c, Vec3f edge, Vec3f half) {
+  const float x = std::fabs(edge.x), y = std::fabs(edge.y), z = std::fabs(edge.z);
+  return separates(edge.y * a.z - edge.z * a.y, edge.y * b.z - edge.z * b.y, edge.y * c.z - edge.z * c.y,
+                   half.y * z + half.z * y) ||
+         separates(edge.z * a.x - edge.x * a.z, edge.z * b.x - edge.x * b.z, edge.z * c.x - edge.x * c.z,
+                   half.z * x + half.x * z) ||
+         separates(edge.x * a.y - edge.y * a.x, edge.x * b.y - edge.y * b.x, edge.x * c.y - edge.y * c.x,
+                   half.x * y + half.y * x);
 }
 
 // Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001: three axes of the box, the normal, nine products.
 inline bool scalar_box_overlaps(Vec3f centre, Vec3f half, const Triangle& triangle) {
-  const Vec3f v[3] = {triangle.a - centre, triangle.b - centre, triangle.c - centre};
-  const Vec3f low = min(min(v[0], v[1]), v[2]), high = max(max(v[0], v[1]), v[2]);
-  if (low.x > half.x || low.y > half.y || low.z > half.z) return false;
-  if (high.x < -half.x || high.y < -half.y || high.z < -half.z) return false;
-  const Vec3f edges[3] = {v[1] - v[0], v[2] - v[1], v[0] - v[2]};
-  const Vec3f normal = cross(edges[0], edges[1]);
+  const Vec3f a = triangle.a - centre, b = triangle.b - centre, c = triangle.c - centre;
+  if (separates(a.x, b.x, c.x, half.x) || separates(a.y, b.y, c.y, half.y) || separates(a.z, b.z, c.z, half.z))
+    return false;
+  const Vec3f ab = b - a, bc = c - b, ca = a - c;
+  const Vec3f normal = cross(ab, bc);
   const float reach = half.x * std::fabs(normal.x) + half.y * std::fabs(normal.y) + half.z * std::fabs(normal.z);
-  if (std::fabs(dot(normal, v[0])) > reach) return false;
-  for (const Vec3f& edge : edges)
-    for (int axis = 0; axis < 3; ++axis)
-      if (edge_separates(v, edge, half, axis)) return false;
-  return true;
+  if (std::fabs(dot(normal, a)) > reach) return false;
+  return !edge_separates(a, b, c, ab, half) && !edge_separates(a, b, c, bc, half) && !edge_separates(a, b, c, ca, half);
 }
 
 }  // namespace locus::bench
