@@ -46,7 +46,7 @@ class PlacedTriangles {
   // that lies far from its own origin.
   static double lever(const Instance& instance) {
     return max_component(abs(instance.transform.translation)) +
-           double{instance.transform.scale} * magnitude(instance.mesh->mesh().bounds());
+           double{instance.transform.scale} * magnitude(instance.mesh->bounds());
   }
 
   const Instance& instance_;

@@ -135,7 +135,7 @@ Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding) {
   }
   if (hit.instance == nullptr) return surface;
   const Transform& transform = hit.instance->transform;
-  const Triangle triangle = hit.instance->mesh->mesh().triangle(hit.triangle);
+  const Triangle triangle = hit.instance->mesh->triangle(hit.triangle);
   const TriangleRay ray(transform.point_to_mesh(request.origin), transform.direction_to_mesh(request.direction));
   if (const std::optional<TriangleHit> found = ray.hit(triangle)) {
     surface.u = found->u;

@@ -67,7 +67,7 @@ absl::StatusOr<Instance> read_instance(const PlacementColumns& place, uint32_t i
   Instance instance;
   instance.mesh = place.mesh;
   instance.transform = *transform;
-  instance.bounds = bounds_to_world(*transform, place.mesh->mesh().bounds());
+  instance.bounds = bounds_to_world(*transform, place.mesh->bounds());
   instance.layers = ColumnReader<uint32_t>(place.layers, 1).value(i, kDefaultLayers);
   instance.group = ColumnReader<uint64_t>(place.groups, 1).value(i, 0);
   instance.tag = ColumnReader<uint64_t>(place.tags, 1).value(i, 0);
@@ -172,7 +172,7 @@ absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
     const Instance& instance = set->tree_.values()[i];
     set->positions_.emplace(instance.id, i);
     ++set->uses_[instance.mesh.get()];
-    set->triangle_count_ += instance.mesh->mesh().triangle_count();
+    set->triangle_count_ += instance.mesh->triangle_count();
   }
   return Changed{std::move(set), std::move(changing.placed())};
 }

@@ -106,12 +106,12 @@ v1::Mesh to_proto(const Registry::NamedMesh& mesh) {
   out.set_name(mesh.name);
   const Sha256& sha256 = mesh.mesh->sha256();
   out.set_sha256(sha256.data(), sha256.size());
-  out.set_vertices(static_cast<uint32_t>(mesh.mesh->mesh().vertices().size() / 3));
-  out.set_triangles(mesh.mesh->mesh().triangle_count());
-  out.set_zero_area_triangles(mesh.mesh->mesh().zero_area_count());
+  out.set_vertices(mesh.mesh->vertex_count());
+  out.set_triangles(mesh.mesh->triangle_count());
+  out.set_zero_area_triangles(mesh.mesh->zero_area_count());
   out.set_bytes(mesh.mesh->bytes());
   out.set_uses(mesh.uses);
-  for (const MeshPart& part : mesh.mesh->mesh().parts()) {
+  for (const MeshPart& part : mesh.mesh->parts()) {
     v1::MeshPart* out_part = out.add_parts();
     out_part->set_name(part.name);
     out_part->set_first_triangle(part.first_triangle);

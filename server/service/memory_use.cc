@@ -14,8 +14,10 @@ namespace {
 // An object that is inserted or moved copies its cell and its way through the tree of ids.
 constexpr uint64_t kBytesAnItem = 700;
 constexpr uint64_t kBytesABatch = 16384;
-// Columns, their copy by triangle, the tree and what building it takes, together against the columns alone.
-constexpr uint64_t kUploadTimesColumns = 8;
+// Columns grow by doubling while they come, ...
+constexpr uint64_t kUploadTimesColumns = 3;
+// ... then there are their copy by triangle, what building takes, the tree, and what is kept beside it.
+constexpr uint64_t kBytesATriangle = 180;
 constexpr uint64_t kBytesAnInstance = 1024;
 
 uint64_t resident_bytes() {
@@ -50,7 +52,7 @@ UpdateCost cost_of(const UpdateBatch& batch) {
 
 uint64_t upload_cost(uint32_t vertices, uint32_t triangles) {
   const uint64_t columns = 3 * sizeof(float) * uint64_t{vertices} + 3 * sizeof(uint32_t) * uint64_t{triangles};
-  return columns * kUploadTimesColumns;
+  return columns * kUploadTimesColumns + triangles * kBytesATriangle;
 }
 
 uint64_t change_cost(const StaticSet& statics, const StaticChange& change) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "absl/types/span.h"
 #include "core/base/limits.h"
@@ -21,6 +22,8 @@ constexpr size_t kTripleBytes = 12;
 // A part's name, the triangle it begins at, and the tags and lengths of both and of the part.
 constexpr size_t kMostPartBytes = limits::kMaxLabelLength + 16;
 static_assert(kMostPartBytes <= kRoom);
+// Indices that are unpacked before they go into a piece.
+constexpr uint64_t kIndicesAtOnce = 3 << 14;
 
 // Fills pieces and hands each over when it is full.
 class Pieces {
@@ -50,6 +53,8 @@ class Pieces {
     }
   }
 
+  bool taken() const { return taken_; }
+
   bool finish() {
     taken_ = taken_ && take_(piece_);
     return taken_;
@@ -72,19 +77,29 @@ class Pieces {
 }  // namespace
 
 bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) {
-  const TriangleMesh& triangles = mesh.mesh->mesh();
+  const StaticMesh& from = *mesh.mesh;
   Pieces pieces(mesh, take);
-  for (const MeshPart& part : triangles.parts()) pieces.add(part);
-  pieces.add(absl::MakeConstSpan(triangles.vertices()), &v1::DownloadMeshResponse::mutable_vertices);
-  pieces.add(absl::MakeConstSpan(triangles.indices()), &v1::DownloadMeshResponse::mutable_indices);
+  for (const MeshPart& part : from.parts()) pieces.add(part);
+  pieces.add(absl::MakeConstSpan(from.vertices()), &v1::DownloadMeshResponse::mutable_vertices);
+  PackedIndices::Reader reader = from.indices();
+  std::vector<uint32_t> some;
+  for (uint64_t left = uint64_t{3} * from.triangle_count(); left > 0 && pieces.taken(); left -= some.size()) {
+    some.resize(std::min(left, kIndicesAtOnce));
+    for (uint32_t& index : some) index = reader.next();
+    pieces.add(absl::MakeConstSpan(some), &v1::DownloadMeshResponse::mutable_indices);
+  }
   return pieces.finish();
 }
 
-absl::Status download_mesh(const Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
+absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
                            grpc::ServerWriter<v1::DownloadMeshResponse>& writer) {
   if (absl::Status status = check_mesh_name(request.mesh(), "mesh"); !status.ok()) return status;
   absl::StatusOr<MeshPtr> mesh = host.registry.find_mesh(request.mesh(), "mesh");
   if (!mesh.ok()) return mesh.status();
+  // The vertices are made anew.
+  const absl::StatusOr<MemoryBudget::Claim> room =
+      host.memory.claim("mesh", uint64_t{kTripleBytes} * (*mesh)->vertex_count());
+  if (!room.ok()) return room.status();
   const uint32_t uses = host.registry.mesh_uses(mesh->get());
   const auto take = [&](const v1::DownloadMeshResponse& piece) { return caller.stop().ok() && writer.Write(piece); };
   if (send_mesh({request.mesh(), *std::move(mesh), uses}, take)) return absl::OkStatus();

@@ -21,7 +21,7 @@ using TakeMeshPiece = std::function<bool(const v1::DownloadMeshResponse&)>;
 bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take);
 
 // Holds the mesh until its last piece is sent, whoever deletes it meanwhile.
-absl::Status download_mesh(const Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
+absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
                            grpc::ServerWriter<v1::DownloadMeshResponse>& writer);
 
 }  // namespace locus::server

@@ -98,7 +98,7 @@ absl::StatusOr<bool> answer_early(Host& host, const MeshUpload& upload, v1::Uplo
     return refuse_full("mesh", "meshes", host.config.max_meshes, static_cast<double>(meshes + 1), 0);
   if (!upload.announced()) return false;
   MeshPtr known = host.registry.find_content(*upload.announced());
-  if (known != nullptr && upload.has_counts_of(known->mesh())) {
+  if (known != nullptr && upload.has_counts_of(*known)) {
     const absl::Status status = reuse(host, upload.name(), std::move(known), response);
     if (!status.ok()) return status;
     return true;
@@ -161,8 +161,8 @@ absl::Status MeshUpload::append_later(const v1::UploadMeshRequest& message) {
   return append(message);
 }
 
-bool MeshUpload::has_counts_of(const TriangleMesh& mesh) const {
-  return mesh.vertices().size() == vertex_numbers_ && mesh.indices().size() == index_numbers_;
+bool MeshUpload::has_counts_of(const StaticMesh& mesh) const {
+  return size_t{3} * mesh.vertex_count() == vertex_numbers_ && size_t{3} * mesh.triangle_count() == index_numbers_;
 }
 
 absl::StatusOr<MeshUpload::Complete> MeshUpload::finish() {
@@ -197,8 +197,13 @@ absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1
   if (!complete.ok()) return complete.status();
   if (MeshPtr known = host.registry.find_content(complete->sha256); known != nullptr)
     return reuse(host, upload->name(), std::move(known), response);
+  BvhOptions options;
+  options.cancel = host.drain.ended_flag();
+  options.parallel_for = [&host](size_t n, const std::function<void(size_t)>& work) {
+    host.pool.parallel_for(n, work);
+  };
   absl::StatusOr<MeshPtr> built =
-      StaticMesh::build(upload->name(), complete->sha256, std::move(complete->mesh), host.drain.ended_flag());
+      StaticMesh::build(upload->name(), complete->sha256, std::move(complete->mesh), options);
   if (!built.ok()) return built.status();
   absl::StatusOr<MeshPtr> added = host.registry.add_mesh(upload->name(), *std::move(built));
   if (!added.ok()) return added.status();

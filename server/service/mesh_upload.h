@@ -33,7 +33,7 @@ class MeshUpload {
   const std::string& name() const { return name_; }
   const std::optional<Sha256>& announced() const { return announced_; }
   // True for a mesh with as many vertices and triangles as were announced.
-  bool has_counts_of(const TriangleMesh& mesh) const;
+  bool has_counts_of(const StaticMesh& mesh) const;
 
   struct Complete {
     Sha256 sha256;

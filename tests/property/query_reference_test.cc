@@ -44,7 +44,7 @@ struct Judgement {
 Judgement judge(const SceneSnapshot& snapshot, const OwnedBlock& block, const std::vector<Triangle>& triangles) {
   const Instance& instance = snapshot.statics->tree().values()[0];
   const Transform& transform = instance.transform;
-  const Real extent = magnitude(instance.mesh->mesh().bounds());
+  const Real extent = magnitude(instance.mesh->bounds());
   const BlockResult result = run_block(snapshot, block);
   Judgement judgement;
   for (size_t i = 0; i < result.t.size(); ++i) {
@@ -106,7 +106,7 @@ std::vector<Triangle> slivers(uint64_t seed) {
 void expect_no_miss(const std::vector<Triangle>& triangles, uint64_t rays, uint64_t seed) {
   Random random(seed);
   const StaticMeshPtr mesh = mesh_of(triangles);
-  const double size = magnitude(mesh->mesh().bounds());
+  const double size = magnitude(mesh->bounds());
   Judgement sum;
   constexpr uint64_t kTransforms = 10;
   for (uint64_t i = 0; i < kTransforms; ++i) {
@@ -143,7 +143,7 @@ TEST(QueryReferenceTest, NoRayMissesTrianglesOfScenesKnownForTrouble) {
     QueryWorld world;
     world.instances = {placed(1, mesh_of(triangles))};
     const SnapshotPtr snapshot = snapshot_of(world);
-    const Aabbf bounds = world.instances[0].mesh->mesh().bounds();
+    const Aabbf bounds = world.instances[0].mesh->bounds();
     const double size = max_component(to_double(bounds.extent()));
     const OwnedBlock block = rays_at(triangles, snapshot->statics->find(1)->transform, size, random, 1'000);
     EXPECT_EQ(judge(*snapshot, block, triangles).misses, 0u) << "seed " << seed;

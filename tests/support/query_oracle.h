@@ -93,8 +93,8 @@ class QueryOracle {
     const TriangleRay ray(transform.point_to_mesh(question.origin), transform.direction_to_mesh(question.direction),
                           question.cull);
     const PlacedTriangles placed(instance);
-    for (uint32_t number = 0; number < instance.mesh->mesh().triangle_count(); ++number) {
-      const Triangle triangle = instance.mesh->mesh().triangle(number);
+    for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
+      const Triangle triangle = instance.mesh->triangle(number);
       const std::optional<float> own = entry_of(slabs, placed.bounds_of_triangle(triangle));
       if (!own) continue;
       Row row{std::max(*own, *whole), instance.id, number, 0, nullptr, &instance, 0, 0, {}};
@@ -198,8 +198,8 @@ class QueryOracle {
     const PlacedTriangles placed(instance, reach(solid));
     const auto mesh_solid = in_mesh(solid, instance.transform);
     const std::vector<uint32_t>& storage = storage_.at(instance.mesh.get());
-    for (uint32_t number = 0; number < instance.mesh->mesh().triangle_count(); ++number) {
-      const Triangle triangle = instance.mesh->mesh().triangle(number);
+    for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
+      const Triangle triangle = instance.mesh->triangle(number);
       if (!meets(solid, placed.bounds_of_triangle(triangle))) continue;
       if (block.precision == Precision::kExact && !meets(mesh_solid, triangle)) continue;
       Row row{0, instance.id, kNoTriangle, 0, nullptr, &instance, 0, 0, {}};

@@ -67,7 +67,7 @@ inline void add_instances(const SceneSketch& sketch, Random& random, QueryWorld&
   }
   std::erase_if(world.instances, [](const PlacedMesh& placed) {
     const Transform transform = make_transform(placed.translation, placed.rotation, placed.scale);
-    return magnitude(bounds_to_world(transform, placed.mesh->mesh().bounds())) > 1.9e9;
+    return magnitude(bounds_to_world(transform, placed.mesh->bounds())) > 1.9e9;
   });
 }
 

@@ -37,6 +37,10 @@ class TriangleBvh {
   const Aabbf& bounds() const { return bounds_; }
   uint32_t depth() const { return arrays_.depth; }
   size_t node_count() const { return arrays_.node_count; }
+  size_t block_count() const { return arrays_.block_count; }
+  // One of a block, which is one of tree(); place below the block's count.
+  Triangle triangle(const TriangleBlock& block, uint32_t place) const;
+  // All memory that stays taken besides the object itself.
   size_t bytes() const;
   // As Bvh::sah_cost().
   double sah_cost() const;
@@ -69,7 +73,6 @@ class TriangleBvh {
     return {{node.bounds[0][slot], node.bounds[1][slot], node.bounds[2][slot]},
             {node.bounds[3][slot], node.bounds[4][slot], node.bounds[5][slot]}};
   }
-  Triangle triangle(const TriangleBlock& block, uint32_t place) const;
   Interval<float> node_interval(const SlabRay<float>& slabs, const Aabbf& box) const;
   // Puts the children the ray may hit on the stack, farthest first. Returns the new top.
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;

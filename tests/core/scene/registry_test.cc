@@ -203,7 +203,7 @@ TEST_F(RegistryTest, AMeshInUseOutlivesItsRegistry) {
     ASSERT_TRUE(scene->change_instances(placing(placement({1}, {0, 0, 0}))).ok());
   }
   mesh_.reset();
-  EXPECT_EQ(scene->latest()->statics->find(1)->mesh->mesh().triangle_count(), 1u);
+  EXPECT_EQ(scene->latest()->statics->find(1)->mesh->triangle_count(), 1u);
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ inline Vec3d boundary_point(const Triangle& triangle, Random& random) {
 }
 
 inline Vec3d point_around(const ProofMesh& mesh, double share, Random& random) {
-  const Aabbf bounds = mesh.stored->mesh().bounds();
+  const Aabbf bounds = mesh.stored->bounds();
   Vec3d point;
   for (int axis = 0; axis < 3; ++axis)
     point[axis] = random.between(bounds.min[axis] - share * mesh.size, bounds.max[axis] + share * mesh.size);

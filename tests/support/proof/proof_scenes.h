@@ -35,7 +35,7 @@ struct ProofScene {
 inline std::shared_ptr<const ProofMesh> proof_mesh(std::vector<Triangle> triangles, double lattice = 0) {
   number_in_order(triangles);
   StaticMeshPtr stored = mesh_of(triangles);
-  const Aabbf bounds = stored->mesh().bounds();
+  const Aabbf bounds = stored->bounds();
   ReferenceTree reference(triangles);
   return std::make_shared<const ProofMesh>(ProofMesh{std::move(triangles), std::move(stored), std::move(reference),
                                                      Real{magnitude(bounds)}, double{max_component(bounds.extent())},
