@@ -42,16 +42,35 @@ void BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end) 
   }
 }
 
-void BlockRunner::append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest* request) {
+void BlockRunner::append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest& request) {
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
   const Winding winding = task_.snapshot().winding;
-  for (size_t row = 0; row < kept; ++row) {
-    append_row(rows[row], columns_, result_);
-    if (request != nullptr) append_surface(*request, block_.frame, rows[row], winding, columns_, result_);
+  for (const Hit& row : rows.subspan(0, kept)) {
+    append_row(row, columns_, result_);
+    append_surface(request, block_.frame, row, winding, columns_, result_);
   }
-  rows_ += kept;
-  result_.counts.push_back(static_cast<uint32_t>(kept));
-  if (truncated || kept < rows.size()) result_.truncated.push_back(static_cast<uint32_t>(i));
+  count_rows(kept, truncated || kept < rows.size(), i);
+}
+
+void BlockRunner::append_runs(const OverlapAnswer& answer, size_t i) {
+  size_t kept = 0;
+  bool cut = answer.truncated;
+  for (const RowRun& run : answer.runs) {
+    const size_t rows = std::min<uint64_t>(run.rows(), max_rows_ - rows_ - kept);
+    if (run.triangle_count != 0)
+      append_triangle_rows(run.row, answer.triangles_of(run).subspan(0, rows), columns_, result_);
+    else if (rows != 0)
+      append_row(run.row, columns_, result_);
+    cut = cut || rows < run.rows();
+    kept += rows;
+  }
+  count_rows(kept, cut, i);
+}
+
+void BlockRunner::count_rows(size_t rows, bool cut, size_t i) {
+  rows_ += rows;
+  result_.counts.push_back(static_cast<uint32_t>(rows));
+  if (cut) result_.truncated.push_back(static_cast<uint32_t>(i));
 }
 
 void BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) {
@@ -65,7 +84,7 @@ void BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) 
 }
 
 void BlockRunner::append_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i) {
-  if (rays.mode == RayMode::kAll) return append_counted(answer.hits, answer.truncated, i, &request);
+  if (rays.mode == RayMode::kAll) return append_counted(answer.hits, answer.truncated, i, request);
   if (answer.truncated) result_.truncated.push_back(static_cast<uint32_t>(i));
   if (rays.mode == RayMode::kAny) {
     result_.hits.push_back(answer.hits.empty() ? '\0' : '\1');
@@ -80,20 +99,20 @@ void BlockRunner::run_query(const BallColumns& balls, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
     answer = run_ball(task_, ball_of(block_, balls, i), overlap_options(block_, balls.detail), Filter(block_, i));
-  append_counted(answer.rows, answer.truncated, i, nullptr);
+  append_runs(answer, i);
 }
 
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
     answer = run_box(task_, box_of(block_, boxes, i), overlap_options(block_, boxes.detail), Filter(block_, i));
-  append_counted(answer.rows, answer.truncated, i, nullptr);
+  append_runs(answer, i);
 }
 
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
   if (lookup.groups.empty()) return append_row(look_up(task_.snapshot(), lookup.ids[i]), columns_, result_);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];
-  append_counted(answer.rows, answer.truncated, i, nullptr);
+  append_runs(answer, i);
 }
 
 }  // namespace locus

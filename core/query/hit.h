@@ -16,13 +16,12 @@ struct Hit {
   float t = std::numeric_limits<float>::infinity();  // in units of the ray's direction
   Id id = kNoId;                                     // 0 = a miss
   uint32_t triangle = kNoTriangle;                   // number in the mesh
-  uint32_t storage = 0;                              // ascends with the mesh's storage order
   const Object* object = nullptr;                    // one of the two, or neither for a miss
   const Instance* instance = nullptr;
 };
 
-inline Hit hit_on(const Object& object, float t) { return {t, object.id, kNoTriangle, 0, &object, nullptr}; }
-inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, 0, nullptr, &instance}; }
+inline Hit hit_on(const Object& object, float t) { return {t, object.id, kNoTriangle, &object, nullptr}; }
+inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, nullptr, &instance}; }
 
 // The order of ray hits: nearer first, then lower id, then lower triangle.
 inline bool nearer(const Hit& a, const Hit& b) {

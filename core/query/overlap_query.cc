@@ -1,8 +1,5 @@
 #include "core/query/overlap_query.h"
 
-#include <algorithm>
-#include <tuple>
-
 #include "core/index/regions.h"
 #include "core/query/placed_triangle.h"
 #include "core/query/triangle_search.h"
@@ -85,30 +82,19 @@ class InstanceRows {
       if (!numbers.empty()) rows_.offer(hit_on(instance_, 0));
       return numbers.empty();
     }
-    const size_t wanted = detail_ == StaticDetail::kTriangles ? size_t{max_results_} + 1 - found_ : numbers.size();
-    const absl::Span<const uint32_t> kept = numbers.subspan(0, wanted);
-    rows_.offer(hit_on(instance_, 0), kept, found_);
-    found_ += static_cast<uint32_t>(kept.size());
+    rows_.offer(hit_on(instance_, 0), numbers);
+    found_ += numbers.size();
     return detail_ != StaticDetail::kTriangles || found_ <= max_results_;
   }
 
-  // False when the instance needs no more triangles.
-  bool offer(const Triangle& triangle) {
-    Hit row = hit_on(instance_, 0);
-    if (detail_ != StaticDetail::kInstances) {
-      row.triangle = triangle.number;
-      row.storage = found_++;
-    }
-    rows_.offer(row);
-    return detail_ != StaticDetail::kInstances;
-  }
+  bool offer(const Triangle& triangle) { return offer({&triangle.number, 1}); }
 
  private:
   const Instance& instance_;
   const StaticDetail detail_;
   const uint32_t max_results_;
   LowestRows& rows_;
-  uint32_t found_ = 0;
+  size_t found_ = 0;
 };
 
 template <class Kind>
@@ -237,46 +223,6 @@ OverlapAnswer run_overlap(QueryTask& task, const typename Kind::World& shape, co
 Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
 
 }  // namespace
-
-bool LowestRows::before(const Hit& a, const Hit& b) const {
-  if (sorted_triangles_) return std::tie(a.id, a.triangle) < std::tie(b.id, b.triangle);
-  return std::tie(a.id, a.storage) < std::tie(b.id, b.storage);
-}
-
-void LowestRows::offer(const Hit& row) {
-  answer_.rows.push_back(row);
-  if (answer_.rows.size() > 2 * max_results_) keep_lowest();
-}
-
-void LowestRows::offer(const Hit& head, absl::Span<const uint32_t> triangles, uint32_t storage) {
-  Hit row = head;
-  for (size_t first = 0; first < triangles.size(); first += max_results_) {
-    for (const uint32_t triangle : triangles.subspan(first, max_results_)) {
-      row.triangle = triangle;
-      row.storage = storage++;
-      answer_.rows.push_back(row);
-    }
-    if (answer_.rows.size() > 2 * max_results_) keep_lowest();
-  }
-}
-
-void LowestRows::keep_lowest() {
-  if (answer_.rows.size() <= max_results_) return;
-  const auto end = answer_.rows.begin() + static_cast<std::ptrdiff_t>(max_results_);
-  std::nth_element(answer_.rows.begin(), end, answer_.rows.end(),
-                   [this](const Hit& a, const Hit& b) { return before(a, b); });
-  answer_.rows.erase(end, answer_.rows.end());
-  answer_.truncated = true;
-}
-
-OverlapAnswer LowestRows::finish() {
-  keep_lowest();
-  const auto in_order = [this](const Hit& a, const Hit& b) { return before(a, b); };
-  // As they mostly come: in storage order, of one instance or of instances met by ascending id.
-  if (!std::is_sorted(answer_.rows.begin(), answer_.rows.end(), in_order))
-    std::sort(answer_.rows.begin(), answer_.rows.end(), in_order);
-  return std::move(answer_);
-}
 
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
   const uint32_t max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;

@@ -148,6 +148,18 @@ void append_row(const Hit& hit, ColumnSet columns, BlockResult& result) {
   result.rotations.push_back(labels.rotation.w);
 }
 
+void append_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, ColumnSet columns,
+                          BlockResult& result) {
+  if (columns.has(Column::kId)) result.ids.insert(result.ids.end(), triangles.size(), hit.id);
+  if (columns.has(Column::kTriangle))
+    result.triangles.insert(result.triangles.end(), triangles.begin(), triangles.end());
+  ColumnSet labels;
+  for (const Column column : {Column::kGroup, Column::kTag, Column::kLayers, Column::kPose})
+    if (columns.has(column)) labels.add(column);
+  if (labels.empty()) return;
+  for (size_t row = 0; row < triangles.size(); ++row) append_row(hit, labels, result);
+}
+
 void append_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, ColumnSet columns,
                     BlockResult& result) {
   if (columns.has(Column::kUv) || columns.has(Column::kNormal)) {

@@ -35,6 +35,8 @@ absl::Status check_reply_size(const QueryBatch& batch);
 
 // Writes the columns of a row that every kind has; a miss where `hit` names nothing.
 void append_row(const Hit& hit, ColumnSet columns, BlockResult& result);
+// Writes a row like `hit` for each of some triangles.
+void append_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, ColumnSet columns, BlockResult& result);
 // Writes what only hits of rays have: uv, normal and point, the latter relative to the frame.
 void append_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, ColumnSet columns,
                     BlockResult& result);
