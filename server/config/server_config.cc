@@ -57,7 +57,7 @@ void add_options(CLI::App& app, ServerConfig& config) {
       ->check(CLI::Range(0u, limits::kMaxThreads))
       ->capture_default_str();
   app.add_option("--instruction-set", config.instruction_set,
-                 "Vector instructions of queries: avx2 or portable [the widest there are]");
+                 "Vector instructions of queries: avx2, sse4 or portable [the widest there are]");
   const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
                                                   {"info", LogLevel::kInfo},
                                                   {"warning", LogLevel::kWarning},

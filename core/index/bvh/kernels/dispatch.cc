@@ -6,24 +6,29 @@
 namespace locus {
 namespace {
 
-std::vector<const RayKernels*> available() {
-  std::vector<const RayKernels*> kernels;
+struct Kernels {
+  absl::string_view name = kPortable;
+  const RayKernels* rays = nullptr;
+  const RegionKernels* regions = nullptr;
+};
+
+// What this processor runs, the widest first.
+std::vector<Kernels> available() {
+  std::vector<Kernels> kernels;
 #ifdef LOCUS_X86_KERNELS
-  const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-                    __builtin_cpu_supports("bmi2");
-  if (avx2) kernels.push_back(&ray_kernels_avx2());
+  const bool sse4 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
+  const bool avx2 = sse4 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                    __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+  if (avx2) kernels.push_back({ray_kernels_avx2().name, &ray_kernels_avx2(), &region_kernels_avx2()});
+  if (sse4) kernels.push_back({ray_kernels_sse4().name, &ray_kernels_sse4(), &region_kernels_sse4()});
 #endif
+  kernels.emplace_back();
   return kernels;
 }
 
-const RayKernels* widest() {
-  const std::vector<const RayKernels*> kernels = available();
-  return kernels.empty() ? nullptr : kernels.front();
-}
-
 // Written by use_instruction_set() only.
-const RayKernels*& active() {
-  static const RayKernels* kernels = widest();
+Kernels& active() {
+  static Kernels kernels = available().front();
   return kernels;
 }
 
@@ -31,42 +36,24 @@ const RayKernels*& active() {
 
 std::vector<std::string> instruction_sets() {
   std::vector<std::string> names;
-  for (const RayKernels* kernels : available()) names.emplace_back(kernels->name);
-  names.emplace_back(kPortable);
+  for (const Kernels& kernels : available()) names.emplace_back(kernels.name);
   return names;
 }
 
 absl::Status use_instruction_set(absl::string_view name) {
-  if (name == kPortable) {
-    active() = nullptr;
-    return absl::OkStatus();
-  }
-  for (const RayKernels* kernels : available()) {
-    if (!name.empty() && name != kernels->name) continue;
+  for (const Kernels& kernels : available()) {
+    if (!name.empty() && name != kernels.name) continue;
     active() = kernels;
-    return absl::OkStatus();
-  }
-  if (name.empty()) {
-    active() = nullptr;
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(absl::StrCat("this processor does not run the instruction set '", name,
                                                  "'; it runs: ", absl::StrJoin(instruction_sets(), ", ")));
 }
 
-absl::string_view instruction_set() {
-  const RayKernels* const kernels = active_ray_kernels();
-  return kernels == nullptr ? kPortable : kernels->name;
-}
+absl::string_view instruction_set() { return active().name; }
 
-const RayKernels* active_ray_kernels() { return active(); }
+const RayKernels* active_ray_kernels() { return active().rays; }
 
-const RegionKernels* active_region_kernels() {
-#ifdef LOCUS_X86_KERNELS
-  return active() == nullptr ? nullptr : &region_kernels_avx2();
-#else
-  return nullptr;
-#endif
-}
+const RegionKernels* active_region_kernels() { return active().regions; }
 
 }  // namespace locus

@@ -53,6 +53,7 @@ struct RayKernels {
 
 // The exported symbol of each instruction set's object. Only to be called on a processor that has it.
 const RayKernels& ray_kernels_avx2();
+const RayKernels& ray_kernels_sse4();
 
 }  // namespace locus
 

@@ -92,6 +92,7 @@ struct RegionKernels {
 
 // The exported symbol of the instruction set's object. Only to be called on a processor that has it.
 const RegionKernels& region_kernels_avx2();
+const RegionKernels& region_kernels_sse4();
 
 }  // namespace locus
 

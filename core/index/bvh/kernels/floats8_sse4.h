@@ -1,0 +1,141 @@
+// Eight floats at once in two registers of SSE, up to 4.2 (x86-64-v2): see floats8.h, and floats8_avx2.h for what each
+// function does. Without fused products: the bounds of the kernels allow for one more rounding.
+#ifndef LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_SSE4_H_
+#define LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_SSE4_H_
+
+#include <immintrin.h>
+
+#include <cstdint>
+
+#include "core/index/bvh/triangle_tree.h"
+
+namespace locus {
+namespace {
+
+struct Floats8 {
+  __m128 low, high;
+
+  static inline Floats8 both_halves(__m128 half) { return {half, half}; }
+  static inline Floats8 all(float value) { return both_halves(_mm_set1_ps(value)); }
+  static inline Floats8 load(const float* from) { return {_mm_load_ps(from), _mm_load_ps(from + 4)}; }
+  static inline Floats8 load_any(const float* from) { return {_mm_loadu_ps(from), _mm_loadu_ps(from + 4)}; }
+  inline void store(float* to) const {
+    _mm_storeu_ps(to, low);
+    _mm_storeu_ps(to + 4, high);
+  }
+
+  friend inline Floats8 operator+(Floats8 a, Floats8 b) {
+    return {_mm_add_ps(a.low, b.low), _mm_add_ps(a.high, b.high)};
+  }
+  friend inline Floats8 operator-(Floats8 a, Floats8 b) {
+    return {_mm_sub_ps(a.low, b.low), _mm_sub_ps(a.high, b.high)};
+  }
+  friend inline Floats8 operator*(Floats8 a, Floats8 b) {
+    return {_mm_mul_ps(a.low, b.low), _mm_mul_ps(a.high, b.high)};
+  }
+  friend inline Floats8 operator/(Floats8 a, Floats8 b) {
+    return {_mm_div_ps(a.low, b.low), _mm_div_ps(a.high, b.high)};
+  }
+};
+
+static inline Floats8 multiply_add(Floats8 a, Floats8 b, Floats8 c) { return a * b + c; }
+static inline Floats8 multiply_subtract(Floats8 a, Floats8 b, Floats8 c) { return a * b - c; }
+static inline Floats8 subtract_product(Floats8 c, Floats8 a, Floats8 b) { return c - a * b; }
+static inline Floats8 smaller(Floats8 a, Floats8 b) { return {_mm_min_ps(a.low, b.low), _mm_min_ps(a.high, b.high)}; }
+static inline Floats8 larger(Floats8 a, Floats8 b) { return {_mm_max_ps(a.low, b.low), _mm_max_ps(a.high, b.high)}; }
+static inline Floats8 square_root(Floats8 a) { return {_mm_sqrt_ps(a.low), _mm_sqrt_ps(a.high)}; }
+
+static inline Floats8 bits_of(uint32_t bits) {
+  return Floats8::both_halves(_mm_castsi128_ps(_mm_set1_epi32(static_cast<int>(bits))));
+}
+static inline Floats8 both(Floats8 a, Floats8 b) { return {_mm_and_ps(a.low, b.low), _mm_and_ps(a.high, b.high)}; }
+static inline Floats8 either(Floats8 a, Floats8 b) { return {_mm_or_ps(a.low, b.low), _mm_or_ps(a.high, b.high)}; }
+static inline Floats8 size_of(Floats8 a) { return both(a, bits_of(0x7FFFFFFFu)); }
+static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
+static inline Floats8 where_at_least(Floats8 a, Floats8 b) {
+  return {_mm_cmpge_ps(a.low, b.low), _mm_cmpge_ps(a.high, b.high)};
+}
+static inline Floats8 choose(Floats8 where, Floats8 yes, Floats8 no) {
+  return {_mm_blendv_ps(no.low, yes.low, where.low), _mm_blendv_ps(no.high, yes.high, where.high)};
+}
+
+static inline uint32_t lanes_of(__m128 low, __m128 high) {
+  return static_cast<uint32_t>(_mm_movemask_ps(low) | _mm_movemask_ps(high) << 4);
+}
+static inline uint32_t at_most(Floats8 a, Floats8 b) {
+  return lanes_of(_mm_cmple_ps(a.low, b.low), _mm_cmple_ps(a.high, b.high));
+}
+static inline uint32_t below(Floats8 a, Floats8 b) {
+  return lanes_of(_mm_cmplt_ps(a.low, b.low), _mm_cmplt_ps(a.high, b.high));
+}
+
+static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t* children) {
+  const uint32_t set = at_most(near, far);
+  uint32_t count = 0;
+  for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
+    children[count] = node.child[slot];
+    count += set >> slot & 1u;
+  }
+  return count;
+}
+
+static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
+                                   uint32_t* children, float* nears) {
+  alignas(16) float entered[kTreeWidth];
+  near.store(entered);
+  const uint32_t set = at_most(near, far), order = node.order[octant];
+  uint32_t count = 0;
+  for (uint32_t place = 0; place < kTreeWidth; ++place) {
+    const uint32_t slot = order >> (3 * place) & 7u;
+    children[count] = node.child[slot];
+    nears[count] = entered[slot];
+    count += set >> slot & 1u;
+  }
+  return count;
+}
+
+static inline void pack_entries(uint32_t* children, float* nears, uint32_t from, uint32_t set, uint32_t to) {
+  for (uint32_t entry = 0; entry < kTreeWidth; ++entry) {
+    if ((set >> entry & 1u) == 0) continue;
+    children[to] = children[from + entry];
+    nears[to++] = nears[from + entry];
+  }
+}
+
+static inline void transpose_three(const double* const* rows, Floats8* columns) {
+  for (int axis = 0; axis < 3; ++axis) {
+    alignas(16) float column[kTreeWidth];
+    for (int row = 0; row < kTreeWidth; ++row) column[row] = static_cast<float>(rows[row][axis]);
+    columns[axis] = Floats8::load(column);
+  }
+}
+
+typedef double Doubles __attribute__((vector_size(32)));
+
+static inline Doubles widened(float a, float b, float c) { return Doubles{a, b, c, c}; }
+
+static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
+                                uint32_t* children) {
+  uint32_t count = 0;
+  for (uint32_t slot = kTreeWidth; slot-- > 0;) {
+    children[count] = node.child[slot] | ((flagged >> slot & 1u) != 0 ? flag : 0u);
+    count += set >> slot & 1u;
+  }
+}
+
+static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t set, uint32_t* to) {
+  uint32_t kept = 0;
+  for (uint32_t number = 0; number < count; ++number) {
+    to[kept] = from[number];
+    kept += set >> number & 1u;
+  }
+}
+
+static inline void copy_numbers(const uint32_t* from, uint32_t count, uint32_t* to) {
+  __builtin_memcpy(to, from, count * sizeof(uint32_t));
+}
+
+}  // namespace
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_SSE4_H_

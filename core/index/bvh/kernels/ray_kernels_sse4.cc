@@ -1,0 +1,11 @@
+// Compiled for SSE up to 4.2: x86-64-v2.
+#include "core/index/bvh/kernels/ray_kernels_impl.h"
+
+namespace locus {
+
+const RayKernels& ray_kernels_sse4() {
+  static constexpr RayKernels kKernels = {"sse4", trace<false>, trace<true>};
+  return kKernels;
+}
+
+}  // namespace locus

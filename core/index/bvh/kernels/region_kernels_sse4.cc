@@ -1,0 +1,16 @@
+// Compiled for SSE up to 4.2: x86-64-v2.
+#include "core/index/bvh/kernels/region_kernels_impl.h"
+
+namespace locus {
+
+const RegionKernels& region_kernels_sse4() {
+  static constexpr RegionKernels kKernels = {"sse4",
+                                             find<BallQuery, KernelBall>,
+                                             find<BoxQuery<false>, KernelBox>,
+                                             find<BoxQuery<true>, KernelBox>,
+                                             find<BallOfBoundsQuery, KernelBallOfBounds>,
+                                             find<BoxOfBoundsQuery, KernelBoxOfBounds>};
+  return kKernels;
+}
+
+}  // namespace locus
