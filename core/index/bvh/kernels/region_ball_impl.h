@@ -134,51 +134,6 @@ class BallQuery {
   float radius_;
 };
 
-// The same by the bounds of triangles, grown by a margin.
-class BallOfBoundsQuery {
- public:
-  inline void set(const KernelBallOfBounds& ball) {
-    const float inner = ball.inner_radius * ball.inner_radius * (1 - kSquarePad) - kSquareFloor;
-    center_ = Vector8::all(ball.center);
-    outer_ = Floats8::all(ball.outer_radius * ball.outer_radius * (1 + kSquarePad) + kSquareFloor);
-    inner_ = Floats8::all(ball.inner_radius > 0 ? inner : -1);
-    outer_margin_ = Floats8::all(ball.outer_margin * (1 + kSquarePad));
-    inner_margin_ = Floats8::all(ball.inner_margin * (1 - kSquarePad));
-  }
-
-  __attribute__((always_inline)) inline MetChildren meet_node(const TriangleNode& node) const {
-    const Vector8 below = Vector8::load(node.bounds) - center_, above = center_ - Vector8::load(node.bounds + 3);
-    const uint32_t some = at_most(squared_gap(below, above, outer_margin_), outer_);
-    const Vector8 far = {smaller(below.x, above.x), smaller(below.y, above.y), smaller(below.z, above.z)};
-    return {some, at_most(dot(far, far), inner_) & some};
-  }
-
-  __attribute__((always_inline)) inline MetTriangles meet_block(const TriangleBlock& block) const {
-    const Vector8 a = Vector8::load(block.vertices), b = Vector8::load(block.vertices + 3),
-                  c = Vector8::load(block.vertices + 6);
-    const Vector8 low = {smaller(a.x, smaller(b.x, c.x)), smaller(a.y, smaller(b.y, c.y)),
-                         smaller(a.z, smaller(b.z, c.z))};
-    const Vector8 high = {larger(a.x, larger(b.x, c.x)), larger(a.y, larger(b.y, c.y)), larger(a.z, larger(b.z, c.z))};
-    const Vector8 below = low - center_, above = center_ - high;
-    const uint32_t all = (1u << block.count) - 1u;
-    const uint32_t sure = at_most(squared_gap(below, above, inner_margin_), inner_) & all;
-    return {sure, at_most(squared_gap(below, above, outer_margin_), outer_) & all & ~sure};
-  }
-
- private:
-  static inline Floats8 squared_gap(Vector8 below, Vector8 above, Floats8 margin) {
-    const Floats8 zero = Floats8::all(0);
-    const Vector8 gap = {larger(larger(below.x, above.x) - margin, zero),
-                         larger(larger(below.y, above.y) - margin, zero),
-                         larger(larger(below.z, above.z) - margin, zero)};
-    return dot(gap, gap);
-  }
-
-  Vector8 center_;
-  Floats8 outer_, inner_;  // squares of radii
-  Floats8 outer_margin_, inner_margin_;
-};
-
 }  // namespace
 }  // namespace locus
 

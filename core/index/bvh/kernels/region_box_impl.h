@@ -206,33 +206,6 @@ class BoxQuery {
   const KernelBox* box_;
 };
 
-// The same by the bounds of triangles.
-class BoxOfBoundsQuery {
- public:
-  inline void set(const KernelBoxOfBounds& box) {
-    outer_ = {Vector8::all(box.outer_min), Vector8::all(box.outer_max)};
-    inner_ = {Vector8::all(box.inner_min), Vector8::all(box.inner_max)};
-  }
-
-  __attribute__((always_inline)) inline MetChildren meet_node(const TriangleNode& node) const {
-    const Vector8 low = Vector8::load(node.bounds), high = Vector8::load(node.bounds + 3);
-    const uint32_t some = outer_.overlaps(low, high);
-    return {some, some & inner_.contains(low, high)};
-  }
-
-  inline MetTriangles meet_block(const TriangleBlock& block) const {
-    const Vector8 a = Vector8::load(block.vertices), b = Vector8::load(block.vertices + 3),
-                  c = Vector8::load(block.vertices + 6);
-    const Vector8 low = smallest(a, b, c), high = largest(a, b, c);
-    const uint32_t all = (1u << block.count) - 1u;
-    const uint32_t sure = inner_.overlaps(low, high) & all;
-    return {sure, outer_.overlaps(low, high) & all & ~sure};
-  }
-
- private:
-  Boxes8 outer_, inner_;
-};
-
 }  // namespace
 }  // namespace locus
 

@@ -30,19 +30,6 @@ struct KernelBox {
   float inner_min[3], inner_max[3];
 };
 
-// A world's ball or box asked by the bounds of triangles, in axes that are the world's but for a translation and a
-// scale. Each triangle's bounds are grown by a margin first. What the inner numbers find is found, what the outer ones
-// do not is not, and between them the judge decides.
-struct KernelBallOfBounds {
-  float center[3];
-  float inner_radius, outer_radius;
-  float inner_margin, outer_margin;  // outer above inner
-};
-struct KernelBoxOfBounds {
-  float outer_min[3], outer_max[3];  // grown by the margin
-  float inner_min[3], inner_max[3];
-};
-
 inline constexpr float kMaxRegionReach = 0x1p29f;
 // A call ends after so many triangles, for its caller to see whether to go on.
 inline constexpr uint32_t kMaxRegionTests = 4096;
@@ -86,8 +73,6 @@ struct RegionKernels {
   void (*ball)(const TriangleTree&, const KernelBall*, RegionVisit*, size_t count);
   void (*box)(const TriangleTree&, const KernelBox*, RegionVisit*, size_t count);  // none of them turned
   void (*turned_box)(const TriangleTree&, const KernelBox*, RegionVisit*, size_t count);
-  void (*ball_of_bounds)(const TriangleTree&, const KernelBallOfBounds*, RegionVisit*, size_t count);
-  void (*box_of_bounds)(const TriangleTree&, const KernelBoxOfBounds*, RegionVisit*, size_t count);
 };
 
 // The exported symbol of the instruction set's object. Only to be called on a processor that has it.

@@ -4,12 +4,8 @@
 namespace locus {
 
 const RegionKernels& region_kernels_avx2() {
-  static constexpr RegionKernels kKernels = {"avx2",
-                                             find<BallQuery, KernelBall>,
-                                             find<BoxQuery<false>, KernelBox>,
-                                             find<BoxQuery<true>, KernelBox>,
-                                             find<BallOfBoundsQuery, KernelBallOfBounds>,
-                                             find<BoxOfBoundsQuery, KernelBoxOfBounds>};
+  static constexpr RegionKernels kKernels = {"avx2", find<BallQuery, KernelBall>, find<BoxQuery<false>, KernelBox>,
+                                             find<BoxQuery<true>, KernelBox>};
   return kKernels;
 }
 
