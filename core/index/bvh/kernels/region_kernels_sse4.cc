@@ -4,12 +4,8 @@
 namespace locus {
 
 const RegionKernels& region_kernels_sse4() {
-  static constexpr RegionKernels kKernels = {"sse4",
-                                             find<BallQuery, KernelBall>,
-                                             find<BoxQuery<false>, KernelBox>,
-                                             find<BoxQuery<true>, KernelBox>,
-                                             find<BallOfBoundsQuery, KernelBallOfBounds>,
-                                             find<BoxOfBoundsQuery, KernelBoxOfBounds>};
+  static constexpr RegionKernels kKernels = {"sse4", find<BallQuery, KernelBall>, find<BoxQuery<false>, KernelBox>,
+                                             find<BoxQuery<true>, KernelBox>};
   return kKernels;
 }
 
