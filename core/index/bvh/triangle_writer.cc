@@ -83,10 +83,10 @@ TriangleArrays TriangleWriter::write() {
   arrays_.node_count = end.node;
   arrays_.block_count = end.block;
   arrays_.triangle_count = end.position;
-  arrays_.nodes = std::make_unique_for_overwrite<TriangleNode[]>(end.node);
-  arrays_.ranges = std::make_unique_for_overwrite<NodeRange[]>(end.node);
-  arrays_.blocks = std::make_unique_for_overwrite<TriangleBlock[]>(end.block);
-  arrays_.numbers = std::make_unique_for_overwrite<uint32_t[]>(end.position);
+  arrays_.nodes = make_large_array<TriangleNode>(end.node);
+  arrays_.ranges = make_large_array<NodeRange>(end.node);
+  arrays_.blocks = make_large_array<TriangleBlock>(end.block);
+  arrays_.numbers = make_large_array<uint32_t>(end.position);
   for_each(options_, pieces.size(), [&](size_t i) {
     if (!cancelled(options_) && pieces[i].whole) write_whole(pieces[i]);
   });

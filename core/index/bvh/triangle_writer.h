@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/large_array.h"
 #include "core/geometry/triangle.h"
 #include "core/index/bvh/binary_tree.h"
 #include "core/index/bvh/triangle_tree.h"
@@ -16,10 +17,10 @@ namespace locus {
 
 // The arrays behind a TriangleTree, of exactly the length needed.
 struct TriangleArrays {
-  std::unique_ptr<TriangleNode[]> nodes;
-  std::unique_ptr<NodeRange[]> ranges;
-  std::unique_ptr<TriangleBlock[]> blocks;
-  std::unique_ptr<uint32_t[]> numbers;
+  LargeArray<TriangleNode> nodes;
+  LargeArray<NodeRange> ranges;
+  LargeArray<TriangleBlock> blocks;
+  LargeArray<uint32_t> numbers;
   uint32_t node_count = 0, block_count = 0, triangle_count = 0;
   uint32_t depth = 0;  // levels of nodes
 };
