@@ -74,6 +74,46 @@ inline std::vector<KernelTrial> far_trials() {
   return trials;
 }
 
+// Runs of rays that go nearly the same way, as cameras and sensors ask: from one place, at places close together, or
+// side by side along an axis. Limits and culls differ within a run.
+inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mesh, uint64_t seed) {
+  Random random(seed);
+  const Aabbf bounds = internal::bounds_of_all(mesh);
+  const double size = double{max_component(bounds.extent())};
+  std::vector<KernelQuestion> questions;
+  while (questions.size() < scaled_count(3'000)) {
+    const Vec3d origin = to_double(bounds.min + bounds.max) * 0.5 + random.vector(0.7 * size);
+    const Triangle& target = random.pick(mesh);
+    const Vec3d ahead = random.chance(0.5) ? to_double(target.a) - origin : random.unit_vector() * size;
+    const Vec3d along = random.chance(0.2) ? random.whole_vector(1) * size : ahead;
+    const double width = random.chance(0.2) ? 0 : size * random.magnitude(-12, -6);
+    const bool side_by_side = random.chance(0.3);
+    if (squared_length(along) == 0) continue;
+    for (int ray = 0; ray < 20; ++ray) {
+      KernelQuestion question;
+      question.origin = side_by_side ? origin + random.vector(width) : origin;
+      question.direction = side_by_side ? along : along + random.vector(width);
+      if (random.chance(0.2)) question.limit = static_cast<float>(random.unit());
+      if (random.chance(0.3)) question.cull = random.chance(0.5) ? Cull::kBack : Cull::kFront;
+      questions.push_back(question);
+    }
+  }
+  return KernelTrial(std::move(name), mesh, questions);
+}
+
+inline std::vector<KernelTrial> beam_trials() {
+  std::vector<KernelTrial> trials;
+  trials.push_back(beam_trial("beams at a sphere", bumpy_sphere(14, 0.1, 1), 10));
+  trials.push_back(beam_trial("beams at a city", box_city(6, 1), 11));
+  trials.push_back(beam_trial("beams at a house", box_city(1, 2), 12));
+  for (const float scale : {0x1p-20f, 1e6f})
+    trials.push_back(beam_trial(absl::StrCat("beams at a sphere times ", scale),
+                                internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), scale, {}), 13));
+  trials.push_back(beam_trial("beams at a far sphere",
+                              internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), 1, {1e5f, -2e5f, 5e4f}), 14));
+  return trials;
+}
+
 // Along axes and diagonals from corners, edges and walls, where many triangles are edge-on or equally near.
 inline KernelTrial lattice_trial() {
   Random random(4);
@@ -164,6 +204,7 @@ inline KernelTrial copies_trial() {
 inline std::vector<KernelTrial> all_kernel_trials() {
   std::vector<KernelTrial> trials = ordinary_trials();
   for (KernelTrial& trial : far_trials()) trials.push_back(std::move(trial));
+  for (KernelTrial& trial : beam_trials()) trials.push_back(std::move(trial));
   for (KernelTrial (*const make)() :
        {lattice_trial, near_diagonal_trial, border_trial, surface_trial, sliver_trial, copies_trial})
     trials.push_back(make());

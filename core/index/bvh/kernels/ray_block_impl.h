@@ -29,76 +29,110 @@ namespace {
 static inline double larger(double a, double b) { return a < b ? b : a; }
 static inline double smaller(double a, double b) { return b < a ? b : a; }
 
-// The eight triangles in the projection along the ray, from the ray's start: every coordinate with its sign turned,
-// which changes no edge function.
+// One ray with eight triangles, or eight rays with one: in either case eight pairs side by side.
+struct Pairs {
+  Floats8 from_x, from_y, from_z;  // where the ray starts
+  Floats8 shear_x, shear_y, reciprocal_z;
+  Floats8 limit;
+  Floats8 edge, noise, t_floor;  // bounds: of the edge functions; of t times the determinant; of t besides
+  Floats8 xs[3], ys[3], zs[3];   // of the triangle's vertices
+};
+
+// A pair in the projection along the ray, from the ray's start: every coordinate with its sign turned, which changes no
+// edge function.
 struct Projected {
   Floats8 weight_a, weight_b, weight_c;  // edge functions
   Floats8 a_z, b_z, c_z;                 // depths
 };
 
-static inline Projected project(const TriangleBlock& block, PreparedRay ray) {
-  const float(*const xs)[kTreeWidth] = block.vertices + ray.whole(kAxisX);
-  const float(*const ys)[kTreeWidth] = block.vertices + ray.whole(kAxisY);
-  const float(*const zs)[kTreeWidth] = block.vertices + ray.whole(kAxisZ);
-  const Floats8 from_x = ray.spread(kFromX), from_y = ray.spread(kFromY), from_z = ray.spread(kFromZ);
-  const Floats8 shear_x = ray.spread(kShearX), shear_y = ray.spread(kShearY);
+static inline Projected project(const Pairs& pairs) {
   Projected p;
-  p.a_z = from_z - Floats8::load(zs[0]);
-  p.b_z = from_z - Floats8::load(zs[3]);
-  p.c_z = from_z - Floats8::load(zs[6]);
-  const Floats8 a_x = subtract_product(from_x - Floats8::load(xs[0]), shear_x, p.a_z);
-  const Floats8 a_y = subtract_product(from_y - Floats8::load(ys[0]), shear_y, p.a_z);
-  const Floats8 b_x = subtract_product(from_x - Floats8::load(xs[3]), shear_x, p.b_z);
-  const Floats8 b_y = subtract_product(from_y - Floats8::load(ys[3]), shear_y, p.b_z);
-  const Floats8 c_x = subtract_product(from_x - Floats8::load(xs[6]), shear_x, p.c_z);
-  const Floats8 c_y = subtract_product(from_y - Floats8::load(ys[6]), shear_y, p.c_z);
+  p.a_z = pairs.from_z - pairs.zs[0];
+  p.b_z = pairs.from_z - pairs.zs[1];
+  p.c_z = pairs.from_z - pairs.zs[2];
+  const Floats8 a_x = subtract_product(pairs.from_x - pairs.xs[0], pairs.shear_x, p.a_z);
+  const Floats8 a_y = subtract_product(pairs.from_y - pairs.ys[0], pairs.shear_y, p.a_z);
+  const Floats8 b_x = subtract_product(pairs.from_x - pairs.xs[1], pairs.shear_x, p.b_z);
+  const Floats8 b_y = subtract_product(pairs.from_y - pairs.ys[1], pairs.shear_y, p.b_z);
+  const Floats8 c_x = subtract_product(pairs.from_x - pairs.xs[2], pairs.shear_x, p.c_z);
+  const Floats8 c_y = subtract_product(pairs.from_y - pairs.ys[2], pairs.shear_y, p.c_z);
   p.weight_a = multiply_subtract(c_x, b_y, c_y * b_x);
   p.weight_b = multiply_subtract(a_x, c_y, a_y * c_x);
   p.weight_c = multiply_subtract(b_x, a_y, b_y * a_x);
   return p;
 }
 
-// What float can tell of a block, a bit for each triangle.
-struct BlockMet {
-  uint32_t open;  // may be hit within the limit
-  uint32_t sure;  // is hit within the limit
-  float edge;     // the bound of the edge functions
+// What float can tell, a bit for each pair.
+struct PairsMet {
+  uint32_t open;  // may hit within the limit
+  uint32_t sure;  // hits within the limit; kAny only
 };
 
+// `front` and `back`: the pairs whose rays accept a triangle seen so.
 template <bool kAny>
-static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
-  const Projected p = project(block, ray);
-  const float edge =
-      planted(PlantedBug::kKernelEdgeBound) ? 0 : ray.number(kEdgeScale) * block.extent + ray.number(kEdgeFloor);
-  const Floats8 bound = Floats8::all(edge), minus_bound = Floats8::all(-edge), zero = Floats8::all(0);
+static inline PairsMet meet(const Pairs& pairs, uint32_t front, uint32_t back) {
+  const Projected p = project(pairs);
+  const Floats8 zero = Floats8::all(0), minus_edge = zero - pairs.edge;
   const Floats8 least = smaller(p.weight_a, smaller(p.weight_b, p.weight_c));
   const Floats8 most = larger(p.weight_a, larger(p.weight_b, p.weight_c));
-  const uint32_t inside = (at_most(minus_bound, least) | at_most(most, bound)) & ((1u << block.count) - 1u);
+  const uint32_t inside = at_most(minus_edge, least) | at_most(most, pairs.edge);
   const Floats8 determinant = p.weight_a + p.weight_b + p.weight_c;
   const Floats8 inverse = Floats8::all(1) / determinant;
   const Floats8 behind = multiply_add(p.weight_a, p.a_z, multiply_add(p.weight_b, p.b_z, p.weight_c * p.c_z));
-  const float noise = edge * block.extent * ray.number(kEdgeNoise) + ray.number(kStartNoise);
-  const Floats8 t = behind * Floats8::all(-ray.number(kReciprocalZ)) * inverse;
-  const Floats8 off = planted(PlantedBug::kKernelTBound)
-                          ? zero
-                          : multiply_add(Floats8::all(noise), size_of(inverse), ray.spread(kTFloor));
-  const Floats8 earliest = t - off, latest = t + off, limit8 = Floats8::all(limit);
-  const uint32_t edge_on = at_most(size_of(determinant), Floats8::all(8 * edge));
-  BlockMet met;
-  met.open = inside & (edge_on | (at_most(earliest, limit8) & at_most(zero, latest)));
+  const Floats8 t = zero - behind * pairs.reciprocal_z * inverse;
+  const Floats8 off =
+      planted(PlantedBug::kKernelTBound) ? zero : multiply_add(pairs.noise, size_of(inverse), pairs.t_floor);
+  const Floats8 earliest = t - off, latest = t + off;
+  const uint32_t edge_on = at_most(size_of(determinant), Floats8::all(8) * pairs.edge);
+  PairsMet met;
+  met.open = inside & (edge_on | (at_most(earliest, pairs.limit) & at_most(zero, latest)));
   if (planted(PlantedBug::kKernelEdgeOn)) met.open &= ~edge_on;
   met.sure = 0;
-  met.edge = edge;
   if constexpr (kAny) {
-    const uint32_t front = given.accept_front ? ~0u : 0u, back = given.accept_back ? ~0u : 0u;
-    met.sure = inside & ~edge_on & below(zero, earliest) & at_most(latest, limit8) &
-               ((front & below(bound, least)) | (back & below(most, minus_bound)));
+    met.sure = inside & ~edge_on & below(zero, earliest) & at_most(latest, pairs.limit) &
+               ((front & below(pairs.edge, least)) | (back & below(most, minus_edge)));
   }
   return met;
 }
 
+struct BlockMet {
+  PairsMet triangles;
+  float edge;  // the bound of the edge functions
+};
+
+// One ray with a block's triangles.
+template <bool kAny>
+static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
+  const float edge =
+      planted(PlantedBug::kKernelEdgeBound) ? 0 : ray.number(kEdgeScale) * block.extent + ray.number(kEdgeFloor);
+  Pairs pairs;
+  pairs.from_x = ray.spread(kFromX);
+  pairs.from_y = ray.spread(kFromY);
+  pairs.from_z = ray.spread(kFromZ);
+  pairs.shear_x = ray.spread(kShearX);
+  pairs.shear_y = ray.spread(kShearY);
+  pairs.reciprocal_z = ray.spread(kReciprocalZ);
+  pairs.limit = Floats8::all(limit);
+  pairs.edge = Floats8::all(edge);
+  pairs.noise = Floats8::all(edge * block.extent * ray.number(kEdgeNoise) + ray.number(kStartNoise));
+  pairs.t_floor = ray.spread(kTFloor);
+  const uint32_t x = ray.whole(kAxisX), y = ray.whole(kAxisY), z = ray.whole(kAxisZ);
+  for (uint32_t vertex = 0; vertex < 3; ++vertex) {
+    pairs.xs[vertex] = Floats8::load(block.vertices[x + 3 * vertex]);
+    pairs.ys[vertex] = Floats8::load(block.vertices[y + 3 * vertex]);
+    pairs.zs[vertex] = Floats8::load(block.vertices[z + 3 * vertex]);
+  }
+  BlockMet met;
+  met.triangles = meet<kAny>(pairs, given.accept_front ? ~0u : 0u, given.accept_back ? ~0u : 0u);
+  const uint32_t places = (1u << block.count) - 1u;
+  met.triangles.open &= places;
+  met.triangles.sure &= places;
+  met.edge = edge;
+  return met;
+}
+
 static inline Doubles spread(double value) { return Doubles{value, value, value, value}; }
-// Of the three vertices.
+// Of the three vertices; the fourth is not used.
 static inline Doubles coordinates(const TriangleBlock& block, uint32_t axis, int place) {
   const float(*const rows)[kTreeWidth] = block.vertices + axis;
   return widened(rows[0][place], rows[3][place], rows[6][place]);

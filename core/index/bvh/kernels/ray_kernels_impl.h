@@ -9,32 +9,17 @@
 
 #include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/floats8.h"
+#include "core/index/bvh/kernels/ray_answer_impl.h"
 #include "core/index/bvh/kernels/ray_block_impl.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
+#include "core/index/bvh/kernels/ray_packet_impl.h"
 #include "core/index/bvh/kernels/ray_setup_impl.h"
 
 namespace locus {
 namespace {
 
-constexpr uint32_t kNoNumber = 0xFFFFFFFFu;
 constexpr uint32_t kMostFlights = 32;    // rays on their way at once
-constexpr uint32_t kPreparedRays = 256;  // rays prepared at once
-
-// For each octant the rows of TriangleNode::bounds that a ray enters by, x, y, z, and those it leaves by: their first
-// floats.
-struct RowTable {
-  uint32_t entered[8][4], left[8][4];
-  constexpr RowTable() : entered(), left() {
-    for (int octant = 0; octant < 8; ++octant) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const int negative = octant >> axis & 1;
-        entered[octant][axis] = static_cast<uint32_t>(kTreeWidth * (axis + 3 * negative));
-        left[octant][axis] = static_cast<uint32_t>(kTreeWidth * (axis + 3 - 3 * negative));
-      }
-    }
-  }
-};
-static constexpr RowTable kRows;
+constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; their numbers fit a byte
 
 // A ray on its way. Waiting nodes and blocks start no later than the limit; below them stands kNoChild.
 struct alignas(64) Flight {
@@ -63,13 +48,19 @@ struct Agenda {
   inline bool empty() const { return counts[kNode] + counts[kBlock] + counts[kEnd] == 0; }
 };
 
-// Up to kPreparedRays rays through one tree.
+// Up to kPreparedRays rays through one tree: those whose numbers are given.
 template <bool kAny>
 class Voyage {
  public:
   inline Voyage(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared, KernelHit* hits,
-                uint32_t count, Flight* flights)
-      : tree_(tree), rays_(rays), prepared_(prepared), hits_(hits), count_(count), flights_(flights) {}
+                const uint8_t* numbers, uint32_t count, Flight* flights)
+      : tree_(tree),
+        rays_(rays),
+        prepared_(prepared),
+        hits_(hits),
+        numbers_(numbers),
+        count_(count),
+        flights_(flights) {}
 
   inline void run() {
     Agenda now;
@@ -93,7 +84,7 @@ class Voyage {
 
   inline void start(uint32_t number, Agenda& then) {
     Flight& flight = flights_[number];
-    const uint32_t index = next_++;
+    const uint32_t index = numbers_[next_++];
     flight.ray = PreparedRay(prepared_[index / kTreeWidth], index % kTreeWidth);
     flight.index = index;
     flight.now = 0;
@@ -151,7 +142,7 @@ class Voyage {
     met.number = block_number;
     // Branches would be guessed wrongly too often here.
     const uint32_t settle_first =
-        static_cast<uint32_t>(met.block.open != 0) | static_cast<uint32_t>(flight.tests > kMaxKernelTests);
+        static_cast<uint32_t>(met.block.triangles.open != 0) | static_cast<uint32_t>(flight.tests > kMaxKernelTests);
     const uint32_t behind = flight.waiting[flight.top - 1], step = step_at(behind);
     fetch(behind, step);
     flight.top -= 1u - settle_first;
@@ -162,7 +153,7 @@ class Voyage {
   // Decides what float left open in a block, and goes on.
   inline void settle(uint32_t number, const Met& met, Agenda& then) {
     Flight& flight = flights_[number];
-    if (kAny && met.block.sure != 0) flight.found = true;
+    if (kAny && met.block.triangles.sure != 0) flight.found = true;
     const float limit = flight.limit;
     if (!kAny || !flight.found) decide_open(flight, met);
     if (flight.tests > kMaxKernelTests) flight.undecided = true;
@@ -173,15 +164,13 @@ class Voyage {
 
   inline void decide_open(Flight& flight, const Met& met) {
     const TriangleBlock& block = tree_.blocks[met.number];
-    for (uint32_t open = met.block.open; open != 0; open &= open - 1u) {
+    for (uint32_t open = met.block.triangles.open; open != 0; open &= open - 1u) {
       const int place = __builtin_ctz(open);
       const Verdict verdict = decide(block, place, rays_[flight.index], flight.ray, double{met.block.edge});
       if (verdict.what == KernelVerdict::kUndecided) flight.undecided = true;
-      if (verdict.what != KernelVerdict::kHit || verdict.t > flight.limit) continue;
-      if (planted(PlantedBug::kKernelLimit) && !flight.found && verdict.t == flight.limit) continue;
-      const uint32_t number = tree_.numbers[block.first + static_cast<uint32_t>(place)];
-      if (flight.found && verdict.t == flight.limit && (number >= flight.number) != planted(PlantedBug::kKernelTie))
-        continue;
+      if (verdict.what != KernelVerdict::kHit) continue;
+      const uint32_t number = number_of(tree_, block, place);
+      if (!is_better(verdict.t, number, flight.limit, flight.found, flight.number)) continue;
       flight.limit = verdict.t;
       flight.number = number;
       flight.found = true;
@@ -223,6 +212,7 @@ class Voyage {
   const KernelRay* const rays_;
   const PreparedRays* const prepared_;
   KernelHit* const hits_;
+  const uint8_t* const numbers_;
   const uint32_t count_;
   Flight* const flights_;
   // Where the things of each step lie; what has come to its end asks for the root.
@@ -234,14 +224,32 @@ class Voyage {
   Met met_[kMostFlights];
 };
 
+// Answers the groups of eight that go together; lists the other rays in `rest` and returns how many they are.
+template <bool kAny>
+static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared,
+                              KernelHit* hits, uint32_t count, uint8_t* rest) {
+  uint32_t left = 0;
+  for (uint32_t first = 0; first < count; first += kTreeWidth) {
+    const uint32_t size = count - first < kTreeWidth ? count - first : kTreeWidth;
+    if (size == kTreeWidth && go_together(prepared[first / kTreeWidth], tree.magnitude)) {
+      Packet<kAny>(tree, rays + first, prepared[first / kTreeWidth], hits + first).run();
+      continue;
+    }
+    for (uint32_t i = first; i < first + size; ++i) rest[left++] = static_cast<uint8_t>(i);
+  }
+  return left;
+}
+
 template <bool kAny>
 static void trace(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count) {
   PreparedRays prepared[kPreparedRays / kTreeWidth];
+  uint8_t rest[kPreparedRays];
   Flight flights[kMostFlights];
   while (count != 0) {
     const auto now = static_cast<uint32_t>(count < kPreparedRays ? count : kPreparedRays);
     for (uint32_t i = 0; i < now; i += kTreeWidth) prepare(rays + i, now - i, tree.magnitude, prepared[i / kTreeWidth]);
-    Voyage<kAny>(tree, rays, prepared, hits, now, flights).run();
+    const uint32_t left = trace_packets<kAny>(tree, rays, prepared, hits, now, rest);
+    Voyage<kAny>(tree, rays, prepared, hits, rest, left, flights).run();
     rays += now;
     hits += now;
     count -= now;

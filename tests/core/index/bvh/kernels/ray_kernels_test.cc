@@ -35,6 +35,26 @@ TEST_P(RayKernelsTest, DecideFarMeshesAsAllTrianglesDo) {
   for (const KernelTrial& trial : far_trials()) EXPECT_EQ(trial.difference(*kernels_), "");
 }
 
+TEST_P(RayKernelsTest, DecideRaysThatGoTogetherAsAllTrianglesDo) {
+  for (const KernelTrial& trial : beam_trials()) EXPECT_EQ(trial.difference(*kernels_), "");
+}
+
+TEST_P(RayKernelsTest, RaysThatGoTogetherOpenNodesOnce) {
+  const TriangleBvh tree = *TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
+  std::vector<KernelRay> rays;
+  for (int i = 0; i < 8; ++i) rays.push_back({{0, 0, 0}, {1, 0.2 + 0.001 * i, 0.3}, 10, true, true});
+  const auto nodes = [&](size_t at_once) {
+    uint32_t sum = 0;
+    for (size_t first = 0; first < rays.size(); first += at_once) {
+      std::vector<KernelHit> hits(at_once);
+      kernels_->first(tree.tree(), &rays[first], hits.data(), at_once);
+      for (const KernelHit& hit : hits) sum += hit.nodes;
+    }
+    return sum;
+  };
+  EXPECT_LT(nodes(8) * 4, nodes(1));
+}
+
 TEST_P(RayKernelsTest, DecideRaysOfALatticeAsAllTrianglesDo) { EXPECT_EQ(lattice_trial().difference(*kernels_), ""); }
 
 TEST_P(RayKernelsTest, DecideNearDiagonalsAsAllTrianglesDo) {

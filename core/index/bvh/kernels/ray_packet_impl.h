@@ -1,0 +1,227 @@
+// Eight rays that go nearly the same way, through one tree together: every box and every triangle is met by all of them
+// at once. Cameras and sensors ask so. Each ray meets what it would meet alone, by the same arithmetic, so that its
+// answer is the same.
+//
+// Source: Wald, Slusallek, Benthin, Wagner, Interactive Rendering with Coherent Ray Tracing, 2001.
+#ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
+#define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
+
+#include "core/index/bvh/kernels/floats8.h"
+#include "core/index/bvh/kernels/ray_answer_impl.h"
+#include "core/index/bvh/kernels/ray_block_impl.h"
+#include "core/index/bvh/kernels/ray_setup_impl.h"
+
+namespace locus {
+namespace {
+
+// Whether eight rays stay close enough together: in one octant, along one axis, their directions within a cone and
+// their starts within a small part of the way to the far end of everything. A matter of speed alone.
+static inline bool go_together(const PreparedRays& rays, float magnitude) {
+  constexpr float kMostSpread = 0.03f;
+  const auto differs = [&](uint32_t column) {
+    const Floats8 all = Floats8::load(rays.columns[column]);
+    return at_most(all, Floats8::all(rays.columns[column][0])) != 255u ||
+           at_most(Floats8::all(rays.columns[column][0]), all) != 255u;
+  };
+  const auto apart = [&](uint32_t column, float most) {
+    const Floats8 off = size_of(Floats8::load(rays.columns[column]) - Floats8::all(rays.columns[column][0]));
+    return at_most(off, Floats8::all(most)) != 255u;
+  };
+  for (uint32_t column = kFromX; column <= kFromZ; ++column)
+    if (apart(column, kMostSpread * magnitude)) return false;
+  // Whole numbers compare as the floats of their bits.
+  return !differs(kOctant) && !differs(kAxisZ) && !apart(kShearX, kMostSpread) && !apart(kShearY, kMostSpread);
+}
+
+template <bool kAny>
+class Packet {
+ public:
+  // Eight of each.
+  inline Packet(const TriangleTree& tree, const KernelRay* rays, const PreparedRays& prepared, KernelHit* hits)
+      : tree_(tree), rays_(rays), prepared_(prepared), hits_(hits) {
+    Floats8::load(prepared.columns[kLimit]).store(limits_);
+    for (uint32_t k = 0; k < 3; ++k) {
+      slabs_.reciprocal[k] = Floats8::load(prepared.columns[kReciprocal + k]);
+      slabs_.near_offset[k] = Floats8::load(prepared.columns[kNearOffset + k]);
+      slabs_.far_offset[k] = Floats8::load(prepared.columns[kFarOffset + k]);
+    }
+    for (uint32_t i = 0; i < kTreeWidth; ++i) {
+      hits[i] = {limits_[i], kNoNumber, KernelVerdict::kMiss, 0, 0};
+      front_ |= (rays[i].accept_front ? 1u : 0u) << i;
+      back_ |= (rays[i].accept_back ? 1u : 0u) << i;
+    }
+  }
+
+  inline void run() {
+    waiting_[0] = {Floats8::all(0), 255, 0};
+    for (uint32_t top = 1; top != 0;) {
+      const Waiting now = waiting_[--top];
+      // Limits may have fallen since. A box that starts exactly at one is opened: a lower number may wait there.
+      const Floats8 limit = Floats8::load(limits_);
+      const uint32_t rays =
+          now.rays & (planted(PlantedBug::kKernelPruneEqual) ? below(now.near, limit) : at_most(now.near, limit));
+      if (rays == 0) continue;
+      if ((now.reference & kBlockBit) == 0)
+        top = open_node(tree_.nodes[now.reference], top);
+      else
+        open_block(tree_.blocks[now.reference & ~kBlockBit], rays);
+    }
+    hits_[0].nodes = nodes_;
+  }
+
+ private:
+  static constexpr float kNever = -1;  // the limit of a ray that looks for nothing more
+
+  struct Waiting {
+    Floats8 near;
+    uint32_t rays;  // that meet the box
+    uint32_t reference;
+  };
+
+  struct Slabs {
+    Floats8 reciprocal[3], near_offset[3], far_offset[3];
+  };
+
+  // Puts the children that any of the rays may hit on the stack, the nearest last. Returns the new top.
+  inline uint32_t open_node(const TriangleNode& node, uint32_t top) {
+    ++nodes_;
+    // Copies: the stores to the stack would make every turn of the loop read them again.
+    const Slabs slabs = slabs_;
+    const Floats8 limit = Floats8::load(limits_);
+    const uint32_t octant = axis(kOctant), order = node.order[octant];
+    const uint32_t* const rows_in = kRows.entered[octant];
+    const uint32_t* const rows_out = kRows.left[octant];
+    for (uint32_t place = 0; place < kTreeWidth; ++place) {
+      const uint32_t slot = order >> (3 * place) & 7u;
+      if (node.child[slot] == kNoChild) continue;
+      const float* const bounds = node.bounds[0] + slot;
+      const auto near = [&](uint32_t k) {
+        return multiply_subtract(Floats8::all(bounds[rows_in[k]]), slabs.reciprocal[k], slabs.near_offset[k]);
+      };
+      const auto far = [&](uint32_t k) {
+        return multiply_subtract(Floats8::all(bounds[rows_out[k]]), slabs.reciprocal[k], slabs.far_offset[k]);
+      };
+      const Floats8 entered = larger(larger(near(0), near(1)), larger(near(2), Floats8::all(0)));
+      const uint32_t met = at_most(entered, smaller(smaller(far(0), far(1)), smaller(far(2), limit)));
+      waiting_[top] = {entered, met, node.child[slot]};
+      top += met != 0 ? 1 : 0;
+    }
+    return top;
+  }
+
+  // Triangle by triangle, or ray by ray where few of the rays meet the block.
+  inline void open_block(const TriangleBlock& block, uint32_t rays) {
+    for (uint32_t i = 0; i < kTreeWidth; ++i) hits_[i].tests += (rays >> i & 1u) * block.count;
+    constexpr int kRayCost = 5, kTriangleCost = 2;  // measured, in proportion
+    if (__builtin_popcount(rays) * kRayCost < static_cast<int>(block.count) * kTriangleCost)
+      meet_by_ray(block, rays);
+    else
+      meet_by_triangle(block, rays);
+    for (uint32_t i = 0; i < kTreeWidth; ++i)
+      if (hits_[i].tests > kMaxKernelTests) give_up(i);
+  }
+
+  inline void meet_by_ray(const TriangleBlock& block, uint32_t rays) {
+    for (; rays != 0; rays &= rays - 1u) {
+      const auto i = static_cast<uint32_t>(__builtin_ctz(rays));
+      const BlockMet met = meet_block<kAny>(block, PreparedRay(prepared_, i), limits_[i], rays_[i]);
+      if (met.triangles.sure != 0) {
+        find(i);
+        continue;
+      }
+      for (uint32_t open = met.triangles.open; open != 0; open &= open - 1u)
+        settle(block, __builtin_ctz(open), i, met.edge);
+    }
+  }
+
+  inline void meet_by_triangle(const TriangleBlock& block, uint32_t rays) {
+    alignas(32) float edges[kTreeWidth];
+    Pairs pairs = pairs_with(block, edges);
+    const uint32_t x = axis(kAxisX), y = axis(kAxisY), z = axis(kAxisZ);
+    for (uint32_t place = 0; place < block.count; ++place) {
+      for (uint32_t vertex = 0; vertex < 3; ++vertex) {
+        pairs.xs[vertex] = Floats8::all(block.vertices[x + 3 * vertex][place]);
+        pairs.ys[vertex] = Floats8::all(block.vertices[y + 3 * vertex][place]);
+        pairs.zs[vertex] = Floats8::all(block.vertices[z + 3 * vertex][place]);
+      }
+      const PairsMet met = meet<kAny>(pairs, front_, back_);
+      uint32_t open = met.open & rays;
+      if (open == 0) continue;
+      for (; open != 0; open &= open - 1u) {
+        const auto i = static_cast<uint32_t>(__builtin_ctz(open));
+        if ((met.sure >> i & 1u) != 0)
+          find(i);
+        else
+          settle(block, static_cast<int>(place), i, edges[i]);
+        if (limits_[i] < 0) rays &= ~(1u << i);
+      }
+      pairs.limit = Floats8::load(limits_);
+    }
+  }
+
+  // Of any of the rays: they have it in common.
+  inline uint32_t axis(uint32_t column) const { return PreparedRay(prepared_, 0).whole(column); }
+
+  // What does not depend on the triangle.
+  inline Pairs pairs_with(const TriangleBlock& block, float* edges) const {
+    const auto column = [&](uint32_t number) { return Floats8::load(prepared_.columns[number]); };
+    const Floats8 extent = Floats8::all(block.extent);
+    Pairs pairs;
+    pairs.from_x = column(kFromX);
+    pairs.from_y = column(kFromY);
+    pairs.from_z = column(kFromZ);
+    pairs.shear_x = column(kShearX);
+    pairs.shear_y = column(kShearY);
+    pairs.reciprocal_z = column(kReciprocalZ);
+    pairs.limit = Floats8::load(limits_);
+    pairs.edge =
+        planted(PlantedBug::kKernelEdgeBound) ? Floats8::all(0) : column(kEdgeScale) * extent + column(kEdgeFloor);
+    pairs.noise = pairs.edge * extent * column(kEdgeNoise) + column(kStartNoise);
+    pairs.t_floor = column(kTFloor);
+    pairs.edge.store(edges);
+    return pairs;
+  }
+
+  // Decides a pair that float left open.
+  inline void settle(const TriangleBlock& block, int place, uint32_t i, float edge) {
+    const Verdict verdict = decide(block, place, rays_[i], PreparedRay(prepared_, i), double{edge});
+    if (verdict.what == KernelVerdict::kUndecided) give_up(i);
+    if (verdict.what != KernelVerdict::kHit) return;
+    take(i, verdict.t, number_of(tree_, block, place));
+  }
+
+  // kAny: nothing more is wanted of the ray.
+  inline void find(uint32_t i) {
+    hits_[i].verdict = KernelVerdict::kHit;
+    limits_[i] = kNever;
+  }
+
+  inline void take(uint32_t i, float t, uint32_t number) {
+    KernelHit& hit = hits_[i];
+    if (!is_better(t, number, limits_[i], hit.verdict == KernelVerdict::kHit, hit.number)) return;
+    hit.verdict = KernelVerdict::kHit;
+    hit.t = t;
+    hit.number = number;
+    limits_[i] = kAny ? kNever : t;
+  }
+
+  inline void give_up(uint32_t i) {
+    hits_[i].verdict = KernelVerdict::kUndecided;
+    limits_[i] = kNever;
+  }
+
+  const TriangleTree& tree_;
+  const KernelRay* const rays_;
+  const PreparedRays& prepared_;
+  KernelHit* const hits_;
+  Slabs slabs_;
+  uint32_t front_ = 0, back_ = 0;  // the rays that accept a triangle seen so
+  uint32_t nodes_ = 0;
+  alignas(32) float limits_[kTreeWidth];
+  Waiting waiting_[kTreeStack];
+};
+
+}  // namespace
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
