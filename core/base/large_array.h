@@ -6,7 +6,9 @@
 #ifndef LOCUS_CORE_BASE_LARGE_ARRAY_H_
 #define LOCUS_CORE_BASE_LARGE_ARRAY_H_
 
+#ifdef __linux__
 #include <sys/mman.h>
+#endif
 
 #include <algorithm>
 #include <cstddef>

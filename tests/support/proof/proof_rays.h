@@ -110,6 +110,9 @@ inline void add_ray(const ProofInstance& instance, const MeshRay& ray, Random& r
 
 }  // namespace internal
 
+// Rays that go nearly the same way, in one block of four: the kernels take them together.
+inline constexpr size_t kBeamRays = 24;
+
 // `count` rays, the families in turn. Origins are floats of the block's frame, which is near their instance or, for one
 // block in four, anywhere within a kilometre of it: the reference starts from what the block says.
 inline OwnedBlock proof_rays(const ProofScene& scene, size_t count, Random& random) {
@@ -118,10 +121,17 @@ inline OwnedBlock proof_rays(const ProofScene& scene, size_t count, Random& rand
   const Vec3d center = random.pick(scene.instances).transform.translation;
   block.settings.frame = random.chance(0.75) ? center : center + random.vector(1e3);
   if (random.chance(0.3)) rays_of(block).cull = random.chance(0.5) ? Cull::kBack : Cull::kFront;
+  const size_t beam = random.chance(0.25) ? kBeamRays : 1;
+  const ProofInstance* instance = nullptr;
+  internal::MeshRay ray{};
   for (size_t i = 0; i < count; ++i) {
-    const ProofInstance& instance = random.pick(scene.instances);
-    const internal::MeshRay ray = internal::kRayFamilies[i % std::size(internal::kRayFamilies)](*instance.mesh, random);
-    internal::add_ray(instance, ray, random, block);
+    if (i % beam == 0) {
+      instance = &random.pick(scene.instances);
+      ray = internal::kRayFamilies[i / beam % std::size(internal::kRayFamilies)](*instance->mesh, random);
+    } else {
+      ray.target = ray.target + random.vector(instance->mesh->size * random.magnitude(-16, -8));
+    }
+    internal::add_ray(*instance, ray, random, block);
   }
   return block;
 }
