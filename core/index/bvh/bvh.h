@@ -69,9 +69,10 @@ class Bvh {
   // time.
   class RayWalk {
    public:
-    RayWalk(const Bvh& tree, const SlabRay<S>& slabs) : tree_(&tree), slabs_(slabs) {
-      if (!tree.nodes_.empty()) pending_.push_back({{0, 0}, -std::numeric_limits<S>::infinity()});
-    }
+    RayWalk(const Bvh& tree, const SlabRay<S>& slabs)
+        : tree_(&tree),
+          slabs_(slabs),
+          pending_(tree.nodes_.empty() ? 0 : 1, Pending{{0, 0}, -std::numeric_limits<S>::infinity()}) {}
 
     const SlabRay<S>& slabs() const { return slabs_; }
     // The next value as visit_ray() hands them over, null behind the last. `limit` may fall from call to call.
