@@ -14,23 +14,25 @@
 namespace locus {
 namespace {
 
-// Whether eight rays stay close enough together: in one octant, along one axis, their directions within a cone and
-// their starts within a small part of the way to the far end of everything. A matter of speed alone.
+// Whether eight rays may go together: in one octant and along one axis, which they must have in common, and close
+// enough to gain by it: their directions within a cone, their starts within a small part of everything.
 static inline bool go_together(const PreparedRays& rays, float magnitude) {
   constexpr float kMostSpread = 0.03f;
-  const auto differs = [&](uint32_t column) {
-    const Floats8 all = Floats8::load(rays.columns[column]);
-    return at_most(all, Floats8::all(rays.columns[column][0])) != 255u ||
-           at_most(Floats8::all(rays.columns[column][0]), all) != 255u;
-  };
   const auto apart = [&](uint32_t column, float most) {
     const Floats8 off = size_of(Floats8::load(rays.columns[column]) - Floats8::all(rays.columns[column][0]));
     return at_most(off, Floats8::all(most)) != 255u;
   };
   for (uint32_t column = kFromX; column <= kFromZ; ++column)
     if (apart(column, kMostSpread * magnitude)) return false;
-  // Whole numbers compare as the floats of their bits.
-  return !differs(kOctant) && !differs(kAxisZ) && !apart(kShearX, kMostSpread) && !apart(kShearY, kMostSpread);
+  if (apart(kShearX, kMostSpread) || apart(kShearY, kMostSpread)) return false;
+  // As the whole numbers they are: as floats they are denormal, and equal where the host takes those for zero.
+  const PreparedRay first(rays, 0);
+  uint32_t different = 0;
+  for (uint32_t i = 1; i < kTreeWidth; ++i) {
+    const PreparedRay other(rays, i);
+    different |= (other.whole(kOctant) ^ first.whole(kOctant)) | (other.whole(kAxisZ) ^ first.whole(kAxisZ));
+  }
+  return different == 0;
 }
 
 template <bool kAny>

@@ -2,6 +2,9 @@
 #include "core/index/bvh/kernels/ray_kernels.h"
 
 #include <gtest/gtest.h>
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
 #include <string>
 #include <vector>
@@ -38,6 +41,29 @@ TEST_P(RayKernelsTest, DecideFarMeshesAsAllTrianglesDo) {
 TEST_P(RayKernelsTest, DecideRaysThatGoTogetherAsAllTrianglesDo) {
   for (const KernelTrial& trial : beam_trials()) EXPECT_EQ(trial.difference(*kernels_), "");
 }
+
+#ifdef __SSE__
+// Some libraries tell the processor so for the whole thread.
+TEST_P(RayKernelsTest, AnswersStayWhereDenormalsCountAsZero) {
+  const TriangleBvh tree = *TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
+  std::vector<KernelRay> rays;
+  for (int i = 0; i < 8; ++i)  // nearly the same way, but in different octants
+    rays.push_back({{0, 0, 0}, {1, i % 2 == 0 ? 0.01 : -0.01, i % 4 < 2 ? 0.01 : -0.01}, 10, true, true});
+  const auto numbers = [&] {
+    std::vector<KernelHit> hits(rays.size());
+    kernels_->first(tree.tree(), rays.data(), hits.data(), rays.size());
+    std::vector<uint32_t> result;
+    for (const KernelHit& hit : hits) result.push_back(hit.number);
+    return result;
+  };
+  const std::vector<uint32_t> expected = numbers();
+  const unsigned int usual = _mm_getcsr();
+  _mm_setcsr(usual | 0x8040);  // flush to zero, denormals are zero
+  const std::vector<uint32_t> found = numbers();
+  _mm_setcsr(usual);
+  EXPECT_EQ(found, expected);
+}
+#endif
 
 TEST_P(RayKernelsTest, RaysThatGoTogetherOpenNodesOnce) {
   const TriangleBvh tree = *TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
