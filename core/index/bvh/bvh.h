@@ -57,7 +57,7 @@ class Bvh {
   // for an empty tree. O(nodes).
   double sah_cost() const;
 
-  // Near to far by the boxes of nodes. Allocates nothing.
+  // Near to far by the boxes of nodes. Allocates only where more than sixteen nodes wait.
   template <RayVisitor<V> Visitor>
   void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
 
