@@ -77,7 +77,8 @@ struct OwnedBlock {
   }
 };
 
-// Borrows from `blocks`.
+// Borrows from `blocks`, which must therefore outlive it: a list that is not kept is refused.
+QueryBatch batch_of(std::vector<OwnedBlock>&& blocks) = delete;
 inline QueryBatch batch_of(const std::vector<OwnedBlock>& blocks) {
   QueryBatch batch;
   for (const OwnedBlock& block : blocks) batch.blocks.push_back(block.view());

@@ -73,8 +73,8 @@ TEST_P(KernelRaysTest, FindWhetherThereIsAHitAsEveryTriangleDoes) {
 
 TEST_P(KernelRaysTest, ABudgetThatEndsListsTheRaysThatWereLeft) {
   const SnapshotPtr snapshot = snapshot_of(crowd());
-  const OwnedBlock rays = rays_through(RayMode::kFirst);
-  QueryBatch batch = batch_of({rays});
+  const std::vector<OwnedBlock> blocks = {rays_through(RayMode::kFirst)};
+  QueryBatch batch = batch_of(blocks);
   batch.max_work = 1;
   const absl::StatusOr<BatchResult> result = run_batch(*snapshot, batch, {});
   ASSERT_TRUE(result.ok()) << result.status();

@@ -20,6 +20,11 @@ std::vector<OwnedBlock> three_blocks(OwnedBlock last) {
   return {rays_along_x(RayMode::kFirst), one_ball({0, 0, 0}, 1), std::move(last)};
 }
 
+absl::Status status_with(const OwnedBlock& last) {
+  const std::vector<OwnedBlock> blocks = three_blocks(last);
+  return check_batch(batch_of(blocks));
+}
+
 OwnedBlock twenty_rays() {
   OwnedBlock block = rays_along_x(RayMode::kFirst, std::vector<float>(60, 1));
   block.sizes.assign(60, 1);
@@ -59,13 +64,13 @@ void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& f
 TEST(CheckBatchTest, BlocksThatAreRightPass) {
   for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), lookup_of_ids({1}),
                                   lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
-    EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+    EXPECT_TRUE(status_with(block).ok());
 }
 
 TEST(CheckBatchTest, TheMessageNamesFieldAndIndex) {
   OwnedBlock block = twenty_rays();
   block.sizes[17 * 3 + 1] = kNan;
-  const absl::Status status = check_batch(batch_of(three_blocks(block)));
+  const absl::Status status = status_with(block);
   EXPECT_NE(status.message().find("blocks[2].rays.directions[17]"), absl::string_view::npos) << status;
 }
 
@@ -89,14 +94,14 @@ TEST(CheckBatchTest, DirectionsOfZeroAreRefused) {
 TEST(CheckBatchTest, DenormalDirectionsPass) {
   OwnedBlock block = twenty_rays();
   block.sizes.assign(60, std::numeric_limits<float>::denorm_min());
-  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  EXPECT_TRUE(status_with(block).ok());
 }
 
 TEST(CheckBatchTest, RayEndsMayBeInfiniteButNotNegativeNorNan) {
   OwnedBlock block = twenty_rays();
   block.extras[3] = kInf;
   block.extras[4] = 0;
-  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  EXPECT_TRUE(status_with(block).ok());
   block.extras[7] = kNan;
   expect_refusal(block, Reason::kNotFinite, "rays.t_max", 7);
   block.extras[7] = -std::numeric_limits<float>::denorm_min();
@@ -116,7 +121,7 @@ TEST(CheckBatchTest, RadiiMustBeFiniteAndNotNegative) {
   block.sizes[11] = 1.001e9f;
   expect_refusal(block, Reason::kOutOfRange, "balls.radii", 11);
   block.sizes[11] = 1e9f;
-  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  EXPECT_TRUE(status_with(block).ok());
 }
 
 TEST(CheckBatchTest, HalfExtentsMustBeFiniteAndNotNegative) {
@@ -140,7 +145,7 @@ TEST(CheckBatchTest, RotationsMustBeOfUnitLengthWithinAThousandth) {
   OwnedBlock block = twenty_boxes();
   float& w = block.extras[4 * 6 + 3];
   w = 1.0009f;
-  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  EXPECT_TRUE(status_with(block).ok());
   for (const float wrong : {1.0011f, 0.9989f, 0.0f, -0.5f}) {
     w = wrong;
     expect_refusal(block, Reason::kOutOfRange, "boxes.rotations", 6);
@@ -164,7 +169,7 @@ TEST(CheckBatchTest, FrameAndOffsetTogetherMustBeInTheWorld) {
   block.settings.frame = {1e9, 0, 0};
   expect_refusal(block, Reason::kOutOfRange, "rays.origins", 0);
   block.points.assign(60, -1);
-  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  EXPECT_TRUE(status_with(block).ok());
   block.points[3 * 12] = 0.5f;
   expect_refusal(block, Reason::kOutOfRange, "rays.origins", 12);
 }
@@ -193,7 +198,7 @@ TEST(CheckBatchTest, ColumnsHaveNEntriesOneOrWhereAllowedNone) {
       if (c.width == 4 && numbers == 4) c.column(block) = {0, 0, 0, 1};
       const bool fits = numbers == whole.size() || (c.one_for_all && numbers == c.width) || (c.none && numbers == 0);
       if (fits) {
-        EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok()) << c.field << " " << numbers;
+        EXPECT_TRUE(status_with(block).ok()) << c.field << " " << numbers;
       } else {
         expect_refusal(block, Reason::kColumnLength, c.field, -1);
       }
@@ -212,7 +217,7 @@ TEST(CheckBatchTest, MasksAndIgnoredGroupsHaveNEntriesOneOrNone) {
   for (const size_t entries : {0u, 1u, 20u}) {
     block.masks.assign(entries, 1);
     block.ignore_groups.assign(entries, 1);
-    EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+    EXPECT_TRUE(status_with(block).ok());
   }
   block.masks.assign(19, 1);
   expect_refusal(block, Reason::kColumnLength, "masks", -1);
@@ -224,7 +229,7 @@ TEST(CheckBatchTest, MasksAndIgnoredGroupsHaveNEntriesOneOrNone) {
 TEST(CheckBatchTest, AtMost64IdsAreIgnored) {
   OwnedBlock block = twenty_rays();
   block.ignore_ids.assign(64, 7);
-  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  EXPECT_TRUE(status_with(block).ok());
   block.ignore_ids.push_back(7);
   expect_refusal(block, Reason::kLimit, "ignore_ids", -1);
 }
@@ -232,7 +237,7 @@ TEST(CheckBatchTest, AtMost64IdsAreIgnored) {
 TEST(CheckBatchTest, MaxResultsHasALimit) {
   OwnedBlock block = twenty_rays();
   block.settings.max_results = limits::kMaxMaxResults;
-  EXPECT_TRUE(check_batch(batch_of(three_blocks(block))).ok());
+  EXPECT_TRUE(status_with(block).ok());
   ++block.settings.max_results;
   expect_refusal(block, Reason::kLimit, "max_results", -1);
 }
