@@ -73,6 +73,12 @@ constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
   return squared_length(gap);
 }
 
+// The point of the box nearest to `point`, which is `point` itself inside. Not for an empty box.
+template <class S>
+constexpr Vec3<S> nearest_in(Vec3<S> point, const Aabb<S>& box) {
+  return min(max(point, box.min), box.max);
+}
+
 template <class S>
 Aabb<S> grown(const Aabb<S>& box, S by) {
   const Vec3<S> margin{by, by, by};

@@ -2,6 +2,7 @@
 
 #include "core/base/planted_bug.h"
 #include "core/geometry/obb_obb.h"
+#include "core/geometry/point_shape.h"
 #include "core/geometry/ray_ball.h"
 #include "core/geometry/ray_capsule.h"
 #include "core/geometry/ray_obb.h"
@@ -82,27 +83,6 @@ std::optional<ShapeHit> solid_hit(const ObjectRay& ray, const Shape& shape) {
   return hit_at(local, chord->near, chord->near_normal);
 }
 
-double squared_distance_to_box(Vec3d point, Vec3d half) { return squared_distance(point, Aabbd{-half, half}); }
-
-double squared_distance_to_shape(Vec3d point, const Shape& shape) {
-  const Vec3d offset = point - shape.position;
-  switch (shape.kind) {
-    case ShapeKind::kPoint:
-    case ShapeKind::kBall:
-      return squared_length(offset);
-    case ShapeKind::kBox:
-      return squared_distance_to_box(rotation_of(shape.rotation).to_local(offset), to_double(shape.size));
-    case ShapeKind::kCapsule:
-      return squared_distance_to_segment(rotation_of(shape.rotation).to_local(offset), to_double(shape.size));
-  }
-  return std::numeric_limits<double>::infinity();
-}
-
-// What a ball or capsule adds around its centre or inner segment.
-double rounding_radius(const Shape& shape) {
-  return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule ? shape.radius : 0;
-}
-
 }  // namespace
 
 Aabbd bounds_of(const Shape& shape) {
@@ -130,8 +110,8 @@ std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape) {
 
 bool ball_overlaps(const Balld& ball, const Shape& shape) {
   if (!reaches(ball, bounds_of(shape))) return false;
-  const double reach = ball.radius + rounding_radius(shape);
-  const double distance = squared_distance_to_shape(ball.center, shape);
+  const double reach = ball.radius + core_radius(shape);
+  const double distance = squared_distance_to_core(ball.center, shape);
   return planted(PlantedBug::kStrictTie) ? distance < reach * reach : distance <= reach * reach;
 }
 
@@ -143,7 +123,7 @@ bool box_overlaps(const Obbd& box, const Shape& shape) {
     case ShapeKind::kPoint:
       return box_contains(box.half, offset);
     case ShapeKind::kBall:
-      return squared_distance_to_box(offset, box.half) <= rr;
+      return squared_distance(offset, Aabbd{-box.half, box.half}) <= rr;
     case ShapeKind::kBox:
       return boxes_overlap(box, box_of(shape));
     case ShapeKind::kCapsule: {

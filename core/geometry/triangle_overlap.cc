@@ -5,38 +5,6 @@
 namespace locus {
 namespace {
 
-double squared_distance_to_edge(Vec3d point, Vec3d from, Vec3d to) {
-  const Vec3d edge = to - from;
-  const Vec3d offset = point - from;
-  const double along = dot(offset, edge);
-  const double length = squared_length(edge);
-  if (along <= 0) return squared_length(offset);
-  if (along >= length) return squared_length(point - to);
-  return squared_length(cross(offset, edge)) / length;
-}
-
-// Squared distance to the plane where the foot of the perpendicular lies within the triangle, else infinity.
-double squared_distance_to_face(Vec3d point, Vec3d a, Vec3d b, Vec3d c) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const Vec3d ab = b - a, ac = c - a;
-  const Vec3d offset = point - a;
-  const Vec3d normal = cross(ab, ac);
-  const double nn = squared_length(normal);
-  if (nn == 0) return kInfinity;
-  const double weight_b = dot(cross(offset, ac), normal);
-  const double weight_c = dot(cross(ab, offset), normal);
-  const double weight_a = dot(cross(c - b, point - b), normal);
-  if (!(weight_a >= 0 && weight_b >= 0 && weight_c >= 0)) return kInfinity;
-  // The plane of a sliver is known too badly to measure from, but a point of the triangle is never too near.
-  constexpr double kSliver = 0x1p-40;  // square of the sine at vertex a
-  if (nn < kSliver * squared_length(ab) * squared_length(ac)) {
-    const double sum = weight_a + weight_b + weight_c;
-    return squared_length(offset - (ab * (weight_b / sum) + ac * (weight_c / sum)));
-  }
-  const double height = dot(offset, normal);
-  return height * height / nn;
-}
-
 struct Range {
   double low, high;
 };
@@ -71,13 +39,6 @@ bool triangle_meets_box(const Triangle& triangle, const Obbf& box) {
 }
 
 }  // namespace
-
-double squared_distance(Vec3d point, const Triangle& triangle) {
-  const Vec3d a = to_double(triangle.a), b = to_double(triangle.b), c = to_double(triangle.c);
-  const double edges = std::min(squared_distance_to_edge(point, a, b),
-                                std::min(squared_distance_to_edge(point, b, c), squared_distance_to_edge(point, c, a)));
-  return std::min(edges, squared_distance_to_face(point, a, b, c));
-}
 
 bool ball_overlaps(const Ballf& ball, const Triangle& triangle) {
   if (!reaches(ball, bounds_of(triangle))) return false;

@@ -5,15 +5,11 @@
 
 #include "core/geometry/ball.h"
 #include "core/geometry/obb.h"
-#include "core/geometry/triangle.h"
+#include "core/geometry/point_triangle.h"
 
 namespace locus {
 
-// Squared distance from a point to the triangle: the least of three clamped segment distances and, where the foot of
-// the perpendicular lies inside, of the distance to the plane. No cancellation drops a sliver.
-double squared_distance(Vec3d point, const Triangle& triangle);
-
-// squared_distance <= radius^2, and the triangle's own box is no farther than that either.
+// squared_distance() <= radius^2, and the triangle's own box is no farther than that either.
 bool ball_overlaps(const Ballf& ball, const Triangle& triangle);
 
 // Separating axis test over 13 axes in the box's own axes, and the triangle's own box overlaps the bounds of `box`.

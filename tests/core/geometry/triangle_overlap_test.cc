@@ -1,97 +1,18 @@
 #include "core/geometry/triangle_overlap.h"
 
-#include <cstdint>
-#include <tuple>
-#include <utility>
-
 #include "gtest/gtest.h"
 #include "tests/support/box_clip.h"
-#include "tests/support/convex_reference.h"
-#include "tests/support/random.h"
+#include "tests/support/triangle_reference.h"
 
 namespace locus {
 namespace {
 
 using test::Random;
+using test::random_triangle;
 using test::Real;
+using test::reference_distance;
+using test::size_of;
 using test::to_real;
-using test::Vec3r;
-
-// General triangles, slivers, segments and points, of any size.
-Triangle random_triangle(Random& random) {
-  const Vec3d place = random.vector(random.magnitude(0, 10));
-  const double size = random.magnitude(-6, 6);
-  Triangle t{to_float(place + random.vector(size)), to_float(place + random.vector(size)), {}, 0};
-  t.c = to_float(place + random.vector(size));
-  if (random.chance(0.3)) {  // a sliver: the third vertex almost on the line of the others
-    const Vec3d along = to_double(t.a) + (to_double(t.b) - to_double(t.a)) * random.between(-0.5, 1.5);
-    t.c = to_float(along + random.vector(size * random.magnitude(-24, -2)));
-  }
-  if (random.chance(0.05)) t.c = t.b;
-  if (random.chance(0.02)) t.a = t.b = t.c;
-  return t;
-}
-
-double size_of(const Triangle& t) { return std::sqrt(squared_length(to_double(bounds_of(t)).extent())); }
-
-// Least distance over all weights, by search within search: convex in each.
-Real reference_distance(Vec3r point, const Triangle& t) {
-  const Vec3r a = to_real(t.a) - point, ab = to_real(t.b) - to_real(t.a), ac = to_real(t.c) - to_real(t.a);
-  const auto nearest_v = [&](Real u) {
-    const auto distance = [&](Real v) { return test::length(a + ab * u + ac * v); };
-    const Real limit = 1 - u;
-    return std::min(distance(test::argmin(distance, 0, limit)), std::min(distance(0), distance(limit)));
-  };
-  return std::min(nearest_v(test::argmin(nearest_v, 0, 1)), std::min(nearest_v(0), nearest_v(1)));
-}
-
-TEST(TriangleOverlapTest, DistanceAgreesWithASearchOverAllWeights) {
-  constexpr uint64_t kSeed = 41;
-  Random random(kSeed);
-  for (int i = 0; i < 10000; ++i) {
-    const Triangle t = random_triangle(random);
-    const double size = size_of(t) + 1e-6;
-    const Vec3d point = to_double(t.a) + random.vector(size * random.magnitude(-8, 3));
-    const Real expected = reference_distance(to_real(point), t);
-    const Real actual = std::sqrt(Real{squared_distance(point, t)});
-    const Real tolerance = 1e-9L * (expected + size);
-    ASSERT_NEAR(static_cast<double>(actual), static_cast<double>(expected), static_cast<double>(tolerance))
-        << "seed " << kSeed << " case " << i;
-  }
-}
-
-// Vertices of whole numbers whose cross product is 1, and a third beside the origin: as thin as floats allow, with a
-// normal of which only a few bits are known.
-Triangle hairline(Random& random) {
-  constexpr int64_t kLargest = 1 << 21;
-  int64_t p = random.whole(1, kLargest), q = random.whole(1, kLargest);
-  // Extended Euclid: p * s - q * r = 1 for coprime p and q.
-  int64_t r0 = p, r1 = q, s0 = 1, s1 = 0, t0 = 0, t1 = 1;
-  while (r1 != 0) {
-    const int64_t n = r0 / r1;
-    std::tie(r0, r1) = std::pair(r1, r0 - n * r1);
-    std::tie(s0, s1) = std::pair(s1, s0 - n * s1);
-    std::tie(t0, t1) = std::pair(t1, t0 - n * t1);
-  }
-  p /= r0, q /= r0;
-  const int64_t s = s0, r = -t0;
-  const Vec3d b = {double(p), double(q), double(p + q)}, c = {double(r), double(s), double(r + s)};
-  return {to_float(random.vector(random.magnitude(-26, 0))), to_float(b), to_float(c), 0};
-}
-
-TEST(TriangleOverlapTest, DistanceToHairlinesAgreesWithTheSearch) {
-  constexpr uint64_t kSeed = 45;
-  Random random(kSeed);
-  for (int i = 0; i < 5000; ++i) {
-    const Triangle t = hairline(random);
-    const Vec3d along = to_double(t.b) * random.between(-0.1, 1.1);
-    const Vec3d point = along + random.vector(size_of(t) * random.magnitude(-40, 0));
-    const Real expected = reference_distance(to_real(point), t);
-    const Real actual = std::sqrt(Real{squared_distance(point, t)});
-    ASSERT_NEAR(static_cast<double>(actual), static_cast<double>(expected), 1e-9 * size_of(t))
-        << "seed " << kSeed << " case " << i;
-  }
-}
 
 // A polygon clipped in long double, the box grown or shrunk by a margin.
 bool reference_overlap(const Obbf& box, const Quaternion& rotation, const Triangle& t, Real grown) {

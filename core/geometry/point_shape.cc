@@ -1,0 +1,60 @@
+#include "core/geometry/point_shape.h"
+
+#include "core/geometry/segment.h"
+
+namespace locus {
+namespace {
+
+// In the shape's own axes.
+Vec3d nearest_in_core(Vec3d local, const Shape& shape) {
+  const Vec3d size = to_double(shape.size);
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+    case ShapeKind::kBall:
+      return {};
+    case ShapeKind::kBox:
+      return nearest_in(local, Aabbd{-size, size});
+    case ShapeKind::kCapsule:
+      return nearest_on_segment(local, size);
+  }
+  return {};
+}
+
+}  // namespace
+
+double core_radius(const Shape& shape) {
+  return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule ? shape.radius : 0;
+}
+
+double squared_distance_to_core(Vec3d point, const Shape& shape) {
+  const Vec3d offset = point - shape.position;
+  const Vec3d size = to_double(shape.size);
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+    case ShapeKind::kBall:
+      return squared_length(offset);
+    case ShapeKind::kBox:
+      return squared_distance(rotation_of(shape.rotation).to_local(offset), Aabbd{-size, size});
+    case ShapeKind::kCapsule:
+      return squared_distance_to_segment(rotation_of(shape.rotation).to_local(offset), size);
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+double distance(Vec3d point, const Shape& shape) {
+  const double apart = std::sqrt(squared_distance_to_core(point, shape));
+  if (shape.kind == ShapeKind::kPoint) return apart;  // its bounds are as far
+  return std::max(apart - core_radius(shape), std::sqrt(squared_distance(point, bounds_of(shape))));
+}
+
+Vec3d nearest_on_shape(Vec3d point, const Shape& shape) {
+  const double apart = std::sqrt(squared_distance_to_core(point, shape));
+  const double radius = core_radius(shape);
+  if (apart <= radius) return point;
+  const Rotation rotation = shape.kind == ShapeKind::kBall ? Rotation{} : rotation_of(shape.rotation);
+  const Vec3d local = rotation.to_local(point - shape.position);
+  const Vec3d from = nearest_in_core(local, shape);
+  return shape.position + rotation.to_world(from + (local - from) * (radius / apart));
+}
+
+}  // namespace locus
