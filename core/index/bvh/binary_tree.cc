@@ -15,7 +15,7 @@ namespace {
 constexpr uint32_t kSubtreeReferences = 4096;
 constexpr size_t kPieceReferences = 1u << 16;  // that one thread measures at once
 // Of all nodes of a tree together, against the area of its root, were every node to hold as many children as blocks.
-constexpr double kNodeCost = 0.25;
+constexpr double kNodeCost = 4;
 
 }  // namespace
 

@@ -1,7 +1,7 @@
 // Splits ranges of boxes in two: by the binned surface area heuristic, few boxes by every cut of their sorted centres,
-// and by halves where areas tell nothing. What a part costs is its area times the blocks that its boxes fill at best.
-// Internal to this folder. Pure functions. Source: Wald, On fast Construction of SAH-based Bounding Volume Hierarchies,
-// 2007.
+// and by halves where areas tell nothing. What a part costs is its area times the blocks that its boxes fill at best
+// and a little for each box. Internal to this folder. Pure functions. Source: Wald, On fast Construction of SAH-based
+// Bounding Volume Hierarchies, 2007.
 #ifndef LOCUS_CORE_INDEX_BVH_SPLITTER_H_
 #define LOCUS_CORE_INDEX_BVH_SPLITTER_H_
 

@@ -109,6 +109,22 @@ TEST(TriangleBvhBuildTest, TheFirstTriangleThatIsNotFiniteIsNamedByAnyThreads) {
   }
 }
 
+// As the ground among houses: whoever shares its block is met by all rays that meet the ground.
+TEST(TriangleBvhBuildTest, ALargeTriangleTakesNoSmallOnesIntoItsBlockToSaveOne) {
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < 15; ++i) {
+    const auto x = static_cast<float>(i);
+    triangles.push_back({{x, 0, 0}, {x + 0.5f, 0, 0}, {x, 0.5f, 0}});
+  }
+  triangles.push_back({{-900, -1000, 0}, {1100, -1000, 0}, {100, 1000, 0}});
+  number_in_order(triangles);
+  const TriangleBvh built = build(triangles);
+  ASSERT_EQ(block_count(built), 3u);
+  const TriangleTree tree = built.tree();
+  for (size_t block = 0; block < 3; ++block)
+    EXPECT_EQ(tree.blocks[block].count == 1, tree.numbers[tree.blocks[block].first] == 15);
+}
+
 // Adds up what first hits open. A block is met when its first triangle is.
 class CountingRay {
  public:
