@@ -74,14 +74,16 @@ int run(const Options& options) {
   const Progress progress = [start](const std::string& sentence) {
     std::cerr << absl::StrFormat("[%5.0f s] %s", wall_seconds() - start, sentence) << std::endl;
   };
-  const absl::StatusOr<Report> report = suite->run(options, progress);
-  if (!report.ok()) return fail(report.status(), 1);
-  write_table(*report, std::cout);
+  Report report;
+  report.on_cell = [](const Cell& cell) { write_row(cell, std::cout); };
+  write_heading(std::cout);
+  if (const absl::Status run = suite->run(options, progress, report); !run.ok()) return fail(run, 1);
+  write_closing(report, std::cout);
   if (!options.json.empty()) {
-    const absl::Status written = write_json(*report, options.json);
+    const absl::Status written = write_json(report, options.json);
     if (!written.ok()) return fail(written, 1);
   }
-  return exit_status(*report);
+  return exit_status(report);
 }
 
 }  // namespace

@@ -1,9 +1,11 @@
 // What a benchmark says: cells, each our figure beside a peer's, and the sentences that belong to them. For every
-// suite. Plain data.
+// suite.
 #ifndef LOCUS_TESTS_BENCH_FRAME_CELL_H_
 #define LOCUS_TESTS_BENCH_FRAME_CELL_H_
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace locus::bench {
@@ -21,9 +23,16 @@ struct Cell {
 };
 
 struct Report {
+  // Hears of each cell as soon as it is known; may be empty.
+  std::function<void(const Cell& cell)> on_cell;
   std::vector<Cell> cells;
   std::vector<std::string> notes;          // what the reader has to know: a peer that is not there, rays that differ
   std::vector<std::string> disagreements;  // what nobody has explained; one is enough for exit status 1
+
+  void add(Cell cell) {
+    if (on_cell) on_cell(cell);
+    cells.push_back(std::move(cell));
+  }
 };
 
 }  // namespace locus::bench

@@ -54,7 +54,7 @@ void add_cells(const std::vector<Contestant>& contestants, const std::vector<std
     full.peer_name = contestants[i].name;
     full.ratio = median(ratios);
     full.spread = spread(ratios);
-    report.cells.push_back(full);
+    report.add(full);
   }
 }
 

@@ -7,19 +7,19 @@
 #include "absl/strings/str_format.h"
 
 namespace locus::bench {
-namespace {
+void write_heading(std::ostream& out) {
+  out << absl::StrFormat("%-36s %-20s %11s %11s %-14s %8s %7s  %s\n", "case", "peer", "ours", "peer's", "metric",
+                         "ratio", "spread", "results")
+      << std::flush;
+}
 
 void write_row(const Cell& cell, std::ostream& out) {
   out << absl::StrFormat("%-36s %-20s %11.4g %11.4g %-14s %8.3f %6.1f%%  %s\n", cell.case_name, cell.peer_name,
-                         cell.ours, cell.peer, cell.metric, cell.ratio, 100 * cell.spread, cell.results_hash);
+                         cell.ours, cell.peer, cell.metric, cell.ratio, 100 * cell.spread, cell.results_hash)
+      << std::flush;
 }
 
-}  // namespace
-
-void write_table(const Report& report, std::ostream& out) {
-  out << absl::StrFormat("%-36s %-20s %11s %11s %-14s %8s %7s  %s\n", "case", "peer", "ours", "peer's", "metric",
-                         "ratio", "spread", "results");
-  for (const Cell& cell : report.cells) write_row(cell, out);
+void write_closing(const Report& report, std::ostream& out) {
   out << "ratio: above 1 means ours is better; the median of "
       << "the rounds. Figures of time are for orientation.\n";
   for (const std::string& note : report.notes) out << "note: " << note << "\n";

@@ -33,12 +33,20 @@ TEST(ReportTest, JsonIsAListOfCellsWithEveryField) {
   EXPECT_EQ(list, expected);
 }
 
-TEST(ReportTest, TheTableSaysNotesAndDisagreements) {
+TEST(ReportTest, WhoeverListensHearsOfEachCellAtOnce) {
+  Report report;
+  std::ostringstream out;
+  report.on_cell = [&](const Cell& cell) { write_row(cell, out); };
+  report.add(report_of_one().cells.front());
+  EXPECT_THAT(out.str(), HasSubstr("build/delta"));
+  EXPECT_EQ(report.cells.size(), 1u);
+}
+
+TEST(ReportTest, TheTableEndsWithNotesAndDisagreements) {
   Report report = report_of_one();
   report.disagreements.emplace_back("we are wrong");
   std::ostringstream out;
-  write_table(report, out);
-  EXPECT_THAT(out.str(), HasSubstr("build/delta"));
+  write_closing(report, out);
   EXPECT_THAT(out.str(), HasSubstr("note: a peer is missing"));
   EXPECT_THAT(out.str(), HasSubstr("DISAGREEMENT: we are wrong"));
 }

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "absl/status/statusor.h"
+#include "absl/status/status.h"
 #include "tests/bench/frame/cell.h"
 #include "tests/bench/frame/options.h"
 
@@ -17,8 +17,9 @@ using Progress = std::function<void(const std::string& sentence)>;
 struct Suite {
   std::string name;
   std::string description;
-  // Errors: what keeps the suite from running at all, for example a mesh that cannot be read.
-  absl::StatusOr<Report> (*run)(const Options& options, const Progress& progress);
+  // Adds to the report case by case. Errors: what keeps the suite from running at all, for example a mesh that cannot
+  // be read.
+  absl::Status (*run)(const Options& options, const Progress& progress, Report& report);
 };
 
 }  // namespace locus::bench

@@ -41,7 +41,7 @@ void run_memory(const std::string& name, const MeshRun& run, const Builders& bui
     cell.peer = bytes(*builders[i]);
     cell.peer_name = builders[i]->name();
     cell.ratio = cell.peer / cell.ours;
-    run.report.cells.push_back(cell);
+    run.report.add(cell);
   }
 }
 

@@ -3,13 +3,13 @@
 #ifndef LOCUS_TESTS_BENCH_STATIC_STATIC_SUITE_H_
 #define LOCUS_TESTS_BENCH_STATIC_STATIC_SUITE_H_
 
-#include "absl/status/statusor.h"
+#include "absl/status/status.h"
 #include "tests/bench/frame/suite.h"
 
 namespace locus::bench {
 
 // Errors: those of load_mesh() for a mesh that was asked for by name. Fetched levels that are absent are only noted.
-absl::StatusOr<Report> run_static_suite(const Options& options, const Progress& progress);
+absl::Status run_static_suite(const Options& options, const Progress& progress, Report& report);
 
 }  // namespace locus::bench
 
