@@ -29,7 +29,7 @@ python_packages="python3 python3-grpcio python3-protobuf"
 # binutils gives nm to the house test; zsh and fish run the completions; groff and mandoc read the manual.
 test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc
   groff-base"
-bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev"
+bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev libnanoflann-dev"
 lint_packages="clang-tidy mypy"
 # systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"

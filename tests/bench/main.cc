@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "tests/bench/dynamic/dynamic_suite.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/report.h"
 #include "tests/bench/frame/suite.h"
@@ -20,6 +21,8 @@ namespace {
 std::vector<Suite> suites() {
   return {
       {"static", "rays, balls, boxes, builds and memory of one level, beside Embree and others", run_static_suite},
+      {"dynamic", "moving objects: moves, queries, memory and readers beside a writer, beside Bullet and others",
+       dynamic::run_dynamic_suite},
   };
 }
 
@@ -29,6 +32,7 @@ constexpr char kExamples[] = R"(Examples:
   locus-bench static --filter '^ray/.*/first' --mesh level.obj
   locus-bench static --mesh city:200000:9 --mesh build/levels/pak1-maps.pk3#maps/delta.bsp
   locus-bench static --filter '^(build|memory)/' --rounds 9
+  locus-bench dynamic --filter '^(move|ball)/(uniform|far)/100k'
 
 A MESH is a file that `locus import` reads (FILE, or FILE#ENTRY for a level in a .pk3), or a made-up one: KIND:TRIANGLES
 or KIND:TRIANGLES:SEED, where KIND is city, terrain or blob. Levels of Debian packages: tests/bench/fetch_levels.sh.

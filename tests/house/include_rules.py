@@ -57,6 +57,7 @@ THIRD_PARTY = {
     "BulletCollision/": ["tests/bench"],
     "boost/": ["tests/bench"],
     "CGAL/": ["tests/bench"],
+    "nanoflann.hpp": ["tests/bench"],
 }
 FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
 INTRINSICS = "immintrin.h"

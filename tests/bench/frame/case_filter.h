@@ -21,6 +21,8 @@ class CaseFilter {
   static absl::StatusOr<CaseFilter> create(const std::string& pattern);
 
   bool wants(const std::string& case_name) const;
+  // Whether there is no pattern.
+  bool wants_every() const { return pattern_ == nullptr; }
 
  private:
   std::shared_ptr<const regex_t> pattern_;

@@ -1,6 +1,6 @@
 #include "tests/bench/static/peers.h"
 
-#include "absl/strings/str_cat.h"
+#include "tests/bench/frame/missing_peer.h"
 #ifdef LOCUS_BENCH_EMBREE
 #include "tests/bench/static/embree.h"
 #include "tests/bench/static/embree_collide.h"
@@ -45,25 +45,19 @@ std::vector<std::unique_ptr<Builder>> all_builders([[maybe_unused]] const BenchM
 }
 
 std::vector<std::string> missing_peers() {
-  std::vector<std::string> packages;
+  std::vector<std::string> sentences;
 #ifndef LOCUS_BENCH_EMBREE
-  packages.emplace_back("libembree-dev");
+  sentences.push_back(missing_peer("libembree-dev"));
 #endif
 #ifndef LOCUS_BENCH_BULLET
-  packages.emplace_back("libbullet-dev");
+  sentences.push_back(missing_peer("libbullet-dev"));
 #endif
 #ifndef LOCUS_BENCH_BOOST
-  packages.emplace_back("libboost-dev");
+  sentences.push_back(missing_peer("libboost-dev"));
 #endif
 #ifndef LOCUS_BENCH_CGAL
-  packages.emplace_back("libcgal-dev");
+  sentences.push_back(missing_peer("libcgal-dev"));
 #endif
-  std::vector<std::string> sentences;
-  sentences.reserve(packages.size());
-  for (const std::string& package : packages)
-    sentences.push_back(
-        absl::StrCat("a peer is missing: ", package,
-                     " was not installed when this program was configured; run deploy/packages.sh bench"));
   return sentences;
 }
 

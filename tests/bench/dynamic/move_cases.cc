@@ -1,0 +1,91 @@
+#include "tests/bench/dynamic/move_cases.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "tests/bench/dynamic/agreement.h"
+#include "tests/bench/dynamic/query_cases.h"
+#include "tests/bench/frame/race.h"
+
+namespace locus::bench::dynamic {
+namespace {
+
+// One tick's columns.
+struct Tick {
+  std::vector<uint64_t> ids;
+  std::vector<float> positions, velocities;
+
+  explicit Tick(const Moves& moves)
+      : ids(moves.ids.begin(), moves.ids.end()),
+        positions(moves.positions.begin(), moves.positions.end()),
+        velocities(moves.velocities.begin(), moves.velocities.end()) {}
+  Moves moves() const { return {ids, positions, velocities}; }
+};
+
+class MoveRace {
+ public:
+  explicit MoveRace(const WorldRun& run) : run_(run) {}
+
+  void run() {
+    // Small worlds go several ticks at a time, or they would find only what the others left in the caches.
+    const uint32_t count = run_.world.count();
+    const size_t ticks = std::clamp<size_t>(100'000 / count, 1, 8), chunks = count < 1'000'000 ? 4 : 1;
+    std::vector<Contestant> contestants = {contestant(run_.ours, ticks * chunks)};
+    for (const auto& peer : run_.peers)
+      if (peer->does(Task::kMove)) contestants.push_back(contestant(*peer, ticks * chunks));
+    contestants.front().prepare = [this, ticks](size_t) {
+      step(ticks);
+      touch();
+    };
+    const auto times = race(contestants, chunks, run_.options.rounds, thread_seconds);
+    add_cells(contestants, times, cell_of(run_.case_of("move"), "ns/move", compare_all()), run_.report);
+  }
+
+ private:
+  void step(size_t ticks) {
+    ticks_.clear();
+    for (size_t i = 0; i < ticks; ++i) {
+      run_.world.step();
+      ticks_.emplace_back(run_.world.moves());
+    }
+  }
+  // Everybody finds the columns as if they had just been received.
+  void touch() {
+    for (const Tick& tick : ticks_)
+      touched_ += static_cast<double>(std::accumulate(tick.ids.begin(), tick.ids.end(), uint64_t{0})) +
+                  std::accumulate(tick.positions.begin(), tick.positions.end(), 0.0f);
+  }
+  Contestant contestant(Contender& contender, size_t ticks) {
+    const auto run_chunk = [this, &contender](size_t) {
+      for (const Tick& tick : ticks_) contender.move(tick.moves());
+    };
+    return {contender.name(), run_chunk, static_cast<double>(run_.world.count()) * static_cast<double>(ticks),
+            [this](size_t) { touch(); }};
+  }
+  // That all are where they should be, by some of the balls.
+  std::string compare_all() {
+    Queries some = run_.queries;
+    some.centers.resize(some.centers.size() / 10);
+    Answers ours, theirs;
+    ask_all(run_.ours, Task::kBall, some, ours);
+    for (const auto& peer : run_.peers) {
+      if (!peer->does(Task::kBall)) continue;
+      theirs.clear();
+      ask_all(*peer, Task::kBall, some, theirs);
+      compare(run_.case_of("move"), Task::kBall, run_.world, some, ours, peer->name(), theirs, run_.report);
+    }
+    return hash_of(ours);
+  }
+
+  const WorldRun& run_;
+  std::vector<Tick> ticks_;
+  double touched_ = 0;
+};
+
+}  // namespace
+
+void run_move_case(const WorldRun& run) {
+  if (run.options.filter.wants(run.case_of("move"))) MoveRace(run).run();
+}
+
+}  // namespace locus::bench::dynamic

@@ -1,0 +1,62 @@
+#include <nanoflann.hpp>
+
+#include "tests/bench/dynamic/id_map.h"
+#include "tests/bench/dynamic/peers.h"
+
+namespace locus::bench::dynamic {
+namespace {
+
+constexpr float kRadius = 0.5f;  // of all: balls around the points are grown by it
+constexpr size_t kLeafSize = 16;
+
+// What nanoflann asks of a set of points.
+struct Points {
+  std::vector<Vec3f> points;
+  size_t kdtree_get_point_count() const { return points.size(); }
+  float kdtree_get_pt(size_t i, size_t axis) const { return points[i][static_cast<int>(axis)]; }
+  template <class Bounds>
+  bool kdtree_get_bbox(Bounds&) const {
+    return false;
+  }
+};
+
+class NanoflannTree : public Contender {
+ public:
+  NanoflannTree() : Contender("nanoflann"), tree_(3, points_, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {}
+  bool does(Task task) const override { return task == Task::kMove || task == Task::kBall; }
+
+  void load(const Objects& objects) override {
+    map_ = std::make_unique<IdMap>(objects.ids);
+    ids_.assign(objects.ids.begin(), objects.ids.end());
+    points_.points.resize(ids_.size());
+    for (size_t i = 0; i < ids_.size(); ++i) points_.points[i] = point_at(objects.positions, i);
+    tree_.buildIndex();
+  }
+  void move(const Moves& moves) override {
+    for (size_t i = 0; i < moves.ids.size(); ++i)
+      points_.points[map_->number_of(moves.ids[i])] = point_at(moves.positions, i);
+    tree_.buildIndex();
+  }
+  void balls(absl::Span<const Vec3f> centers, Answers& answers) override {
+    constexpr float kGrown = kReach + kRadius;
+    each_region(centers, answers, [&](Vec3f center, std::vector<uint64_t>& ids) {
+      tree_.radiusSearch(&center.x, kGrown * kGrown, matches_, nanoflann::SearchParams(0, 0, false));
+      for (const auto& match : matches_) ids.push_back(ids_[match.first]);
+    });
+  }
+
+ private:
+  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>, Points, 3, uint32_t>;
+
+  std::unique_ptr<IdMap> map_;
+  std::vector<uint64_t> ids_;
+  Points points_;
+  Tree tree_;
+  std::vector<std::pair<uint32_t, float>> matches_;
+};
+
+}  // namespace
+
+std::unique_ptr<Contender> nanoflann_tree() { return std::make_unique<NanoflannTree>(); }
+
+}  // namespace locus::bench::dynamic

@@ -1,0 +1,43 @@
+// The one place where the dynamic suite asks us: a scene's writer, its index alone, and whole batches as the server
+// runs them. One thread, but for what the scene promises itself.
+#ifndef LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
+#define LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
+
+#include <memory>
+
+#include "core/scene/scene.h"
+#include "tests/bench/dynamic/contender.h"
+
+namespace locus::bench::dynamic {
+
+// Updates go through the writer, each call one batch; queries are asked of the index of the latest revision.
+class Ours : public Contender {
+ public:
+  Ours();
+  bool does(Task) const override { return true; }
+
+  void load(const Objects& objects) override;
+  void move(const Moves& moves) override;
+  void remove(absl::Span<const uint64_t> ids) override;
+  void insert(const Objects& objects) override;
+  void balls(absl::Span<const Vec3f> centers, Answers& answers) override;
+  void boxes(absl::Span<const Vec3f> centers, Answers& answers) override;
+  void rays(absl::Span<const Rayf> rays, Answers& answers) override;
+
+  // Keeps nothing but the latest revision.
+  void forget_recent();
+  SnapshotPtr latest() const { return scene_.latest(); }
+
+ private:
+  void apply(const UpdateBatch& batch, size_t items);
+
+  Scene scene_;
+  SnapshotPtr snapshot_;  // the latest
+};
+
+// Queries only, of `ours`: each call is one batch of one block.
+std::unique_ptr<Contender> batches_of(const Ours& ours);
+
+}  // namespace locus::bench::dynamic
+
+#endif  // LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
