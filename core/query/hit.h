@@ -8,7 +8,7 @@
 
 #include "core/base/ids.h"
 #include "core/scene/instance.h"
-#include "core/scene/object.h"
+#include "core/scene/object_set.h"
 
 namespace locus {
 
@@ -16,12 +16,12 @@ struct Hit {
   float t = std::numeric_limits<float>::infinity();  // in units of the ray's direction
   Id id = kNoId;                                     // 0 = a miss
   uint32_t triangle = kNoTriangle;                   // number in the mesh
-  const Object* object = nullptr;                    // one of the two, or neither for a miss
+  GridRef object;                                    // one of the two, or neither for a miss
   const Instance* instance = nullptr;
 };
 
-inline Hit hit_on(const Object& object, float t) { return {t, object.id, kNoTriangle, &object, nullptr}; }
-inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, nullptr, &instance}; }
+inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object, nullptr}; }
+inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, GridRef(), &instance}; }
 
 // The order of ray hits: nearer first, then lower id, then lower triangle.
 inline bool nearer(const Hit& a, const Hit& b) {

@@ -5,7 +5,7 @@
 namespace locus {
 
 Hit look_up(const SceneSnapshot& snapshot, Id id) {
-  if (const Object* object = snapshot.objects.find(id)) return hit_on(*object, 0);
+  if (const GridRef object = snapshot.objects.find_ref(id)) return hit_on(object, 0);
   if (const Instance* instance = snapshot.statics->find(id)) return hit_on(*instance, 0);
   return {};
 }
@@ -14,14 +14,17 @@ absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, absl::
                                                          const OverlapOptions& options) {
   absl::flat_hash_map<Group, LowestRows> rows;
   for (const Group group : groups) rows.emplace(group, LowestRows(options.max_results, false));
-  const auto offer = [&](const auto& item) {
+  const auto offer = [&](const auto& labels, const auto& item) {
     ++task.work().tests;
-    if (!task.count_test() || item.id <= options.after_id) return;
-    const auto wanted = rows.find(item.group);
+    if (!task.count_test() || labels.id <= options.after_id) return;
+    const auto wanted = rows.find(labels.group);
     if (wanted != rows.end()) wanted->second.offer(hit_on(item, 0));
   };
-  for (const Instance& instance : task.snapshot().statics->tree().values()) offer(instance);
-  task.snapshot().objects.for_each([&](Id, const Object& object) { offer(object); });
+  for (const Instance& instance : task.snapshot().statics->tree().values()) offer(instance, instance);
+  task.snapshot().objects.grid().for_each([&](const GridRef& object) {
+    offer(object.entry(), object);
+    return !task.ended();
+  });
   absl::flat_hash_map<Group, OverlapAnswer> answers;
   for (auto& [group, lowest] : rows) answers.emplace(group, lowest.finish());
   return answers;

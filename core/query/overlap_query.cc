@@ -49,13 +49,12 @@ class ObjectRows {
       : task_(task), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
 
   Aabbd bounds() const { return region_.bounds(); }
-  bool overlaps(const Aabbd& box) const { return region_.overlaps(box); }
-  bool visit(const Object& object) {
+  bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
-    if (object.id <= options_.after_id || !filter_.accepts(object)) return true;
-    const bool found = options_.precision == Precision::kConservative
-                           ? Kind::overlaps_bounds(shape_, bounds_of(object.shape))
-                           : Kind::overlaps_object(shape_, object.shape);
+    if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;
+    const Shape shape = shape_of(object);
+    const bool found = options_.precision == Precision::kConservative ? Kind::overlaps_bounds(shape_, bounds_of(shape))
+                                                                      : Kind::overlaps_object(shape_, shape);
     if (found) rows_.offer(hit_on(object, 0));
     return true;
   }
@@ -215,7 +214,7 @@ OverlapAnswer run_overlap(QueryTask& task, const typename Kind::World& shape, co
   }
   if (options.source != Source::kStatic && !task.ended()) {
     ObjectRows<Kind> search(task, shape, options, filter, rows);
-    task.visit_region(task.snapshot().grid, search);
+    task.visit_objects_in_region(search);
   }
   return rows.finish();
 }

@@ -104,6 +104,25 @@ class QueryTask {
       index.visit_region(visitor, work_);
   }
 
+  // The same of the scene's objects, which visitors take by reference.
+  template <class Visitor>
+  void visit_objects_on_ray(const SlabRay<double>& slabs, Visitor& visitor) {
+    const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
+    if (brute_force_)
+      snapshot_.objects.grid().for_each(visit);
+    else
+      snapshot_.objects.grid().visit_ray(
+          slabs, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
+  }
+  template <class Visitor>
+  void visit_objects_in_region(Visitor& visitor) {
+    const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
+    if (brute_force_)
+      snapshot_.objects.grid().for_each(visit);
+    else
+      snapshot_.objects.grid().visit_region(std::as_const(visitor).bounds(), work_, visit);
+  }
+
  private:
   template <class Value, class Visitor>
   static void visit_all(const Bvh<Value>& index, Visitor& visitor) {

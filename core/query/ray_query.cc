@@ -22,17 +22,17 @@ class ObjectVisitor {
 
   const SlabRay<double>& slabs() const { return ray_.slabs(); }
   double limit() const { return raised(collector_.limit()); }
-  bool visit(const Object& object) {
+  bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
-    if (!filter_.accepts(object)) return true;
-    const std::optional<float> t = test(object);
+    if (!filter_.accepts(object.entry())) return true;
+    const std::optional<float> t = test(shape_of(object));
     return !t || collector_.offer(hit_on(object, *t));
   }
 
  private:
-  std::optional<float> test(const Object& object) const {
-    if (precision_ == Precision::kConservative) return entry(ray_.slabs(), bounds_of(object.shape));
-    const std::optional<ShapeHit> hit = ray_hit(ray_, object.shape);
+  std::optional<float> test(const Shape& shape) const {
+    if (precision_ == Precision::kConservative) return entry(ray_.slabs(), bounds_of(shape));
+    const std::optional<ShapeHit> hit = ray_hit(ray_, shape);
     if (!hit) return std::nullopt;
     return rounded_distance(hit->t);
   }
@@ -117,7 +117,7 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
     }
     if (block.source != Source::kStatic && !ray.collector.done() && !task.ended()) {
       ObjectVisitor visitor(task, ray.request, ray.filter, ray.collector);
-      task.visit_ray(task.snapshot().grid, visitor.slabs(), visitor);
+      task.visit_objects_on_ray(visitor.slabs(), visitor);
     }
     answers.push_back(ray.collector.finish());
     answers.back().truncated |= task.ended();
@@ -128,9 +128,9 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
 Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding) {
   Surface surface;
   if (request.precision == Precision::kConservative) return surface;
-  if (hit.object != nullptr) {
+  if (hit.object) {
     const ObjectRay ray(Rayd{request.origin, request.direction}, request.inside);
-    if (const std::optional<ShapeHit> found = ray_hit(ray, hit.object->shape)) surface.normal = found->normal;
+    if (const std::optional<ShapeHit> found = ray_hit(ray, shape_of(hit.object))) surface.normal = found->normal;
     return surface;
   }
   if (hit.instance == nullptr) return surface;

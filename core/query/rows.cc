@@ -72,9 +72,10 @@ struct Labels {
 };
 
 Labels labels_of(const Hit& hit) {
-  if (hit.object != nullptr)
-    return {hit.object->group, hit.object->tag, hit.object->layers, hit.object->shape.position,
-            hit.object->shape.rotation};
+  if (hit.object) {
+    const GridEntry& entry = hit.object.entry();
+    return {entry.group, entry.tag, entry.layers, entry.position, hit.object.form().rotation};
+  }
   if (hit.instance != nullptr)
     return {hit.instance->group, hit.instance->tag, hit.instance->layers, hit.instance->transform.translation,
             hit.instance->transform.quaternion};
@@ -138,6 +139,9 @@ void append_row(const Hit& hit, ColumnSet columns, BlockResult& result) {
   if (columns.has(Column::kT)) result.t.push_back(hit.t);
   if (columns.has(Column::kId)) result.ids.push_back(hit.id);
   if (columns.has(Column::kTriangle)) result.triangles.push_back(hit.triangle);
+  if (!columns.has(Column::kGroup) && !columns.has(Column::kTag) && !columns.has(Column::kLayers) &&
+      !columns.has(Column::kPose))
+    return;
   const Labels labels = labels_of(hit);
   if (columns.has(Column::kGroup)) result.groups.push_back(labels.group);
   if (columns.has(Column::kTag)) result.tags.push_back(labels.tag);

@@ -19,18 +19,6 @@ Reason check_numbers(const float* numbers, size_t count, float lowest) {
   return Reason::kUnspecified;
 }
 
-Reason check_position(Vec3d position) {
-  if (!is_finite(position)) return Reason::kNotFinite;
-  return max_component(abs(position)) > limits::kMaxCoordinate ? Reason::kOutOfRange : Reason::kUnspecified;
-}
-
-Reason check_rotation(const Quaternion& rotation) {
-  const double deviation = unit_deviation(rotation);
-  if (!std::isfinite(deviation)) return Reason::kNotFinite;
-  return deviation > limits::kMaxQuaternionDeviation ? Reason::kOutOfRange : Reason::kUnspecified;
-}
-
-Vec3d point(const double* p) { return {p[0], p[1], p[2]}; }
 Vec3f point(const float* p) { return {p[0], p[1], p[2]}; }
 
 template <class Columns>
@@ -42,8 +30,7 @@ void read_labels(const Columns& columns, size_t i, Object& object) {
 
 }  // namespace
 
-BatchApplication::BatchApplication(const PersistentMap<Id, Object>& objects, const StaticSet& statics,
-                                   const UpdateBatch& batch)
+BatchApplication::BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch)
     : objects_(objects), statics_(statics), batch_(batch), count_(batch.clear ? 0 : objects.size()) {}
 
 void BatchApplication::run() {
@@ -54,10 +41,10 @@ void BatchApplication::run() {
   for (size_t i = 0; i < batch_.relabels.size(); ++i) relabel(batch_.relabels[i], absl::StrCat("relabels[", i, "]"));
 }
 
-const Object* BatchApplication::current(Id id) const {
+std::optional<Object> BatchApplication::current(Id id) const {
   const auto changed = changed_.find(id);
-  if (changed != changed_.end()) return changed->second ? &*changed->second : nullptr;
-  return batch_.clear ? nullptr : objects_.find(id);
+  if (changed != changed_.end()) return changed->second;
+  return batch_.clear ? std::nullopt : objects_.find(id);
 }
 
 void BatchApplication::refuse(std::string field, size_t index, Id id, Reason reason) {
@@ -69,7 +56,7 @@ void BatchApplication::refuse(std::string field, size_t index, Id id, Reason rea
 void BatchApplication::remove_ids() {
   for (size_t i = 0; i < batch_.remove_ids.size(); ++i) {
     const Id id = batch_.remove_ids[i];
-    if (current(id) == nullptr) {
+    if (!current(id)) {
       refuse("remove_ids", i, id, Reason::kUnknownId);
       continue;
     }
@@ -90,32 +77,24 @@ void BatchApplication::remove_groups() {
     ++applied_;
   }
   if (groups.empty() || batch_.clear) return;
-  objects_.for_each([&](Id id, const Object& object) {
-    if (!groups.contains(object.group) || current(id) == nullptr) return;
-    changed_[id] = std::nullopt;
+  objects_.for_each([&](const Object& object) {
+    if (!groups.contains(object.group) || !current(object.id)) return;
+    changed_[object.id] = std::nullopt;
     --count_;
   });
 }
 
-bool BatchApplication::read_pose(absl::Span<const float> positions, absl::Span<const double> positions_f64,
-                                 absl::Span<const float> rotations, uint32_t index, Id id, const std::string& field,
+bool BatchApplication::read_pose(const PoseReader& poses, uint32_t index, Id id, const std::string& field,
                                  Shape& shape) {
-  const bool absolute = !positions_f64.empty();
-  shape.position = absolute ? point(ColumnReader<double>(positions_f64, 3).entry(index))
-                            : batch_.frame + to_double(point(ColumnReader<float>(positions, 3).entry(index)));
-  if (const Reason reason = check_position(shape.position); reason != Reason::kUnspecified) {
-    refuse(field + (absolute ? ".positions_f64" : ".positions"), index, id, reason);
+  if (const Reason reason = poses.read_position(index, shape.position); reason != Reason::kUnspecified) {
+    refuse(absl::StrCat(field, ".", poses.position_column()), index, id, reason);
     return false;
   }
-  const ColumnReader<float> turns(rotations, 4);
-  if (!turns.given()) return true;
-  const float* q = turns.entry(index);
-  const Quaternion rotation{q[0], q[1], q[2], q[3]};
-  if (const Reason reason = check_rotation(rotation); reason != Reason::kUnspecified) {
-    refuse(field + ".rotations", index, id, reason);
+  if (!poses.turns()) return true;
+  if (const Reason reason = poses.read_rotation(index, shape.rotation); reason != Reason::kUnspecified) {
+    refuse(absl::StrCat(field, ".", PoseReader::kRotationColumn), index, id, reason);
     return false;
   }
-  shape.rotation = normalized(rotation);
   return true;
 }
 
@@ -143,7 +122,7 @@ bool BatchApplication::read_shape(const InsertColumns& columns, uint32_t index, 
 
 bool BatchApplication::may_insert(Id id, uint32_t index, const std::string& field) {
   Reason reason = Reason::kUnspecified;
-  const bool known = current(id) != nullptr;
+  const bool known = current(id).has_value();
   if (id == kNoId) reason = Reason::kOutOfRange;
   if (statics_.find(id) != nullptr || (known && !batch_.upsert)) reason = Reason::kDuplicateId;
   if (reason != Reason::kUnspecified) refuse(field + ".ids", index, id, reason);
@@ -151,30 +130,31 @@ bool BatchApplication::may_insert(Id id, uint32_t index, const std::string& fiel
 }
 
 void BatchApplication::insert(const InsertColumns& columns, const std::string& field) {
+  const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     Object object;
     object.id = columns.ids[i];
     if (!may_insert(object.id, i, field)) continue;
-    if (!read_pose(columns.positions, columns.positions_f64, columns.rotations, i, object.id, field, object.shape))
-      continue;
+    if (!read_pose(poses, i, object.id, field, object.shape)) continue;
     if (!read_shape(columns, i, object.id, field, object.shape)) continue;
     read_labels(columns, i, object);
-    if (current(object.id) == nullptr) ++count_;
+    if (!current(object.id)) ++count_;
     put(object);
     ++applied_;
   }
 }
 
 void BatchApplication::move(const MoveColumns& columns, const std::string& field) {
+  const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     const Id id = columns.ids[i];
-    const Object* known = current(id);
-    if (known == nullptr) {
+    const std::optional<Object> known = current(id);
+    if (!known) {
       refuse(field + ".ids", i, id, Reason::kUnknownId);
       continue;
     }
     Object object = *known;
-    if (!read_pose(columns.positions, columns.positions_f64, columns.rotations, i, id, field, object.shape)) continue;
+    if (!read_pose(poses, i, id, field, object.shape)) continue;
     put(object);
     ++applied_;
   }
@@ -182,8 +162,8 @@ void BatchApplication::move(const MoveColumns& columns, const std::string& field
 
 void BatchApplication::relabel(const RelabelColumns& columns, const std::string& field) {
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
-    const Object* known = current(columns.ids[i]);
-    if (known == nullptr) {
+    const std::optional<Object> known = current(columns.ids[i]);
+    if (!known) {
       refuse(field + ".ids", i, columns.ids[i], Reason::kUnknownId);
       continue;
     }
@@ -197,15 +177,15 @@ void BatchApplication::relabel(const RelabelColumns& columns, const std::string&
 BatchApplication::Difference BatchApplication::difference() const {
   Difference difference;
   if (batch_.clear)
-    objects_.for_each([&](Id id, const Object& object) {
-      const auto changed = changed_.find(id);
+    objects_.for_each([&](const Object& object) {
+      const auto changed = changed_.find(object.id);
       if (changed == changed_.end() || !changed->second || !(*changed->second == object))
         difference.gone.push_back(object);
     });
   for (const auto& [id, object] : changed_) {
-    const Object* before = objects_.find(id);
-    if (before != nullptr && object && *object == *before) continue;
-    if (before != nullptr && !batch_.clear) difference.gone.push_back(*before);
+    const std::optional<Object> before = objects_.find(id);
+    if (before && object && *object == *before) continue;
+    if (before && !batch_.clear) difference.gone.push_back(*before);
     if (object) difference.come.push_back(*object);
   }
   return difference;

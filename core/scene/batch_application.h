@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
-#include "core/base/persistent_map.h"
-#include "core/scene/object.h"
+#include "core/scene/object_store.h"
+#include "core/scene/pose_reader.h"
 #include "core/scene/static_set.h"
 #include "core/scene/update_batch.h"
 
@@ -18,7 +18,7 @@ namespace locus {
 class BatchApplication {
  public:
   // All three are borrowed for the life of this object. `batch` has passed check_form().
-  BatchApplication(const PersistentMap<Id, Object>& objects, const StaticSet& statics, const UpdateBatch& batch);
+  BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch);
 
   // Clear, removes, inserts, moves, relabels: in this order, once.
   void run();
@@ -39,7 +39,7 @@ class BatchApplication {
   Difference difference() const;
 
  private:
-  const Object* current(Id id) const;
+  std::optional<Object> current(Id id) const;
   void put(const Object& object) { changed_[object.id] = object; }
   void refuse(std::string field, size_t index, Id id, Reason reason);
   void remove_ids();
@@ -48,11 +48,10 @@ class BatchApplication {
   bool may_insert(Id id, uint32_t index, const std::string& field);
   void move(const MoveColumns& columns, const std::string& field);
   void relabel(const RelabelColumns& columns, const std::string& field);
-  bool read_pose(absl::Span<const float> positions, absl::Span<const double> positions_f64,
-                 absl::Span<const float> rotations, uint32_t index, Id id, const std::string& field, Shape& shape);
+  bool read_pose(const PoseReader& poses, uint32_t index, Id id, const std::string& field, Shape& shape);
   bool read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field, Shape& shape);
 
-  const PersistentMap<Id, Object>& objects_;
+  const ObjectStore& objects_;
   const StaticSet& statics_;
   const UpdateBatch& batch_;
   size_t count_;                                            // objects there are after what was applied so far

@@ -104,7 +104,7 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
   const SnapshotPtr base = latest();
-  const auto is_object = [&base](Id id) { return base->objects.find(id) != nullptr; };
+  const auto is_object = [&base](Id id) { return static_cast<bool>(base->objects.find_ref(id)); };
   absl::StatusOr<StaticSet::Changed> changed = base->statics->apply(change, is_object, base->revision << 24);
   if (!changed.ok()) return changed.status();
   const MutexLock lock(writer_mutex_);
@@ -182,7 +182,7 @@ SceneStatus Scene::status() const {
     status.last_build_error = last_build_error_;
     snapshot = latest_;
   }
-  status.memory_bytes = snapshot->statics->bytes() + snapshot->grid.bytes() + snapshot->objects.size() * sizeof(Object);
+  status.memory_bytes = snapshot->statics->bytes() + snapshot->objects.bytes();
   return status;
 }
 

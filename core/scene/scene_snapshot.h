@@ -5,9 +5,7 @@
 
 #include <memory>
 
-#include "core/base/persistent_map.h"
-#include "core/index/hash_grid/hash_grid.h"
-#include "core/scene/object.h"
+#include "core/scene/object_set.h"
 #include "core/scene/static_set.h"
 
 namespace locus {
@@ -20,8 +18,7 @@ struct SceneSnapshot {
   uint64_t tick = 0;      // the caller's time step
   Winding winding = Winding::kCounterClockwise;
   std::shared_ptr<const StaticSet> statics;
-  HashGrid<Object> grid;
-  PersistentMap<Id, Object> objects;  // the same objects, by id
+  ObjectSet objects;
 };
 
 using SnapshotPtr = std::shared_ptr<const SceneSnapshot>;

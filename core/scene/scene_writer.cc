@@ -67,8 +67,8 @@ SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const 
 
 SnapshotPtr SceneWriter::freeze() {
   const bool stale = planted(PlantedBug::kStaleSnapshot) && published_ != nullptr;
-  return std::make_shared<const SceneSnapshot>(SceneSnapshot{
-      epoch_, revision_, tick_, winding_, statics_, stale ? published_->grid : grid_.snapshot(), objects_.snapshot()});
+  return std::make_shared<const SceneSnapshot>(
+      SceneSnapshot{epoch_, revision_, tick_, winding_, statics_, stale ? published_->objects : objects_.snapshot()});
 }
 
 SnapshotPtr SceneWriter::next_revision() {
@@ -101,35 +101,53 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch
     }
     return Applied{std::move(ack), nullptr, 0};
   }
+  absl::StatusOr<Applied> result = MoveApplication::serves(batch) ? apply_moves(batch) : apply_changes(batch);
+  if (result.ok()) writers_.record(batch.writer, batch.batch, result->ack);
+  return result;
+}
+
+template <class Application>
+absl::Status SceneWriter::book(const UpdateBatch& batch, Application& application, Applied& result) {
+  result.ack.applied = application.applied();
+  result.ack.refused = application.refused();
+  result.ack.errors = std::move(application.errors());
+  if (!batch.all_or_nothing || result.ack.refused == 0) return absl::OkStatus();
+  const ItemError& first = result.ack.errors.front();
+  return refuse_argument(first.reason, first.field, first.index,
+                         absl::StrCat(reason_name(first.reason), ", id ", first.id, "; all_or_nothing refuses all ",
+                                      result.ack.refused, " wrong items and the batch with them"));
+}
+
+absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch& batch) {
+  Applied result;
+  moves_.run(objects_, batch);
+  if (absl::Status status = book(batch, moves_, result); !status.ok()) return status;
+  if (moves_.changes()) objects_.move(moves_.moves());
+  commit(batch, moves_.changes() ? moves_.moves().size() : 0, result);
+  return result;
+}
+
+absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatch& batch) {
+  Applied result;
   BatchApplication application(objects_, *statics_, batch);
   application.run();
   if (application.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
                        static_cast<double>(application.object_count()), 0);
-  Applied result;
-  result.ack.applied = application.applied();
-  result.ack.refused = application.refused();
-  result.ack.errors = std::move(application.errors());
-  if (batch.all_or_nothing && result.ack.refused > 0) {
-    const ItemError& first = result.ack.errors.front();
-    return refuse_argument(first.reason, first.field, first.index,
-                           absl::StrCat(reason_name(first.reason), ", id ", first.id, "; all_or_nothing refuses all ",
-                                        result.ack.refused, " wrong items and the batch with them"));
-  }
-  commit(batch, application.difference(), result);
-  writers_.record(batch.writer, batch.batch, result.ack);
+  if (absl::Status status = book(batch, application, result); !status.ok()) return status;
+  const BatchApplication::Difference difference = application.difference();
+  objects_.apply(difference.gone, difference.come);
+  commit(batch, difference.gone.size() + difference.come.size(), result);
+  result.replaced_items = difference.gone.size();
   return result;
 }
 
-void SceneWriter::commit(const UpdateBatch& batch, const BatchApplication::Difference& difference, Applied& result) {
+void SceneWriter::commit(const UpdateBatch& batch, uint64_t changes, Applied& result) {
   const uint64_t tick = !batch.tick ? tick_ : batch.restart_ticks ? *batch.tick : std::max(tick_, *batch.tick);
-  if (!difference.empty() || tick != tick_) {
+  if (changes != 0 || tick != tick_) {
     tick_ = tick;
-    grid_.apply(difference.gone, difference.come);
-    for (const Object& object : difference.gone) objects_.erase(object.id);
-    for (const Object& object : difference.come) objects_.set(object.id, object);
     result.snapshot = next_revision();
-    result.replaced_items = difference.gone.size();
+    result.replaced_items = changes;
   }
   result.ack.epoch = epoch_;
   result.ack.revision = revision_;

@@ -11,6 +11,8 @@
 #include "absl/status/statusor.h"
 #include "core/base/limits.h"
 #include "core/scene/batch_application.h"
+#include "core/scene/move_application.h"
+#include "core/scene/object_store.h"
 #include "core/scene/scene_snapshot.h"
 #include "core/scene/update_batch.h"
 
@@ -63,14 +65,20 @@ class SceneWriter {
   // The revision reached so far.
   const SnapshotPtr& published() const { return published_; }
 
-  bool is_object(Id id) const { return objects_.find(id) != nullptr; }
+  bool is_object(Id id) const { return objects_.handle(id) != ObjectStore::kNoHandle; }
   const std::shared_ptr<const StaticSet>& statics() const { return statics_; }
 
  private:
   SnapshotPtr freeze();
   SnapshotPtr next_revision();
   UpdateAck ack_now() const;
-  void commit(const UpdateBatch& batch, const BatchApplication::Difference& difference, Applied& result);
+  // What the batch came to, into the ack; refuses it if it is all_or_nothing and an item is wrong.
+  template <class Application>
+  static absl::Status book(const UpdateBatch& batch, Application& application, Applied& result);
+  absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
+  absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
+  // Applies the tick; the next revision if that changes anything or `changes` says so, and the ack's last part.
+  void commit(const UpdateBatch& batch, uint64_t changes, Applied& result);
 
   uint64_t epoch_;
   size_t max_objects_;
@@ -78,8 +86,8 @@ class SceneWriter {
   uint64_t tick_ = 0;
   Winding winding_;
   std::shared_ptr<const StaticSet> statics_;
-  HashGrid<Object> grid_;
-  PersistentMap<Id, Object> objects_;
+  ObjectStore objects_;
+  MoveApplication moves_;
   WriterTable writers_;
   SnapshotPtr published_;
 };

@@ -9,7 +9,7 @@ namespace {
 // Bounds of everything at one revision. Touches every object, so it is for descriptions only.
 Aabbd bounds_of_all(const SceneSnapshot& snapshot) {
   Aabbd bounds = snapshot.statics->tree().bounds();
-  snapshot.objects.for_each([&bounds](Id, const Object& object) { bounds = merge(bounds, bounds_of(object.shape)); });
+  snapshot.objects.for_each([&bounds](const Object& object) { bounds = merge(bounds, bounds_of(object.shape)); });
   return bounds;
 }
 

@@ -146,15 +146,19 @@ MeshName names_of(const Registry& registry) {
 }  // namespace
 
 bool dump_snapshot(const SceneSnapshot& snapshot, const MeshName& mesh_name, const TakePiece& take) {
-  std::vector<const Object*> objects;
+  std::vector<GridRef> objects;
   objects.reserve(snapshot.objects.size());
-  snapshot.objects.for_each([&objects](Id, const Object& object) { objects.push_back(&object); });
-  std::sort(objects.begin(), objects.end(), [](const Object* a, const Object* b) { return a->id < b->id; });
+  snapshot.objects.grid().for_each([&objects](const GridRef& object) {
+    objects.push_back(object);
+    return true;
+  });
+  std::sort(objects.begin(), objects.end(),
+            [](const GridRef& a, const GridRef& b) { return a.entry().id < b.entry().id; });
   std::vector<const Instance*> instances;
   for (const Instance& instance : snapshot.statics->tree().values()) instances.push_back(&instance);
   std::sort(instances.begin(), instances.end(), [](const Instance* a, const Instance* b) { return a->id < b->id; });
   Dump dump(snapshot, take);
-  for (const Object* object : objects) dump.add(*object);
+  for (const GridRef& object : objects) dump.add(object_of(object));
   for (const Instance* instance : instances) dump.add(*instance, mesh_name(*instance->mesh));
   return dump.finish();
 }

@@ -39,7 +39,9 @@ ALLOWED = {
 }
 # The kernels are compiled for processors that the rest may not run on: only plain data of the tree goes in.
 ALLOWED["core/index/bvh/kernels"] = ["core/index/bvh", "core/base"]
+ALLOWED["core/index/hash_grid/kernels"] = ["core/base"]
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
+ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 
 # Third-party headers by the start of their names, and the folders (with those below) that may see them. Tests may see all.
 THIRD_PARTY = {
@@ -61,7 +63,7 @@ THIRD_PARTY = {
 }
 FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
 INTRINSICS = "immintrin.h"
-KERNELS = "core/index/bvh/kernels/"
+KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
 # How an array asks for large pages: advice that changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
 CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/scene\.(h|cc)")

@@ -45,7 +45,7 @@ def kernels_export_one_symbol(build):
     if build is None:
         raise Skip("no build folder was given")
     objects = [os.path.join(folder, name) for folder, _, names in os.walk(os.path.join(build, "core"))
-               for name in names if name.startswith(("ray_kernels_", "region_kernels_")) and name.endswith(".o")]
+               for name in names if name.startswith(("ray_kernels_", "region_kernels_", "grid_kernels_")) and name.endswith(".o")]
     with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as cache:
         settings = cache.read()
     if not objects or "CMAKE_BUILD_TYPE:STRING=Release" not in settings:

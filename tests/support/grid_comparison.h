@@ -7,13 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/index/hash_grid/hash_grid.h"
 #include "tests/support/grid_scenes.h"
 #include "tests/support/index_judge.h"
+#include "tests/support/object_grid.h"
 
 namespace locus::test {
 
-using ObjectGrid = HashGrid<Object>;
 using ObjectList = ListIndex<Object>;
 using ObjectScene = TestScene<Object>;
 
@@ -53,7 +52,7 @@ class GridLockstep {
       : scene_(scene), random_(random), grid_(random_grid_options(random)) {}
 
   std::string run(int batches) {
-    std::vector<std::pair<ObjectGrid, ObjectList>> kept;
+    std::vector<std::pair<ObjectSet, ObjectList>> kept;
     for (int batch = 0; batch < batches; ++batch) {
       if (random_.chance(0.3)) kept.emplace_back(grid_.snapshot(), list_);
       apply_batch();
@@ -66,14 +65,16 @@ class GridLockstep {
   }
 
  private:
-  static std::string difference(const ObjectGrid& grid, const ObjectList& list, const ObjectScene& scene) {
+  template <class Grid>
+  static std::string difference(const Grid& grid, const ObjectList& list, const ObjectScene& scene) {
     const std::string what = IndexJudge(grid, list).difference(scene);
     if (!what.empty()) return ": " + what;
     size_t present = 0;
     for (const Object& object : list.values()) present += grid.contains(object);
     return present == list.size() ? "" : ": an object is not where contains() looks";
   }
-  std::string difference(const ObjectGrid& grid, const ObjectList& list) const {
+  template <class Grid>
+  std::string difference(const Grid& grid, const ObjectList& list) const {
     return difference(grid, list, scene_);
   }
 

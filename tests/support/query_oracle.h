@@ -26,7 +26,7 @@ class QueryOracle {
       uint32_t position = 0;
       instance.mesh->tree().for_each([&](const Triangle& triangle) { storage[triangle.number] = position++; });
     }
-    snapshot.objects.for_each([this](Id, const Object& object) { objects_.push_back(&object); });
+    snapshot.objects.for_each([this](const Object& object) { objects_.push_back(object); });
   }
 
   // Knows no limit of the reply's size.
@@ -146,8 +146,8 @@ class QueryOracle {
       for (const Instance* instance : instances_)
         if (wanted(block, i, *instance)) hits_on(*instance, question, rows);
     if (block.source != Source::kStatic)
-      for (const Object* object : objects_)
-        if (wanted(block, i, *object)) hit_on(*object, question, rows);
+      for (const Object& object : objects_)
+        if (wanted(block, i, object)) hit_on(object, question, rows);
     std::erase_if(rows, [&](const Row& row) { return row.t > question.t_max; });
     std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
       return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
@@ -217,11 +217,11 @@ class QueryOracle {
     for (const Instance* instance : instances_)
       if (block.source != Source::kDynamic && instance->id > block.after_id && wanted(block, i, *instance))
         overlap_rows(block, detail, solid, *instance, rows);
-    for (const Object* object : objects_) {
-      if (block.source == Source::kStatic || object->id <= block.after_id || !wanted(block, i, *object)) continue;
-      if (!meets(solid, bounds_of(object->shape))) continue;
-      if (block.precision == Precision::kExact && !meets(solid, object->shape)) continue;
-      rows.push_back({0, object->id, kNoTriangle, 0, object, nullptr, 0, 0, {}});
+    for (const Object& object : objects_) {
+      if (block.source == Source::kStatic || object.id <= block.after_id || !wanted(block, i, object)) continue;
+      if (!meets(solid, bounds_of(object.shape))) continue;
+      if (block.precision == Precision::kExact && !meets(solid, object.shape)) continue;
+      rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}});
     }
     std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
       return std::tie(a.id, a.storage, a.triangle) < std::tie(b.id, b.storage, b.triangle);
@@ -254,8 +254,8 @@ class QueryOracle {
       Rows rows;
       for (const Instance* instance : instances_)
         if (wants(*instance)) rows.push_back({0, instance->id, kNoTriangle, 0, nullptr, instance, 0, 0, {}});
-      for (const Object* object : objects_)
-        if (wants(*object)) rows.push_back({0, object->id, kNoTriangle, 0, object, nullptr, 0, 0, {}});
+      for (const Object& object : objects_)
+        if (wants(object)) rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}});
       std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.id < b.id; });
       return rows;
     };
@@ -339,7 +339,7 @@ class QueryOracle {
 
   const bool clockwise_;
   std::vector<const Instance*> instances_;
-  std::vector<const Object*> objects_;
+  std::vector<Object> objects_;
   std::map<const StaticMesh*, std::vector<uint32_t>> storage_;
 };
 

@@ -103,10 +103,10 @@ class SceneFixture : public ::testing::Test {
   }
 
   uint64_t revision() const { return scene_.latest()->revision; }
-  const Object* object(Id id) const { return scene_.latest()->objects.find(id); }
+  std::optional<Object> object(Id id) const { return scene_.latest()->objects.find(id); }
   std::vector<Id> ids() const {
     std::vector<Id> found;
-    scene_.latest()->objects.for_each([&](Id id, const Object&) { found.push_back(id); });
+    scene_.latest()->objects.for_each([&](const Object& object) { found.push_back(object.id); });
     std::sort(found.begin(), found.end());
     return found;
   }

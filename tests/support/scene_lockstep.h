@@ -81,7 +81,7 @@ class SceneLockstep {
   std::string ball_difference(const SceneSnapshot& snapshot, const SceneModel& model) {
     const Balld ball{random_.whole_vector(3) * 8, random_.between(0, 20)};
     std::vector<Object> found;
-    ball_overlap(snapshot.grid, ball, found);
+    ball_overlap(snapshot.objects, ball, found);
     size_t expected = 0;
     for (const auto& [id, object] : model.objects()) expected += ball_overlaps(ball, object.shape);
     if (found.size() != expected) return "objects that a ball finds";
@@ -94,14 +94,14 @@ class SceneLockstep {
 
   std::string difference(const SceneSnapshot& snapshot, const SceneModel& model) {
     std::vector<Object> in_grid;
-    snapshot.grid.for_each([&](const Object& object) { in_grid.push_back(object); });
+    snapshot.objects.for_each([&](const Object& object) { in_grid.push_back(object); });
     std::sort(in_grid.begin(), in_grid.end(), [](const Object& a, const Object& b) { return a.id < b.id; });
     if (snapshot.objects.size() != model.objects().size()) return "number of objects";
     if (in_grid.size() != model.objects().size()) return "number of objects in the grid";
     size_t at = 0;
     for (const auto& [id, object] : model.objects()) {
-      const Object* known = snapshot.objects.find(id);
-      if (known == nullptr || !(*known == object)) return "object " + std::to_string(id);
+      const std::optional<Object> known = snapshot.objects.find(id);
+      if (!known || !(*known == object)) return "object " + std::to_string(id);
       if (!(in_grid[at++] == object)) return "object " + std::to_string(id) + " in the grid";
     }
     if (snapshot.statics->size() != model.instances().size()) return "number of instances";

@@ -1,122 +1,53 @@
-// Bricks, the unit in which the hash grid stores and shares values: 4x4x4 cells, of which only the occupied ones exist,
-// each with its values in one array. Bricks and cells are immutable once shared; a changed brick shares its unchanged
-// cells with the one before, so that a small batch copies little.
+// Bricks, the unit in which the hash grid stores and shares values: 4x4x4 cells with one sorted block of values, and
+// the few values that came or moved since that block was sorted. Immutable once shared; any thread. A small batch
+// replaces the few, a large one or many small ones sort the block anew.
 //
-// Invariants of a shared brick: `slots` are those of the set bits of `occupied`, in order, none of them empty; bounds
-// are exactly the merged bounds of the values.
+// Invariants: a value is alive in `sorted` (its bit in `gone` is not set) or in `recent`, never in both; every value
+// lies in this brick by its position; `gone` is empty or has a bit for each value of `sorted` and 64 more.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_H_
 
-#include <algorithm>
-#include <bit>
-#include <cstdint>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include "absl/types/span.h"
-#include "core/base/check.h"
-#include "core/base/planted_bug.h"
-#include "core/geometry/primitive_traits.h"
-#include "core/index/work.h"
+#include "core/index/hash_grid/cell_key.h"
+#include "core/index/hash_grid/grid_block.h"
 
 namespace locus::internal {
 
-template <Bounded V>
-struct Brick {
-  struct Entry {
-    Aabbd bounds;  // of the value, kept since computing them may cost more than the test
-    V value;
-  };
-  using Cell = std::vector<Entry>;
-  struct Slot {
-    Aabbd bounds;
-    std::shared_ptr<const Cell> cell;
-  };
+// Where the brick lies: fixed from its first version to its last.
+struct BrickPlace {
+  GridKey key;
+  int exponent = 0;  // of the cell edge
+  double cells_per_unit = 1;
+  Vec3d low;        // the corner of the first cell; exact
+  Vec3d center;     // exact
+  double edge = 0;  // of the brick
 
-  uint64_t occupied = 0;  // bit number_in_brick()
-  Aabbd bounds;
-  std::vector<Slot> slots;
-
-  bool empty() const { return slots.empty(); }
-  // Null where the cell is not occupied.
-  const Cell* cell(int number) const {
-    return (occupied >> number & 1) == 0 ? nullptr : slots[rank(number)].cell.get();
-  }
-  // Puts `entries` in place of the cell; an empty one is taken out. Leaves `bounds` to update_bounds().
-  void replace_cell(int number, Cell entries);
-  void update_bounds();
-
-  // Calls visit(entry) for the entries whose own bounds and whose cell's bounds `reaches`; false once visit() was.
-  // Cells from the last to the first where `backwards`.
-  template <class Reaches, class Visit>
-  bool visit(bool backwards, const Reaches& reaches, Work& work, const Visit& visit_entry) const;
-
- private:
-  size_t rank(int number) const { return static_cast<size_t>(std::popcount(occupied & ((uint64_t{1} << number) - 1))); }
+  static BrickPlace of(const GridKey& key, int exponent);
+  // The cell within the brick of a position in it.
+  int cell_of(Vec3d position) const { return number_in_brick(internal::cell_of(position, cells_per_unit)); }
 };
 
-// The cell without the values of ids in `removed`, which is sorted and of which each must be found, and with those of
-// `inserted`. `old` is null for a cell that was not occupied.
-template <Bounded V>
-typename Brick<V>::Cell updated_cell(const typename Brick<V>::Cell* old, absl::Span<const uint64_t> removed,
-                                     absl::Span<const V* const> inserted) {
-  using Traits = PrimitiveTraits<V>;
-  const size_t before = old == nullptr ? 0 : old->size();
-  LOCUS_CHECK_LE(removed.size(), before);
-  typename Brick<V>::Cell cell;
-  cell.reserve(before - removed.size() + inserted.size());
-  for (size_t i = 0; i < before; ++i) {
-    const auto& entry = (*old)[i];
-    if (!std::binary_search(removed.begin(), removed.end(), Traits::id(entry.value))) cell.push_back(entry);
-  }
-  LOCUS_CHECK_EQ(before - cell.size(), removed.size());
-  for (const V* value : inserted) cell.push_back({Traits::bounds(*value), *value});
-  return cell;
-}
+struct Brick {
+  BrickPlace place;
+  std::shared_ptr<const GridBlock> sorted;  // never null
+  std::shared_ptr<const GridBlock> recent;  // null when there are none
+  std::vector<uint64_t> gone;
+  uint32_t gone_count = 0;
 
-template <Bounded V>
-void Brick<V>::replace_cell(int number, Cell entries) {
-  const uint64_t bit = uint64_t{1} << number;
-  const auto slot = slots.begin() + static_cast<std::ptrdiff_t>(rank(number));
-  if (entries.empty()) {
-    if ((occupied & bit) != 0) slots.erase(slot);
-    occupied &= ~bit;
-    return;
+  uint32_t size() const { return sorted->count() - gone_count + (recent == nullptr ? 0 : recent->count()); }
+  bool is_gone(uint32_t slot) const { return !gone.empty() && (gone[slot / 64] >> (slot % 64) & 1) != 0; }
+  float largest_reach() const {
+    return recent == nullptr ? sorted->largest_reach() : std::max(sorted->largest_reach(), recent->largest_reach());
   }
-  Aabbd cell_bounds;
-  for (const Entry& entry : entries) cell_bounds = merge(cell_bounds, entry.bounds);
-  Slot made{cell_bounds, std::make_shared<const Cell>(std::move(entries))};
-  if ((occupied & bit) != 0) {
-    *slot = std::move(made);
-  } else {
-    slots.insert(slot, std::move(made));
+  size_t bytes() const {
+    return sizeof(Brick) + sorted->bytes() + (recent == nullptr ? 0 : recent->bytes()) + gone.size() * sizeof(gone[0]);
   }
-  occupied |= bit;
-}
+};
 
-template <Bounded V>
-void Brick<V>::update_bounds() {
-  bounds = Aabbd();
-  for (const Slot& slot : slots) bounds = merge(bounds, slot.bounds);
-}
-
-template <Bounded V>
-template <class Reaches, class Visit>
-bool Brick<V>::visit(bool backwards, const Reaches& reaches, Work& work, const Visit& visit_entry) const {
-  const size_t first = planted(PlantedBug::kDropCell) && slots.size() > 1 ? 1 : 0;
-  for (size_t i = first; i < slots.size(); ++i) {
-    const Slot& slot = slots[backwards ? slots.size() - 1 - (i - first) : i];
-    ++work.cells;
-    if (slots.size() > 1 && !reaches(slot.bounds)) continue;
-    for (const Entry& entry : *slot.cell) {
-      if (slot.cell->size() > 1 && !reaches(entry.bounds)) continue;
-      ++work.tests;
-      if (!visit_entry(entry)) return false;
-    }
-  }
-  return true;
-}
+using BrickPtr = std::shared_ptr<const Brick>;
 
 }  // namespace locus::internal
 

@@ -38,7 +38,8 @@ struct GridKeyHash {
     return h ^ (h >> 31);
   }
   size_t operator()(const GridKey& key) const {
-    return mix(mix(mix(static_cast<uint64_t>(key.x)) + static_cast<uint64_t>(key.y)) + static_cast<uint64_t>(key.z));
+    return mix(static_cast<uint64_t>(key.x) * 0x9E3779B97F4A7C15u + static_cast<uint64_t>(key.y) * 0xD6E8FEB86659FD93u +
+               static_cast<uint64_t>(key.z) * 0xA0761D6478BD642Fu);
   }
 };
 
@@ -49,9 +50,11 @@ inline int64_t to_cell_index(double scaled) {
 // The inverse of a cell's edge, exactly: what the functions below take.
 inline double cells_per_unit(int exponent) { return std::ldexp(1.0, -exponent); }
 
-// The cell that holds `coordinate` on one axis.
+// The cell that holds `coordinate` on one axis. Rounds down by hand: std::floor() is a call on the oldest processors.
 inline int64_t cell_index(double coordinate, double per_unit) {
-  return to_cell_index(std::floor(coordinate * per_unit));
+  const double scaled = std::clamp(coordinate * per_unit, -kMaxCellIndex, kMaxCellIndex);
+  const auto towards_zero = static_cast<int64_t>(scaled);
+  return towards_zero - static_cast<int64_t>(scaled < static_cast<double>(towards_zero));
 }
 inline int64_t brick_index(double coordinate, double per_unit) {
   return cell_index(coordinate, per_unit) >> kBrickBits;
@@ -90,8 +93,8 @@ inline double reach_of(const Aabbd& bounds, Vec3d position) {
   return std::max(max_component(position - bounds.min), max_component(bounds.max - position));
 }
 
-// Bricks from `lo` to `hi`, both included.
-struct BrickRange {
+// Bricks, or cells, from `lo` to `hi`, both included.
+struct KeyRange {
   GridKey lo, hi;
 
   bool empty() const { return lo.x > hi.x || lo.y > hi.y || lo.z > hi.z; }
@@ -99,17 +102,24 @@ struct BrickRange {
     return (static_cast<double>(hi.x - lo.x) + 1) * (static_cast<double>(hi.y - lo.y) + 1) *
            (static_cast<double>(hi.z - lo.z) + 1);
   }
+  bool contains(const GridKey& key) const {
+    return lo.x <= key.x && key.x <= hi.x && lo.y <= key.y && key.y <= hi.y && lo.z <= key.z && key.z <= hi.z;
+  }
 };
 
-// Bricks of one level that hold every position within `box`, which is not empty.
-inline BrickRange bricks_within(const Aabbd& box, double per_unit) {
-  BrickRange range;
+// Cells of one level that hold every position within `box`, which is not empty.
+inline KeyRange cells_within(const Aabbd& box, double per_unit) {
+  KeyRange range;
   for (int axis = 0; axis < 3; ++axis) {
-    range.lo[axis] = brick_index(box.min[axis], per_unit);
-    range.hi[axis] = brick_index(box.max[axis], per_unit);
+    range.lo[axis] = cell_index(box.min[axis], per_unit);
+    range.hi[axis] = cell_index(box.max[axis], per_unit);
   }
   return range;
 }
+
+// The bricks of those cells.
+inline KeyRange bricks_of(const KeyRange& cells) { return {brick_of(cells.lo), brick_of(cells.hi)}; }
+inline KeyRange bricks_within(const Aabbd& box, double per_unit) { return bricks_of(cells_within(box, per_unit)); }
 
 }  // namespace locus::internal
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absl/types/span.h"
-#include "core/geometry/primitive_traits.h"
+#include "core/geometry/vec3.h"
 
 namespace locus::internal {
 
@@ -30,10 +30,8 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
 class EvenSample {
  public:
   explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}
-  template <Bounded V>
-  void offer(const V& value) {
-    if (offered_++ % stride_ != 0) return;
-    values_.push_back({PrimitiveTraits<V>::position(value), max_component(PrimitiveTraits<V>::bounds(value).extent())});
+  void offer(Vec3d position, double diameter) {
+    if (offered_++ % stride_ == 0) values_.push_back({position, diameter});
   }
   absl::Span<const SampledValue> values() const { return values_; }
 

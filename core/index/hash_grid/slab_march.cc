@@ -45,22 +45,39 @@ SlabMarch::SlabMarch(const SlabRay<double>& ray, const LevelExtent& level, doubl
   bricks_ = static_cast<double>(slabs_) + (way.x + way.y + way.z - way[axis_]) / slab_edge_;
 }
 
-SlabMarch::Slab SlabMarch::slab(int64_t n, double limit) const {
-  const double index = static_cast<double>(first_ + n * step_);
-  const double low = index * slab_edge_ - margin_, high = (index + 1) * slab_edge_ + margin_;
+SlabMarch::Crossing SlabMarch::cross(double index, double edge, double limit) const {
+  const double low = index * edge - margin_, high = (index + 1) * edge + margin_;
   const double o = origin_[axis_], d = direction_[axis_];
   const double enter = ((step_ > 0 ? low : high) - o) / d, leave = ((step_ > 0 ? high : low) - o) / d;
-  Slab slab{std::max(enter, part_.near), {{0, 0, 0}, {-1, -1, -1}}};
+  Crossing crossing{std::max(enter, part_.near), Aabbd()};
   const double t0 = std::max({enter, part_.near, 0.0});
   const double t1 = std::min({leave, part_.far, std::max(limit, 0.0)});
-  if (t0 > t1) return slab;
+  if (t0 > t1) return crossing;
   const Vec3d a = point_at(t0), b = point_at(t1);
-  Aabbd positions = grown(Aabbd{min(a, b), max(a, b)}, margin_);
-  positions = {max(positions.min, bounds_.min), min(positions.max, bounds_.max)};
-  if (positions.empty()) return slab;
-  slab.bricks = bricks_within(positions, per_unit_);
-  slab.bricks.lo[axis_] = slab.bricks.hi[axis_] = first_ + n * step_;
+  const Aabbd near = grown(Aabbd{min(a, b), max(a, b)}, margin_);
+  crossing.positions = {max(near.min, bounds_.min), min(near.max, bounds_.max)};
+  return crossing;
+}
+
+SlabMarch::Slab SlabMarch::slab(int64_t n, double limit) const {
+  const int64_t index = first_ + n * step_;
+  const Crossing crossing = cross(static_cast<double>(index), slab_edge_, limit);
+  Slab slab{crossing.near, {{0, 0, 0}, {-1, -1, -1}}};
+  if (crossing.positions.empty()) return slab;
+  slab.bricks = bricks_within(crossing.positions, per_unit_);
+  slab.bricks.lo[axis_] = slab.bricks.hi[axis_] = index;
   return slab;
+}
+
+SlabMarch::Layer SlabMarch::layer(int64_t n, int number, double limit) const {
+  const int64_t within = step_ > 0 ? number : (1 << kBrickBits) - 1 - number;
+  const int64_t index = ((first_ + n * step_) << kBrickBits) + within;
+  const Crossing crossing = cross(static_cast<double>(index), slab_edge_ / (1 << kBrickBits), limit);
+  Layer layer{crossing.near, {{0, 0, 0}, {-1, -1, -1}}};
+  if (crossing.positions.empty()) return layer;
+  layer.cells = cells_within(crossing.positions, per_unit_);
+  layer.cells.lo[axis_] = layer.cells.hi[axis_] = index;
+  return layer;
 }
 
 }  // namespace locus::internal

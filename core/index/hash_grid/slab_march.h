@@ -17,15 +17,15 @@ namespace locus::internal {
 // What a march needs to know of a level.
 struct LevelExtent {
   Aabbd bounds;      // around all its values; not empty
-  double reach = 0;  // how far any value extends from its position
+  double reach = 0;  // how far the bounds of any value extend from its position
   double cells_per_unit = 1;
 };
 
 class SlabMarch {
  public:
   struct Slab {
-    double near;        // no value of this slab or a later one has a smaller near value
-    BrickRange bricks;  // may be empty
+    double near;      // no value of this slab or a later one has a smaller near value
+    KeyRange bricks;  // may be empty
   };
 
   // For the part of the ray up to `limit`, in the unit of the slab test.
@@ -38,7 +38,24 @@ class SlabMarch {
   // Slab number `n` from the near end; `limit` as above, possibly smaller by now.
   Slab slab(int64_t n, double limit) const;
 
+  // One layer of cells within a slab, likewise: number 0 to 3 from the near end.
+  struct Layer {
+    double near;
+    KeyRange cells;  // may be empty
+  };
+  Layer layer(int64_t n, int number, double limit) const;
+
+  // How far from the ray the positions of values that it can meet may lie, on any axis.
+  double margin() const { return margin_; }
+
  private:
+  // The positions of values between two planes across the ray, which `index` times `edge` and one edge more name, that
+  // the ray can meet up to `limit`; near as in Slab.
+  struct Crossing {
+    double near;
+    Aabbd positions;  // may be empty
+  };
+  Crossing cross(double index, double edge, double limit) const;
   Vec3d point_at(double t) const { return origin_ + direction_ * t; }
 
   Vec3d origin_, direction_;

@@ -89,7 +89,7 @@ TEST_F(BatchApplicationTest, ClearAndInsertOfAKnownIdIsNoDuplicate) {
   EXPECT_EQ(apply(batch).refused, 0u);
   EXPECT_EQ(ids(), (std::vector<Id>{2}));
   EXPECT_EQ(object(2)->shape.kind, ShapeKind::kPoint);
-  EXPECT_EQ(scene_.latest()->grid.size(), 1u);
+  EXPECT_EQ(scene_.latest()->objects.size(), 1u);
 }
 
 TEST_F(BatchApplicationTest, ClearLeavesInstances) {
@@ -115,7 +115,7 @@ TEST_F(BatchApplicationTest, InsertOfAKnownIdIsRefused) {
   apply(with(points({1}, {1, 1, 1})));
   expect_error(with(points({2, 1}, {2, 2, 2})), "inserts[0].ids", 1, 1, Reason::kDuplicateId);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
-  EXPECT_NE(object(2), nullptr);
+  EXPECT_TRUE(object(2).has_value());
 }
 
 TEST_F(BatchApplicationTest, UpsertReplacesShapeAndLabels) {

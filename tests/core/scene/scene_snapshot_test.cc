@@ -37,11 +37,11 @@ void expect_object_of(const Object& object, uint64_t tick) {
 void expect_whole(const SceneSnapshot& snapshot) {
   WorldVisitor visitor;
   Work work;
-  snapshot.grid.visit_region(visitor, work);
+  snapshot.objects.visit_region(visitor, work);
   ASSERT_EQ(visitor.found.size(), kObjects);
   for (const Object& object : visitor.found) expect_object_of(object, snapshot.tick);
   uint64_t in_map = 0;
-  snapshot.objects.for_each([&](Id, const Object& object) {
+  snapshot.objects.for_each([&](const Object& object) {
     ++in_map;
     expect_object_of(object, snapshot.tick);
   });

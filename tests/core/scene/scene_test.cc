@@ -86,7 +86,7 @@ TEST_F(SceneTest, ExactlyGivesARecentRevisionAsItWas) {
   const auto snapshot = scene_.view(exactly(1), kNow);
   ASSERT_TRUE(snapshot.ok());
   EXPECT_EQ((*snapshot)->objects.find(1)->shape.position.x, 1);
-  EXPECT_EQ((*scene_.view(exactly(3), kNow))->objects.find(1), nullptr);
+  EXPECT_EQ((*scene_.view(exactly(3), kNow))->objects.find(1), std::nullopt);
 }
 
 TEST_F(SceneTest, ExactlyTheNextRevisionIsOutOfRange) {
@@ -169,7 +169,7 @@ TEST_F(SceneTest, ASnapshotOutlivesItsScene) {
   const SnapshotPtr snapshot = scene->latest();
   scene.reset();
   EXPECT_EQ(snapshot->objects.find(1)->shape.position.x, 4);
-  EXPECT_EQ(snapshot->grid.size(), 1u);
+  EXPECT_EQ(snapshot->objects.size(), 1u);
 }
 
 TEST_F(SceneTest, WrongFormIsRefusedAndChangesNothing) {

@@ -90,7 +90,7 @@ TEST_F(SceneWriterTest, AnOlderTickIsAppliedUnderTheCurrent) {
   const UpdateAck ack = apply(batch);
   EXPECT_EQ(ack.tick, 5u);
   EXPECT_EQ(ack.revision, 2u);
-  EXPECT_NE(object(1), nullptr);
+  EXPECT_TRUE(object(1).has_value());
 }
 
 TEST_F(SceneWriterTest, AnOlderTickAloneMakesNoRevision) {

@@ -99,7 +99,7 @@ TEST_F(StaticSetTest, ChosenIdsAreNotUsedAgainAfterARemove) {
 TEST_F(StaticSetTest, ChosenIdsAvoidThoseOfObjects) {
   apply(with(points({kChosenIdBit | ((uint64_t{1} << 24) + 1)}, {0, 0, 0})));
   const Id placed = change(placing(placement({}, {0, 0, 0}))).placed[0];
-  EXPECT_EQ(object(placed), nullptr);
+  EXPECT_FALSE(object(placed).has_value());
 }
 
 TEST_F(StaticSetTest, RemovesAndPlacesAreOneRevision) {
@@ -124,7 +124,7 @@ TEST_F(StaticSetTest, RemovesWholeGroupsOfInstancesAndNoObjects) {
   change(what);
   EXPECT_EQ(scene_.latest()->statics->size(), 1u);
   EXPECT_NE(instance(2), nullptr);
-  EXPECT_NE(object(10), nullptr);
+  EXPECT_TRUE(object(10).has_value());
 }
 
 TEST_F(StaticSetTest, GroupZeroIsRefused) {
@@ -208,7 +208,7 @@ TEST_F(StaticSetTest, AnObjectInsertedDuringTheBuildKeepsItsId) {
     const UpdateAck ack = apply(batch);
     builder.join();
     EXPECT_NE(placed.ok(), ack.applied == 1) << id;
-    EXPECT_NE(instance(id) != nullptr, object(id) != nullptr) << id;
+    EXPECT_NE(instance(id) != nullptr, object(id).has_value()) << id;
     if (!placed.ok())
       expect_refusal(placed, absl::StatusCode::kInvalidArgument, Reason::kDuplicateId, "place[0].ids", 1);
   }

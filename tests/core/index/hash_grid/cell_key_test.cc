@@ -72,7 +72,7 @@ TEST(CellKeyTest, NeighbouringKeysHashApart) {
 
 TEST(CellKeyTest, CountsOfHugeRangesDoNotOverflow) {
   constexpr int64_t kFar = int64_t{1} << 52;
-  const BrickRange range{{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}};
+  const KeyRange range{{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}};
   EXPECT_GT(range.count(), 1e46);
   EXPECT_FALSE(range.empty());
 }

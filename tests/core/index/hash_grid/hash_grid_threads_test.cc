@@ -8,14 +8,14 @@
 #include "core/base/mutex.h"
 #include "core/index/hash_grid/hash_grid.h"
 #include "core/index/index_queries.h"
-#include "core/scene/object.h"
+#include "core/scene/object_store.h"
 #include "tests/support/random.h"
 #include "tests/support/test_scale.h"
 
 namespace locus::test {
 namespace {
 
-using SharedGrid = std::shared_ptr<const HashGrid<Object>>;
+using SharedGrid = std::shared_ptr<const ObjectSet>;
 
 class Published {
  public:
@@ -36,7 +36,7 @@ class Published {
 constexpr size_t kObjects = 1'000;
 
 // All objects of one revision carry its number as their tag.
-void expect_one_revision(const HashGrid<Object>& grid) {
+void expect_one_revision(const ObjectSet& grid) {
   std::vector<Object> found;
   ball_overlap(grid, {{}, 1e6}, found);
   ASSERT_EQ(found.size(), kObjects);
@@ -61,10 +61,10 @@ TEST(HashGridThreadsTest, ReadersOfSnapshotsSeeWholeRevisionsWhileTheWriterGoesO
     objects[i].id = i + 1;
     objects[i].shape = {ShapeKind::kBall, random.vector(100), {}, {}, 0.5f};
   }
-  HashGrid<Object> grid;
+  ObjectStore grid;
   grid.apply({}, objects);
   Published published;
-  published.set(std::make_shared<const HashGrid<Object>>(grid.snapshot()));
+  published.set(std::make_shared<const ObjectSet>(grid.snapshot()));
 
   std::atomic<bool> done{false};
   std::atomic<uint64_t> reads{0};
@@ -83,12 +83,12 @@ TEST(HashGridThreadsTest, ReadersOfSnapshotsSeeWholeRevisionsWhileTheWriterGoesO
     }
     grid.apply(objects, moved);
     objects = std::move(moved);
-    published.set(std::make_shared<const HashGrid<Object>>(grid.snapshot()));
+    published.set(std::make_shared<const ObjectSet>(grid.snapshot()));
   }
   done.store(true);
   first.join();
   second.join();
-  expect_one_revision(grid);
+  expect_one_revision(grid.snapshot());
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ Rayd grazing_ray(Random& random, const FiledLevel& level, double pad) {
   return {through - direction * back, direction * random.magnitude(-20, 20)};
 }
 
-bool names(const BrickRange& range, const GridKey& brick) {
+bool names(const KeyRange& range, const GridKey& brick) {
   for (int axis = 0; axis < 3; ++axis) {
     if (brick[axis] < range.lo[axis] || brick[axis] > range.hi[axis]) return false;
   }

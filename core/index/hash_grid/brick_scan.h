@@ -1,0 +1,176 @@
+// Goes through the values of one brick, or of some of its cells: float culls them eight at a time, and what remains is
+// handed to the caller. Plain functions; any thread.
+#ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
+#define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/planted_bug.h"
+#include "core/geometry/ray.h"
+#include "core/index/hash_grid/brick.h"
+#include "core/index/hash_grid/kernels/grid_dispatch.h"
+#include "core/index/hash_grid/slab_march.h"
+#include "core/index/work.h"
+
+namespace locus {
+
+// A value in the grid. Borrows from the snapshot that gave it.
+class GridRef {
+ public:
+  GridRef() = default;
+  GridRef(const internal::GridBlock& block, uint32_t slot) : block_(&block), slot_(slot) {}
+
+  explicit operator bool() const { return block_ != nullptr; }
+  const GridEntry& entry() const { return block_->entry(slot_); }
+  uint32_t handle() const { return block_->handle(slot_); }
+  float reach() const { return block_->reach(slot_); }
+  GridForm form() const { return block_->form(slot_); }
+  GridItem item() const { return block_->item(slot_); }
+
+ private:
+  const internal::GridBlock* block_ = nullptr;
+  uint32_t slot_ = 0;
+};
+
+namespace internal {
+
+// Bounds of values are wider than their reach by the rounding of predicates: 2^-40 of the magnitudes, as
+// core/geometry/shape.h says. This much of the magnitudes covers that and the sums here.
+inline constexpr double kBoundsGrowth = 0x1p-38;
+
+inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};
+
+// How much wider than its reach a value of `brick` may be, and how far off its columns in float.
+inline double cull_margin(const Brick& brick) {
+  const GridBlock* const recent = brick.recent.get();
+  const float coordinate = recent == nullptr
+                               ? brick.sorted->largest_coordinate()
+                               : std::max(brick.sorted->largest_coordinate(), recent->largest_coordinate());
+  const double reach = brick.largest_reach();
+  const double magnitude = max_component(abs(brick.place.center)) + brick.place.edge;
+  return double{kCullSlack} * (coordinate + reach) + kBoundsGrowth * (magnitude + reach);
+}
+
+inline GridBox cull_box_of(const Brick& brick, const Aabbd& region) {
+  const double margin = cull_margin(brick);
+  GridBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = region.min[axis] - brick.place.center[axis] - margin;
+    const double high = region.max[axis] - brick.place.center[axis] + margin;
+    box.low[axis] = static_cast<float>(low - std::abs(low) * double{kCullSlack});
+    box.high[axis] = static_cast<float>(high + std::abs(high) * double{kCullSlack});
+  }
+  return box;
+}
+
+// The ray's line as seen from the brick, by its point nearest to the centre, so that the numbers are small.
+inline GridLine cull_line_of(const Brick& brick, const SlabRay<double>& ray, double ray_margin) {
+  const Vec3d direction = ray.direction() * (1 / max_component(abs(ray.direction())));
+  const Vec3d toward = direction * (1 / std::sqrt(squared_length(direction)));
+  const Vec3d to_origin = ray.origin() - brick.place.center;
+  const Vec3d point = to_origin - toward * dot(to_origin, toward);
+  const double far = max_component(abs(to_origin));
+  GridLine line;
+  for (int axis = 0; axis < 3; ++axis) {
+    line.point[axis] = static_cast<float>(point[axis]);
+    line.direction[axis] = static_cast<float>(toward[axis]);
+  }
+  // Along the brick the line's direction and its point are off by a few 2^-24 of the lengths, and by 2^-50 of the way.
+  line.margin = static_cast<float>((cull_margin(brick) + ray_margin + 0x1p-46 * far +
+                                    4 * double{kCullSlack} * (max_component(abs(point)) + 2 * brick.place.edge)) *
+                                   (1 + 2 * double{kCullSlack}));
+  return line;
+}
+
+// Fills GridRows with rows of one block, runs cull(rows, slots) when they are full, and hands on what it keeps.
+template <class Cull, class Visit>
+class RowScan {
+ public:
+  RowScan(const GridBlock& block, const uint64_t* gone, const Cull& cull, const Visit& visit, Work& work)
+      : block_(block), cull_(cull), visit_(visit), work_(work) {
+    rows_ = {block.column(0), block.column(1), block.column(2), block.column(3), gone, 0, {}, {}};
+  }
+
+  // False once visit() was.
+  bool add(uint32_t begin, uint32_t end) {
+    while (begin < end) {
+      const uint32_t taken = std::min(end - begin, GridRows::kMostValues - values_);
+      rows_.begin[rows_.count] = begin;
+      rows_.end[rows_.count++] = begin + taken;
+      begin += taken;
+      values_ += taken;
+      if ((values_ == GridRows::kMostValues || rows_.count == GridRows::kMost) && !flush()) return false;
+    }
+    return true;
+  }
+
+  bool flush() {
+    if (rows_.count == 0) return true;
+    const uint32_t kept = cull_(rows_, slots_);
+    work_.cells += rows_.count;
+    rows_.count = 0;
+    values_ = 0;
+    for (uint32_t i = 0; i < kept; ++i) __builtin_prefetch(&block_.entry(slots_[i]));
+    for (uint32_t i = 0; i < kept; ++i) {
+      ++work_.tests;
+      if (!visit_(GridRef(block_, slots_[i]))) return false;
+    }
+    return true;
+  }
+
+ private:
+  const GridBlock& block_;
+  const Cull& cull_;
+  const Visit& visit_;
+  Work& work_;
+  GridRows rows_;
+  uint32_t values_ = 0;
+  uint32_t slots_[GridRows::kMostValues + GridBlock::kLanes];
+};
+
+// Those values of `cells`, which are numbered within the brick, that cull(rows, slots) keeps; false once visit() was.
+template <class Cull, class Visit>
+bool scan_cells(const Brick& brick, const KeyRange& cells, Work& work, const Cull& cull, const Visit& visit) {
+  const GridBlock& sorted = *brick.sorted;
+  RowScan<Cull, Visit> scan(sorted, brick.gone.empty() ? nullptr : brick.gone.data(), cull, visit, work);
+  uint32_t begin = 0, end = 0;
+  bool first = true;
+  for (int64_t z = cells.lo.z; z <= cells.hi.z; ++z) {
+    for (int64_t y = cells.lo.y; y <= cells.hi.y; ++y) {
+      const auto row = static_cast<size_t>(z << (2 * kBrickBits) | y << kBrickBits);
+      const uint32_t row_begin = sorted.offsets()[row + static_cast<size_t>(cells.lo.x)];
+      const uint32_t row_end = sorted.offsets()[row + static_cast<size_t>(cells.hi.x) + 1];
+      if (row_begin == row_end || (planted(PlantedBug::kDropCell) && std::exchange(first, false))) continue;
+      if (row_begin != end) {
+        if (!scan.add(begin, end)) return false;
+        begin = row_begin;
+      }
+      end = row_end;
+    }
+  }
+  return scan.add(begin, end) && scan.flush();
+}
+
+// The same for the values that came or moved lately, wherever in the brick they are.
+template <class Cull, class Visit>
+bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& visit) {
+  if (brick.recent == nullptr) return true;
+  RowScan<Cull, Visit> scan(*brick.recent, nullptr, cull, visit, work);
+  return scan.add(0, brick.recent->count()) && scan.flush();
+}
+
+// Each value, until visit() is false, which is then returned.
+template <class Visit>
+bool for_each_value(const Brick& brick, const Visit& visit) {
+  for (uint32_t slot = 0; slot < brick.sorted->count(); ++slot)
+    if (!brick.is_gone(slot) && !visit(GridRef(*brick.sorted, slot))) return false;
+  for (uint32_t slot = 0; brick.recent != nullptr && slot < brick.recent->count(); ++slot)
+    if (!visit(GridRef(*brick.recent, slot))) return false;
+  return true;
+}
+
+}  // namespace internal
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_

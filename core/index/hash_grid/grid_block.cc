@@ -1,0 +1,33 @@
+#include "core/index/hash_grid/grid_block.h"
+
+#include <algorithm>
+
+namespace locus::internal {
+
+GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((count + kLanes - 1) / kLanes * kLanes) {
+  // A vector that starts at the last value of the last column of floats ends within the handles or entries.
+  const size_t floats = size_t{4} * stride_ * sizeof(float);
+  const size_t handles = size_t{stride_} * sizeof(uint32_t);
+  const size_t entries = count * sizeof(GridEntry);
+  bytes_ = floats + handles + entries + (has_forms ? count * sizeof(GridForm) : 0);
+  memory_ = std::make_unique_for_overwrite<std::byte[]>(bytes_);
+  floats_ = reinterpret_cast<float*>(memory_.get());
+  handles_ = reinterpret_cast<uint32_t*>(memory_.get() + floats);
+  entries_ = reinterpret_cast<GridEntry*>(memory_.get() + floats + handles);
+  if (has_forms) forms_ = reinterpret_cast<GridForm*>(memory_.get() + floats + handles + entries);
+  for (int number = 0; number < 4; ++number)
+    std::fill(floats_ + number * stride_ + count, floats_ + (number + 1) * stride_, 0.0f);
+}
+
+uint32_t GridBlock::find(uint32_t handle) const {
+  uint32_t slot = 0;
+  for (; slot + kLanes <= count_; slot += kLanes) {
+    uint32_t equal = 0;
+    for (uint32_t lane = 0; lane < kLanes; ++lane) equal |= handles_[slot + lane] == handle ? 1u : 0u;
+    if (equal != 0) break;
+  }
+  while (slot < count_ && handles_[slot] != handle) ++slot;
+  return slot;
+}
+
+}  // namespace locus::internal

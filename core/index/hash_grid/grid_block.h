@@ -1,0 +1,113 @@
+// The values of one brick of the hash grid, in columns: what culls in float, relative to the brick's centre, eight at a
+// time, and what decides in double, one entry a value. Immutable once shared; any thread.
+//
+// Invariants: values lie in the order of their cells, those of cell c at offsets[c] to offsets[c + 1]; float columns
+// are padded with zeros to whole vectors, and so many more that a vector may start at any value.
+#ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
+#define LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "core/base/ids.h"
+#include "core/geometry/shape.h"
+
+namespace locus {
+
+// One value as the grid stores it, but for its form, its reach and its handle.
+struct GridEntry {
+  Vec3d position;
+  Id id = kNoId;
+  Group group = 0;
+  Tag tag = 0;
+  Layers layers = kDefaultLayers;
+  ShapeKind kind = ShapeKind::kPoint;
+};
+static_assert(sizeof(GridEntry) == 56);
+
+// What most values go without: as in Shape.
+struct GridForm {
+  Quaternion rotation;
+  Vec3f size;
+  float radius = 0;  // not of balls, whose radius is their reach
+
+  friend constexpr bool operator==(const GridForm&, const GridForm&) = default;
+};
+
+// A value on its way into the grid. `handle` is the caller's number for it. `reach`: how far it extends from its
+// position in any direction, whatever its rotation, but for the rounding of bounds; the exact radius of balls.
+struct GridItem {
+  GridEntry entry;
+  uint32_t handle = 0;
+  float reach = 0;
+  GridForm form;
+};
+
+namespace internal {
+
+inline constexpr int kBrickCells = 64;
+
+class GridBlock {
+ public:
+  static constexpr uint32_t kLanes = 8;
+
+  // `count` values, to be put() once each before the block is shared.
+  GridBlock(uint32_t count, bool has_forms);
+
+  uint32_t count() const { return count_; }
+  bool has_forms() const { return forms_ != nullptr; }
+  // Columns x, y, z relative to the centre, and reach.
+  const float* column(int number) const { return floats_ + size_t{stride_} * static_cast<size_t>(number); }
+  const GridEntry& entry(uint32_t slot) const { return entries_[slot]; }
+  float reach(uint32_t slot) const { return column(3)[slot]; }
+  GridForm form(uint32_t slot) const { return forms_ == nullptr ? GridForm() : forms_[slot]; }
+  uint32_t handle(uint32_t slot) const { return handles_[slot]; }
+  GridItem item(uint32_t slot) const { return {entry(slot), handle(slot), reach(slot), form(slot)}; }
+  // Where the value of that handle is; count() if it is not here. O(count), a vector at a time.
+  uint32_t find(uint32_t handle) const;
+
+  std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }
+  const std::array<uint32_t, kBrickCells + 1>& offsets() const { return offsets_; }
+
+  // Of all values: the largest reach and |x| of the float columns, at least.
+  float largest_reach() const { return largest_reach_; }
+  float largest_coordinate() const { return largest_coordinate_; }
+
+  // `entry` at another position, perhaps.
+  void put(uint32_t slot, const GridEntry& entry, Vec3d position, uint32_t handle, float reach, Vec3d center) {
+    const Vec3f relative = to_float(position - center);
+    floats_[slot] = relative.x;
+    floats_[stride_ + slot] = relative.y;
+    floats_[2 * stride_ + slot] = relative.z;
+    floats_[3 * stride_ + slot] = reach;
+    handles_[slot] = handle;
+    entries_[slot] = entry;
+    entries_[slot].position = position;
+    largest_reach_ = std::max(largest_reach_, reach);
+    largest_coordinate_ = std::max(largest_coordinate_, max_component(abs(relative)));
+  }
+  // Only where has_forms().
+  void put_form(uint32_t slot, const GridForm& form) { forms_[slot] = form; }
+
+  size_t bytes() const { return sizeof(GridBlock) + bytes_; }
+
+ private:
+  uint32_t count_;
+  uint32_t stride_;
+  float largest_reach_ = 0;
+  float largest_coordinate_ = 0;
+  float* floats_ = nullptr;
+  uint32_t* handles_ = nullptr;
+  GridEntry* entries_ = nullptr;
+  GridForm* forms_ = nullptr;
+  size_t bytes_ = 0;
+  std::unique_ptr<std::byte[]> memory_;
+  std::array<uint32_t, kBrickCells + 1> offsets_{};
+};
+
+}  // namespace internal
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_

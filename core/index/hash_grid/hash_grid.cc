@@ -1,0 +1,220 @@
+#include "core/index/hash_grid/hash_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/base/limits.h"
+#include "core/base/planted_bug.h"
+#include "core/index/hash_grid/cell_size.h"
+
+namespace locus {
+
+using internal::BrickChange;
+using internal::BrickPlace;
+using internal::GridKey;
+using internal::GridSlot;
+
+HashGrid::HashGrid(const HashGridOptions& options)
+    : base_exponent_(
+          internal::exponent_covering(options.cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent)),
+      first_choice_(std::max<size_t>(options.first_choice, 1)) {}
+
+double HashGrid::cell_size() const { return std::ldexp(1.0, base_exponent_); }
+
+GridRef HashGrid::at(uint32_t handle) const {
+  const GridSlot& slot = slots_[handle];
+  const internal::Brick& brick = *bricks_[slot.brick];
+  const bool recent = (slot.slot & GridSlot::kRecent) != 0;
+  return {recent ? *brick.recent : *brick.sorted, slot.slot & ~GridSlot::kRecent};
+}
+
+void HashGrid::prefetch_value(uint32_t handle) const { __builtin_prefetch(&at(handle).entry()); }
+
+HashGrid::Level& HashGrid::level_for(float reach) {
+  const int exponent = internal::exponent_covering(2.0 * double{reach}, base_exponent_, internal::kMaxCellExponent);
+  auto at = levels_.begin();
+  while (at != levels_.end() && (*at)->exponent > exponent) ++at;
+  if (at == levels_.end() || (*at)->exponent != exponent) at = levels_.insert(at, std::make_unique<Level>(exponent));
+  return **at;
+}
+
+internal::BrickTable& HashGrid::writable_table(Level& level) {
+  if (std::exchange(level.table_is_shared, false)) level.table = std::make_shared<internal::BrickTable>(*level.table);
+  return *level.table;
+}
+
+uint32_t HashGrid::brick_for(Level& level, const GridKey& key) {
+  const uint32_t found = level.table->find(key, [&](uint32_t number) { return known_[number].place.key == key; });
+  if (found != internal::BrickTable::kNone) return found;
+  uint32_t number = static_cast<uint32_t>(known_.size());
+  if (free_bricks_.empty()) {
+    known_.emplace_back();
+  } else {
+    number = free_bricks_.back();
+    free_bricks_.pop_back();
+  }
+  known_[number] = {BrickPlace::of(key, level.exponent), &level, 0};
+  bricks_.set(number, nullptr);
+  writable_table(level).insert(key, number);
+  const Vec3d half = Vec3d{1, 1, 1} * (known_[number].place.edge / 2);
+  const Vec3d center = known_[number].place.center;
+  level.bounds = merge(level.bounds, Aabbd{center - half, center + half});
+  return number;
+}
+
+// A brick is among the touched if the list says so at the number it keeps: nothing needs to be cleared between batches.
+void HashGrid::change(uint32_t brick, const BrickChange& change) {
+  Known& known = known_[brick];
+  if (known.touched >= touched_.size() || touched_[known.touched] != brick) {
+    known.touched = static_cast<uint32_t>(touched_.size());
+    touched_.push_back(brick);
+    change_counts_.push_back(0);
+  }
+  ++change_counts_[known.touched];
+  changes_.push_back({known.touched, change});
+}
+
+void HashGrid::remove(uint32_t handle) {
+  LOCUS_CHECK_LT(handle, slots_.size());
+  const GridSlot slot = slots_[handle];
+  --known_[slot.brick].level->size;
+  --size_;
+  change(slot.brick, {slot.slot, BrickChange::kLeaves});
+}
+
+void HashGrid::arrive(const GridItem& item, Level& level, const GridKey& key) {
+  const uint32_t brick = brick_for(level, key);
+  level.reach = std::max(level.reach, double{item.reach});
+  ++level.size;
+  ++size_;
+  if (item.handle >= slots_.size()) slots_.resize(item.handle + 1);
+  bricks_by_handle_.set(item.handle, brick);
+  change(brick, {BrickChange::kArrives, static_cast<uint32_t>(arrivals_.size())});
+  arrivals_.push_back(item);
+}
+
+void HashGrid::insert(const GridItem& item) {
+  LOCUS_DCHECK(max_component(abs(item.entry.position)) <= limits::kMaxCoordinate);
+  Level& level = level_for(item.reach);
+  arrive(item, level, internal::brick_of(internal::cell_of(item.entry.position, level.cells_per_unit)));
+}
+
+void HashGrid::move(const GridMove& move, uint32_t number) {
+  const GridSlot slot = slots_[move.handle];
+  const Known& known = known_[slot.brick];
+  const GridKey key = internal::brick_of(internal::cell_of(move.position, known.place.cells_per_unit));
+  if (key == known.place.key) return change(slot.brick, {slot.slot, number});
+  Level& level = *known.level;
+  GridItem item = at(move.handle).item();
+  item.entry.position = move.position;
+  if (move.turns) item.form.rotation = move.rotation;
+  if (!planted(PlantedBug::kGhostAfterMove)) remove(move.handle);
+  arrive(item, level, key);
+}
+
+void HashGrid::group_changes() {
+  uint32_t begin = 0;
+  for (uint32_t& count : change_counts_) begin += std::exchange(count, begin);
+  grouped_.resize(changes_.size());
+  for (const Change& change : changes_) grouped_[change_counts_[change.touched]++] = change.change;
+}
+
+void HashGrid::drop_brick(uint32_t brick) {
+  Level& level = *known_[brick].level;
+  writable_table(level).erase(known_[brick].place.key, brick);
+  bricks_.set(brick, nullptr);
+  free_bricks_.push_back(brick);
+}
+
+void HashGrid::rebuild_bricks(absl::Span<const GridMove> moves) {
+  const internal::BatchParts parts{moves, arrivals_};
+  uint32_t begin = 0;
+  for (size_t i = 0; i < touched_.size(); ++i) {
+    const uint32_t brick = touched_[i];
+    const uint32_t end = change_counts_[i];
+    internal::BrickPtr next = builder_.apply(bricks_[brick].get(), known_[brick].place, brick,
+                                             absl::MakeConstSpan(grouped_).subspan(begin, end - begin), parts, slots_);
+    begin = end;
+    if (next == nullptr) {
+      drop_brick(brick);
+    } else {
+      bricks_.set(brick, std::move(next));
+    }
+  }
+}
+
+void HashGrid::apply_to_bricks(const GridBatch& batch) {
+  touched_.clear();
+  change_counts_.clear();
+  changes_.clear();
+  arrivals_.clear();
+  for (const uint32_t handle : batch.removed) remove(handle);
+  for (size_t i = 0; i < batch.moves.size(); ++i) move(batch.moves[i], static_cast<uint32_t>(i));
+  for (const GridItem& item : batch.inserted) insert(item);
+  group_changes();
+  rebuild_bricks(batch.moves);
+  std::erase_if(levels_, [](const std::unique_ptr<Level>& level) { return level->size == 0; });
+}
+
+void HashGrid::apply(const GridBatch& batch) {
+  if (size_ == 0 && batch.inserted.size() >= first_choice_) {  // files a bulk load once, at the right size
+    internal::EvenSample sample(batch.inserted.size());
+    for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
+    base_exponent_ = internal::choose_cell_exponent(sample.values(), batch.inserted.size());
+    size_at_choice_ = batch.inserted.size();
+    changes_since_choice_ = 0;
+  }
+  apply_to_bricks(batch);
+  changes_since_choice_ += batch.removed.size() + batch.moves.size() + batch.inserted.size();
+  if (choice_is_stale()) choose_cell_size();
+}
+
+bool HashGrid::choice_is_stale() const {
+  if (size_ < first_choice_) return false;
+  return size_ >= 2 * size_at_choice_ || size_ <= size_at_choice_ / 8 || changes_since_choice_ >= 16 * size_;
+}
+
+void HashGrid::choose_cell_size() {
+  internal::EvenSample sample(size_);
+  for_each([&sample](const GridRef& value) {
+    sample.offer(value.entry().position, 2.0 * double{value.reach()});
+    return true;
+  });
+  const int exponent = internal::choose_cell_exponent(sample.values(), size_);
+  size_at_choice_ = size_;
+  changes_since_choice_ = 0;
+  if (exponent != base_exponent_) rebuild(exponent);
+}
+
+void HashGrid::rebuild(int base_exponent) {
+  std::vector<GridItem> all;
+  all.reserve(size_);
+  for_each([&all](const GridRef& value) {
+    all.push_back(value.item());
+    return true;
+  });
+  base_exponent_ = base_exponent;
+  levels_.clear();
+  for (size_t brick = 0; brick < known_.size(); ++brick) bricks_.set(brick, nullptr);
+  known_.clear();
+  free_bricks_.clear();
+  size_ = 0;
+  apply_to_bricks({{}, {}, all});
+}
+
+GridSnapshot HashGrid::snapshot() {
+  std::vector<internal::GridLevel> levels;
+  levels.reserve(levels_.size());
+  for (const std::unique_ptr<Level>& level : levels_) {
+    level->table_is_shared = true;
+    const double growth = internal::kBoundsGrowth * (level->reach + magnitude(level->bounds));
+    const double reach = level->reach + growth;
+    levels.push_back(
+        {level->exponent, {grown(level->bounds, reach), reach, level->cells_per_unit}, level->size, level->table});
+  }
+  return {std::move(levels), bricks_.snapshot(), bricks_by_handle_.snapshot(), cell_size()};
+}
+
+}  // namespace locus

@@ -1,0 +1,14 @@
+// Which of the grid's kernels serve: those of the instruction set in use.
+#ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_DISPATCH_H_
+#define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_DISPATCH_H_
+
+#include "core/index/hash_grid/kernels/grid_kernels.h"
+
+namespace locus {
+
+// Thread-safe.
+const GridKernels& active_grid_kernels();
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_DISPATCH_H_

@@ -1,0 +1,11 @@
+// Compiled for AVX2.
+#include "core/index/hash_grid/kernels/grid_kernels_impl.h"
+
+namespace locus {
+
+const GridKernels& grid_kernels_avx2() {
+  static constexpr GridKernels kKernels = {"avx2", cull_box, cull_line, cull_ball};
+  return kKernels;
+}
+
+}  // namespace locus

@@ -1,0 +1,11 @@
+// Compiled for any processor: two halves of a vector, or one number after the other.
+#include "core/index/hash_grid/kernels/grid_kernels_impl.h"
+
+namespace locus {
+
+const GridKernels& grid_kernels_portable() {
+  static constexpr GridKernels kKernels = {"portable", cull_box, cull_line, cull_ball};
+  return kKernels;
+}
+
+}  // namespace locus

@@ -1,0 +1,74 @@
+// The moving objects of a scene at one revision: by id, and in the grid. Immutable, any thread; what it shares with
+// other revisions is not seen. A SpatialIndex (core/index/spatial_index.h) of objects.
+#ifndef LOCUS_CORE_SCENE_OBJECT_SET_H_
+#define LOCUS_CORE_SCENE_OBJECT_SET_H_
+
+#include <optional>
+#include <utility>
+
+#include "core/base/persistent_map.h"
+#include "core/index/hash_grid/grid_snapshot.h"
+#include "core/index/spatial_index.h"
+#include "core/scene/object.h"
+
+namespace locus {
+
+// The shape, or the whole object, that the grid keeps as a reference says.
+Shape shape_of(const GridRef& value);
+Object object_of(const GridRef& value);
+// The object as the grid takes it.
+GridItem grid_item_of(const Object& object, uint32_t handle);
+
+class ObjectSet {
+ public:
+  using Value = Object;
+
+  ObjectSet() = default;
+  ObjectSet(GridSnapshot grid, PersistentMap<Id, uint32_t> handles)
+      : grid_(std::move(grid)), handles_(std::move(handles)) {}
+
+  size_t size() const { return grid_.size(); }
+  const GridSnapshot& grid() const { return grid_; }
+  // Nothing where no object has the id. O(1) and a look through the keys of one brick.
+  GridRef find_ref(Id id) const;
+  std::optional<Object> find(Id id) const;
+  // Whether the object is here, at its position.
+  bool contains(const Object& object) const {
+    const GridRef known = find_ref(object.id);
+    return known && known.entry().position == object.shape.position;
+  }
+
+  // fn(object) for each, in an order that depends on the grid's history only. O(size).
+  template <class Fn>
+  void for_each(Fn&& fn) const {
+    grid_.for_each([&fn](const GridRef& value) {
+      fn(object_of(value));
+      return true;
+    });
+  }
+
+  // As SpatialIndex asks.
+  template <RayVisitor<Object> Visitor>
+  void visit_ray(const SlabRay<double>& ray, Visitor& visitor, Work& work) const {
+    grid_.visit_ray(
+        ray, [&visitor] { return std::as_const(visitor).limit(); }, work,
+        [&visitor](const GridRef& value) { return visitor.visit(object_of(value)); });
+  }
+  template <RegionVisitor<Object> Visitor>
+  void visit_region(Visitor& visitor, Work& work) const {
+    grid_.visit_region(std::as_const(visitor).bounds(), work,
+                       [&visitor](const GridRef& value) { return visitor.visit(object_of(value)); });
+  }
+
+  GridStatistics statistics() const { return grid_.statistics(); }
+  // Of objects, bricks and the maps that find them. O(bricks).
+  size_t bytes() const;
+
+ private:
+  GridSnapshot grid_;
+  PersistentMap<Id, uint32_t> handles_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_OBJECT_SET_H_

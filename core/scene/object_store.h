@@ -1,0 +1,71 @@
+// The writer's side of a scene's objects: finds them by id and applies batches of changes, from which it makes sets for
+// readers. One thread at a time; sets belong to anybody.
+//
+// Invariant: every object has a handle of its own, which no other one gets while a set that holds it may be asked by
+// it; handles_ of the store and of its sets say which.
+#ifndef LOCUS_CORE_SCENE_OBJECT_STORE_H_
+#define LOCUS_CORE_SCENE_OBJECT_STORE_H_
+
+#include <optional>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/types/span.h"
+#include "core/index/hash_grid/hash_grid.h"
+#include "core/scene/object_set.h"
+
+namespace locus {
+
+class ObjectStore {
+ public:
+  static constexpr uint32_t kNoHandle = ~0u;
+
+  ObjectStore() = default;
+  explicit ObjectStore(const HashGridOptions& options) : grid_(options) {}
+
+  size_t size() const { return grid_.size(); }
+  std::optional<Object> find(Id id) const;
+  bool contains(const Object& object) const { return handles_.contains(object.id); }
+  // kNoHandle for an unknown id. Both O(1).
+  uint32_t handle(Id id) const;
+  // One more than the highest handle that was ever given out.
+  size_t handle_count() const { return next_handle_; }
+  GridRef at(uint32_t handle) const { return grid_.at(handle); }
+  // Ask for the memory of handle() and at(), some time before it is needed.
+  void prefetch_handle(Id id) const { handles_.prefetch(id); }
+  void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
+
+  // Removes the objects of one span, as they are, and inserts those of the other: a changed object is in both, under
+  // its id. All removed ones must be here, no inserted one may remain here. O(n) and the bricks that are touched.
+  void apply(absl::Span<const Object> removed, absl::Span<const Object> inserted);
+  // Handles are distinct.
+  void move(absl::Span<const GridMove> moves) { grid_.apply({{}, moves, {}}); }
+  void insert(const Object& object) { apply({}, {&object, 1}); }
+  // False, and no change, when contains() is false.
+  bool remove(const Object& object);
+
+  // fn(object) for each. O(size).
+  template <class Fn>
+  void for_each(Fn&& fn) const {
+    grid_.for_each([&fn](const GridRef& value) {
+      fn(object_of(value));
+      return true;
+    });
+  }
+
+  // What readers get. O(1) in the number of objects.
+  ObjectSet snapshot() { return {grid_.snapshot(), handles_for_readers_.snapshot()}; }
+
+ private:
+  uint32_t new_handle();
+
+  HashGrid grid_;
+  absl::flat_hash_map<Id, uint32_t> handles_;  // finds faster than the map that readers share
+  PersistentMap<Id, uint32_t> handles_for_readers_;
+  std::vector<uint32_t> free_handles_;
+  uint32_t next_handle_ = 0;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_OBJECT_STORE_H_

@@ -1,0 +1,64 @@
+#include "core/base/persistent_array.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/support/random.h"
+
+namespace locus {
+namespace {
+
+using Array = PersistentArray<uint32_t, 4>;
+
+std::vector<uint32_t> values_of(const Array& array) {
+  std::vector<uint32_t> values;
+  for (size_t place = 0; place < array.size(); ++place) values.push_back(array[place]);
+  return values;
+}
+
+TEST(PersistentArrayTest, PlacesThatWereNeverSetHoldTheDefault) {
+  Array array;
+  EXPECT_EQ(array.size(), 0u);
+  array.set(9, 7);
+  EXPECT_EQ(values_of(array), (std::vector<uint32_t>{0, 0, 0, 0, 0, 0, 0, 0, 0, 7}));
+}
+
+TEST(PersistentArrayTest, SnapshotsKeepWhatTheyHeldWhileTheArrayGoesOn) {
+  test::Random random(1);
+  Array array;
+  std::vector<uint32_t> model;
+  std::vector<std::pair<Array, std::vector<uint32_t>>> kept;
+  for (uint32_t step = 0; step < 2'000; ++step) {
+    const size_t place = random.below(model.size() + 3);
+    if (place >= model.size()) model.resize(place + 1);
+    model[place] = step;
+    array.set(place, step);
+    if (random.chance(0.1)) kept.emplace_back(array.snapshot(), model);
+    if (model.size() > 60) break;
+  }
+  ASSERT_GT(kept.size(), 2u);
+  for (const auto& [snapshot, expected] : kept) EXPECT_EQ(values_of(snapshot), expected);
+  EXPECT_EQ(values_of(array), model);
+}
+
+TEST(PersistentArrayTest, AWrittenSnapshotLeavesTheOthersAlone) {
+  Array array;
+  array.set(0, 1);
+  Array first = array.snapshot();
+  const Array second = array.snapshot();
+  first.set(0, 2);
+  array.set(0, 3);
+  EXPECT_EQ(first[0], 2u);
+  EXPECT_EQ(second[0], 1u);
+  EXPECT_EQ(array[0], 3u);
+}
+
+TEST(PersistentArrayDeathTest, CopyingWhatIsBeingWrittenIsAProgrammersError) {
+  Array array;
+  array.set(0, 1);
+  EXPECT_DEATH(Array copy(array), "owner");
+}
+
+}  // namespace
+}  // namespace locus

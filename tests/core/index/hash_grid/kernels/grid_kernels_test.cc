@@ -1,0 +1,130 @@
+// What float culls, by every instruction set: never a value that double keeps, and little more than it must.
+#include "core/index/hash_grid/kernels/grid_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "core/base/instruction_set.h"
+#include "core/index/hash_grid/kernels/grid_dispatch.h"
+#include "tests/support/random.h"
+
+namespace locus::test {
+namespace {
+
+// Columns of one block with room for a vector behind them.
+struct Columns4 {
+  explicit Columns4(size_t values) : count(static_cast<uint32_t>(values)) {
+    for (std::vector<float>* column : {&x, &y, &z, &reach}) column->resize(values + 8);
+    gone.resize(values / 64 + 2);
+  }
+  GridRows rows() const { return {x.data(), y.data(), z.data(), reach.data(), nullptr, 0, {}, {}}; }
+
+  uint32_t count;
+  std::vector<float> x, y, z, reach;
+  std::vector<uint64_t> gone;
+};
+
+Columns4 random_columns(size_t values, Random& random) {
+  Columns4 columns(values);
+  for (size_t i = 0; i < values; ++i) {
+    columns.x[i] = random.float_between(-10, 10);
+    columns.y[i] = random.float_between(-10, 10);
+    columns.z[i] = random.float_between(-10, 10);
+    columns.reach[i] = random.float_between(0, 2);
+  }
+  return columns;
+}
+
+class GridKernelsTest : public ::testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override { ASSERT_TRUE(use_instruction_set(GetParam()).ok()); }
+  void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
+
+  // Asks about rows drawn at random and compares what is kept with keep(slot), 1 must be, 0 may be, -1 must not.
+  template <class Ask, class Keep>
+  static void expect_kept(Columns4& columns, Random& random, const Ask& ask, const Keep& keep) {
+    for (int round = 0; round < 200; ++round) {
+      GridRows rows = columns.rows();
+      std::set<uint32_t> asked;
+      const bool some_gone = random.chance(0.5);
+      for (uint64_t& word : columns.gone) word = some_gone ? random.next() & random.next() : 0;
+      if (some_gone) rows.gone = columns.gone.data();
+      uint32_t at = 0;
+      while (rows.count < GridRows::kMost && at < columns.count) {
+        const auto begin = static_cast<uint32_t>(at + random.below(12));
+        const auto end = std::min(columns.count, static_cast<uint32_t>(begin + 1 + random.below(30)));
+        if (begin >= end) break;
+        rows.begin[rows.count] = begin;
+        rows.end[rows.count++] = end;
+        for (uint32_t slot = begin; slot < end; ++slot)
+          if ((columns.gone[slot / 64] >> (slot % 64) & 1) == 0) asked.insert(slot);
+        at = end;
+      }
+      uint32_t slots[GridRows::kMostValues + 8];
+      const uint32_t count = ask(rows, slots);
+      ASSERT_TRUE(std::is_sorted(slots, slots + count));
+      const std::set<uint32_t> kept(slots, slots + count);
+      ASSERT_EQ(kept.size(), count);
+      for (const uint32_t slot : kept) ASSERT_TRUE(asked.contains(slot) && keep(slot) >= 0) << slot;
+      for (const uint32_t slot : asked) ASSERT_TRUE(keep(slot) <= 0 || kept.contains(slot)) << slot;
+    }
+  }
+};
+
+// 1 where `distance` is within `reach` and a little less, -1 where it is beyond and a little more.
+int verdict(double distance, double reach) {
+  constexpr double kSlack = 1e-4;
+  return distance <= reach - kSlack ? 1 : distance > reach + kSlack ? -1 : 0;
+}
+
+TEST_P(GridKernelsTest, KeepValuesThatReachABox) {
+  Random random(1);
+  Columns4 columns = random_columns(300, random);
+  const GridBox box{{-3, -2, 0}, {4, 5, 1}};
+  const auto keep = [&](uint32_t slot) {
+    double worst = -1e9;
+    const double at[] = {columns.x[slot], columns.y[slot], columns.z[slot]};
+    for (int axis = 0; axis < 3; ++axis)
+      worst = std::max({worst, double{box.low[axis]} - at[axis], at[axis] - double{box.high[axis]}});
+    return verdict(worst, columns.reach[slot]);
+  };
+  expect_kept(
+      columns, random,
+      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_box(rows, box, slots); }, keep);
+}
+
+TEST_P(GridKernelsTest, KeepValuesThatReachABall) {
+  Random random(2);
+  Columns4 columns = random_columns(300, random);
+  const GridBall ball{{1, -2, 3}, 4};
+  const auto keep = [&](uint32_t slot) {
+    const double x = columns.x[slot] - 1.0, y = columns.y[slot] + 2.0, z = columns.z[slot] - 3.0;
+    return verdict(std::sqrt(x * x + y * y + z * z), 4.0 + columns.reach[slot]);
+  };
+  expect_kept(
+      columns, random,
+      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_ball(rows, ball, slots); }, keep);
+}
+
+TEST_P(GridKernelsTest, KeepValuesThatReachALine) {
+  Random random(3);
+  Columns4 columns = random_columns(300, random);
+  const GridLine line{{1, 2, 0}, {0.6f, 0, 0.8f}, 0.5f};
+  const auto keep = [&](uint32_t slot) {
+    const double x = columns.x[slot] - 1.0, y = columns.y[slot] - 2.0, z = columns.z[slot];
+    const double along = x * 0.6 + z * 0.8;
+    const double off_x = x - along * 0.6, off_z = z - along * 0.8;
+    return verdict(std::sqrt(off_x * off_x + y * y + off_z * off_z), 0.5 + columns.reach[slot]);
+  };
+  expect_kept(
+      columns, random,
+      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_line(rows, line, slots); }, keep);
+}
+
+INSTANTIATE_TEST_SUITE_P(InstructionSets, GridKernelsTest, ::testing::ValuesIn(instruction_sets()));
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,52 @@
+// Objects in a hash grid that can be written to and asked at once, like the other structures: for the tests that
+// compare structures. Every question goes to a set as readers get it.
+#ifndef LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
+#define LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
+
+#include "core/scene/object_store.h"
+
+namespace locus::test {
+
+class ObjectGrid {
+ public:
+  using Value = Object;
+
+  ObjectGrid() : ObjectGrid(HashGridOptions()) {}
+  explicit ObjectGrid(const HashGridOptions& options) : store_(options), set_(store_.snapshot()) {}
+
+  void apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
+    store_.apply(removed, inserted);
+    set_ = store_.snapshot();
+  }
+  void insert(const Object& object) { apply({}, {&object, 1}); }
+  bool remove(const Object& object) {
+    const bool removed = store_.remove(object);
+    set_ = store_.snapshot();
+    return removed;
+  }
+
+  ObjectSet snapshot() const { return set_; }
+  size_t size() const { return set_.size(); }
+  bool contains(const Object& object) const { return set_.contains(object); }
+  GridStatistics statistics() const { return set_.statistics(); }
+  template <class Fn>
+  void for_each(Fn&& fn) const {
+    set_.for_each(fn);
+  }
+  template <RayVisitor<Object> Visitor>
+  void visit_ray(const SlabRay<double>& ray, Visitor& visitor, Work& work) const {
+    set_.visit_ray(ray, visitor, work);
+  }
+  template <RegionVisitor<Object> Visitor>
+  void visit_region(Visitor& visitor, Work& work) const {
+    set_.visit_region(visitor, work);
+  }
+
+ private:
+  ObjectStore store_;
+  ObjectSet set_;
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
