@@ -33,7 +33,7 @@ template <class Region, class Meets>
 void collect(const SceneSnapshot& snapshot, const Region& region, const Meets& meets, std::vector<uint64_t>& ids) {
   Work work;
   Ids<Region, Meets> visitor(region, meets, ids);
-  snapshot.grid.visit_region(visitor, work);
+  snapshot.objects.visit_region(visitor, work);
 }
 
 absl::Span<const float> numbers_of(const Vec3f& first, size_t count) {
@@ -172,7 +172,7 @@ void Ours::rays(absl::Span<const Rayf> rays, Answers& answers) {
     Object object;
     double distance = kRayLength;
     FirstHit first;
-    first.found = first_ray(snapshot_->grid, prepared, object, distance);
+    first.found = first_ray(snapshot_->objects, prepared, object, distance);
     first.id = object.id;
     first.distance = static_cast<float>(distance);
     return first;
