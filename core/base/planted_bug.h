@@ -24,6 +24,20 @@ enum class PlantedBug {
   kKernelLimit,       // a hit exactly at the limit is lost
   kKernelTie,         // of equal hits the highest number wins
   kKernelPruneEqual,  // boxes that start exactly at the best hit are left out
+  // The region kernels:
+  kRegionReach,       // boxes of nodes are held against the ball without a pad
+  kRegionInside,      // float decides what is inside the ball without its error bound
+  kRegionBeyond,      // float parts ball and triangle by a plane without its error bound
+  kRegionNear,        // float decides the distance to edges without its error bound
+  kRegionPlane,       // float decides the distance to planes without its error bound
+  kRegionWeight,      // float decides whether a foot lies inside without its error bound
+  kRegionOwnBounds,   // the bounds of a triangle's own are forgotten
+  kRegionFloor,       // squares and products that underflow are trusted
+  kRegionHalf,        // half extents go without their error bound
+  kRegionBoxPlane,    // float decides shadows on normals without their error bound
+  kRegionEdgeScale,   // products of edges may underflow
+  kRegionRange,       // coordinates of which products underflow are decided in float
+  kRegionTurnedNode,  // boxes of nodes are held against a turned box without a pad
 };
 
 #ifdef LOCUS_PLANT_BUGS

@@ -1,7 +1,6 @@
 #include "core/query/triangle_search.h"
 
 #include <algorithm>
-#include <memory>
 
 #include "core/base/check.h"
 #include "core/index/regions.h"
@@ -65,7 +64,7 @@ class Collector {
   bool full_ = false;
 };
 
-// Answers regions one behind the other. Memory that a large tree's searches wait for is worth taking turns for.
+// Answers regions one behind the other, many in one call of the kernels.
 template <class Shape>
 class BatchSearch {
  public:
@@ -76,83 +75,58 @@ class BatchSearch {
   }
 
   size_t run() {
-    const bool in_turns = tree_.bytes() >= kTurnsFromBytes && shapes_.size() > 1;
-    if (in_turns) places_ = std::make_unique_for_overwrite<uint32_t[]>(kTurns * kPlace);
     while (done_ < shapes_.size()) {
-      const size_t turns = in_turns ? std::min(kTurns, shapes_.size() - done_) : 1;
-      const bool fits = turns > 1 && of_one_kernel(turns) ? find_in_turns(turns) : find(shapes_[done_]);
-      if (!fits) break;
+      const size_t together = of_one_kernel();
+      if (!(together == 0 ? find_without_kernels(shapes_[done_]) : find_many(together))) break;
     }
     return done_;
   }
 
  private:
-  static constexpr size_t kTurnsFromBytes = size_t{2} << 20;
-  static constexpr size_t kTurns = 8;
-  static constexpr size_t kPlace = 1024;  // numbers for each of those that take turns; what is more comes after
-
-  bool of_one_kernel(size_t turns) const {
-    for (const Shape& shape : shapes_.subspan(done_, turns))
-      if (!TriangleSearch<Shape>::served(tree_, shape) || kernel_for(shape) != kernel_for(shapes_[done_])) return false;
-    return true;
-  }
-
-  bool book(size_t count) {
-    counts_[done_++] = static_cast<uint32_t>(count);
-    used_ += count;
-    return true;
-  }
-
-  bool find(const Shape& shape) {
-    if (!TriangleSearch<Shape>::served(tree_, shape)) return find_without_kernels(shape);
-    TriangleSearch<Shape> search(tree_, shape);
+  // How many of the next are for one kernel.
+  size_t of_one_kernel() const {
+    if (active_region_kernels() == nullptr) return 0;
+    const bool first = turned(shapes_[done_]);
     size_t count = 0;
-    while (!search.over()) {
-      const size_t room = numbers_.size() - used_ - count;
-      if (room < kMinRegionRoom) return false;
-      count += search.next(numbers_.data() + used_ + count, room);
+    while (count < kMaxRegions && done_ + count < shapes_.size()) {
+      const Shape& shape = shapes_[done_ + count];
+      if (!TriangleSearch<Shape>::served(tree_, shape) || turned(shape) != first) break;
+      ++count;
     }
-    return book(count);
+    return count;
+  }
+  static bool turned(const Ballf& /*ball*/) { return false; }
+  static bool turned(const Obbf& box) { return !(box.rotation == Rotation{}); }
+
+  bool find_many(size_t count) {
+    decltype(kernel_region(shapes_[0])) regions[kMaxRegions];
+    RegionJudge judges[kMaxRegions];
+    for (size_t i = 0; i < count; ++i) {
+      regions[i] = kernel_region(shapes_[done_ + i]);
+      judges[i] = judge_of(shapes_[done_ + i]);
+    }
+    uint32_t* const counts = counts_.data() + done_;
+    const size_t answered =
+        kernel_for(shapes_[done_])
+            .many(tree_.tree(), regions, judges, count, numbers_.data() + used_, numbers_.size() - used_, counts);
+    for (size_t i = 0; i < answered; ++i) used_ += counts[i];
+    done_ += answered;
+    return answered == count;
   }
 
   bool find_without_kernels(const Shape& shape) {
     Collector<Shape> collector(shape, numbers_.subspan(used_));
     Work work;
     tree_.visit_region(collector, work);
-    return !collector.full() && book(collector.count());
-  }
-
-  bool find_in_turns(size_t turns) {
-    decltype(kernel_region(shapes_[0])) regions[kTurns];
-    RegionVisit visits[kTurns];
-    const auto kernel = kernel_for(shapes_[done_]);
-    for (size_t i = 0; i < turns; ++i) {
-      regions[i] = kernel_region(shapes_[done_ + i]);
-      visits[i].start(judge_of(shapes_[done_ + i]));
-      visits[i].numbers = places_.get() + i * kPlace;
-      visits[i].room = kPlace;
-    }
-    kernel(tree_.tree(), regions, visits, turns);
-    for (size_t i = 0; i < turns; ++i) {
-      size_t count = visits[i].found;
-      if (count > numbers_.size() - used_) return false;
-      std::copy_n(visits[i].numbers, count, numbers_.data() + used_);
-      while (!visits[i].over()) {
-        visits[i].numbers = numbers_.data() + used_ + count;
-        visits[i].room = numbers_.size() - used_ - count;
-        if (visits[i].room < kMinRegionRoom) return false;
-        kernel(tree_.tree(), &regions[i], &visits[i], 1);
-        count += visits[i].found;
-      }
-      book(count);
-    }
+    if (collector.full()) return false;
+    counts_[done_++] = static_cast<uint32_t>(collector.count());
+    used_ += collector.count();
     return true;
   }
 
   const TriangleBvh& tree_;
   const absl::Span<const Shape> shapes_;
   const absl::Span<uint32_t> counts_, numbers_;
-  std::unique_ptr<uint32_t[]> places_;
   size_t done_ = 0, used_ = 0;
 };
 

@@ -49,7 +49,7 @@ class TriangleSearch {
   }
 
   TriangleSearch(const TriangleBvh& tree, const Shape& shape)
-      : run_(kernel_for(shape)), tree_(tree.tree()), region_(kernel_region(shape)) {
+      : run_(kernel_for(shape).one), tree_(tree.tree()), region_(kernel_region(shape)) {
     visit_.start(judge_of(shape));
   }
 
@@ -59,7 +59,7 @@ class TriangleSearch {
   size_t next(uint32_t* numbers, size_t room) {
     visit_.numbers = numbers;
     visit_.room = room;
-    run_(tree_, &region_, &visit_, 1);
+    run_(tree_, region_, visit_);
     return visit_.found;
   }
   // Of the last next(): nodes opened and triangles tested, and of these how many by the predicates.
@@ -68,7 +68,7 @@ class TriangleSearch {
   uint32_t judged() const { return visit_.judged; }
 
  private:
-  const decltype(kernel_for(std::declval<Shape>())) run_;
+  const decltype(kernel_for(std::declval<Shape>()).one) run_;
   const TriangleTree tree_;
   const decltype(kernel_region(std::declval<Shape>())) region_;
   RegionVisit visit_;

@@ -133,8 +133,12 @@ void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
     if ((now & kBlockBit) == 0) {
       ++work.nodes;
       const TriangleNode& node = arrays_.nodes[now];
-      for (int slot = kTreeWidth; slot-- > 0;) {
-        if (node.child[slot] != kNoChild && visitor.overlaps(box(node, slot))) *top++ = node.child[slot];
+      // Blocks are taken before nodes: in storage order.
+      for (const uint32_t kind : {uint32_t{0}, kBlockBit}) {
+        for (int slot = kTreeWidth; slot-- > 0;) {
+          const uint32_t child = node.child[slot];
+          if ((child & kBlockBit) == kind && child != kNoChild && visitor.overlaps(box(node, slot))) *top++ = child;
+        }
       }
       continue;
     }

@@ -43,7 +43,8 @@ struct NodeRange {
   uint32_t count;
 };
 
-// A whole tree, borrowed. Node 0 is the root; nodes, blocks and triangles stand in depth-first order.
+// A whole tree, borrowed. Node 0 is the root; nodes, blocks and triangles stand in depth-first order: of the children
+// of a node first the blocks, then the nodes, each by slot.
 struct TriangleTree {
   const TriangleNode* nodes;
   const NodeRange* ranges;  // by node

@@ -94,6 +94,14 @@ TriangleArrays TriangleWriter::write() {
   return std::move(arrays_);
 }
 
+// Backwards, so that the first child is the next to be taken: depth-first order. Leaves are taken before nodes.
+void TriangleWriter::push_children(const WideChildren<float>& children, uint32_t parent, uint32_t depth,
+                                   std::vector<Waiting>& waiting) {
+  for (const bool leaves : {false, true})
+    for (uint32_t slot = children.size(); slot-- > 0;)
+      if (children[slot].is_leaf() == leaves) waiting.push_back({&children[slot], parent, slot, depth});
+}
+
 // Depth-first: the single nodes of the top, and the pieces below them.
 std::vector<TriangleWriter::Piece> TriangleWriter::cut() const {
   std::vector<Piece> pieces;
@@ -106,8 +114,7 @@ std::vector<TriangleWriter::Piece> TriangleWriter::cut() const {
     pieces.push_back({now.node, whole, now.parent, now.slot, now.depth, {}});
     if (whole) continue;
     const WideChildren<float> children = children_by_area(*now.node);
-    for (uint32_t slot = children.size(); slot-- > 0;)
-      waiting.push_back({&children[slot], number, slot, now.depth + 1});
+    push_children(children, number, now.depth + 1, waiting);
   }
   return pieces;
 }
@@ -156,8 +163,7 @@ void TriangleWriter::write_whole(const Piece& piece) {
   const auto open = [&](const BinaryNode<float>& node) {
     const WideChildren<float> children = children_by_area(node);
     write_node(children, {next.position, node.count}, next.node);
-    // Backwards, so that the first child is the next to be taken: depth-first order.
-    for (uint32_t slot = children.size(); slot-- > 0;) waiting.push_back({&children[slot], next.node, slot, 0});
+    push_children(children, next.node, 0, waiting);
     ++next.node;
   };
   open(*piece.root);

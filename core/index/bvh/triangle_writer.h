@@ -1,6 +1,6 @@
 // Turns a binary tree over triangles into the nodes and blocks that TriangleBvh serves: children by rising area,
-// everything depth-first. Pieces of the tree are written by many threads to where a count has told that they go.
-// Internal to this folder.
+// everything depth-first, blocks before nodes. Pieces of the tree are written by many threads to where a count has told
+// that they go. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 
@@ -53,6 +53,8 @@ class TriangleWriter {
     uint32_t depth;
   };
 
+  static void push_children(const WideChildren<float>& children, uint32_t parent, uint32_t depth,
+                            std::vector<Waiting>& waiting);
   std::vector<Piece> cut() const;
   bool is_block(const Piece& piece) const;
   // Deepens the piece's depth to that of its deepest node.

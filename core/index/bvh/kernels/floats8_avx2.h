@@ -145,17 +145,34 @@ struct FallingPackTable {
 };
 static constexpr FallingPackTable kFallingPack;
 
+// The children, with `flag` set in those whose bits are set in `flagged`.
+static inline __m256i flagged_children(const TriangleNode& node, uint32_t flagged, uint32_t flag) {
+  const __m256i lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i bits = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(flagged)), lanes);
+  const __m256i flags = _mm256_and_si256(_mm256_cmpeq_epi32(bits, lanes), _mm256_set1_epi32(static_cast<int>(flag)));
+  return _mm256_or_si256(_mm256_load_si256(reinterpret_cast<const __m256i*>(node.child)), flags);
+}
+
 // Writes the children whose bits are set, from the last slot to the first, with `flag` set in those whose bits are set
 // in `flagged`; eight places are written.
 static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
                                 uint32_t* children) {
-  const __m256i lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-  const __m256i bits = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(flagged)), lanes);
-  const __m256i flags = _mm256_and_si256(_mm256_cmpeq_epi32(bits, lanes), _mm256_set1_epi32(static_cast<int>(flag)));
-  const __m256i all = _mm256_or_si256(_mm256_load_si256(reinterpret_cast<const __m256i*>(node.child)), flags);
   const __m256i order =
       _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kFallingPack.lanes[set])));
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(children), _mm256_permutevar8x32_epi32(all, order));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(children),
+                      _mm256_permutevar8x32_epi32(flagged_children(node, flagged, flag), order));
+}
+
+// Likewise from the first slot to the last.
+static inline void pack_rising(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
+                               uint32_t* children) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(children),
+                      _mm256_permutevar8x32_epi32(flagged_children(node, flagged, flag), packing(set)));
+}
+
+// The slots whose children are blocks, and those without a child.
+static inline uint32_t block_slots(const TriangleNode& node) {
+  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_load_ps(reinterpret_cast<const float*>(node.child))));
 }
 
 // Up to eight numbers, of which `count` may be read.
@@ -173,11 +190,7 @@ static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t s
 
 // Copies numbers; up to seven places behind them are written too.
 static inline void copy_numbers(const uint32_t* from, uint32_t count, uint32_t* to) {
-  uint32_t done = 0;
-  for (; count - done >= 8; done += 8)
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + done),
-                        _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from + done)));
-  if (done != count)
+  for (uint32_t done = 0; done < count; done += 8)
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + done), load_numbers(from + done, count - done));
 }
 

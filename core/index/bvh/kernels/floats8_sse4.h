@@ -123,6 +123,20 @@ static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t
   }
 }
 
+static inline void pack_rising(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
+                               uint32_t* children) {
+  uint32_t count = 0;
+  for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
+    children[count] = node.child[slot] | ((flagged >> slot & 1u) != 0 ? flag : 0u);
+    count += set >> slot & 1u;
+  }
+}
+
+static inline uint32_t block_slots(const TriangleNode& node) {
+  const float* const children = reinterpret_cast<const float*>(node.child);
+  return lanes_of(_mm_load_ps(children), _mm_load_ps(children + 4));
+}
+
 static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t set, uint32_t* to) {
   uint32_t kept = 0;
   for (uint32_t number = 0; number < count; ++number) {

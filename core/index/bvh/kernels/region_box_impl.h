@@ -2,16 +2,22 @@
 // as the predicate's. The error bounds of the triangle test, with u = 2^-24, E = the block's extent, h = the half
 // extents and R = h + 2 E, by axis; the box reaches the block's box, so no coordinate of a vertex, seen from the centre
 // along the box's axes, is larger than R. The differences of floats, all that is computed from, are off by u of
-// themselves. In a box that is not turned:
+// themselves, and every product and every sum counts as a rounding of its own, as it does without fused products. In a
+// box that is not turned:
 //
-// - Shadows on the axis across a box axis and an edge are off by 8 u (|ax| R_x + |ay| R_y), reach included: that is
-// what
-//   the shadow of half extents smaller or larger by 16 u R differs by. Where an edge is parallel to the box's axis, the
-//   shadows are exactly zero, and zero is in reach of zero. Edges are taken 2^60 times, so that no product underflows.
-// - Shadows on the normal are off by 26 u E^2 (R_x + R_y + R_z): plane = 32 u of it.
+// - A shadow on the axis across a box axis and an edge (x, y) is off by 4 u (|x| R_y + |y| R_x): two differences, a
+//   product and a sum; the box's reach as well. The shadow of half extents smaller or larger by 16 u R differs by twice
+//   that. Where an edge is parallel to the box's axis, the shadows are exactly zero, and zero is in reach of zero.
+//   Edges are taken 2^60 times, so that no product underflows.
+// - A normal's component, at most E^2, is off by 3 u of each of its products and u of itself: 7 u E^2. The height is
+// off
+//   by 7 u and 4 u of E^2 (R_x + R_y + R_z), the reach by 7 u and 3 u, the sums with the bound by u each: 23 u in all,
+//   and plane = 32 u of it.
 //
-// In a turned box coordinates are off by 16 u S, with S the sum of R, and edges by 16 u E: half extents differ by
-// 2^-18 S, the shadows across an edge by 2^-17 E S, and those on the normal by 2^-15 E^2 S.
+// In a turned box, with S the sum of R, coordinates are sums of three products, off by 5 u S, and edges by 9 u E: half
+// extents differ by 2^-18 S. Across an edge a shadow is off by 42 u E S and the reach by 14 u E S, against 2^-17 E S.
+// A normal's component is off by 78 u E^2, the height by 78 u, 26 u and 9 u of E^2 S, the reach by 87 u, against
+// 2^-15 E^2 S.
 //
 // What is certain to overlap on all axes has a point in common with the box, and so has its bounds; triangles without
 // area never are, but where they lie inside: a vertex inside is in reach on every axis, by monotone rounding.
@@ -114,14 +120,17 @@ class BoxQuery {
     inline Span(const KernelBox& box, float extent) {
       float reach[3], pad[3], sum = 0;
       for (int axis = 0; axis < 3; ++axis) sum += reach[axis] = box.half[axis] + 2 * extent;
-      in_range = reach[0] >= 0x1p-39f && reach[1] >= 0x1p-39f && reach[2] >= 0x1p-39f;
-      for (int axis = 0; axis < 3; ++axis) pad[axis] = kTurned ? 0x1p-18f * sum : 0x1p-20f * reach[axis];
+      const float least = unless(PlantedBug::kRegionRange, 0x1p-39f);
+      in_range = reach[0] >= least && reach[1] >= least && reach[2] >= least;
+      for (int axis = 0; axis < 3; ++axis)
+        pad[axis] = unless(PlantedBug::kRegionHalf, kTurned ? 0x1p-18f * sum : 0x1p-20f * reach[axis]);
       half = Vector8::all(box.half);
       const Vector8 pads = Vector8::all(pad);
       inner = half - pads;
       outer = {half.x + pads.x, half.y + pads.y, half.z + pads.z};
       across = Floats8::all(kTurned ? 0x1p-17f * extent * sum * kEdgeScale : 0);
-      plane = Floats8::all((kTurned ? 0x1p-15f : 0x1p-19f) * extent * extent * sum + kSquareFloor);
+      plane = Floats8::all(unless(PlantedBug::kRegionBoxPlane,
+                                  (kTurned ? 0x1p-15f : 0x1p-19f) * extent * extent * sum + square_floor()));
     }
     inline uint32_t contains(Vector8 point) const {
       const Vector8 size = size_of(point);
@@ -157,9 +166,9 @@ class BoxQuery {
     const Floats8 half = Floats8::all(0.5f);
     const Vector8 middle = seen({(low.x + high.x) * half, (low.y + high.y) * half, (low.z + high.z) * half});
     const Vector8 extent = times(high - low, half);
-    const Floats8 pad =
-        Floats8::all(0x1p-19f) * (larger(size_of(low.x), size_of(high.x)) + larger(size_of(low.y), size_of(high.y)) +
-                                  larger(size_of(low.z), size_of(high.z)));
+    const Floats8 pad = Floats8::all(unless(PlantedBug::kRegionTurnedNode, 0x1p-19f)) *
+                        (larger(size_of(low.x), size_of(high.x)) + larger(size_of(low.y), size_of(high.y)) +
+                         larger(size_of(low.z), size_of(high.z)));
     uint32_t some = 255, whole = 255;
     const Floats8 middles[3] = {size_of(middle.x), size_of(middle.y), size_of(middle.z)};
     for (int k = 0; k < 3; ++k) {
@@ -181,7 +190,7 @@ class BoxQuery {
 
   // The axes across an edge from `from`; `other` is the vertex that the edge does not touch.
   static inline void meet_edge(Vector8 edge, Vector8 from, Vector8 other, const Span& span, Shadows& shadows) {
-    const Vector8 e = times(edge, Floats8::all(kEdgeScale));
+    const Vector8 e = times(edge, Floats8::all(planted(PlantedBug::kRegionEdgeScale) ? 1 : kEdgeScale));
     meet_across(e.y, e.z, from.y, from.z, other.y, other.z, span.inner.y, span.inner.z, span.outer.y, span.outer.z,
                 span.across, shadows);
     meet_across(e.z, e.x, from.z, from.x, other.z, other.x, span.inner.z, span.inner.x, span.outer.z, span.outer.x,

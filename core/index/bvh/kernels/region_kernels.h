@@ -35,8 +35,10 @@ inline constexpr float kMaxRegionReach = 0x1p29f;
 inline constexpr uint32_t kMaxRegionTests = 4096;
 // The least room for numbers that a call works with.
 inline constexpr size_t kMinRegionRoom = 8;
-// Visits that a call takes.
-inline constexpr size_t kMaxRegionVisits = 16;
+// Regions that a call for many takes.
+inline constexpr size_t kMaxRegions = 16;
+// Blocks and subtrees that a visit may have found, but not yet looked into; eight more may be written behind the last.
+inline constexpr uint32_t kMaxRegionItems = 56;
 
 // Decides what float leaves open.
 struct RegionJudge {
@@ -47,32 +49,44 @@ struct RegionJudge {
 // A visit of one tree for one region: where it stands between two calls, and where its numbers go.
 struct RegionVisit {
   RegionJudge judge;
-  uint32_t* numbers;  // where the next call writes to
-  size_t room;        // and how far: at least kMinRegionRoom; all of it may be written to
-  size_t found;       // by the last call: in storage order, behind those of the calls before
-  uint32_t nodes;     // opened by the last call
-  uint32_t tests;     // triangles met by the last call
-  uint32_t judged;    // of these, by the judge
-  uint32_t top;       // of `waiting`
-  NodeRange rest;     // of a subtree that is found, but not yet written
-  alignas(32) uint32_t waiting[kTreeStack];
+  uint32_t* numbers;                         // where the next call writes to
+  size_t room;                               // and how far: at least kMinRegionRoom; all of it may be written to
+  size_t found;                              // by the last call: in storage order, behind those of the calls before
+  uint32_t nodes;                            // opened by the last call
+  uint32_t tests;                            // triangles met by the last call
+  uint32_t judged;                           // of these, by the judge
+  uint32_t top;                              // of `waiting`
+  uint32_t next, end;                        // of `items`
+  NodeRange rest;                            // of a subtree that is found, but not yet written
+  alignas(32) uint32_t waiting[kTreeStack];  // nodes
+  alignas(32) uint32_t items[kMaxRegionItems + kTreeWidth];
 
   void start(const RegionJudge& by) {
     judge = by;
     top = 1;
+    next = end = 0;
     rest = {};
     waiting[0] = 0;
   }
-  bool over() const { return top == 0 && rest.count == 0; }
+  bool over() const { return top == 0 && next == end && rest.count == 0; }
 };
 
-// Each goes on with `count` visits, at most kMaxRegionVisits, in turns: a visit that waits for memory does not hold up
-// the others. A visit pauses when it is over, when it has no room left, or after kMaxRegionTests tests.
+// One goes on with a visit, which pauses when it is over, when it has no room left, or after kMaxRegionTests tests.
+// Many answers up to kMaxRegions regions, whose nodes it opens in turns, so that they wait for memory together: the
+// numbers of each behind those of the one before, and how many there are. It returns how many regions are answered:
+// all, unless there was no room for more.
+template <class Region>
+struct RegionKernel {
+  void (*one)(const TriangleTree&, const Region&, RegionVisit&);
+  size_t (*many)(const TriangleTree&, const Region*, const RegionJudge*, size_t regions, uint32_t* numbers, size_t room,
+                 uint32_t* counts);
+};
+
 struct RegionKernels {
   const char* name;  // of the instruction set
-  void (*ball)(const TriangleTree&, const KernelBall*, RegionVisit*, size_t count);
-  void (*box)(const TriangleTree&, const KernelBox*, RegionVisit*, size_t count);  // none of them turned
-  void (*turned_box)(const TriangleTree&, const KernelBox*, RegionVisit*, size_t count);
+  RegionKernel<KernelBall> ball;
+  RegionKernel<KernelBox> box;  // not turned
+  RegionKernel<KernelBox> turned_box;
 };
 
 // The exported symbol of the instruction set's object. Only to be called on a processor that has it.

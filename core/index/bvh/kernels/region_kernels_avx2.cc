@@ -4,8 +4,9 @@
 namespace locus {
 
 const RegionKernels& region_kernels_avx2() {
-  static constexpr RegionKernels kKernels = {"avx2", find<BallQuery, KernelBall>, find<BoxQuery<false>, KernelBox>,
-                                             find<BoxQuery<true>, KernelBox>};
+  static constexpr RegionKernels kKernels = {"avx2", kernel_of<BallQuery, KernelBall>(),
+                                             kernel_of<BoxQuery<false>, KernelBox>(),
+                                             kernel_of<BoxQuery<true>, KernelBox>()};
   return kKernels;
 }
 

@@ -1,6 +1,8 @@
-// The visit of a tree by the region kernels, compiled once for each instruction set by the file that includes this one.
-// Children wait with the last slot lowest, so that triangles come in storage order. region_ball_impl.h and
-// region_box_impl.h hold the tests and their error bounds.
+// How the region kernels go through a tree, compiled once for each instruction set by the file that includes this one.
+// They open nodes first and collect what they find: blocks to look into, and blocks and subtrees that are wholly
+// inside. Only then do they look into it, item by item, so that neither part waits for the other's branches. Of a
+// node's children the blocks stand before the nodes, which wait with the last slot lowest, so that items come in
+// storage order. region_ball_impl.h and region_box_impl.h hold the tests and their error bounds.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 
@@ -10,14 +12,36 @@
 namespace locus {
 namespace {
 
-// What waits is wholly inside. Numbers of nodes and blocks stay below it.
+// What waits or is found is wholly inside. Numbers of nodes and blocks stay below it.
 constexpr uint32_t kWholeBit = 0x40000000u;
 
-static inline NodeRange range_of(const TriangleTree& tree, uint32_t child) {
-  if ((child & kBlockBit) == 0) return tree.ranges[child & ~kWholeBit];
-  const TriangleBlock& block = tree.blocks[child & ~(kBlockBit | kWholeBit)];
-  return {block.first, block.count};
-}
+// Where a query stands among the nodes: those that wait, and what was found and is not yet looked into.
+template <class Query>
+struct Walk {
+  Query query;
+  uint32_t* waiting;
+  uint32_t* items;
+  uint32_t top, end, nodes;
+
+  inline bool goes_on() const { return (top != 0) & (end <= kMaxRegionItems); }
+
+  // Opens the node on top.
+  __attribute__((always_inline)) inline void step(const TriangleTree& tree) {
+    const uint32_t now = waiting[--top];
+    if ((now & kWholeBit) != 0) {
+      items[end++] = now;
+      return;
+    }
+    const TriangleNode& node = tree.nodes[now];
+    ++nodes;
+    const MetChildren met = query.meet_node(node);
+    const uint32_t blocks = block_slots(node) & met.some, inner = met.some & ~blocks;
+    pack_rising(node, blocks, met.whole, kWholeBit, items + end);
+    pack_falling(node, inner, met.whole, kWholeBit, waiting + top);
+    end += static_cast<uint32_t>(__builtin_popcount(blocks));
+    top += static_cast<uint32_t>(__builtin_popcount(inner));
+  }
+};
 
 static inline uint32_t judged(const TriangleBlock& block, uint32_t unsure, const RegionJudge& judge) {
   uint32_t found = 0;
@@ -28,42 +52,16 @@ static inline uint32_t judged(const TriangleBlock& block, uint32_t unsure, const
   return found;
 }
 
-// A visit on its way, its numbers out of reach of what is written to `waiting`.
-template <class Query>
-struct Walker {
-  Query query;
-  RegionVisit* visit;
-  uint32_t* waiting;
-  uint32_t top, nodes, tests, judged;
-  NodeRange rest;
+// Where numbers go.
+struct Sink {
   uint32_t* to;
   size_t count, room;
-
-  template <class Region>
-  inline void start(const Region& region, RegionVisit& from) {
-    query.set(region);
-    visit = &from;
-    waiting = from.waiting;
-    top = from.top;
-    rest = from.rest;
-    to = from.numbers;
-    room = from.room;
-    count = 0;
-    nodes = tests = judged = 0;
-  }
-  inline void leave() const {
-    visit->top = top;
-    visit->rest = rest;
-    visit->found = count;
-    visit->nodes = nodes;
-    visit->tests = tests;
-    visit->judged = judged;
-  }
+  NodeRange rest;  // of a subtree that did not fit
+  uint32_t tests, judged;
 
   inline bool full() const { return room - count < kTreeWidth; }
-  inline bool pauses() const { return top == 0 || rest.count != 0 || tests >= kMaxRegionTests || full(); }
 
-  // Copies what fits of the rest.
+  // Copies what fits of the rest; not when full.
   inline void copy_rest(const TriangleTree& tree) {
     const size_t most = room - count - (kTreeWidth - 1);
     const uint32_t fits = rest.count <= most ? rest.count : static_cast<uint32_t>(most);
@@ -73,85 +71,140 @@ struct Walker {
     rest.count -= fits;
   }
 
-  // Takes what waits on top.
-  __attribute__((always_inline)) inline void step(const TriangleTree& tree) {
-    const uint32_t now = waiting[--top];
-    if ((now & kWholeBit) != 0) {
-      rest = range_of(tree, now);
-      copy_rest(tree);
-    } else if ((now & kBlockBit) != 0) {
-      look_into(tree, tree.blocks[now & ~kBlockBit]);
-    } else {
-      open(tree.nodes[now]);
+  template <class Query>
+  __attribute__((always_inline)) inline void look_into(const TriangleTree& tree, const Query& query,
+                                                       const RegionJudge& judge, uint32_t item) {
+    if ((item & kBlockBit) == 0) {
+      rest = tree.ranges[item & ~kWholeBit];
+      return copy_rest(tree);
     }
-  }
-
-  // Asks for the memory of the next step.
-  inline void prefetch_next(const TriangleTree& tree) const {
-    const uint32_t next = waiting[top - 1];
-    if ((next & kBlockBit) != 0)
-      prefetch(&tree.blocks[next & ~(kBlockBit | kWholeBit)], sizeof(TriangleBlock));
-    else if ((next & kWholeBit) != 0)
-      prefetch(&tree.ranges[next & ~kWholeBit], sizeof(NodeRange));
-    else
-      prefetch(&tree.nodes[next], sizeof(TriangleNode));
+    const TriangleBlock& block = tree.blocks[item & ~(kBlockBit | kWholeBit)];
+    const uint32_t found = (item & kWholeBit) != 0 ? (1u << block.count) - 1u : tested(query, judge, block);
+    pack_numbers(tree.numbers + block.first, block.count, found, to + count);
+    count += static_cast<size_t>(__builtin_popcount(found));
   }
 
  private:
-  __attribute__((always_inline)) inline void open(const TriangleNode& node) {
-    ++nodes;
-    const MetChildren met = query.meet_node(node);
-    pack_falling(node, met.some, met.whole, kWholeBit, waiting + top);
-    top += static_cast<uint32_t>(__builtin_popcount(met.some));
-  }
-
-  __attribute__((always_inline)) inline void look_into(const TriangleTree& tree, const TriangleBlock& block) {
+  template <class Query>
+  __attribute__((always_inline)) inline uint32_t tested(const Query& query, const RegionJudge& judge,
+                                                        const TriangleBlock& block) {
     tests += block.count;
     const MetTriangles met = query.meet_block(block);
-    uint32_t found = met.sure;
-    if (met.unsure != 0) {
-      judged += static_cast<uint32_t>(__builtin_popcount(met.unsure));
-      found |= locus::judged(block, met.unsure, visit->judge);
-    }
-    pack_numbers(tree.numbers + block.first, block.count, found, to + count);
-    count += static_cast<size_t>(__builtin_popcount(found));
+    if (__builtin_expect(met.unsure == 0, 1)) return met.sure;
+    judged += static_cast<uint32_t>(__builtin_popcount(met.unsure));
+    return met.sure | locus::judged(block, met.unsure, judge);
   }
 };
 
 template <class Query, class Region>
-static inline void find_one(const TriangleTree& tree, const Region& region, RegionVisit& visit) {
-  Walker<Query> walker;
-  walker.start(region, visit);
-  if (walker.rest.count != 0 && !walker.full()) walker.copy_rest(tree);
-  while (!walker.pauses()) walker.step(tree);
-  walker.leave();
+static void find_one(const TriangleTree& tree, const Region& region, RegionVisit& visit) {
+  Walk<Query> walk;
+  walk.query.set(region);
+  walk.waiting = visit.waiting;
+  walk.items = visit.items;
+  walk.top = visit.top;
+  walk.end = visit.end;
+  walk.nodes = 0;
+  Sink sink = {visit.numbers, 0, visit.room, visit.rest, 0, 0};
+  uint32_t next = visit.next;
+  if (sink.rest.count != 0 && !sink.full()) sink.copy_rest(tree);
+  while (sink.rest.count == 0 && sink.tests < kMaxRegionTests && !sink.full()) {
+    if (next != walk.end) {
+      sink.look_into(tree, walk.query, visit.judge, visit.items[next++]);
+      continue;
+    }
+    next = walk.end = 0;
+    if (walk.top == 0) break;
+    while (walk.goes_on()) walk.step(tree);
+  }
+  visit.top = walk.top;
+  visit.next = next;
+  visit.end = walk.end;
+  visit.rest = sink.rest;
+  visit.found = sink.count;
+  visit.nodes = walk.nodes;
+  visit.tests = sink.tests;
+  visit.judged = sink.judged;
 }
 
-// Several visits in turns: while one waits for memory, the others go on.
-template <class Query, class Region>
-static void find(const TriangleTree& tree, const Region* regions, RegionVisit* visits, size_t count) {
-  if (count == 1) return find_one<Query>(tree, regions[0], visits[0]);
-  Walker<Query> walkers[kMaxRegionVisits];
-  uint32_t going[kMaxRegionVisits];
-  uint32_t left = 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    walkers[i].start(regions[i], visits[i]);
-    if (walkers[i].rest.count != 0 && !walkers[i].full()) walkers[i].copy_rest(tree);
-    going[left++] = i;
-  }
-  while (left != 0) {
-    for (uint32_t turn = 0; turn < left;) {
-      Walker<Query>& walker = walkers[going[turn]];
-      if (!walker.pauses()) walker.step(tree);
-      if (walker.pauses()) {
-        walker.leave();
-        going[turn] = going[--left];
-        continue;
-      }
-      walker.prefetch_next(tree);
-      ++turn;
+// The walks of several queries.
+template <class Query>
+class Walks {
+ public:
+  template <class Region>
+  inline Walks(const Region* regions, size_t count) : count_(static_cast<uint32_t>(count)) {
+    for (uint32_t i = 0; i < count_; ++i) {
+      Lane& lane = lanes_[i];
+      lane.walk.query.set(regions[i]);
+      lane.walk.waiting = lane.waiting;
+      lane.walk.items = lane.items;
+      lane.walk.top = 1;
+      lane.walk.end = lane.walk.nodes = 0;
+      lane.waiting[0] = 0;
     }
   }
+
+  inline Walk<Query>& operator[](size_t i) { return lanes_[i].walk; }
+
+  // All of them in turns: while one waits for memory or for its last step's outcome, the others go on.
+  inline void go_on(const TriangleTree& tree) {
+    uint32_t going[kMaxRegions];
+    for (uint32_t i = 0; i < count_; ++i) going[i] = i;
+    for (uint32_t left = count_; left != 0;) {
+      uint32_t still = 0;
+      for (uint32_t i = 0; i < left; ++i) {
+        const uint32_t now = going[i];
+        lanes_[now].walk.step(tree);
+        going[still] = now;
+        still += static_cast<uint32_t>(lanes_[now].walk.goes_on());
+      }
+      left = still;
+    }
+  }
+
+ private:
+  struct Lane {
+    Walk<Query> walk;
+    alignas(32) uint32_t waiting[kTreeStack];
+    alignas(32) uint32_t items[kMaxRegionItems + kTreeWidth];
+  };
+
+  Lane lanes_[kMaxRegions];
+  uint32_t count_;
+};
+
+// All that a walk finds; false if there is no room for it.
+template <class Query>
+static inline bool finish(const TriangleTree& tree, const RegionJudge& judge, Walk<Query>& walk, Sink& sink) {
+  for (;;) {
+    for (uint32_t next = 0; next < walk.end; ++next) {
+      if (sink.full()) return false;
+      sink.look_into(tree, walk.query, judge, walk.items[next]);
+      if (sink.rest.count != 0) return false;
+    }
+    if (walk.top == 0) return true;
+    walk.end = 0;
+    while (walk.goes_on()) walk.step(tree);
+  }
+}
+
+template <class Query, class Region>
+static size_t find_many(const TriangleTree& tree, const Region* regions, const RegionJudge* judges, size_t count,
+                        uint32_t* numbers, size_t room, uint32_t* counts) {
+  Walks<Query> walks(regions, count);
+  walks.go_on(tree);
+  Sink sink = {numbers, 0, room, {}, 0, 0};
+  for (size_t i = 0; i < count; ++i) {
+    const size_t before = sink.count;
+    if (!finish(tree, judges[i], walks[i], sink)) return i;
+    counts[i] = static_cast<uint32_t>(sink.count - before);
+  }
+  return count;
+}
+
+template <class Query, class Region>
+static constexpr RegionKernel<Region> kernel_of() {
+  return {find_one<Query, Region>, find_many<Query, Region>};
 }
 
 }  // namespace

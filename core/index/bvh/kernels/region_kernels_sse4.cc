@@ -4,8 +4,9 @@
 namespace locus {
 
 const RegionKernels& region_kernels_sse4() {
-  static constexpr RegionKernels kKernels = {"sse4", find<BallQuery, KernelBall>, find<BoxQuery<false>, KernelBox>,
-                                             find<BoxQuery<true>, KernelBox>};
+  static constexpr RegionKernels kKernels = {"sse4", kernel_of<BallQuery, KernelBall>(),
+                                             kernel_of<BoxQuery<false>, KernelBox>(),
+                                             kernel_of<BoxQuery<true>, KernelBox>()};
   return kKernels;
 }
 

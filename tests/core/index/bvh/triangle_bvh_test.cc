@@ -92,17 +92,19 @@ TEST(TriangleBvhTest, ChildrenStandByRisingAreaAndOrdersNameEverySlotOnce) {
   }
 }
 
-TEST(TriangleBvhTest, EveryNodesRangeIsThoseOfItsChildrenInTurn) {
+TEST(TriangleBvhTest, EveryNodesRangeIsThoseOfItsBlocksThenOfItsNodesInTurn) {
   const TriangleBvh built = build(box_city(12, 3));
   const TriangleTree tree = built.tree();
   EXPECT_EQ(tree.ranges[0].count, built.size());
   for (size_t number = 0; number < built.node_count(); ++number) {
     uint32_t next = tree.ranges[number].first;
-    for (const uint32_t child : tree.nodes[number].child) {
-      if (child == kNoChild) continue;
-      const bool is_block = (child & kBlockBit) != 0;
-      ASSERT_EQ(is_block ? tree.blocks[child & ~kBlockBit].first : tree.ranges[child].first, next);
-      next += is_block ? tree.blocks[child & ~kBlockBit].count : tree.ranges[child].count;
+    for (const uint32_t kind : {kBlockBit, uint32_t{0}}) {
+      for (const uint32_t child : tree.nodes[number].child) {
+        if (child == kNoChild || (child & kBlockBit) != kind) continue;
+        const bool is_block = kind == kBlockBit;
+        ASSERT_EQ(is_block ? tree.blocks[child & ~kBlockBit].first : tree.ranges[child].first, next);
+        next += is_block ? tree.blocks[child & ~kBlockBit].count : tree.ranges[child].count;
+      }
     }
     ASSERT_EQ(next, tree.ranges[number].first + tree.ranges[number].count);
   }

@@ -9,7 +9,7 @@
 
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/query/triangle_search.h"
-#include "tests/support/generated_meshes.h"
+#include "tests/support/random_region.h"
 #include "tests/support/test_scale.h"
 
 namespace locus::test {
@@ -25,87 +25,6 @@ std::string described(const Obbf& b) {
   return testing::PrintToString(std::vector<float>{b.center.x, b.center.y, b.center.z, b.half.x, b.half.y, b.half.z});
 }
 
-Aabbf bounds_of_all(const std::vector<Triangle>& triangles) {
-  Aabbf bounds;
-  for (const Triangle& triangle : triangles) bounds = merge(bounds, bounds_of(triangle));
-  return bounds;
-}
-
-std::vector<Triangle> moved(std::vector<Triangle> triangles, float scale, Vec3f by) {
-  for (Triangle& triangle : triangles)
-    for (Vec3f* vertex : {&triangle.a, &triangle.b, &triangle.c}) *vertex = *vertex * scale + by;
-  return triangles;
-}
-
-// What the half extents of a box have to be multiplied by for it to touch a triangle.
-double touching_scale(const Obbf& box, const Triangle& triangle) {
-  const Rotation& r = box.rotation;
-  const Vec3d center = to_double(box.center), half = to_double(box.half);
-  const Vec3d a = r.to_local(to_double(triangle.a) - center), b = r.to_local(to_double(triangle.b) - center),
-              c = r.to_local(to_double(triangle.c) - center);
-  const Vec3d units[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, edges[3] = {b - a, c - b, a - c};
-  std::vector<Vec3d> axes = {units[0], units[1], units[2], cross(edges[0], edges[1])};
-  for (const Vec3d unit : units)
-    for (const Vec3d edge : edges) axes.push_back(cross(unit, edge));
-  double scale = 0;
-  for (const Vec3d axis : axes) {
-    const double p = dot(axis, a), q = dot(axis, b), s = dot(axis, c), reach = dot(abs(axis), half);
-    const double gap = std::max(std::min(p, std::min(q, s)), -std::max(p, std::max(q, s)));
-    if (reach > 0) scale = std::max(scale, gap / reach);
-  }
-  return scale;
-}
-
-// Regions around and on a mesh's triangles, of sizes from nothing to the whole mesh.
-class Regions {
- public:
-  Regions(const std::vector<Triangle>& triangles, uint64_t seed)
-      : triangles_(triangles), bounds_(bounds_of_all(triangles)), random_(seed) {}
-
-  Ballf ball() { return {center(), static_cast<float>(size())}; }
-  Obbf box(bool turned) {
-    Obbf box{center(), to_float(Vec3d{size(), size(), size()}), {}};
-    if (turned) box.rotation = rotation_of(random_.rotation());
-    return box;
-  }
-  // A ball that touches: its radius is the distance of a triangle to float's precision, give or take a few units.
-  Ballf touching_ball() {
-    Ballf ball{center(), 0};
-    ball.radius = static_cast<float>(std::sqrt(squared_distance(to_double(ball.center), random_.pick(triangles_))));
-    const float toward = random_.chance(0.5) ? 0 : 1e30f;
-    for (int steps = random_.whole(0, 2); steps > 0; --steps) ball.radius = std::nextafter(ball.radius, toward);
-    return ball;
-  }
-  // A box that touches a triangle, give or take a few units.
-  Obbf touching_box(bool turned) {
-    Obbf box = this->box(turned);
-    const auto scale = static_cast<float>(touching_scale(box, random_.pick(triangles_)));
-    if (!(scale < 8)) return box;
-    const float unit = random_.chance(0.5) ? 1 : 1 + 0x1p-23f * static_cast<float>(random_.whole(-3, 3));
-    box.half = box.half * scale * unit;
-    return box;
-  }
-
- private:
-  Vec3f center() {
-    if (random_.chance(0.2)) return random_.pick(triangles_).b;
-    Vec3f point;
-    for (int axis = 0; axis < 3; ++axis) point[axis] = random_.float_between(bounds_.min[axis], bounds_.max[axis]);
-    if (random_.chance(0.5)) return point;
-    const Triangle& triangle = random_.pick(triangles_);
-    const double u = random_.unit(), v = random_.unit() * (1 - u);
-    return to_float(to_double(triangle.a) * (1 - u - v) + to_double(triangle.b) * u + to_double(triangle.c) * v);
-  }
-  double size() {
-    if (random_.chance(0.05)) return 0;
-    return double{max_component(bounds_.extent())} * random_.magnitude(-10, 1);
-  }
-
-  const std::vector<Triangle>& triangles_;
-  const Aabbf bounds_;
-  Random random_;
-};
-
 class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
@@ -118,7 +37,7 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
   void judge(const std::vector<Triangle>& triangles, size_t count, uint64_t seed) {
     const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles);
     ASSERT_TRUE(tree.ok()) << tree.status();
-    Regions regions(triangles, seed);
+    RandomRegions regions(triangles, seed);
     for (size_t i = 0; i < count && !HasFailure(); ++i) {
       judge_one(*tree, regions.ball());
       judge_one(*tree, regions.touching_ball());
@@ -271,28 +190,59 @@ TEST_P(RegionKernelsTest, ACallEndsAfterAnAmountOfTests) {
   EXPECT_LT(search.tests(), kMaxRegionTests + 8);
 }
 
-TEST_P(RegionKernelsTest, VisitsInTurnsFindWhatTheyFindAlone) {
-  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(20, 0.1, 1));
-  ASSERT_TRUE(tree.ok());
-  std::vector<uint32_t> numbers(2 * kMaxRegionVisits * tree->size());
-  KernelBall balls[kMaxRegionVisits];
-  RegionVisit visits[kMaxRegionVisits];
-  std::vector<Ballf> shapes;
-  for (size_t i = 0; i < kMaxRegionVisits; ++i)
-    shapes.push_back({{0, 0, static_cast<float>(i) * 0.1f}, 0.1f * static_cast<float>(i)});
-  for (size_t i = 0; i < kMaxRegionVisits; ++i) {
-    balls[i] = kernel_region(shapes[i]);
-    visits[i].start(judge_of(shapes[i]));
-    visits[i].numbers = &numbers[2 * i * tree->size()];
-    visits[i].room = 2 * tree->size();
+// As many as one call answers, from nothing to the whole mesh, and their numbers one by one.
+struct Together {
+  explicit Together(const TriangleBvh& tree) {
+    for (size_t i = 0; i < kMaxRegions; ++i) {
+      shapes[i] = {{0, 0, static_cast<float>(i) * 0.1f}, 0.15f * static_cast<float>(i)};
+      balls[i] = kernel_region(shapes[i]);
+      judges[i] = judge_of(shapes[i]);
+      TriangleSearch<Ballf> search(tree, shapes[i]);
+      while (!search.over()) {
+        uint32_t found[64];
+        const size_t count = search.next(found, 64);
+        alone.insert(alone.end(), found, found + count);
+      }
+      ends.push_back(alone.size());
+    }
   }
-  active_region_kernels()->ball(tree->tree(), balls, visits, kMaxRegionVisits);
-  for (size_t i = 0; i < kMaxRegionVisits; ++i) {
-    ASSERT_TRUE(visits[i].over());
-    std::vector<uint32_t> alone(2 * tree->size());
-    TriangleSearch<Ballf> search(*tree, shapes[i]);
-    alone.resize(search.next(alone.data(), alone.size()));
-    EXPECT_EQ(std::vector<uint32_t>(visits[i].numbers, visits[i].numbers + visits[i].found), alone);
+
+  size_t answered(const TriangleBvh& tree, size_t room) {
+    numbers.assign(room, 0);
+    return active_region_kernels()->ball.many(tree.tree(), balls, judges, kMaxRegions, numbers.data(), room, counts);
+  }
+
+  Ballf shapes[kMaxRegions];
+  KernelBall balls[kMaxRegions];
+  RegionJudge judges[kMaxRegions];
+  uint32_t counts[kMaxRegions];
+  std::vector<uint32_t> numbers, alone;
+  std::vector<size_t> ends;  // of each region's numbers in `alone`
+};
+
+TEST_P(RegionKernelsTest, RegionsAnsweredTogetherFindWhatTheyFindAlone) {
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(40, 0.1, 1));
+  ASSERT_TRUE(tree.ok());
+  Together together(*tree);
+  ASSERT_EQ(together.answered(*tree, together.alone.size() + kMinRegionRoom), kMaxRegions);
+  size_t end = 0;
+  for (size_t i = 0; i < kMaxRegions; ++i) EXPECT_EQ(end += together.counts[i], together.ends[i]) << i;
+  together.numbers.resize(end);
+  EXPECT_EQ(together.numbers, together.alone);
+}
+
+TEST_P(RegionKernelsTest, RegionsForWhichThereIsNoRoomAreNotAnswered) {
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
+  ASSERT_TRUE(tree.ok());
+  Together together(*tree);
+  for (size_t room = 0; room < together.alone.size() + kMinRegionRoom; room += 97) {
+    const size_t answered = together.answered(*tree, room);
+    ASSERT_LT(answered, kMaxRegions);
+    size_t end = 0;
+    for (size_t i = 0; i < answered; ++i) EXPECT_EQ(end += together.counts[i], together.ends[i]) << i;
+    // What is answered fits, and the next would not with what may be written behind it.
+    EXPECT_LE(end, room);
+    EXPECT_LT(room, together.ends[answered] + kMinRegionRoom);
   }
 }
 
