@@ -5,8 +5,10 @@
 
 #include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
+#include "core/index/bvh/kernels/region_kernels.h"
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
+#include "tests/support/region_trials.h"
 #include "tests/support/scene_lockstep.h"
 #include "tests/support/scene_search.h"
 
@@ -36,6 +38,13 @@ std::string compare_kernels_with_list() {
     if (const std::string what = trial.difference(ray_kernels_avx2()); !what.empty()) return what;
   return "";
 }
+
+std::string compare_region_kernels_with_list() {
+  static const std::vector<RegionTrial>* const kTrials = new std::vector<RegionTrial>(all_region_trials());
+  for (const RegionTrial& trial : *kTrials)
+    if (const std::string what = trial.difference(region_kernels_avx2()); !what.empty()) return what;
+  return "";
+}
 #endif
 
 struct Trial {
@@ -63,12 +72,25 @@ constexpr Trial kTrials[] = {
     {"KernelThatLosesAHitAtTheLimit", PlantedBug::kKernelLimit, compare_kernels_with_list},
     {"KernelWithTiesTheWrongWayRound", PlantedBug::kKernelTie, compare_kernels_with_list},
     {"KernelThatPrunesEqualHits", PlantedBug::kKernelPruneEqual, compare_kernels_with_list},
+    {"RegionKernelWithoutNodePad", PlantedBug::kRegionReach, compare_region_kernels_with_list},
+    {"RegionKernelWithoutInnerPad", PlantedBug::kRegionInside, compare_region_kernels_with_list},
+    {"RegionKernelWithoutBoundOfPartingPlanes", PlantedBug::kRegionBeyond, compare_region_kernels_with_list},
+    {"RegionKernelWithoutBoundOfEdges", PlantedBug::kRegionNear, compare_region_kernels_with_list},
+    {"RegionKernelWithoutBoundOfPlanes", PlantedBug::kRegionPlane, compare_region_kernels_with_list},
+    {"RegionKernelWithoutBoundOfWeights", PlantedBug::kRegionWeight, compare_region_kernels_with_list},
+    {"RegionKernelWithoutBoundsOfATriangle", PlantedBug::kRegionOwnBounds, compare_region_kernels_with_list},
+    {"RegionKernelThatTrustsSquaresThatUnderflow", PlantedBug::kRegionFloor, compare_region_kernels_with_list},
+    {"RegionKernelWithoutBoundOfHalfExtents", PlantedBug::kRegionHalf, compare_region_kernels_with_list},
+    {"RegionKernelWithoutBoundOfNormals", PlantedBug::kRegionBoxPlane, compare_region_kernels_with_list},
+    {"RegionKernelWithoutScaleOfEdges", PlantedBug::kRegionEdgeScale, compare_region_kernels_with_list},
+    {"RegionKernelThatDecidesWhatUnderflows", PlantedBug::kRegionRange, compare_region_kernels_with_list},
+    {"RegionKernelWithoutPadOfTurnedBoxes", PlantedBug::kRegionTurnedNode, compare_region_kernels_with_list},
 #endif
 };
 
 bool can_run(const Trial& trial) {
 #ifdef LOCUS_X86_KERNELS
-  if (trial.comparison == compare_kernels_with_list)
+  if (trial.comparison == compare_kernels_with_list || trial.comparison == compare_region_kernels_with_list)
     return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
 #endif
   return trial.comparison != nullptr;
