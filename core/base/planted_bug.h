@@ -13,6 +13,7 @@ enum class PlantedBug {
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
   kUnsignedCellIndex,  // cell indices truncate towards zero instead of flooring
   kUnpaddedNear,       // the near side of the slab test of tree nodes goes without its pad
+  kEdgeOnInDouble,     // triangles nearly edge-on are decided in double, like all others
   // The ray kernels:
   kKernelEdgeBound,   // float decides edges without its error bound
   kKernelTBound,      // float decides t without its error bound

@@ -76,8 +76,7 @@ void ask_instance(QueryTask& task, const RayRequest& request, const SlabRay<doub
     task.visit_region(instance.mesh->tree(), visitor);
     return;
   }
-  const TriangleRay ray(instance.transform.point_to_mesh(request.origin),
-                        instance.transform.direction_to_mesh(request.direction), request.cull);
+  const TriangleRay ray(instance.transform, request.origin, request.direction, request.cull);
   TriangleVisitor visitor(task, ray, slabs, instance, nearest, collector);
   task.visit_ray(instance.mesh->tree(), ray.slabs(), visitor);
 }

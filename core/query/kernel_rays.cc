@@ -122,11 +122,9 @@ class Round {
     const double reach = max_component(abs(origin)) + double{stop.instance->mesh->tree().tree().magnitude};
     if (!(longest >= kMinKernelDirection && longest <= kMaxKernelDirection)) return std::nullopt;
     if (!(reach >= kMinKernelReach && reach <= kMaxKernelReach)) return std::nullopt;
-    return KernelRay{{origin.x, origin.y, origin.z},
-                     {direction.x, direction.y, direction.z},
-                     ray.collector.limit(),
-                     ray.request.cull != Cull::kFront,
-                     ray.request.cull != Cull::kBack};
+    return KernelRay{{origin.x, origin.y, origin.z},  {direction.x, direction.y, direction.z},
+                     ray.collector.limit(),           ray.request.cull != Cull::kFront,
+                     ray.request.cull != Cull::kBack, transform.quaternion.is_identity()};
   }
 
   QueryTask& task_;

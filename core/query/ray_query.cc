@@ -136,7 +136,7 @@ Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding) {
   if (hit.instance == nullptr) return surface;
   const Transform& transform = hit.instance->transform;
   const Triangle triangle = hit.instance->mesh->triangle(hit.triangle);
-  const TriangleRay ray(transform.point_to_mesh(request.origin), transform.direction_to_mesh(request.direction));
+  const TriangleRay ray(transform, request.origin, request.direction);
   if (const std::optional<TriangleHit> found = ray.hit(triangle)) {
     surface.u = found->u;
     surface.v = found->v;

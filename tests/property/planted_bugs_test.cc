@@ -6,6 +6,7 @@
 #include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/region_kernels.h"
+#include "tests/support/edge_on_cases.h"
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
 #include "tests/support/region_trials.h"
@@ -56,6 +57,7 @@ struct Trial {
 constexpr Trial kTrials[] = {
     {"TreeWithUnpaddedNear", PlantedBug::kUnpaddedNear, compare_trees_with_list},
     {"TreeWithStrictTie", PlantedBug::kStrictTie, compare_trees_with_list},
+    {"TrianglesEdgeOnDecidedInDouble", PlantedBug::kEdgeOnInDouble, edge_on_difference},
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
     {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},

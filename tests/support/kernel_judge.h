@@ -51,7 +51,8 @@ inline KernelRay kernel_ray(const KernelQuestion& question) {
           {question.direction.x, question.direction.y, question.direction.z},
           question.limit,
           question.cull != Cull::kFront,
-          question.cull != Cull::kBack};
+          question.cull != Cull::kBack,
+          true};
 }
 
 // A mesh and questions to it with their answers; each that has a hit is asked again with a limit at, just behind and

@@ -90,8 +90,7 @@ class QueryOracle {
     const std::optional<float> whole = entry_of(slabs, instance.bounds);
     if (!whole) return;
     const Transform& transform = instance.transform;
-    const TriangleRay ray(transform.point_to_mesh(question.origin), transform.direction_to_mesh(question.direction),
-                          question.cull);
+    const TriangleRay ray(transform, question.origin, question.direction, question.cull);
     const PlacedTriangles placed(instance);
     for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
       const Triangle triangle = instance.mesh->triangle(number);

@@ -22,8 +22,7 @@ FirstHit first_on_instance(const Rayd& ray, const CheckedInstance& instance) {
   FirstHit best;
   const std::optional<float> nearest = entry(ray, instance);
   if (!nearest) return best;
-  const TriangleRay mesh_ray(instance.transform.point_to_mesh(ray.origin),
-                             instance.transform.direction_to_mesh(ray.direction));
+  const TriangleRay mesh_ray(instance.transform, ray.origin, ray.direction);
   for (const Triangle& triangle : instance.triangles) {
     const std::optional<TriangleHit> hit = mesh_ray.hit(triangle);
     if (!hit) continue;

@@ -5,12 +5,10 @@
 //   e / |direction|.
 // - false hit: the answer names a triangle that is farther than e from the answer's place on the ray, or one that is
 //   culled, or a t beyond t_max.
-// An answer with all hits misses a triangle so met that it does not name.
-//
-// - edge-on: what would be one of these two, but for a triangle that the ray meets at a sine below 2^-28. There the
-//   rounding of the ray itself to double, 2^-50 of the reach, may move a hit by more than e. Counted apart: a
-//   definition without this clause calls them misses and false hits.
 // - undecidable: the answer differs from what the reference finds without e, and none of these.
+//
+// An answer with all hits misses a triangle so met that it does not name. No angle is left out: a triangle that is all
+// but edge-on is judged as any other.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_JUDGE_H_
 
@@ -28,7 +26,6 @@ struct RayTally {
   uint64_t hits = 0;  // the answer has one
   uint64_t misses = 0;
   uint64_t false_hits = 0;
-  uint64_t edge_on = 0;
   uint64_t undecidable = 0;
   uint64_t repeats = 0;             // of the same rays by other modes and limits
   uint64_t differing_repeats = 0;   // that answered otherwise
@@ -39,7 +36,6 @@ struct RayTally {
     hits += other.hits;
     misses += other.misses;
     false_hits += other.false_hits;
-    edge_on += other.edge_on;
     undecidable += other.undecidable;
     repeats += other.repeats;
     differing_repeats += other.differing_repeats;
@@ -75,7 +71,7 @@ class RayJudge {
   }
 
   // The worse, the greater.
-  enum class Verdict { kRight, kUndecidable, kEdgeOn, kFalseHit, kMiss };
+  enum class Verdict { kRight, kUndecidable, kFalseHit, kMiss };
 
   // Of an answer with the first hit.
   Verdict judge_first(const RayRow& answer) const {
@@ -103,7 +99,6 @@ class RayJudge {
 
  private:
   static constexpr Real kForever = std::numeric_limits<Real>::infinity();
-  static constexpr Real kLeastSine = 0x1p-28L;
 
   struct Placed {
     RealRay ray;
@@ -117,8 +112,6 @@ class RayJudge {
   }
   bool culled(Real slope) const { return cull_ != Cull::kNone && (cull_ == Cull::kBack) == (slope > 0); }
 
-  static bool is_edge_on(Real slope, const Placed& in) { return std::fabs(slope) < kLeastSine * in.speed; }
-
   // The triangle that the row names.
   Verdict judge_row(const RayRow& row) const {
     const auto instance = std::find_if(scene_.instances.begin(), scene_.instances.end(),
@@ -129,8 +122,7 @@ class RayJudge {
     const Placed in = placed(*instance);
     const RealTriangle& triangle = instance->mesh->reference.triangle(row.triangle);
     const Real slope = triangle.slope(in.ray);
-    if (culled(slope) || triangle.distance(in.ray.origin + in.ray.direction * row.t) > in.e)
-      return is_edge_on(slope, in) ? Verdict::kEdgeOn : Verdict::kFalseHit;
+    if (culled(slope) || triangle.distance(in.ray.origin + in.ray.direction * row.t) > in.e) return Verdict::kFalseHit;
     const std::optional<Meeting> meeting = triangle.meet(in.ray, kForever);
     return meeting && meeting->inset >= 0 ? Verdict::kRight : Verdict::kUndecidable;
   }
@@ -139,8 +131,7 @@ class RayJudge {
   Verdict judge_missing(const Placed& in, const Meeting& meeting, Real end) const {
     if (meeting.inset < 0 || culled(meeting.slope)) return Verdict::kRight;
     const bool within = meeting.inset >= in.e && meeting.t + in.e / in.speed < end;
-    if (!within) return Verdict::kUndecidable;
-    return is_edge_on(meeting.slope, in) ? Verdict::kEdgeOn : Verdict::kMiss;
+    return within ? Verdict::kMiss : Verdict::kUndecidable;
   }
 
   // What the reference hits so much before `t` that an answer there is late.
@@ -173,7 +164,6 @@ inline void count(RayJudge::Verdict verdict, const OwnedBlock& block, size_t ray
   ++tally.rays;
   tally.misses += verdict == RayJudge::Verdict::kMiss;
   tally.false_hits += verdict == RayJudge::Verdict::kFalseHit;
-  tally.edge_on += verdict == RayJudge::Verdict::kEdgeOn;
   tally.undecidable += verdict == RayJudge::Verdict::kUndecidable;
   if (verdict == RayJudge::Verdict::kMiss) tally.note("miss: " + describe(block, ray));
   if (verdict == RayJudge::Verdict::kFalseHit) tally.note("false hit: " + describe(block, ray));

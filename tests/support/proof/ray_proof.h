@@ -45,9 +45,9 @@ class RayProof {
   // What the run says in one line.
   std::string line() const {
     return absl::StrFormat(
-        "proof: %d rays, %d hits, %d misses, %d false hits, %d more of either within 2^-28 of edge-on, %d undecidable "
-        "within the allowance; %d repeats, %d differing; instruction sets %s; seed %d",
-        tally_.rays, tally_.hits, tally_.misses, tally_.false_hits, tally_.edge_on, tally_.undecidable, tally_.repeats,
+        "proof: %d rays, %d hits, %d misses, %d false hits, %d undecidable within the allowance; "
+        "%d repeats, %d differing; instruction sets %s; seed %d",
+        tally_.rays, tally_.hits, tally_.misses, tally_.false_hits, tally_.undecidable, tally_.repeats,
         tally_.differing_repeats, absl::StrJoin(instruction_sets(), ", "), seed_);
   }
 

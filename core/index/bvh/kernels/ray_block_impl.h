@@ -11,8 +11,9 @@
 //   although rounding puts it behind by up to 2^-42 R^3 / |determinant / d|, which the interval of t includes.
 //   Products that underflow add at most 2^-150 / |determinant|, within the 2^-20 R / |d| for R from 2^-25 and |d| to
 //   2^20.
-// - The same in double is smaller by 2^-29. Where it moves a hit by less than 2^-24 of its own coordinates, the hit
-//   lies in the padded slabs of its own box, so that TriangleRay's and the placed bounds' clamps leave t as it is.
+// - What TriangleRay calls nearly edge-on, where double is too coarse, is left to it. Any other hit is moved by double
+//   by less than 2^-24 of its own coordinates and the origin's, so that it lies in the padded slabs of its own box and
+//   TriangleRay's and the placed bounds' clamps leave t as it is.
 //
 // Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
@@ -95,14 +96,9 @@ static inline PairsMet meet(const Pairs& pairs, uint32_t front, uint32_t back) {
   return met;
 }
 
-struct BlockMet {
-  PairsMet triangles;
-  float edge;  // the bound of the edge functions
-};
-
 // One ray with a block's triangles.
 template <bool kAny>
-static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
+static inline PairsMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
   const float edge =
       planted(PlantedBug::kKernelEdgeBound) ? 0 : ray.number(kEdgeScale) * block.extent + ray.number(kEdgeFloor);
   Pairs pairs;
@@ -122,12 +118,10 @@ static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, f
     pairs.ys[vertex] = Floats8::load(block.vertices[y + 3 * vertex]);
     pairs.zs[vertex] = Floats8::load(block.vertices[z + 3 * vertex]);
   }
-  BlockMet met;
-  met.triangles = meet<kAny>(pairs, given.accept_front ? ~0u : 0u, given.accept_back ? ~0u : 0u);
+  PairsMet met = meet<kAny>(pairs, given.accept_front ? ~0u : 0u, given.accept_back ? ~0u : 0u);
   const uint32_t places = (1u << block.count) - 1u;
-  met.triangles.open &= places;
-  met.triangles.sure &= places;
-  met.edge = edge;
+  met.open &= places;
+  met.sure &= places;
   return met;
 }
 
@@ -143,25 +137,38 @@ struct Verdict {
   float t;
 };
 
-// Whether rounding moves a hit on this triangle by so little that no clamp can move it further. `size`: of the
-// determinant.
-static bool lies_clear(const TriangleBlock& block, int place, const KernelRay& ray, Doubles depths, double size,
-                       double noise) {
-  double reach = 0, origin = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    origin = larger(origin, __builtin_fabs(ray.origin[axis]));
-    for (int vertex = 0; vertex < 3; ++vertex)
-      reach = larger(reach, __builtin_fabs(double{block.vertices[3 * vertex + axis][place]}));
-  }
+// Whether TriangleRay may call the triangle nearly edge-on: its bound, or more. With sheared coordinates of up to
+// 2 E + 2^-18 R (as above) that is at most d^2 (2^-12 E^2 + 2^-29 R E + 2^-48 R^2), which costs less to know.
+static inline bool may_be_edge_on(const TriangleBlock& block, PreparedRay prepared, Doubles x, Doubles y,
+                                  Doubles depths, double along, double size) {
+  const double extent = block.extent, edge_scale = prepared.number(kEdgeScale);
+  const double most = extent * (extent + edge_scale) + prepared.number(kEdgeFloor);
+  if (size > 0x1p-12 * most * along * along) return false;
+  const double reach = 0x1p17 * edge_scale, longest = __builtin_fabs(along);
+  double width = 0x1p-39 * reach * longest;
+  for (int vertex = 0; vertex < 3; ++vertex)
+    width = larger(width, larger(__builtin_fabs(x[vertex]), __builtin_fabs(y[vertex])));
   const double span =
       larger(depths[0], larger(depths[1], depths[2])) - smaller(depths[0], smaller(depths[1], depths[2]));
-  return size > 16 * noise && 6 * noise * span < size * 0x1p-24 * (reach + origin);
+  return size <= 4 * longest * width * (0x1p-16 * span + 0x1p-35 * reach);
+}
+
+// TriangleRay::is_exactly_edge_on(): walls seen from within their plane, often asked for where everything stands on a
+// grid.
+static inline bool is_exactly_edge_on(const TriangleBlock& block, int place, const KernelRay& ray) {
+  uint32_t across = 0;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const float(*const rows)[kTreeWidth] = block.vertices + axis;
+    across |= static_cast<uint32_t>(ray.direction[axis] == 0) &
+              static_cast<uint32_t>(rows[0][place] == rows[3][place]) &
+              static_cast<uint32_t>(rows[0][place] == rows[6][place]);
+  }
+  return ray.unturned && across != 0;
 }
 
 // One triangle in double: TriangleRay::edge_test() without its scaling, which changes no bit within the directions and
-// distances accepted here. `edge`: the bound of the edge functions in float.
-static inline Verdict decide(const TriangleBlock& block, int place, const KernelRay& ray, PreparedRay prepared,
-                             double edge) {
+// distances accepted here.
+static inline Verdict decide(const TriangleBlock& block, int place, const KernelRay& ray, PreparedRay prepared) {
   typedef int64_t Places __attribute__((vector_size(32)));
   const uint32_t axis_x = prepared.whole(kAxisX), axis_y = prepared.whole(kAxisY), axis_z = prepared.whole(kAxisZ);
   const double along = ray.direction[axis_z];
@@ -174,16 +181,16 @@ static inline Verdict decide(const TriangleBlock& block, int place, const Kernel
   const Doubles weights = __builtin_shuffle(x, before) * __builtin_shuffle(y, after) -
                           __builtin_shuffle(y, before) * __builtin_shuffle(x, after);
   const double a = weights[0], b = weights[1], c = weights[2];
+  const double determinant = a + b + c, size = __builtin_fabs(determinant);
+  if (may_be_edge_on(block, prepared, x, y, z, along, size))
+    return {is_exactly_edge_on(block, place, ray) ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
   if (smaller(a, smaller(b, c)) < 0 && larger(a, larger(b, c)) > 0) return {KernelVerdict::kMiss, 0};
-  const double determinant = a + b + c;
-  if (determinant == 0 || !(determinant > 0 || planted(PlantedBug::kKernelCull) ? ray.accept_front : ray.accept_back))
+  if (!(determinant > 0 || planted(PlantedBug::kKernelCull) ? ray.accept_front : ray.accept_back))
     return {KernelVerdict::kMiss, 0};
-  const double unit = along * along, size = __builtin_fabs(determinant);
-  if (size < 0.5 * edge * unit && !lies_clear(block, place, ray, z, size, edge * 0x1p-29 * unit))
-    return {KernelVerdict::kUndecided, 0};
   const Doubles shares = weights * z;
   const double t = (shares[0] + shares[1] + shares[2]) / (determinant * along);
   if (t < 0) {
+    const double unit = along * along;
     // Just behind the start is for TriangleRay::depth_noise() to judge; what is far behind, is not hit.
     const double noise = double{prepared.number(kStartNoise)} * unit / size + double{prepared.number(kTFloor)};
     return {t < -noise ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};

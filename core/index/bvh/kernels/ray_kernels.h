@@ -21,6 +21,9 @@ struct KernelRay {
   float limit;        // hits up to here, included; in lengths of the direction
   bool accept_front;  // triangles seen counter-clockwise
   bool accept_back;
+  // Nothing has turned the ray: components of the direction that are zero are so exactly, and triangles across such an
+  // axis exactly edge-on.
+  bool unturned = false;
 };
 
 inline constexpr double kMinKernelDirection = 0x1p-20;

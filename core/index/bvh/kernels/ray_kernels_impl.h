@@ -78,7 +78,7 @@ class Voyage {
 
  private:
   struct Met {
-    BlockMet block;
+    PairsMet triangles;
     uint32_t number;  // of the block
   };
 
@@ -138,11 +138,11 @@ class Voyage {
     const TriangleBlock& block = tree_.blocks[block_number];
     flight.tests += block.count;
     Met& met = met_[then.counts[kCandidates]];
-    met.block = meet_block<kAny>(block, flight.ray, flight.limit, rays_[flight.index]);
+    met.triangles = meet_block<kAny>(block, flight.ray, flight.limit, rays_[flight.index]);
     met.number = block_number;
     // Branches would be guessed wrongly too often here.
     const uint32_t settle_first =
-        static_cast<uint32_t>(met.block.triangles.open != 0) | static_cast<uint32_t>(flight.tests > kMaxKernelTests);
+        static_cast<uint32_t>(met.triangles.open != 0) | static_cast<uint32_t>(flight.tests > kMaxKernelTests);
     const uint32_t behind = flight.waiting[flight.top - 1], step = step_at(behind);
     fetch(behind, step);
     flight.top -= 1u - settle_first;
@@ -153,7 +153,7 @@ class Voyage {
   // Decides what float left open in a block, and goes on.
   inline void settle(uint32_t number, const Met& met, Agenda& then) {
     Flight& flight = flights_[number];
-    if (kAny && met.block.triangles.sure != 0) flight.found = true;
+    if (kAny && met.triangles.sure != 0) flight.found = true;
     const float limit = flight.limit;
     if (!kAny || !flight.found) decide_open(flight, met);
     if (flight.tests > kMaxKernelTests) flight.undecided = true;
@@ -164,9 +164,9 @@ class Voyage {
 
   inline void decide_open(Flight& flight, const Met& met) {
     const TriangleBlock& block = tree_.blocks[met.number];
-    for (uint32_t open = met.block.triangles.open; open != 0; open &= open - 1u) {
+    for (uint32_t open = met.triangles.open; open != 0; open &= open - 1u) {
       const int place = __builtin_ctz(open);
-      const Verdict verdict = decide(block, place, rays_[flight.index], flight.ray, double{met.block.edge});
+      const Verdict verdict = decide(block, place, rays_[flight.index], flight.ray);
       if (verdict.what == KernelVerdict::kUndecided) flight.undecided = true;
       if (verdict.what != KernelVerdict::kHit) continue;
       const uint32_t number = number_of(tree_, block, place);

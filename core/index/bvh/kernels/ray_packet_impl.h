@@ -126,19 +126,17 @@ class Packet {
   inline void meet_by_ray(const TriangleBlock& block, uint32_t rays) {
     for (; rays != 0; rays &= rays - 1u) {
       const auto i = static_cast<uint32_t>(__builtin_ctz(rays));
-      const BlockMet met = meet_block<kAny>(block, PreparedRay(prepared_, i), limits_[i], rays_[i]);
-      if (met.triangles.sure != 0) {
+      const PairsMet met = meet_block<kAny>(block, PreparedRay(prepared_, i), limits_[i], rays_[i]);
+      if (met.sure != 0) {
         find(i);
         continue;
       }
-      for (uint32_t open = met.triangles.open; open != 0; open &= open - 1u)
-        settle(block, __builtin_ctz(open), i, met.edge);
+      for (uint32_t open = met.open; open != 0; open &= open - 1u) settle(block, __builtin_ctz(open), i);
     }
   }
 
   inline void meet_by_triangle(const TriangleBlock& block, uint32_t rays) {
-    alignas(32) float edges[kTreeWidth];
-    Pairs pairs = pairs_with(block, edges);
+    Pairs pairs = pairs_with(block);
     const uint32_t x = axis(kAxisX), y = axis(kAxisY), z = axis(kAxisZ);
     for (uint32_t place = 0; place < block.count; ++place) {
       for (uint32_t vertex = 0; vertex < 3; ++vertex) {
@@ -154,7 +152,7 @@ class Packet {
         if ((met.sure >> i & 1u) != 0)
           find(i);
         else
-          settle(block, static_cast<int>(place), i, edges[i]);
+          settle(block, static_cast<int>(place), i);
         if (limits_[i] < 0) rays &= ~(1u << i);
       }
       pairs.limit = Floats8::load(limits_);
@@ -165,7 +163,7 @@ class Packet {
   inline uint32_t axis(uint32_t column) const { return PreparedRay(prepared_, 0).whole(column); }
 
   // What does not depend on the triangle.
-  inline Pairs pairs_with(const TriangleBlock& block, float* edges) const {
+  inline Pairs pairs_with(const TriangleBlock& block) const {
     const auto column = [&](uint32_t number) { return Floats8::load(prepared_.columns[number]); };
     const Floats8 extent = Floats8::all(block.extent);
     Pairs pairs;
@@ -180,13 +178,12 @@ class Packet {
         planted(PlantedBug::kKernelEdgeBound) ? Floats8::all(0) : column(kEdgeScale) * extent + column(kEdgeFloor);
     pairs.noise = pairs.edge * extent * column(kEdgeNoise) + column(kStartNoise);
     pairs.t_floor = column(kTFloor);
-    pairs.edge.store(edges);
     return pairs;
   }
 
   // Decides a pair that float left open.
-  inline void settle(const TriangleBlock& block, int place, uint32_t i, float edge) {
-    const Verdict verdict = decide(block, place, rays_[i], PreparedRay(prepared_, i), double{edge});
+  inline void settle(const TriangleBlock& block, int place, uint32_t i) {
+    const Verdict verdict = decide(block, place, rays_[i], PreparedRay(prepared_, i));
     if (verdict.what == KernelVerdict::kUndecided) give_up(i);
     if (verdict.what != KernelVerdict::kHit) return;
     take(i, verdict.t, number_of(tree_, block, place));
