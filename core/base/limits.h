@@ -43,7 +43,7 @@ inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;  // clients refuse 4 M
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
 inline constexpr uint32_t kRecentRevisions = 64;       // kept for `exactly` views ...
-inline constexpr uint64_t kRecentItems = 1u << 20;     // ... while they replaced at most this many objects
+inline constexpr uint64_t kRecentBytes = 16u << 20;    // ... while what they replaced takes at most this much
 inline constexpr uint32_t kDefaultWaitMs = 1000;       // at_least without a deadline
 inline constexpr uint32_t kTestsBetweenChecks = 4096;  // primitive tests between two looks at the deadline
 

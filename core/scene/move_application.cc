@@ -37,13 +37,32 @@ void MoveApplication::refuse(const char* column, const Item& item, Reason reason
     errors_.push_back({absl::StrCat("moves[", item.list, "].", column), item.index, item.id, reason});
 }
 
-GridMove& MoveApplication::move_of(uint32_t handle) {
+inline GridMove& MoveApplication::move_of(uint32_t handle) {
   const uint32_t last = last_move_[handle];
   if (last < moves_.size() && moves_[last].handle == handle) return moves_[last];
   last_move_[handle] = static_cast<uint32_t>(moves_.size());
-  moves_.push_back({});
-  moves_.back().handle = handle;
-  return moves_.back();
+  GridMove& move = moves_.emplace_back();
+  move.handle = handle;
+  return move;
+}
+
+inline void MoveApplication::move(const PoseReader& poses, uint32_t handle, const Item& item) {
+  if (handle == ObjectStore::kNoHandle) return refuse("ids", item, Reason::kUnknownId);
+  Vec3d position;
+  Quaternion rotation;
+  if (const Reason reason = poses.read_position(item.index, position); reason != Reason::kUnspecified)
+    return refuse(poses.position_column(), item, reason);
+  if (poses.turns()) {
+    if (const Reason reason = poses.read_rotation(item.index, rotation); reason != Reason::kUnspecified)
+      return refuse(PoseReader::kRotationColumn, item, reason);
+  }
+  GridMove& move = move_of(handle);
+  move.position = position;
+  if (poses.turns()) {
+    move.turns = true;
+    move.rotation = rotation;
+  }
+  ++applied_;
 }
 
 void MoveApplication::run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list) {
@@ -61,25 +80,6 @@ void MoveApplication::run(const ObjectStore& objects, Vec3d frame, const MoveCol
     }
     for (size_t i = 0; i < ids.size(); ++i) move(poses, handles_[i], {list, static_cast<uint32_t>(begin + i), ids[i]});
   }
-}
-
-void MoveApplication::move(const PoseReader& poses, uint32_t handle, const Item& item) {
-  if (handle == ObjectStore::kNoHandle) return refuse("ids", item, Reason::kUnknownId);
-  Vec3d position;
-  Quaternion rotation;
-  if (const Reason reason = poses.read_position(item.index, position); reason != Reason::kUnspecified)
-    return refuse(poses.position_column(), item, reason);
-  if (poses.turns()) {
-    if (const Reason reason = poses.read_rotation(item.index, rotation); reason != Reason::kUnspecified)
-      return refuse(PoseReader::kRotationColumn, item, reason);
-  }
-  GridMove& move = move_of(handle);
-  move.position = position;
-  if (poses.turns()) {
-    move.turns = true;
-    move.rotation = rotation;
-  }
-  ++applied_;
 }
 
 }  // namespace locus

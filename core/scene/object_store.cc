@@ -4,11 +4,6 @@
 
 namespace locus {
 
-uint32_t ObjectStore::handle(Id id) const {
-  const auto known = handles_.find(id);
-  return known == handles_.end() ? kNoHandle : known->second;
-}
-
 std::optional<Object> ObjectStore::find(Id id) const {
   const uint32_t known = handle(id);
   return known == kNoHandle ? std::nullopt : std::optional<Object>(object_of(grid_.at(known)));
@@ -21,7 +16,7 @@ uint32_t ObjectStore::new_handle() {
   return handle;
 }
 
-void ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
+size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
   std::vector<uint32_t> leaving;
   leaving.reserve(removed.size());
   for (const Object& object : removed) {
@@ -53,7 +48,7 @@ void ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Objec
     handles_for_readers_.erase(removed[i].id);
     free_handles_.push_back(leaving[i]);
   }
-  grid_.apply({leaving, {}, items});
+  return grid_.apply({leaving, {}, items});
 }
 
 bool ObjectStore::remove(const Object& object) {

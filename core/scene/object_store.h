@@ -27,7 +27,10 @@ class ObjectStore {
   std::optional<Object> find(Id id) const;
   bool contains(const Object& object) const { return handles_.contains(object.id); }
   // kNoHandle for an unknown id. Both O(1).
-  uint32_t handle(Id id) const;
+  uint32_t handle(Id id) const {
+    const auto known = handles_.find(id);
+    return known == handles_.end() ? kNoHandle : known->second;
+  }
   // One more than the highest handle that was ever given out.
   size_t handle_count() const { return next_handle_; }
   GridRef at(uint32_t handle) const { return grid_.at(handle); }
@@ -37,9 +40,10 @@ class ObjectStore {
 
   // Removes the objects of one span, as they are, and inserts those of the other: a changed object is in both, under
   // its id. All removed ones must be here, no inserted one may remain here. O(n) and the bricks that are touched.
-  void apply(absl::Span<const Object> removed, absl::Span<const Object> inserted);
-  // Handles are distinct.
-  void move(absl::Span<const GridMove> moves) { grid_.apply({{}, moves, {}}); }
+  // Returns the bytes of what the sets so far hold and later ones will not.
+  size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted);
+  // Handles are distinct. Returns as apply().
+  size_t move(absl::Span<const GridMove> moves) { return grid_.apply({{}, moves, {}}); }
   void insert(const Object& object) { apply({}, {&object, 1}); }
   // False, and no change, when contains() is false.
   bool remove(const Object& object);

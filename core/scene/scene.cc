@@ -76,7 +76,7 @@ absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch) {
   if (absl::Status status = check_open(); !status.ok()) return status;
   absl::StatusOr<SceneWriter::Applied> applied = writer_.apply(batch);
   if (!applied.ok()) return applied.status();
-  if (applied->snapshot != nullptr) publish(std::move(applied->snapshot), applied->replaced_items);
+  if (applied->snapshot != nullptr) publish(std::move(applied->snapshot), applied->replaced_bytes);
   return std::move(applied->ack);
 }
 
@@ -118,18 +118,18 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
   return result;
 }
 
-void Scene::publish(SnapshotPtr snapshot, uint64_t replaced_items) {
+void Scene::publish(SnapshotPtr snapshot, uint64_t replaced_bytes) {
   std::vector<Recent> retired;  // freed after the lock: freeing a large snapshot takes a while
   const MutexLock lock(mutex_);
   latest_ = std::move(snapshot);
-  recent_.push_back({latest_, replaced_items});
-  recent_items_ += replaced_items;
-  while (recent_.size() > 1 && (recent_.size() > limits::kRecentRevisions || recent_items_ > limits::kRecentItems)) {
+  recent_.push_back({latest_, replaced_bytes});
+  recent_bytes_ += replaced_bytes;
+  while (recent_.size() > 1 && (recent_.size() > limits::kRecentRevisions || recent_bytes_ > limits::kRecentBytes)) {
     // What the oldest held alone is what the next one replaced.
     retired.push_back(std::move(recent_.front()));
     recent_.pop_front();
-    recent_items_ -= recent_.front().replaced_items;
-    recent_.front().replaced_items = 0;
+    recent_bytes_ -= recent_.front().replaced_bytes;
+    recent_.front().replaced_bytes = 0;
   }
   published_.notify_all();
 }
@@ -164,7 +164,7 @@ void Scene::forget_recent() {
   const MutexLock lock(mutex_);
   forgotten.swap(recent_);
   recent_.push_back({latest_, 0});
-  recent_items_ = 0;
+  recent_bytes_ = 0;
 }
 
 void Scene::close() {

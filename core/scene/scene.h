@@ -75,7 +75,7 @@ class Scene {
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
  private:
-  void publish(SnapshotPtr snapshot, uint64_t replaced_items) LOCUS_EXCLUDES(mutex_);
+  void publish(SnapshotPtr snapshot, uint64_t replaced_bytes) LOCUS_EXCLUDES(mutex_);
   absl::Status closed_status() const;
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
   absl::Status admit_change() LOCUS_EXCLUDES(mutex_);
@@ -93,10 +93,10 @@ class Scene {
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
   struct Recent {
     SnapshotPtr snapshot;
-    uint64_t replaced_items;
+    uint64_t replaced_bytes;
   };
   std::deque<Recent> recent_ LOCUS_GUARDED_BY(mutex_);  // oldest first, latest_ last
-  uint64_t recent_items_ LOCUS_GUARDED_BY(mutex_) = 0;
+  uint64_t recent_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;

@@ -122,8 +122,8 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   Applied result;
   moves_.run(objects_, batch);
   if (absl::Status status = book(batch, moves_, result); !status.ok()) return status;
-  if (moves_.changes()) objects_.move(moves_.moves());
-  commit(batch, moves_.changes() ? moves_.moves().size() : 0, result);
+  if (moves_.changes()) result.replaced_bytes = objects_.move(moves_.moves());
+  commit(batch, moves_.changes(), result);
   return result;
 }
 
@@ -136,18 +136,16 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
                        static_cast<double>(application.object_count()), 0);
   if (absl::Status status = book(batch, application, result); !status.ok()) return status;
   const BatchApplication::Difference difference = application.difference();
-  objects_.apply(difference.gone, difference.come);
-  commit(batch, difference.gone.size() + difference.come.size(), result);
-  result.replaced_items = difference.gone.size();
+  result.replaced_bytes = objects_.apply(difference.gone, difference.come);
+  commit(batch, !difference.empty(), result);
   return result;
 }
 
-void SceneWriter::commit(const UpdateBatch& batch, uint64_t changes, Applied& result) {
+void SceneWriter::commit(const UpdateBatch& batch, bool changes, Applied& result) {
   const uint64_t tick = !batch.tick ? tick_ : batch.restart_ticks ? *batch.tick : std::max(tick_, *batch.tick);
-  if (changes != 0 || tick != tick_) {
+  if (changes || tick != tick_) {
     tick_ = tick;
     result.snapshot = next_revision();
-    result.replaced_items = changes;
   }
   result.ack.epoch = epoch_;
   result.ack.revision = revision_;

@@ -53,7 +53,7 @@ class SceneWriter {
   struct Applied {
     UpdateAck ack;
     SnapshotPtr snapshot;         // null when nothing changed
-    uint64_t replaced_items = 0;  // objects the revision before holds that this one does not
+    uint64_t replaced_bytes = 0;  // of what the revision before holds and this one does not
   };
   // `batch` has passed check_form(). Item errors are in the ack; with all_or_nothing any of them refuses the batch. So
   // does one object too many, with RESOURCE_EXHAUSTED.
@@ -78,7 +78,7 @@ class SceneWriter {
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
   // Applies the tick; the next revision if that changes anything or `changes` says so, and the ack's last part.
-  void commit(const UpdateBatch& batch, uint64_t changes, Applied& result);
+  void commit(const UpdateBatch& batch, bool changes, Applied& result);
 
   uint64_t epoch_;
   size_t max_objects_;

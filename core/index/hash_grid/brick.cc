@@ -13,6 +13,7 @@ BrickPlace BrickPlace::of(const GridKey& key, int exponent) {
   for (int axis = 0; axis < 3; ++axis) {
     place.low[axis] = static_cast<double>(key[axis]) * place.edge;
     place.center[axis] = (static_cast<double>(key[axis]) + 0.5) * place.edge;
+    place.high[axis] = (static_cast<double>(key[axis]) + 1) * place.edge;
   }
   return place;
 }

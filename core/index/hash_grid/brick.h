@@ -7,6 +7,7 @@
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_H_
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -21,13 +22,25 @@ struct BrickPlace {
   GridKey key;
   int exponent = 0;  // of the cell edge
   double cells_per_unit = 1;
-  Vec3d low;        // the corner of the first cell; exact
-  Vec3d center;     // exact
-  double edge = 0;  // of the brick
+  Vec3d low, center, high;  // exact
+  double edge = 0;          // of the brick
 
   static BrickPlace of(const GridKey& key, int exponent);
   // The cell within the brick of a position in it.
-  int cell_of(Vec3d position) const { return number_in_brick(internal::cell_of(position, cells_per_unit)); }
+  int cell_of(Vec3d position) const {
+    return cell_along(position.x - low.x) | cell_along(position.y - low.y) << kBrickBits |
+           cell_along(position.z - low.z) << (2 * kBrickBits);
+  }
+  // As brick_of() its cell says. No branches.
+  bool holds(Vec3d position) const {
+    return ((position.x >= low.x) & (position.x < high.x) & (position.y >= low.y) & (position.y < high.y) &
+            (position.z >= low.z) & (position.z < high.z)) != 0;
+  }
+  // The cell on one axis. Next to the border of two it may be the other, by the rounding of the difference: every query
+  // looks farther than that beyond what it needs.
+  int cell_along(double from_low) const {
+    return std::clamp(static_cast<int>(from_low * cells_per_unit), 0, (1 << kBrickBits) - 1);
+  }
 };
 
 struct Brick {
@@ -42,8 +55,10 @@ struct Brick {
   float largest_reach() const {
     return recent == nullptr ? sorted->largest_reach() : std::max(sorted->largest_reach(), recent->largest_reach());
   }
-  size_t bytes() const {
-    return sizeof(Brick) + sorted->bytes() + (recent == nullptr ? 0 : recent->bytes()) + gone.size() * sizeof(gone[0]);
+  size_t bytes() const { return own_bytes() + sorted->bytes(); }
+  // Without the sorted block, which other versions may share.
+  size_t own_bytes() const {
+    return sizeof(Brick) + (recent == nullptr ? 0 : recent->bytes()) + gone.size() * sizeof(gone[0]);
   }
 };
 

@@ -52,9 +52,11 @@ void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> 
 
 inline void BrickBuilder::add_source(const GridBlock& block, uint32_t slot, uint32_t change) {
   if (change == kStays) {
-    sources_.push_back({block.entry(slot).position, &block, slot, kNoMove});
+    const Vec3d position = block.entry(slot).position;
+    sources_.push_back({position, &block, slot, kNoMove, cell_of(position)});
   } else {
-    sources_.push_back({parts_.moves[change].position, &block, slot, change});
+    const Vec3d position = parts_.moves[change].position;
+    sources_.push_back({position, &block, slot, change, cell_of(position)});
   }
 }
 
@@ -69,7 +71,8 @@ void BrickBuilder::add_sources(const GridBlock& block, const std::vector<uint32_
 void BrickBuilder::add_arrivals(absl::Span<const BrickChange> changes) {
   for (const BrickChange& change : changes) {
     if (change.slot != BrickChange::kArrives) continue;
-    sources_.push_back({parts_.arrivals[change.number].entry.position, nullptr, change.number, kNoMove});
+    const Vec3d position = parts_.arrivals[change.number].entry.position;
+    sources_.push_back({position, nullptr, change.number, kNoMove, cell_of(position)});
   }
 }
 
@@ -79,11 +82,11 @@ GridForm BrickBuilder::form_of(const Source& source) const {
   return form;
 }
 
-bool BrickBuilder::any_form(const Brick* old) const {
+bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickChange> changes) const {
+  if (parts_.turns) return true;
   if (old != nullptr && (old->sorted->has_forms() || (old->recent != nullptr && old->recent->has_forms()))) return true;
-  return std::any_of(sources_.begin(), sources_.end(), [this](const Source& source) {
-    if (source.block == nullptr) return !(parts_.arrivals[source.slot].form == GridForm());
-    return source.move != kNoMove && parts_.moves[source.move].turns;
+  return std::any_of(changes.begin(), changes.end(), [this](const BrickChange& change) {
+    return change.slot == BrickChange::kArrives && !(parts_.arrivals[change.number].form == GridForm());
   });
 }
 
@@ -116,17 +119,12 @@ BrickPtr BrickBuilder::sort_anew(const Brick* old, absl::Span<const BrickChange>
   }
   add_arrivals(changes);
   if (sources_.empty()) return nullptr;
-  const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources_.size()), any_form(old));
+  const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources_.size()), any_form(old, changes));
   std::array<uint32_t, kBrickCells + 1>& offsets = block->offsets();
-  cells_.resize(sources_.size());
-  for (size_t i = 0; i < sources_.size(); ++i) {
-    const int cell = place_->cell_of(sources_[i].position);
-    cells_[i] = static_cast<uint8_t>(cell);
-    ++offsets[static_cast<size_t>(cell) + 1];
-  }
+  for (const Source& source : sources_) ++offsets[source.cell + 1];
   for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] += offsets[cell];
   std::array<uint32_t, kBrickCells + 1> next = offsets;
-  write(*block, 0, [&](size_t i) { return next[cells_[i]]++; });
+  write(*block, 0, [&](size_t i) { return next[sources_[i].cell]++; });
   auto brick = std::make_shared<Brick>();
   brick->place = *place_;
   brick->sorted = block;
@@ -152,7 +150,7 @@ BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange
   add_arrivals(changes);
   brick->recent = nullptr;
   if (!sources_.empty()) {
-    const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources_.size()), any_form(&old));
+    const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources_.size()), any_form(&old, changes));
     write(*block, GridSlot::kRecent, [](size_t i) { return static_cast<uint32_t>(i); });
     brick->recent = block;
   }

@@ -41,6 +41,7 @@ struct BrickChange {
 struct BatchParts {
   absl::Span<const GridMove> moves;
   absl::Span<const GridItem> arrivals;
+  bool turns = false;  // whether any of the moves does
 };
 
 class BrickBuilder {
@@ -58,9 +59,11 @@ class BrickBuilder {
     const GridBlock* block;  // null for an arrival
     uint32_t slot;           // in `block`, or the arrival's number
     uint32_t move;           // kNoMove where it stays as it was
+    uint32_t cell;
   };
   static constexpr uint32_t kNoMove = ~0u;
 
+  uint32_t cell_of(Vec3d position) const { return static_cast<uint32_t>(place_->cell_of(position)); }
   static bool is_few(const Brick* old, size_t changes);
   BrickPtr sort_anew(const Brick* old, absl::Span<const BrickChange> changes);
   BrickPtr change_few(const Brick& old, absl::Span<const BrickChange> changes);
@@ -69,7 +72,7 @@ class BrickBuilder {
   void add_sources(const GridBlock& block, const std::vector<uint32_t>& changes, const Brick* brick);
   void add_arrivals(absl::Span<const BrickChange> changes);
   GridForm form_of(const Source& source) const;
-  bool any_form(const Brick* old) const;
+  bool any_form(const Brick* old, absl::Span<const BrickChange> changes) const;
   // Writes the sources into `block` at the places that place_of(i) gives for source i.
   template <class PlaceOf>
   void write(GridBlock& block, uint32_t flag, const PlaceOf& place_of);
@@ -80,7 +83,6 @@ class BrickBuilder {
   std::vector<GridSlot>* slots_ = nullptr;
   std::vector<uint32_t> sorted_changes_, recent_changes_;  // by slot: the number of the move, kLeaves or kStays
   std::vector<Source> sources_;
-  std::vector<uint8_t> cells_;
 };
 
 }  // namespace internal

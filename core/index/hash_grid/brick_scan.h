@@ -43,10 +43,7 @@ inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};
 
 // How much wider than its reach a value of `brick` may be, and how far off its columns in float.
 inline double cull_margin(const Brick& brick) {
-  const GridBlock* const recent = brick.recent.get();
-  const float coordinate = recent == nullptr
-                               ? brick.sorted->largest_coordinate()
-                               : std::max(brick.sorted->largest_coordinate(), recent->largest_coordinate());
+  const double coordinate = brick.place.edge;  // twice the largest of the float columns
   const double reach = brick.largest_reach();
   const double magnitude = max_component(abs(brick.place.center)) + brick.place.edge;
   return double{kCullSlack} * (coordinate + reach) + kBoundsGrowth * (magnitude + reach);

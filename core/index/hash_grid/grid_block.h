@@ -71,9 +71,7 @@ class GridBlock {
   std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }
   const std::array<uint32_t, kBrickCells + 1>& offsets() const { return offsets_; }
 
-  // Of all values: the largest reach and |x| of the float columns, at least.
   float largest_reach() const { return largest_reach_; }
-  float largest_coordinate() const { return largest_coordinate_; }
 
   // `entry` at another position, perhaps.
   void put(uint32_t slot, const GridEntry& entry, Vec3d position, uint32_t handle, float reach, Vec3d center) {
@@ -86,7 +84,6 @@ class GridBlock {
     entries_[slot] = entry;
     entries_[slot].position = position;
     largest_reach_ = std::max(largest_reach_, reach);
-    largest_coordinate_ = std::max(largest_coordinate_, max_component(abs(relative)));
   }
   // Only where has_forms().
   void put_form(uint32_t slot, const GridForm& form) { forms_[slot] = form; }
@@ -97,7 +94,6 @@ class GridBlock {
   uint32_t count_;
   uint32_t stride_;
   float largest_reach_ = 0;
-  float largest_coordinate_ = 0;
   float* floats_ = nullptr;
   uint32_t* handles_ = nullptr;
   GridEntry* entries_ = nullptr;

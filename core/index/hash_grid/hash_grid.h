@@ -48,8 +48,8 @@ class HashGrid {
   // Asks for the memory of at(), some time before it is needed.
   void prefetch_slot(uint32_t handle) const { __builtin_prefetch(&slots_[handle]); }
   void prefetch_value(uint32_t handle) const;
-  // O(n) and the bricks that are touched.
-  void apply(const GridBatch& batch);
+  // Returns the bytes of what the snapshots so far hold and later ones will not. O(n) and the bricks that are touched.
+  size_t apply(const GridBatch& batch);
 
   // visit(GridRef) for each value, until it returns false. O(size).
   template <class Visit>
@@ -81,20 +81,21 @@ class HashGrid {
   struct Known {
     internal::BrickPlace place;
     Level* level = nullptr;
-    uint32_t touched = 0;  // its number among those the batch touches, if touched_[touched] is this brick
   };
 
   void remove(uint32_t handle);
-  void move(const GridMove& move, uint32_t number);
+  void move_away(const GridMove& move);
   void insert(const GridItem& item);
   void arrive(const GridItem& item, Level& level, const internal::GridKey& key);
   Level& level_for(float reach);
   uint32_t brick_for(Level& level, const internal::GridKey& key);
+  uint32_t touch(uint32_t brick);
   void change(uint32_t brick, const internal::BrickChange& change);
   void group_changes();
   void rebuild_bricks(absl::Span<const GridMove> moves);
   void drop_brick(uint32_t brick);
   internal::BrickTable& writable_table(Level& level);
+  void move_all(absl::Span<const GridMove> moves);
   void apply_to_bricks(const GridBatch& batch);
   bool choice_is_stale() const;
   void choose_cell_size();
@@ -105,9 +106,11 @@ class HashGrid {
   size_t size_at_choice_ = 0;
   size_t changes_since_choice_ = 0;
   size_t size_ = 0;
+  size_t replaced_bytes_ = 0;                   // by the batch at work
   std::vector<std::unique_ptr<Level>> levels_;  // coarse to fine
   std::vector<Known> known_;                    // by brick
   std::vector<uint32_t> free_bricks_;
+  std::vector<uint32_t> touch_numbers_;  // by brick: its number among the touched, if the list there says so
   internal::BrickArray bricks_;
   std::vector<internal::GridSlot> slots_;  // by handle
   internal::BrickNumbers bricks_by_handle_;
@@ -120,6 +123,7 @@ class HashGrid {
   std::vector<uint32_t> touched_;
   std::vector<uint32_t> change_counts_;  // by number among the touched, then where their changes begin
   std::vector<Change> changes_;
+  std::vector<uint32_t> away_;  // moves to other bricks
   std::vector<internal::BrickChange> grouped_;
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;

@@ -101,16 +101,15 @@ TEST_F(SceneTest, AsManyRevisionsAreKeptAsTheLimitSays) {
   expect_outside(oldest - 1, std::to_string(oldest) + " to " + std::to_string(newest));
 }
 
-TEST_F(SceneTest, RevisionsAreKeptWhileTheyReplacedAtMostTheLimitOfObjects) {
-  const uint64_t count = limits::kRecentItems / 4;
-  std::vector<Id> all(count);
-  for (uint64_t i = 0; i < count; ++i) all[i] = i + 1;
+TEST_F(SceneTest, RevisionsAreKeptWhileWhatTheyReplacedTakesAtMostTheLimit) {
+  // Between a sixth and a fifth of the limit each time that all objects move.
+  std::vector<Id> all(limits::kRecentBytes / 420);
+  for (uint64_t i = 0; i < all.size(); ++i) all[i] = i + 1;
   apply(with(points(all, {0, 0, 0})));
-  for (int i = 1; i <= 4; ++i) apply(with(move_to(all, {float(i), 0, 0})));
-  // Revisions 2 to 5 replaced count objects each: 1 to 5 hold the limit, and the empty revision 0 nothing.
-  EXPECT_EQ((*scene_.view(exactly(0), kNow))->revision, 0u);
+  for (int i = 1; i <= 5; ++i) apply(with(move_to(all, {float(i), 0, 0})));
+  EXPECT_EQ((*scene_.view(exactly(1), kNow))->objects.find(1)->shape.position.x, 0);
   apply(with(move_to(all, {9, 0, 0})));
-  expect_outside(1, "2 to 6");
+  expect_outside(1, "2 to 7");
   EXPECT_EQ((*scene_.view(exactly(2), kNow))->objects.find(1)->shape.position.x, 1);
 }
 
