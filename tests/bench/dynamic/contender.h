@@ -67,6 +67,8 @@ class Contender {
   virtual void move(const Moves& moves) = 0;
   virtual void remove(absl::Span<const uint64_t>) {}
   virtual void insert(const Objects&) {}
+  // Gives back what is kept only for looking back.
+  virtual void forget_past() {}
 
   // Appended: everything that shares a point with the ball or box of kReach around each centre, in any order; the first
   // object on each ray, if there is one, and its distance.

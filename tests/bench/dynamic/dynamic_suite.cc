@@ -3,14 +3,21 @@
 #include <algorithm>
 
 #include "tests/bench/dynamic/check_values.h"
+#include "tests/bench/dynamic/concurrent_cases.h"
+#include "tests/bench/dynamic/growth_case.h"
+#include "tests/bench/dynamic/insert_cases.h"
 #include "tests/bench/dynamic/move_cases.h"
 #include "tests/bench/dynamic/peers.h"
 #include "tests/bench/dynamic/query_cases.h"
+#include "tests/bench/frame/heap.h"
 
 namespace locus::bench::dynamic {
 namespace {
 
 constexpr uint32_t kCounts[] = {10'000, 100'000, 1'000'000};
+// Of one world each.
+constexpr const char* kCases[] = {"memory",    "ball",      "box",  "ray",    "ball_batch",
+                                  "box_batch", "ray_batch", "move", "insert", "reinsert"};
 
 // What runs without a filter.
 bool is_usual(Kind kind, uint32_t count, const Options& options) {
@@ -20,52 +27,75 @@ bool is_usual(Kind kind, uint32_t count, const Options& options) {
 }
 
 // In one cell, everything finds everything.
-size_t query_count(Kind kind, uint32_t count) {
-  return kind == Kind::kOneCell ? std::max(20u, 2'000'000 / count) : kQueries;
+size_t query_count(Kind kind, uint32_t count, const Options& options) {
+  if (kind == Kind::kOneCell) return std::max(20u, 2'000'000 / count);
+  return options.quick && kind != Kind::kUniform ? kQueries / 10 : kQueries;
 }
 
 bool wants_any(const Options& options, const std::string& world) {
-  constexpr const char* kCases[] = {"move", "ball", "box", "ray", "ball_batch", "box_batch", "ray_batch"};
   return std::any_of(std::begin(kCases), std::end(kCases),
                      [&](const char* name) { return options.filter.wants(absl::StrCat(name, "/", world)); });
 }
 
-void run_world(const Options& options, const Progress& progress, World& world, Report& report) {
-  Ours ours;
-  ours.load(world.objects());
-  std::vector<std::unique_ptr<Contender>> peers;
-  for (const Maker& maker : peer_makers()) {
-    if (maker.one_size_only && !has_one_size(world.kind())) {
-      report.notes.push_back(absl::StrCat(world.name(), ": ", maker.name, " is left out: it takes one size only"));
-      continue;
-    }
-    peers.push_back(maker.make());
-    peers.back()->load(world.objects());
+// Adds to `bytes` what stays of it.
+template <class Work>
+void weigh(int64_t& bytes, const Work& work) {
+  const int64_t before = heap_bytes();
+  work();
+  bytes += heap_bytes() - before;
+}
+
+std::vector<Entrant> all_entrants(const World& world) {
+  std::vector<Entrant> entrants;
+  for (const Maker& maker : makers_for(world)) {
+    Entrant& entrant = entrants.emplace_back();
+    weigh(entrant.bytes, [&] {
+      entrant.contender = maker.make();
+      entrant.contender->load(world.objects());
+    });
   }
-  const Queries queries = queries_of(world, query_count(world.kind(), world.count()));
-  for (uint32_t tick = 0; tick < ticks_before_queries(world.count()); ++tick) {
-    world.step();
-    ours.move(world.moves());
-    for (const auto& peer : peers) peer->move(world.moves());
+  return entrants;
+}
+
+void tick(World& world, std::vector<Entrant>& entrants) {
+  world.step();
+  for (Entrant& entrant : entrants) {
+    weigh(entrant.bytes, [&] {
+      entrant.contender->move(world.moves());
+      entrant.contender->forget_past();
+    });
   }
-  const WorldRun run{options, progress, world, queries, ours, peers, report};
+}
+
+void run_world(const Options& options, World& world, Report& report) {
+  const Queries queries = queries_of(world, query_count(world.kind(), world.count(), options));
+  std::vector<Entrant> entrants = all_entrants(world);
+  for (uint32_t i = 0; i < ticks_before_queries(world.count()); ++i) tick(world, entrants);
+  const auto& ours = dynamic_cast<const Ours&>(*entrants.front().contender);
+  const WorldRun run{options, world, queries, entrants, ours, report};
+  run_memory_case(run);
   run_query_cases(run);
   run_move_case(run);
+  run_reinsert_case(run);
+  run_insert_case(run);
 }
 
 }  // namespace
 
 absl::Status run_dynamic_suite(const Options& options, const Progress& progress, Report& report) {
   report.notes = missing_peers();
+  report.notes.emplace_back("worlds of several sizes: boost_rtree, nanoflann and flat_hash_map take one size only");
   for (const Kind kind : kKinds) {
     for (const uint32_t count : kCounts) {
       const std::string name = absl::StrCat(name_of(kind), "/", name_of_count(count));
       if (!wants_any(options, name) || (options.filter.wants_every() && !is_usual(kind, count, options))) continue;
       progress(name);
       World world(kind, count);
-      run_world(options, progress, world, report);
+      run_world(options, world, report);
     }
   }
+  run_growth_case(options, progress, report);
+  run_concurrent_cases(options, progress, report);
   return absl::OkStatus();
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "tests/bench/dynamic/agreement.h"
 #include "tests/bench/dynamic/query_cases.h"
 #include "tests/bench/frame/race.h"
 
@@ -29,16 +28,18 @@ class MoveRace {
   void run() {
     // Small worlds go several ticks at a time, or they would find only what the others left in the caches.
     const uint32_t count = run_.world.count();
-    const size_t ticks = std::clamp<size_t>(100'000 / count, 1, 8), chunks = count < 1'000'000 ? 4 : 1;
-    std::vector<Contestant> contestants = {contestant(run_.ours, ticks * chunks)};
-    for (const auto& peer : run_.peers)
-      if (peer->does(Task::kMove)) contestants.push_back(contestant(*peer, ticks * chunks));
+    const size_t ticks = run_.options.quick ? 1 : std::clamp<size_t>(100'000 / count, 1, 8);
+    const size_t chunks = run_.options.quick || count >= 1'000'000 ? 1 : 4;
+    std::vector<Contestant> contestants;
+    for (const Entrant& entrant : run_.entrants)
+      if (entrant.contender->does(Task::kMove)) contestants.push_back(contestant(*entrant.contender, ticks * chunks));
     contestants.front().prepare = [this, ticks](size_t) {
       step(ticks);
       touch();
     };
+    const std::string name = run_.case_of("move");
     const auto times = race(contestants, chunks, run_.options.rounds, thread_seconds);
-    add_cells(contestants, times, cell_of(run_.case_of("move"), "ns/move", compare_all()), run_.report);
+    add_cells(contestants, times, cell_of(name, "ns/move", compare_some_balls(run_, name)), run_.report);
   }
 
  private:
@@ -61,20 +62,6 @@ class MoveRace {
     };
     return {contender.name(), run_chunk, static_cast<double>(run_.world.count()) * static_cast<double>(ticks),
             [this](size_t) { touch(); }};
-  }
-  // That all are where they should be, by some of the balls.
-  std::string compare_all() {
-    Queries some = run_.queries;
-    some.centers.resize(some.centers.size() / 10);
-    Answers ours, theirs;
-    ask_all(run_.ours, Task::kBall, some, ours);
-    for (const auto& peer : run_.peers) {
-      if (!peer->does(Task::kBall)) continue;
-      theirs.clear();
-      ask_all(*peer, Task::kBall, some, theirs);
-      compare(run_.case_of("move"), Task::kBall, run_.world, some, ours, peer->name(), theirs, run_.report);
-    }
-    return hash_of(ours);
   }
 
   const WorldRun& run_;

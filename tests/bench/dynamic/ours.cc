@@ -179,7 +179,7 @@ void Ours::rays(absl::Span<const Rayf> rays, Answers& answers) {
   });
 }
 
-void Ours::forget_recent() { scene_.forget_recent(); }
+void Ours::forget_past() { scene_.forget_recent(); }
 
 std::unique_ptr<Contender> batches_of(const Ours& ours) { return std::make_unique<Batches>(ours); }
 

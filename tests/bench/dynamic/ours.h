@@ -20,12 +20,11 @@ class Ours : public Contender {
   void move(const Moves& moves) override;
   void remove(absl::Span<const uint64_t> ids) override;
   void insert(const Objects& objects) override;
+  void forget_past() override;
   void balls(absl::Span<const Vec3f> centers, Answers& answers) override;
   void boxes(absl::Span<const Vec3f> centers, Answers& answers) override;
   void rays(absl::Span<const Rayf> rays, Answers& answers) override;
 
-  // Keeps nothing but the latest revision.
-  void forget_recent();
   SnapshotPtr latest() const { return scene_.latest(); }
 
  private:

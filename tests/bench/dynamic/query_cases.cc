@@ -11,6 +11,8 @@
 namespace locus::bench::dynamic {
 namespace {
 
+constexpr size_t kParts = 10;  // all queries are so many calls: a call is a batch to those who take batches
+
 struct QueryCase {
   const char* name;
   const char* batch_name;
@@ -32,14 +34,18 @@ void ask(Contender& contender, Task task, const Queries& queries, size_t part, A
   if (task == Task::kRay) contender.rays(part_of(queries.rays, part), answers);
 }
 
+void ask_all(Contender& contender, Task task, const Queries& queries, Answers& answers) {
+  for (size_t part = 0; part < kParts; ++part) ask(contender, task, queries, part, answers);
+}
+
 class QueryRace {
  public:
   QueryRace(const WorldRun& run, const QueryCase& query_case) : run_(run), case_(query_case) {
     batches_ = batches_of(run.ours);
-    enter(run.ours);
-    enter(*batches_);
-    for (const auto& peer : run.peers)
-      if (peer->does(case_.task)) enter(*peer);
+    for (const Entrant& entrant : run.entrants) {
+      if (entrant.contender->does(case_.task)) enter(*entrant.contender);
+      if (entries_.size() == 1) enter(*batches_);
+    }
   }
 
   void run() {
@@ -64,7 +70,7 @@ class QueryRace {
   void compare_all() {
     const std::string name = run_.case_of(case_.name);
     Answers ours, theirs;
-    ask_all(run_.ours, case_.task, run_.queries, ours);
+    ask_all(*entries_.front().contender, case_.task, run_.queries, ours);
     hash_ = hash_of(ours);
     for (Entry& entry : entries_) {
       theirs.clear();
@@ -113,10 +119,6 @@ class QueryRace {
 
 }  // namespace
 
-void ask_all(Contender& contender, Task task, const Queries& queries, Answers& answers) {
-  for (size_t part = 0; part < kParts; ++part) ask(contender, task, queries, part, answers);
-}
-
 std::string hash_of(const Answers& answers) {
   ResultsHash hash;
   auto next = answers.ids.begin();
@@ -126,6 +128,21 @@ std::string hash_of(const Answers& answers) {
     next += count;
   }
   return hash.text();
+}
+
+std::string compare_some_balls(const WorldRun& run, const std::string& case_name) {
+  Queries some = run.queries;
+  some.centers.resize(some.centers.size() / 10);
+  Answers ours, theirs;
+  for (const Entrant& entrant : run.entrants) {
+    if (!entrant.contender->does(Task::kBall)) continue;
+    Answers& answers = ours.counts.empty() ? ours : theirs;
+    answers.clear();
+    ask_all(*entrant.contender, Task::kBall, some, answers);
+    if (&answers == &theirs)
+      compare(case_name, Task::kBall, run.world, some, ours, entrant.contender->name(), theirs, run.report);
+  }
+  return hash_of(ours);
 }
 
 void run_query_cases(const WorldRun& run) {

@@ -7,12 +7,12 @@
 
 namespace locus::bench::dynamic {
 
-// Asks all of these queries in so many calls: a call is a batch to those who take batches.
-inline constexpr size_t kParts = 10;
-void ask_all(Contender& contender, Task task, const Queries& queries, Answers& answers);
-
-// A hash of the answers, whatever the order within a query.
+// Of the answers, whatever the order within a query.
 std::string hash_of(const Answers& answers);
+
+// Whether all contenders find the same in some balls about the world of now: the objects are where they should be. The
+// hash of our answers.
+std::string compare_some_balls(const WorldRun& run, const std::string& case_name);
 
 void run_query_cases(const WorldRun& run);
 

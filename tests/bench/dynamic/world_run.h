@@ -1,4 +1,4 @@
-// What the cases of one world share: who is asked, and where results go. Plain data and pure functions.
+// What the cases of one world share: who is asked, and where results go. Plain data.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_RUN_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_RUN_H_
 
@@ -14,17 +14,24 @@
 
 namespace locus::bench::dynamic {
 
+struct Entrant {
+  std::unique_ptr<Contender> contender;
+  int64_t bytes = 0;  // that it holds since it was loaded and moved
+};
+
 struct WorldRun {
   const Options& options;
-  const Progress& progress;
   World& world;
-  const Queries& queries;  // about its start
-  Ours& ours;
-  const std::vector<std::unique_ptr<Contender>>& peers;  // loaded, and moved as the world was
+  const Queries& queries;                // about its start
+  const std::vector<Entrant>& entrants;  // loaded, and moved as the world was; ours is the first
+  const Ours& ours;                      // the same
   Report& report;
 
   std::string case_of(const std::string& what) const { return absl::StrCat(what, "/", world.name()); }
 };
+
+// Ours, and all peers that can hold this world.
+std::vector<Maker> makers_for(const World& world);
 
 // The part of a cell that a case knows.
 inline Cell cell_of(const std::string& case_name, const std::string& metric, const std::string& results_hash) {

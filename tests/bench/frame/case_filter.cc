@@ -7,6 +7,7 @@
 namespace locus::bench {
 
 absl::StatusOr<CaseFilter> CaseFilter::create(const std::string& pattern) {
+  if (pattern.empty()) return CaseFilter();
   regex_t compiled{};
   const int code = regcomp(&compiled, pattern.c_str(), REG_EXTENDED | REG_NOSUB);
   if (code != 0) {

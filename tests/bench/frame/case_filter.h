@@ -17,7 +17,7 @@ class CaseFilter {
   // Wants every case.
   CaseFilter() = default;
 
-  // POSIX extended syntax. INVALID_ARGUMENT with what is wrong.
+  // POSIX extended syntax; an empty pattern is none. INVALID_ARGUMENT with what is wrong.
   static absl::StatusOr<CaseFilter> create(const std::string& pattern);
 
   bool wants(const std::string& case_name) const;

@@ -8,19 +8,24 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(CaseFilterTest, WithoutAPatternEveryCaseIsWanted) { EXPECT_TRUE(CaseFilter().wants("ray/short/any/delta")); }
+TEST(CaseFilterTest, WithoutAPatternEveryCaseIsWanted) {
+  EXPECT_TRUE(CaseFilter().wants("ray/short/any/delta"));
+  EXPECT_TRUE(CaseFilter().wants_every());
+}
 
 TEST(CaseFilterTest, APatternMatchesAnywhereInTheName) {
   const auto filter = CaseFilter::create("short/(any|all)");
   ASSERT_TRUE(filter.ok());
   EXPECT_TRUE(filter->wants("ray/short/any/delta"));
   EXPECT_FALSE(filter->wants("ray/short/first/delta"));
+  EXPECT_FALSE(filter->wants_every());
 }
 
 TEST(CaseFilterTest, AnEmptyPatternWantsEverything) {
   const auto filter = CaseFilter::create("");
   ASSERT_TRUE(filter.ok());
   EXPECT_TRUE(filter->wants("build/delta"));
+  EXPECT_TRUE(filter->wants_every());
 }
 
 TEST(CaseFilterTest, ABrokenPatternIsRefusedWithItsReason) {

@@ -20,6 +20,13 @@ class ResultsHash {
   uint64_t state_ = 0xCBF29CE484222325u;
 };
 
+// Of one number.
+inline std::string hash_of_number(uint64_t value) {
+  ResultsHash hash;
+  hash.add(value);
+  return hash.text();
+}
+
 }  // namespace locus::bench
 
 #endif  // LOCUS_TESTS_BENCH_FRAME_RESULTS_HASH_H_

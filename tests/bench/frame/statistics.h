@@ -9,6 +9,9 @@ namespace locus::bench {
 // The middle value, or the mean of the two in the middle.
 double median(std::vector<double> values);
 
+// The least value that at least that share (0 ... 1) of all do not exceed.
+double percentile(std::vector<double> values, double share);
+
 // The largest less the smallest, over the median.
 double spread(const std::vector<double>& values);
 

@@ -12,6 +12,13 @@ TEST(StatisticsTest, MedianOfAnOddCountIsTheMiddleValue) { EXPECT_EQ(median({5, 
 
 TEST(StatisticsTest, MedianOfAnEvenCountIsTheMeanOfTheMiddleTwo) { EXPECT_EQ(median({4, 1, 2, 100}), 3); }
 
+TEST(StatisticsTest, APercentileIsTheLeastValueThatTheShareDoesNotExceed) {
+  EXPECT_EQ(percentile({4, 1, 3, 2}, 0.5), 2);
+  EXPECT_EQ(percentile({4, 1, 3, 2}, 0.51), 3);
+  EXPECT_EQ(percentile({4, 1, 3, 2}, 0.99), 4);
+  EXPECT_EQ(percentile({4, 1, 3, 2}, 0), 1);
+}
+
 TEST(StatisticsTest, SpreadIsTheRangeOverTheMedian) { EXPECT_EQ(spread({2, 4, 3, 5, 4}), 0.75); }
 
 TEST(StatisticsTest, EqualValuesHaveNoSpread) { EXPECT_EQ(spread({7, 7, 7}), 0); }

@@ -1,0 +1,15 @@
+// The cases of readers beside a writer that moves objects in scattered batches: concurrent_p99/1reader,
+// concurrent_moves/ 3readers and unpaced/1reader. They use threads and the time that passes; the machine should have
+// two cores to itself.
+#ifndef LOCUS_TESTS_BENCH_DYNAMIC_CONCURRENT_CASES_H_
+#define LOCUS_TESTS_BENCH_DYNAMIC_CONCURRENT_CASES_H_
+
+#include "tests/bench/frame/suite.h"
+
+namespace locus::bench::dynamic {
+
+void run_concurrent_cases(const Options& options, const Progress& progress, Report& report);
+
+}  // namespace locus::bench::dynamic
+
+#endif  // LOCUS_TESTS_BENCH_DYNAMIC_CONCURRENT_CASES_H_

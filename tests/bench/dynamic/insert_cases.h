@@ -1,0 +1,17 @@
+// The cases insert (all objects into an empty structure) and reinsert (a tenth of them, drawn by seed 9, all removed
+// and then inserted again) of one world, and memory (what a structure holds with everything a caller of ids needs,
+// after the ticks before the queries, one revision alive). One thread.
+#ifndef LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
+#define LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
+
+#include "tests/bench/dynamic/world_run.h"
+
+namespace locus::bench::dynamic {
+
+void run_insert_case(const WorldRun& run);
+void run_reinsert_case(const WorldRun& run);
+void run_memory_case(const WorldRun& run);
+
+}  // namespace locus::bench::dynamic
+
+#endif  // LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_

@@ -1,0 +1,18 @@
+// What a process has taken from malloc and not given back: for cases that count bytes. Any thread.
+#ifndef LOCUS_TESTS_BENCH_FRAME_HEAP_H_
+#define LOCUS_TESTS_BENCH_FRAME_HEAP_H_
+
+#include <malloc.h>
+
+#include <cstdint>
+
+namespace locus::bench {
+
+inline int64_t heap_bytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return static_cast<int64_t>(info.uordblks + info.hblkhd);
+}
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_FRAME_HEAP_H_
