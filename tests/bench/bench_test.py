@@ -23,6 +23,13 @@ CASES = {"ray/incoherent/first": RAYS, "ray/incoherent/any": ANY, "ray/short/fir
          "box/2": BOXES, "box/10": BOXES, "build": {"embree": {"embree_medium"}},
          "memory": {"embree": {"embree_medium"}}}
 
+# The suite dynamic; what stands under "ours" needs no package.
+DYNAMIC_PEERS = {"bullet": {"bullet"}, "boost": {"boost_rtree"}, "nanoflann": {"nanoflann"},
+                 "ours": {"flat_hash_map", "sorted_rebuild"}}
+ONE_SIZE_ONLY = {"boost_rtree", "nanoflann", "flat_hash_map"}
+NOT_ASKED = {"box": {"nanoflann"}, "ray": {"nanoflann", "boost_rtree"}, "reinsert": {"nanoflann", "sorted_rebuild"}}
+KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed")
+
 
 def run(*arguments):
     return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600)
@@ -34,6 +41,20 @@ def expected_cells():
         for case, by_library in CASES.items():
             for library in PEERS & set(by_library):
                 cells |= {(f"{case}/{mesh}", name) for name in by_library[library]}
+    return cells
+
+
+def expected_dynamic_cells():
+    peers = set().union(*(DYNAMIC_PEERS[library] for library in (PEERS | {"ours"}) & set(DYNAMIC_PEERS)))
+    cells = {("growth/ball", "10k"), ("concurrent_moves/3readers/10k", "paced")}
+    cells |= {(f"concurrent_{share}/1reader/10k", peer) for share in ("p50", "p99", "p999")
+              for peer in ("no_writer", "spinning")}
+    cells |= {("unpaced/1reader/10k" + batch, "no_reader") for batch in ("", "/batch100", "/batch10000")}
+    for kind in KINDS:
+        for case in ("move", "ball", "ball_batch", "box", "box_batch", "ray", "ray_batch", "insert", "reinsert", "memory"):
+            left_out = NOT_ASKED.get(case.replace("_batch", ""), set()) | (
+                ONE_SIZE_ONLY if kind in ("giant", "mixed") else set())
+            cells |= {(f"{case}/{kind}/10k", peer) for peer in peers - left_out}
     return cells
 
 
@@ -104,6 +125,37 @@ class BenchTest(unittest.TestCase):
         answer = run("--help")
         self.assertEqual(answer.returncode, 0)
         self.assertIn("locus-bench static --quick", answer.stdout)
+
+
+class DynamicTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "dynamic.json")
+            cls.answer = run("dynamic", "--quick", "--json", path)
+            with open(path, encoding="utf-8") as file:
+                cls.cells = json.load(file)
+
+    def test_everything_agrees_and_gives_the_check_values(self):
+        self.assertEqual(self.answer.returncode, 0, self.answer.stdout + self.answer.stderr)
+        self.assertNotIn("DISAGREEMENT", self.answer.stdout)
+
+    def test_every_expected_cell_is_there_once(self):
+        found = [(cell["case"], cell["peer_name"]) for cell in self.cells]
+        self.assertEqual(len(found), len(set(found)))
+        self.assertEqual(set(found), expected_dynamic_cells())
+
+    def test_cells_have_every_field_and_figures_above_zero(self):
+        for cell in self.cells:
+            self.assertEqual({name: type(value) for name, value in cell.items()}, FIELDS)
+            self.assertEqual(cell["suite"], "dynamic")
+            for field in ("ours", "peer", "ratio"):
+                self.assertTrue(math.isfinite(cell[field]) and cell[field] > 0, cell)
+            self.assertRegex(cell["results_hash"], "^[0-9a-f]{16}$")
+
+    def test_missing_peers_are_said(self):
+        said = self.answer.stdout.count("a peer is missing")
+        self.assertEqual(said, 3 - len(PEERS & {"bullet", "boost", "nanoflann"}))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 #include "tests/bench/dynamic/arena.h"
 
+#include <sys/resource.h>
+
 #include <chrono>
 #include <thread>
 
@@ -12,6 +14,13 @@ constexpr size_t kBatchesApart = 997;     // between what two readers start with
 constexpr size_t kBatchesToACount = 500;  // a reader counts all objects once in so many, outside its latencies
 
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+// How often the kernel took the core away from this thread: what other programs do, not we.
+int64_t times_taken_away() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_nivcsw;
+}
 
 void spin(const std::atomic<bool>& stop) {
   while (!stop.load(std::memory_order_relaxed)) {
@@ -40,10 +49,15 @@ void Arena::write(const Window& window, Seen& seen) {
 
 void Arena::read(size_t first_batch, Seen& seen) const {
   for (size_t i = 0; !stop_; ++i) {
+    const int64_t taken_away = times_taken_away();
     const double start = wall_seconds();
     const SnapshotPtr snapshot = ours_.latest();
     batches_.ask(*snapshot, first_batch + i);
-    seen.latencies.push_back(wall_seconds() - start);
+    const double seconds = wall_seconds() - start;
+    if (times_taken_away() == taken_away)
+      seen.latencies.push_back(seconds);
+    else
+      ++seen.interrupted;
     if (i % kBatchesToACount == 0 && count_objects(*snapshot) != world_.count()) ++seen.wrong_counts;
   }
 }
@@ -61,6 +75,7 @@ Seen Arena::run(const Window& window) {
   for (std::thread& thread : threads) thread.join();
   for (const Seen& one : seen) {
     all.latencies.insert(all.latencies.end(), one.latencies.begin(), one.latencies.end());
+    all.interrupted += one.interrupted;
     all.wrong_counts += one.wrong_counts;
   }
   return all;

@@ -27,7 +27,8 @@ struct Window {
 };
 
 struct Seen {
-  std::vector<double> latencies;  // seconds of each batch of 100 queries, of all readers
+  std::vector<double> latencies;  // seconds of each batch of 100 queries, of all readers, but for the interrupted
+  uint64_t interrupted = 0;       // batches during which the kernel gave the core to somebody else
   double moves_a_second = 0;
   uint64_t wrong_counts = 0;  // revisions that did not hold every object once, of those that were counted
 };

@@ -1,6 +1,6 @@
-#include <boost/function_output_iterator.hpp>
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
+#include <boost/iterator/function_output_iterator.hpp>
 
 #include "tests/bench/dynamic/id_map.h"
 #include "tests/bench/dynamic/peers.h"

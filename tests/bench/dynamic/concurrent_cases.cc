@@ -48,6 +48,12 @@ class Rounds {
     Window timed = window;
     timed.seconds = options_.quick ? 0.05 : 2;
     Seen seen = arena_->run(timed);
+    // Whatever is said of a window without a whole batch would be wrong.
+    if (timed.readers != 0 && seen.latencies.empty()) seen.latencies.push_back(timed.seconds);
+    if (timed.readers == 1) {
+      batches_ += seen.latencies.size();
+      interrupted_ += seen.interrupted;
+    }
     if (seen.wrong_counts != 0)
       report_.disagreements.push_back(absl::StrCat(name_of_case("concurrent"), ": ", seen.wrong_counts,
                                                    " revisions did not hold all objects once"));
@@ -75,6 +81,8 @@ class Rounds {
       const std::string name = name_of_case(absl::StrCat(kShares[k].name, "/1reader"));
       if (options_.filter.wants(name)) add_cells(contestants, times[k], cell(name, "us/batch"), report_);
     }
+    report_.notes.push_back(absl::StrCat(name_of_case("concurrent_p99/1reader"), ": ", interrupted_, " batches beside ",
+                                         batches_, " lost their core to other programs and are left out"));
   }
 
   void run_kept_pace() {
@@ -118,6 +126,7 @@ class Rounds {
   const uint32_t count_;
   Report& report_;
   std::unique_ptr<Arena> arena_;
+  size_t batches_ = 0, interrupted_ = 0;  // of single readers
 };
 
 }  // namespace

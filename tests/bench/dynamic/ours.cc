@@ -3,37 +3,38 @@
 #include <array>
 
 #include "core/base/check.h"
-#include "core/index/index_queries.h"
+#include "core/index/regions.h"
 #include "core/query/run_batch.h"
 
 namespace locus::bench::dynamic {
 namespace {
 
-// Ids of what a region meets exactly.
-template <class Region, class Meets>
-class Ids {
- public:
-  Ids(const Region& region, const Meets& meets, std::vector<uint64_t>& ids)
-      : region_(region), meets_(meets), ids_(ids) {}
-
-  Aabbd bounds() const { return region_.bounds(); }
-  bool overlaps(const Aabbd& box) const { return region_.overlaps(box); }
-  bool visit(const Object& object) {
-    if (meets_(object)) ids_.push_back(object.id);
-    return true;
-  }
-
- private:
-  const Region& region_;
-  const Meets& meets_;
-  std::vector<uint64_t>& ids_;
-};
-
+// Ids of what a region meets; `meets` decides by the shape.
 template <class Region, class Meets>
 void collect(const SceneSnapshot& snapshot, const Region& region, const Meets& meets, std::vector<uint64_t>& ids) {
   Work work;
-  Ids<Region, Meets> visitor(region, meets, ids);
-  snapshot.objects.visit_region(visitor, work);
+  snapshot.objects.grid().visit_region(region.bounds(), work, [&](const GridRef& object) {
+    if (meets(shape_of(object))) ids.push_back(object.entry().id);
+    return true;
+  });
+}
+
+// Up to kRayLength; the lower id wins a tie.
+FirstHit first_of(const SceneSnapshot& snapshot, const ObjectRay& ray) {
+  Work work;
+  double nearest = kRayLength;
+  FirstHit first;
+  snapshot.objects.grid().visit_ray(
+      ray.slabs(), [&nearest] { return nearest; }, work,
+      [&](const GridRef& object) {
+        const std::optional<ShapeHit> hit = ray_hit(ray, shape_of(object));
+        const uint64_t id = object.entry().id;
+        if (!hit || hit->t > nearest || (hit->t == nearest && (!first.found || first.id < id))) return true;
+        nearest = hit->t;
+        first = {id, static_cast<float>(nearest), true};
+        return true;
+      });
+  return first;
 }
 
 absl::Span<const float> numbers_of(const Vec3f& first, size_t count) {
@@ -150,8 +151,7 @@ void Ours::balls(absl::Span<const Vec3f> centers, Answers& answers) {
   each_region(centers, answers, [&](Vec3f center, std::vector<uint64_t>& ids) {
     const Balld ball = {to_double(center), kReach};
     collect(
-        *snapshot_, BallRegion<double>(ball),
-        [&](const Object& object) { return PrimitiveTraits<Object>::ball(object, ball); }, ids);
+        *snapshot_, BallRegion<double>(ball), [&](const Shape& shape) { return ball_overlaps(ball, shape); }, ids);
   });
 }
 
@@ -161,21 +161,13 @@ void Ours::boxes(absl::Span<const Vec3f> centers, Answers& answers) {
     box.center = to_double(center);
     box.half = {kReach, kReach, kReach};
     collect(
-        *snapshot_, BoxRegion<double>(box),
-        [&](const Object& object) { return PrimitiveTraits<Object>::box(object, box); }, ids);
+        *snapshot_, BoxRegion<double>(box), [&](const Shape& shape) { return box_overlaps(box, shape); }, ids);
   });
 }
 
 void Ours::rays(absl::Span<const Rayf> rays, Answers& answers) {
   each_ray(rays, answers, [&](const Rayf& ray) {
-    const ObjectRay prepared({to_double(ray.origin), to_double(ray.direction), kRayLength});
-    Object object;
-    double distance = kRayLength;
-    FirstHit first;
-    first.found = first_ray(snapshot_->objects, prepared, object, distance);
-    first.id = object.id;
-    first.distance = static_cast<float>(distance);
-    return first;
+    return first_of(*snapshot_, ObjectRay({to_double(ray.origin), to_double(ray.direction), kRayLength}));
   });
 }
 

@@ -20,9 +20,9 @@ class Draws {
   float unit() { return static_cast<float>(numbers_.next() >> 40) * 0x1p-24f; }
   Vec3f direction(float z_scale) {
     const float z = 2 * unit() - 1, angle = kAround * unit();
-    const float radius = std::sqrt(std::max(0.0f, 1 - z * z));
+    const float radius = std::sqrt(std::max(0.0f, std::fma(-z, z, 1.0f)));
     const Vec3f d = {radius * std::cos(angle), radius * std::sin(angle), z * z_scale};
-    const float length = std::sqrt(squared_length(d));
+    const float length = std::sqrt(std::fma(d.z, d.z, std::fma(d.x, d.x, d.y * d.y)));
     return length < 1e-6f ? Vec3f{1, 0, 0} : Vec3f{d.x / length, d.y / length, d.z / length};
   }
 
@@ -35,14 +35,14 @@ class Places {
  public:
   Places(Kind kind, Vec3f low, Vec3f high) : draws_(1), kind_(kind), low_(low), size_(high - low) {
     for (Vec3f& town : towns_) {
-      town.x = 100 + 1800 * draws_.unit();
-      town.y = 100 + 1800 * draws_.unit();
+      town.x = std::fma(1800.0f, draws_.unit(), 100.0f);
+      town.y = std::fma(1800.0f, draws_.unit(), 100.0f);
     }
   }
   Vec3f next() {
     if (kind_ == Kind::kClustered && draws_.unit() < 0.8f) return in_town();
     Vec3f place;
-    for (int axis = 0; axis < 3; ++axis) place[axis] = low_[axis] + size_[axis] * draws_.unit();
+    for (int axis = 0; axis < 3; ++axis) place[axis] = std::fma(size_[axis], draws_.unit(), low_[axis]);
     if (kind_ == Kind::kBorder)
       for (int axis = 0; axis < 3; ++axis) place[axis] = std::floor(place[axis] / kStep) * kStep;
     return place;
@@ -52,7 +52,7 @@ class Places {
   Vec3f in_town() {
     const Vec3f town = towns_[draws_.next() % kTowns];
     const float angle = kAround * draws_.unit(), radius = 100 * std::sqrt(draws_.unit());
-    return {town.x + radius * std::cos(angle), town.y + radius * std::sin(angle), 100 * draws_.unit()};
+    return {std::fma(radius, std::cos(angle), town.x), std::fma(radius, std::sin(angle), town.y), 100 * draws_.unit()};
   }
 
   Draws draws_;
@@ -95,7 +95,7 @@ std::vector<float> drawn_radii(Kind kind, uint32_t count) {
 // At an object drawn, moved a little.
 Vec3f near_an_object(const World& world, Draws& draws) {
   Vec3f point = point_at(world.objects().positions, draws.next() % world.count());
-  for (int axis = 0; axis < 3; ++axis) point[axis] += 10 * draws.unit() - 5;
+  for (int axis = 0; axis < 3; ++axis) point[axis] += std::fma(10.0f, draws.unit(), -5.0f);
   return point;
 }
 

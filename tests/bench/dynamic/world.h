@@ -1,9 +1,10 @@
 // The moving objects of the dynamic suite: fixed by a kind, a count and fixed seeds, drawn in a fixed order, so that
 // they can be moved in any server, any time. One thread a world.
 //
-// Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). Everything is float. Seed 1: twenty
-// towns (x and y 100 + 1800 f, drawn whatever the kind), then the objects; seed 2: velocities; seed 5: mixed radii;
-// seed 7: ids, without their highest bit.
+// Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). Everything is float, and a product that
+// something is added to is not rounded before (a fused multiplication). Seed 1: twenty towns (x and y 100 + 1800 f,
+// drawn whatever the kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, without their
+// highest bit.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 

@@ -1,8 +1,8 @@
 #include "tests/bench/static/boost_rtree.h"
 
-#include <boost/function_output_iterator.hpp>
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
+#include <boost/iterator/function_output_iterator.hpp>
 
 #include "tests/bench/static/scalar_overlap.h"
 
