@@ -14,6 +14,8 @@ enum class PlantedBug {
   kUnsignedCellIndex,  // cell indices truncate towards zero instead of flooring
   kUnpaddedNear,       // the near side of the slab test of tree nodes goes without its pad
   kEdgeOnInDouble,     // triangles nearly edge-on are decided in double, like all others
+  kNearestLimit,       // boxes as far as the farthest thing found near a point are left out
+  kNearestTreePad,     // float decides distances to the boxes of triangles without its pad
   // The ray kernels:
   kKernelEdgeBound,   // float decides edges without its error bound
   kKernelTBound,      // float decides t without its error bound

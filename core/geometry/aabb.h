@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "core/base/planted_bug.h"
 #include "core/geometry/vec3.h"
 
 namespace locus {
@@ -71,6 +72,12 @@ template <class S>
 constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
   const Vec3<S> gap = max(max(box.min - point, point - box.max), Vec3<S>{});
   return squared_length(gap);
+}
+
+// The distance up to which boxes are wanted, squared: beyond it squared_distance() has a root that rounds to more.
+inline double squared_limit(double distance) {
+  if (planted(PlantedBug::kNearestLimit)) return distance * distance * (1 - 0x1p-50);
+  return distance * distance * (1 + 0x1p-50);
 }
 
 // The point of the box nearest to `point`, which is `point` itself inside. Not for an empty box.

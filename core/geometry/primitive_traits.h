@@ -10,6 +10,7 @@
 //   position   where a grid files the value: any point within the bounds, fixed for the value
 //   ray        distance >= 0 of the first hit, whatever ray's own end
 //   ball, box  closed solids share a point
+//   distance   from a point in double, 0 inside; only for whoever asks what is near
 //
 // Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (PrimitiveKeyTrait and kin).
 #ifndef LOCUS_CORE_GEOMETRY_PRIMITIVE_TRAITS_H_
@@ -19,8 +20,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/geometry/point_shape.h"
 #include "core/geometry/ray_triangle.h"
-#include "core/geometry/shape.h"
 #include "core/geometry/triangle_overlap.h"
 
 namespace locus {
@@ -53,6 +54,12 @@ concept Primitive = Bounded<Value> &&
   { PrimitiveTraits<Value>::box(value, box) } -> std::same_as<bool>;
 };
 
+// Enough to be asked how far it is.
+template <class Value>
+concept Measurable = Bounded<Value> && requires(const Value& value, const Vec3d& point) {
+  { PrimitiveTraits<Value>::distance(value, point) } -> std::same_as<double>;
+};
+
 template <>
 struct PrimitiveTraits<Triangle> {
   using Scalar = float;
@@ -69,6 +76,7 @@ struct PrimitiveTraits<Triangle> {
   }
   static bool ball(const Triangle& triangle, const Ballf& ball) { return ball_overlaps(ball, triangle); }
   static bool box(const Triangle& triangle, const Obbf& box) { return box_overlaps(box, triangle); }
+  static double distance(const Triangle& triangle, const Vec3d& point) { return locus::distance(point, triangle); }
 };
 
 }  // namespace locus

@@ -32,6 +32,14 @@ concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aab
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
+// Takes candidates around a point. limit(): values whose bounds have a greater squared_distance() from it may be
+// skipped, and only those (not ones that equal it); it may fall during the visit. visit(): false ends the visit.
+template <class Visitor, class Value>
+concept PointVisitor = requires(Visitor& visitor, const Value& value) {
+  { std::as_const(visitor).limit() } -> std::same_as<double>;
+  { visitor.visit(value) } -> std::same_as<bool>;
+};
+
 namespace internal {
 template <class Value>
 struct AnyVisitor {  // stands for every visitor in the concept below
@@ -40,11 +48,16 @@ struct AnyVisitor {  // stands for every visitor in the concept below
   bool overlaps(const Aabb<ScalarOf<Value>>&) const { return false; }
   bool visit(const Value&) { return false; }
 };
+template <class Value>
+struct AnyPointVisitor {
+  double limit() const { return 0; }
+  bool visit(const Value&) { return false; }
+};
 }  // namespace internal
 
 // visit_ray hands over, at least once each and at most once each, all values whose own interval satisfies near <= far,
 // far >= 0 and near <= limit(); roughly near to far; possibly others. visit_region likewise for overlaps(bounds of
-// value).
+// value), and visit_nearest for squared_distance(point, bounds of value) <= limit(), nearer ones roughly first.
 template <class Index>
 concept SpatialIndex = Bounded<typename Index::Value> &&
     requires(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs,
@@ -52,6 +65,9 @@ concept SpatialIndex = Bounded<typename Index::Value> &&
   { index.size() } -> std::same_as<size_t>;
   { index.visit_ray(slabs, visitor, work) } -> std::same_as<void>;
   { index.visit_region(visitor, work) } -> std::same_as<void>;
+} && requires(const Index& index, const Vec3d& point, internal::AnyPointVisitor<typename Index::Value>& visitor,
+              Work& work) {
+  { index.visit_nearest(point, visitor, work) } -> std::same_as<void>;
 };
 
 // insert() of an id that is in the index is a programmer error; remove() and contains() compare ids and take the value

@@ -33,6 +33,7 @@ struct PrimitiveTraits<Object> {
   }
   static bool ball(const Object& object, const Balld& ball) { return ball_overlaps(ball, object.shape); }
   static bool box(const Object& object, const Obbd& box) { return box_overlaps(box, object.shape); }
+  static double distance(const Object& object, const Vec3d& point) { return locus::distance(point, object.shape); }
 };
 
 }  // namespace locus

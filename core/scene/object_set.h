@@ -60,6 +60,13 @@ class ObjectSet {
                        [&visitor](const GridRef& value) { return visitor.visit(object_of(value)); });
   }
 
+  template <PointVisitor<Object> Visitor>
+  void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
+    grid_.visit_nearest(
+        point, [&visitor] { return std::as_const(visitor).limit(); }, work,
+        [&visitor](const GridRef& value) { return visitor.visit(object_of(value)); });
+  }
+
   GridStatistics statistics() const { return grid_.statistics(); }
   // Of objects, bricks and the maps that find them. O(bricks).
   size_t bytes() const;

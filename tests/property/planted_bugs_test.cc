@@ -21,6 +21,10 @@ using Comparison = std::string (*)();
 
 std::string compare_trees_with_list() { return search_all_scenes<Triangle>(200, 200, tree_difference<Triangle>); }
 
+std::string compare_triangle_trees_with_list() {
+  return search_all_scenes<Triangle>(200, 200, triangle_tree_difference);
+}
+
 std::string compare_grids_with_list() {
   return search_grid_scenes(scaled_count(400), any_adversarial_scene, grid_difference);
 }
@@ -58,6 +62,8 @@ constexpr Trial kTrials[] = {
     {"TreeWithUnpaddedNear", PlantedBug::kUnpaddedNear, compare_trees_with_list},
     {"TreeWithStrictTie", PlantedBug::kStrictTie, compare_trees_with_list},
     {"TrianglesEdgeOnDecidedInDouble", PlantedBug::kEdgeOnInDouble, edge_on_difference},
+    {"TreeThatLeavesOutWhatIsAsFar", PlantedBug::kNearestLimit, compare_trees_with_list},
+    {"TreeWithUnpaddedDistances", PlantedBug::kNearestTreePad, compare_triangle_trees_with_list},
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
     {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "core/index/index_queries.h"
 #include "core/index/list/list_index.h"
+#include "core/index/nearest_values.h"
 #include "tests/support/scene_sketch.h"
 
 namespace locus::test {
@@ -43,6 +43,8 @@ class IndexJudge {
     }
     for (size_t i = 0; i < scene.balls.size(); ++i) {
       if (std::string what = ball_difference(scene.balls[i]); !what.empty()) return label(scene, "ball", i) + what;
+      const Vec3d center = to_double(scene.balls[i].center);
+      if (std::string what = point_difference(center); !what.empty()) return label(scene, "centre of ball", i) + what;
     }
     for (size_t i = 0; i < scene.boxes.size(); ++i) {
       if (std::string what = box_difference(scene.boxes[i]); !what.empty()) return label(scene, "box", i) + what;
@@ -73,6 +75,27 @@ class IndexJudge {
     return overlap_difference(exact, conservative);
   }
 
+  // The nearest one and most: without end, up to one of them, and just below that.
+  std::string point_difference(const Vec3d& point) const {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    std::vector<ValueAt<Value>> all;
+    nearest_values(oracle_, point, kInfinity, oracle_.size(), all);
+    std::vector<double> distances = {kInfinity};
+    if (const size_t i = all.size() / 3; i < all.size())
+      distances.insert(distances.end(), {all[i].distance, std::nextafter(all[i].distance, 0.0)});
+    for (const double distance : distances) {
+      for (const size_t count : {size_t{1}, std::min<size_t>(oracle_.size(), 200)}) {
+        std::vector<ValueAt<Value>> got, expected;
+        nearest_values(index_, point, distance, count, got);
+        nearest_values(oracle_, point, distance, count, expected);
+        if (std::string what = nearest_difference(got, expected); !what.empty())
+          return text("nearest ", count, " within ", distance, ": ", what);
+      }
+      if (std::string what = broken_point_contract(point, squared_limit(distance)); !what.empty()) return what;
+    }
+    return "";
+  }
+
   std::string box_difference(const typename Traits::BoxQuery& box) const {
     const auto exact = [&](const auto& index, auto& result) { box_overlap(index, box, result); };
     const auto conservative = [&](const auto& index, auto& result) { conservative_box(index, box, result); };
@@ -81,10 +104,11 @@ class IndexJudge {
 
  private:
   // Keeps the ids it is given; wants boxes up to a fixed limit.
+  template <class Limit>
   class Recorder {
    public:
-    explicit Recorder(S limit) : limit_(limit) {}
-    S limit() const { return limit_; }
+    explicit Recorder(Limit limit) : limit_(limit) {}
+    Limit limit() const { return limit_; }
     bool visit(const Value& value) {
       ids_.push_back(Traits::id(value));
       return true;
@@ -95,7 +119,7 @@ class IndexJudge {
     }
 
    private:
-    S limit_;
+    Limit limit_;
     std::vector<uint64_t> ids_;
   };
 
@@ -170,7 +194,7 @@ class IndexJudge {
     for (size_t i = 0; i < std::min<size_t>(values.size(), 4); ++i) {
       const Interval<S> chosen = ray.slabs().interval(Traits::bounds(values[(turn * 4 + i) % values.size()]));
       const S limit = i == 0 ? std::numeric_limits<S>::infinity() : chosen.near;
-      Recorder recorder(limit);
+      Recorder<S> recorder(limit);
       Work work;
       index_.visit_ray(ray.slabs(), recorder, work);
       const std::vector<uint64_t> ids = recorder.sorted_ids();
@@ -182,6 +206,34 @@ class IndexJudge {
         if (wanted && !std::binary_search(ids.begin(), ids.end(), Traits::id(value)))
           return text("id ", Traits::id(value), " with near ", own.near, " was not handed over up to ", limit);
       }
+    }
+    return "";
+  }
+
+  static std::string nearest_difference(const std::vector<ValueAt<Value>>& got,
+                                        const std::vector<ValueAt<Value>>& expected) {
+    if (got.size() != expected.size()) return text(got.size(), " values, but the list says ", expected.size());
+    for (size_t i = 0; i < got.size(); ++i) {
+      const auto id = Traits::id(got[i].value), expected_id = Traits::id(expected[i].value);
+      if (got[i].distance != expected[i].distance || id != expected_id)
+        return text("number ", i, ": ", got[i].distance, " id ", id, ", but the list says ", expected[i].distance,
+                    " id ", expected_id);
+    }
+    return "";
+  }
+
+  // Values are wanted whose bounds are as far as the limit, and no farther.
+  std::string broken_point_contract(const Vec3d& point, double limit) const {
+    Recorder<double> recorder(limit);
+    Work work;
+    index_.visit_nearest(point, recorder, work);
+    const std::vector<uint64_t> ids = recorder.sorted_ids();
+    if (std::adjacent_find(ids.begin(), ids.end()) != ids.end()) return "a value near a point was handed over twice";
+    if (work.tests != ids.size()) return text("counted ", work.tests, " tests for ", ids.size(), " values");
+    for (const Value& value : oracle_.values()) {
+      const double away = squared_distance(point, to_double(Traits::bounds(value)));
+      if (away <= limit && !std::binary_search(ids.begin(), ids.end(), Traits::id(value)))
+        return text("id ", Traits::id(value), " as far as ", away, " was not handed over up to ", limit);
     }
     return "";
   }

@@ -41,6 +41,10 @@ class ObjectGrid {
   void visit_region(Visitor& visitor, Work& work) const {
     set_.visit_region(visitor, work);
   }
+  template <PointVisitor<Object> Visitor>
+  void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
+    set_.visit_nearest(point, visitor, work);
+  }
 
  private:
   ObjectStore store_;

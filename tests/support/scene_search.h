@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/index/bvh/bvh.h"
+#include "core/index/bvh/triangle_bvh.h"
 #include "tests/support/adversarial_scenes.h"
 #include "tests/support/index_judge.h"
 #include "tests/support/test_scale.h"
@@ -45,6 +46,12 @@ std::string tree_difference(const TestScene<V>& scene) {
     if (!what.empty()) return std::to_string(bins) + " bins, " + what;
   }
   return "";
+}
+
+// The same for the tree over a mesh's triangles.
+inline std::string triangle_tree_difference(const TestScene<Triangle>& scene) {
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(scene.values);
+  return tree.ok() ? first_difference(*tree, scene) : tree.status().ToString();
 }
 
 }  // namespace locus::test

@@ -65,6 +65,11 @@ class Bvh {
   template <RegionVisitor<V> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
+  // Nearest boxes first; hands over only values whose own bounds are within the limit. Allocates only where more than
+  // sixteen nodes wait.
+  template <PointVisitor<V> Visitor>
+  void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
+
   // A ray's way from value to value, for those who cannot answer a visitor at once. Borrows the tree. One thread at a
   // time.
   class RayWalk {
@@ -198,6 +203,41 @@ void Bvh<V>::visit_region(Visitor& visitor, Work& work) const {
       if (!visitor.overlaps(Traits::bounds(value))) continue;
       ++work.tests;
       if (!visitor.visit(value)) return;
+    }
+  }
+}
+
+template <Bounded V>
+template <PointVisitor<V> Visitor>
+void Bvh<V>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
+  struct Waiting {
+    BvhChild child;
+    double away;
+  };
+  absl::InlinedVector<Waiting, 16> waiting(nodes_.empty() ? 0 : 1, Waiting{{0, 0}, 0});
+  while (!waiting.empty()) {
+    const Waiting now = waiting.back();
+    waiting.pop_back();
+    // The limit may have fallen since the push.
+    if (now.away > visitor.limit()) continue;
+    if (now.child.is_leaf()) {
+      for (const V& value : values().subspan(now.child.first, now.child.count)) {
+        if (squared_distance(point, to_double(Traits::bounds(value))) > visitor.limit()) continue;
+        ++work.tests;
+        if (!visitor.visit(value)) return;
+      }
+      continue;
+    }
+    ++work.nodes;
+    const BvhNode<S>& node = nodes_[now.child.first];
+    const size_t base = waiting.size();
+    for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+      const double away = squared_distance(point, to_double(node.bounds[slot]));
+      if (away > visitor.limit()) continue;
+      size_t place = waiting.size();
+      waiting.emplace_back();
+      for (; place > base && waiting[place - 1].away < away; --place) waiting[place] = waiting[place - 1];
+      waiting[place] = {node.children[slot], away};
     }
   }
 }

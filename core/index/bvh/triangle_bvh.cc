@@ -95,6 +95,18 @@ Interval<float> TriangleBvh::node_interval(const SlabRay<float>& slabs, const Aa
   return result;
 }
 
+TriangleBvh::Pending* TriangleBvh::push_near(const TriangleNode& node, const float (&away)[kTreeWidth], float limit,
+                                             Pending* top) {
+  Pending* const base = top;
+  for (int slot = 0; slot < kTreeWidth; ++slot) {
+    if (away[slot] > limit || node.child[slot] == kNoChild) continue;
+    Pending* place = top++;
+    for (; place > base && place[-1].near < away[slot]; --place) *place = place[-1];
+    *place = {node.child[slot], away[slot]};
+  }
+  return top;
+}
+
 TriangleBvh::Pending* TriangleBvh::push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit,
                                             Pending* top) const {
   Pending* const base = top;

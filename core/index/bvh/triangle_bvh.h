@@ -13,6 +13,7 @@
 #include "absl/types/span.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/triangle.h"
+#include "core/index/bvh/box_distances.h"
 #include "core/index/bvh/bvh_build.h"
 #include "core/index/bvh/triangle_tree.h"
 #include "core/index/bvh/triangle_writer.h"
@@ -61,6 +62,10 @@ class TriangleBvh {
   template <RegionVisitor<Triangle> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
+  // Nearest boxes first, by distances in float that never exceed the true ones. Allocates nothing.
+  template <PointVisitor<Triangle> Visitor>
+  void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
+
  private:
   struct Pending {
     uint32_t child;
@@ -74,6 +79,8 @@ class TriangleBvh {
             {node.bounds[3][slot], node.bounds[4][slot], node.bounds[5][slot]}};
   }
   Interval<float> node_interval(const SlabRay<float>& slabs, const Aabbf& box) const;
+  // Puts the children within the limit on the stack, farthest first. Returns the new top.
+  static Pending* push_near(const TriangleNode& node, const float (&away)[kTreeWidth], float limit, Pending* top);
   // Puts the children the ray may hit on the stack, farthest first. Returns the new top.
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
 
@@ -148,6 +155,42 @@ void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
       if (!visitor.overlaps(bounds_of(candidate))) continue;
       ++work.tests;
       if (!visitor.visit(candidate)) return;
+    }
+  }
+}
+
+template <PointVisitor<Triangle> Visitor>
+void TriangleBvh::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
+  if (size() == 0) return;
+  const BoxDistances distances(point);
+  Pending stack[kTreeStack];
+  Pending* top = stack;
+  *top++ = {0, 0};
+  double limit = visitor.limit();
+  float near = distances.limit(limit);
+  const auto update_limit = [&] {
+    if (visitor.limit() == limit) return;
+    limit = visitor.limit();
+    near = distances.limit(limit);
+  };
+  float away[kTreeWidth];
+  while (top != stack) {
+    const Pending now = *--top;
+    if (now.near > near) continue;
+    if ((now.child & kBlockBit) == 0) {
+      ++work.nodes;
+      const TriangleNode& node = arrays_.nodes[now.child];
+      distances.to_boxes(node.bounds, away);
+      top = push_near(node, away, near, top);
+      continue;
+    }
+    const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];
+    distances.to_triangles(block.vertices, away);
+    for (uint32_t place = 0; place < block.count; ++place) {
+      if (away[place] > near) continue;
+      ++work.tests;
+      if (!visitor.visit(triangle(block, place))) return;
+      update_limit();
     }
   }
 }

@@ -49,6 +49,13 @@ inline double cull_margin(const Brick& brick) {
   return double{kCullSlack} * (coordinate + reach) + kBoundsGrowth * (magnitude + reach);
 }
 
+// Contains the bounds of every value of the brick, of which none extends farther than `reach` from its position.
+inline Aabbd box_of_values(const Brick& brick, double reach) {
+  const BrickPlace& place = brick.place;
+  const double half = place.edge / 2 + reach;
+  return grown(Aabbd{place.center, place.center}, half + kBoundsGrowth * (max_component(abs(place.center)) + half));
+}
+
 inline GridBox cull_box_of(const Brick& brick, const Aabbd& region) {
   const double margin = cull_margin(brick);
   GridBox box;

@@ -66,6 +66,12 @@ class GridSnapshot {
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
 
+  // visit(GridRef) for every value whose bounds have a squared_distance() from `point` of at most limit(), and for
+  // others near it; on each level the nearest bricks first. limit() may fall meanwhile; false ends the visit. Cost: a
+  // look at every brick, and the cells within the limit.
+  template <class Limit, class Visit>
+  void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
+
   // visit(GridRef) for each value, until it returns false, which is then returned.
   template <class Visit>
   bool for_each(const Visit& visit) const;
@@ -220,6 +226,34 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, const Sla
       return false;
   }
   return true;
+}
+
+template <class Limit, class Visit>
+void GridSnapshot::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
+  const GridKernels& kernels = active_grid_kernels();
+  absl::InlinedVector<std::pair<double, const internal::Brick*>, 32> near;
+  for (const internal::GridLevel& level : levels_) {
+    near.clear();
+    level.table->for_each([&](uint32_t number) {
+      ++work.cells;
+      const internal::Brick& brick = *bricks_[number];
+      const double away = squared_distance(point, internal::box_of_values(brick, level.extent.reach));
+      if (away <= limit()) near.emplace_back(away, &brick);
+      return true;
+    });
+    std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [away, brick] : near) {
+      if (away > limit()) break;
+      // Whatever is within the limit reaches into this box: its margin is that of squares and roots.
+      const double half = std::sqrt(limit()) * (1 + 0x1p-40) + 0x1p-40 * max_component(abs(point)) + 0x1p-530;
+      const Aabbd region = grown(Aabbd{point, point}, half);
+      const internal::KeyRange cells = internal::within_brick(internal::cells_near(level, region), brick->place.key);
+      const GridBox box = internal::cull_box_of(*brick, region);
+      const auto cull = [&](const GridRows& rows, uint32_t* slots) { return kernels.cull_box(rows, box, slots); };
+      if (!internal::scan_cells(*brick, cells, work, cull, visit) || !internal::scan_recent(*brick, work, cull, visit))
+        return;
+    }
+  }
 }
 
 template <class Visit>

@@ -62,6 +62,11 @@ class ListIndex {
     visit_all(visitor, work);
   }
 
+  template <PointVisitor<V> Visitor>
+  void visit_nearest(const Vec3d&, Visitor& visitor, Work& work) const {
+    visit_all(visitor, work);
+  }
+
  private:
   template <class Visitor>
   void visit_all(Visitor& visitor, Work& work) const {

@@ -1,0 +1,63 @@
+// Squared distances from a point to eight boxes or triangles' boxes at once, in float, for culling: with a limit made
+// for it, a box is beyond the limit in float only where it is beyond it in double. Plain loops over eight numbers side
+// by side, which compilers turn into vector instructions. Immutable.
+#ifndef LOCUS_CORE_INDEX_BVH_BOX_DISTANCES_H_
+#define LOCUS_CORE_INDEX_BVH_BOX_DISTANCES_H_
+
+#include <cmath>
+#include <limits>
+
+#include "core/base/planted_bug.h"
+#include "core/geometry/vec3.h"
+#include "core/index/bvh/triangle_tree.h"
+
+namespace locus {
+
+class BoxDistances {
+ public:
+  explicit BoxDistances(const Vec3d& point)
+      : x_(static_cast<float>(point.x)),
+        y_(static_cast<float>(point.y)),
+        z_(static_cast<float>(point.z)),
+        // Rounding the point moves it by less than 2^-24 sqrt(3) of its largest coordinate.
+        pad_(planted(PlantedBug::kNearestTreePad) ? 0 : 0x1p-23 * max_component(abs(point))) {}
+
+  // For a limit of squared distances in double. Gaps, squares and sums round by less than 2^-22 of the distance.
+  float limit(double squared) const {
+    const double raised = std::sqrt(squared) * (1 + kRounding) + pad_;
+    const double result = raised * raised * (1 + kRounding);
+    // Squares below this are no longer floats of full precision.
+    constexpr double kLeast = 0x1p-100, kMost = std::numeric_limits<float>::max();
+    return result > kMost ? std::numeric_limits<float>::infinity() : static_cast<float>(std::max(result, kLeast));
+  }
+
+  void to_boxes(const float (&bounds)[6][kTreeWidth], float (&away)[kTreeWidth]) const {
+    for (int i = 0; i < kTreeWidth; ++i)
+      away[i] = squared(gap(x_, bounds[0][i], bounds[3][i]), gap(y_, bounds[1][i], bounds[4][i]),
+                        gap(z_, bounds[2][i], bounds[5][i]));
+  }
+
+  void to_triangles(const float (&v)[9][kTreeWidth], float (&away)[kTreeWidth]) const {
+    for (int i = 0; i < kTreeWidth; ++i)
+      away[i] = squared(gap(x_, least(v[0][i], v[3][i], v[6][i]), most(v[0][i], v[3][i], v[6][i])),
+                        gap(y_, least(v[1][i], v[4][i], v[7][i]), most(v[1][i], v[4][i], v[7][i])),
+                        gap(z_, least(v[2][i], v[5][i], v[8][i]), most(v[2][i], v[5][i], v[8][i])));
+  }
+
+ private:
+  static constexpr double kRounding = 0x1p-21;
+
+  static float lesser(float a, float b) { return a < b ? a : b; }
+  static float greater(float a, float b) { return a > b ? a : b; }
+  static float least(float a, float b, float c) { return lesser(lesser(a, b), c); }
+  static float most(float a, float b, float c) { return greater(greater(a, b), c); }
+  static float gap(float at, float low, float high) { return greater(greater(low - at, at - high), 0.0f); }
+  static float squared(float x, float y, float z) { return x * x + y * y + z * z; }
+
+  float x_, y_, z_;
+  double pad_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_BOX_DISTANCES_H_

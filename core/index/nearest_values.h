@@ -1,0 +1,87 @@
+// What is nearest to a point, written once for every structure: exactly, by the values' own distances in double.
+// Answers are the same for all structures.
+#ifndef LOCUS_CORE_INDEX_NEAREST_VALUES_H_
+#define LOCUS_CORE_INDEX_NEAREST_VALUES_H_
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "core/index/index_queries.h"
+
+namespace locus {
+
+template <Measurable V>
+struct ValueAt {
+  double distance;
+  V value;
+
+  // Order: by distance, then by id.
+  friend bool operator<(const ValueAt& a, const ValueAt& b) {
+    if (a.distance != b.distance) return a.distance < b.distance;
+    return PrimitiveTraits<V>::id(a.value) < PrimitiveTraits<V>::id(b.value);
+  }
+};
+
+// The visitor behind nearest_values(): keeps what was appended as a heap with the farthest on top. One thread, one
+// query.
+template <Measurable V>
+class NearestValuesVisitor {
+ public:
+  NearestValuesVisitor(const Vec3d& point, double max_distance, size_t max_values, std::vector<ValueAt<V>>& result)
+      : point_(point),
+        max_distance_(max_distance),
+        limit_(squared_limit(max_distance)),
+        max_values_(max_values),
+        begin_(static_cast<ptrdiff_t>(result.size())),
+        result_(result) {}
+
+  double limit() const { return limit_; }
+  bool visit(const V& value) {
+    if (max_values_ == 0) return false;
+    const ValueAt<V> found = {PrimitiveTraits<V>::distance(value, point_), value};
+    if (found.distance <= max_distance_) add(found);
+    return true;
+  }
+
+  // Sorts what was appended. The visitor is done after it.
+  void finish() { std::sort_heap(result_.begin() + begin_, result_.end()); }
+
+ private:
+  bool full() const { return result_.size() - static_cast<size_t>(begin_) == max_values_; }
+  void add(const ValueAt<V>& found) {
+    const auto first = result_.begin() + begin_;
+    if (full()) {
+      if (!(found < *first)) return;
+      std::pop_heap(first, result_.end());
+      result_.back() = found;
+    } else {
+      result_.push_back(found);
+    }
+    std::push_heap(result_.begin() + begin_, result_.end());
+    if (full()) limit_ = squared_limit(result_[static_cast<size_t>(begin_)].distance);
+  }
+
+  const Vec3d point_;
+  const double max_distance_;
+  double limit_;
+  const size_t max_values_;
+  const ptrdiff_t begin_;
+  std::vector<ValueAt<V>>& result_;
+};
+
+// Appends the `max_values` values nearest to `point` within `max_distance`, both ends included, ascending by (distance,
+// id). `work`, where given, is added to. Cost: that of the structure's visit, and O(log max_values) for each value
+// kept.
+template <SpatialIndex Index>
+void nearest_values(const Index& index, const Vec3d& point, double max_distance, size_t max_values,
+                    std::vector<ValueAt<typename Index::Value>>& result, Work* work = nullptr) {
+  internal::WorkSink sink(work);
+  NearestValuesVisitor<typename Index::Value> visitor(point, max_distance, max_values, result);
+  index.visit_nearest(point, visitor, sink.get());
+  visitor.finish();
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_NEAREST_VALUES_H_

@@ -1,0 +1,108 @@
+#include "core/index/nearest_values.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/index/bvh/bvh.h"
+#include "core/index/list/list_index.h"
+#include "tests/support/object_grid.h"
+
+namespace locus::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Object ball_at(Id id, double x, float radius = 1) {
+  Object object;
+  object.id = id;
+  object.shape.kind = ShapeKind::kBall;
+  object.shape.position = {x, 0, 0};
+  object.shape.radius = radius;
+  return object;
+}
+
+// Every query must do the same for every structure.
+template <class Index>
+class NearestValuesTest : public ::testing::Test {
+ protected:
+  static Index make(const std::vector<Object>& objects) {
+    if constexpr (MutableSpatialIndex<Index>) {
+      Index index;
+      for (const Object& object : objects) index.insert(object);
+      return index;
+    } else {
+      return *Index::build(objects);
+    }
+  }
+
+  static std::vector<Id> nearest(const Index& index, double max_distance, size_t count) {
+    std::vector<ValueAt<Object>> found;
+    nearest_values(index, Vec3d{}, max_distance, count, found);
+    std::vector<Id> ids;
+    for (const ValueAt<Object>& at : found) ids.push_back(at.value.id);
+    return ids;
+  }
+};
+
+using Structures = ::testing::Types<ListIndex<Object>, Bvh<Object>, ObjectGrid>;
+TYPED_TEST_SUITE(NearestValuesTest, Structures);
+
+TYPED_TEST(NearestValuesTest, AscendByDistanceThenId) {
+  const auto index = this->make({ball_at(9, 30), ball_at(2, -10), ball_at(5, 20), ball_at(1, -30), ball_at(8, 10)});
+  EXPECT_THAT(this->nearest(index, kInfinity, 100), ElementsAre(2, 8, 5, 1, 9));
+  EXPECT_THAT(this->nearest(index, kInfinity, 2), ElementsAre(2, 8));
+  EXPECT_THAT(this->nearest(index, kInfinity, 4), ElementsAre(2, 8, 5, 1));
+  EXPECT_THAT(this->nearest(index, kInfinity, 0), IsEmpty());
+}
+
+TYPED_TEST(NearestValuesTest, TheMaximumDistanceIsIncluded) {
+  const auto index = this->make({ball_at(2, 10), ball_at(5, 20)});
+  EXPECT_THAT(this->nearest(index, 19, 9), ElementsAre(2, 5));
+  EXPECT_THAT(this->nearest(index, std::nextafter(19.0, 0.0), 9), ElementsAre(2));
+  EXPECT_THAT(this->nearest(index, 0, 9), IsEmpty());
+}
+
+TYPED_TEST(NearestValuesTest, SolidsAroundThePointAreAtZero) {
+  const auto index = this->make({ball_at(3, 10, 30), ball_at(2, 10, 10), ball_at(5, 20)});
+  std::vector<ValueAt<Object>> found;
+  nearest_values(index, Vec3d{}, 0, 9, found);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].value.id, 2u);
+  EXPECT_EQ(found[0].distance, 0);
+  EXPECT_EQ(found[1].value.id, 3u);
+  EXPECT_EQ(found[1].distance, 0);
+}
+
+TYPED_TEST(NearestValuesTest, AnEmptyIndexHasNothingNear) {
+  EXPECT_THAT(this->nearest(this->make({}), kInfinity, 3), IsEmpty());
+}
+
+TYPED_TEST(NearestValuesTest, ResultsAreAppendedAndWorkIsAdded) {
+  const auto index = this->make({ball_at(2, 10)});
+  std::vector<ValueAt<Object>> found = {{0, ball_at(7, 0)}};
+  Work work;
+  work.tests = 100;
+  nearest_values(index, Vec3d{}, kInfinity, 1, found, &work);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].value.id, 7u);
+  EXPECT_EQ(found[1].value.id, 2u);
+  EXPECT_EQ(found[1].distance, 9);
+  EXPECT_EQ(work.tests, 101u);
+}
+
+TEST(NearestWorkTest, TreesLookAtLittleMoreThanWhatIsNear) {
+  std::vector<Object> objects;
+  for (Id id = 1; id <= 4096; ++id) objects.push_back(ball_at(id, 4.0 * static_cast<double>(id)));
+  const Bvh<Object> tree = *Bvh<Object>::build(objects);
+  std::vector<ValueAt<Object>> found;
+  Work work;
+  nearest_values(tree, Vec3d{8000, 3, 0}, kInfinity, 4, found, &work);
+  EXPECT_EQ(found.size(), 4u);
+  EXPECT_LE(work.tests, 32u);
+}
+
+}  // namespace
+}  // namespace locus::test
