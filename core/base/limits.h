@@ -39,6 +39,7 @@ inline constexpr uint32_t kMaxQueries = 65536;             // per query batch, a
 inline constexpr uint32_t kMaxIgnoredIds = 64;             // per block
 inline constexpr uint32_t kDefaultMaxResults = 1024;       // per query
 inline constexpr uint32_t kMaxMaxResults = 1u << 20;       // per query
+inline constexpr uint32_t kMaxNearest = 65536;             // k of a query for what is nearest
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;  // clients refuse 4 MiB by default
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
@@ -60,6 +61,7 @@ inline constexpr uint32_t kMaxPageSize = 1000;  // scenes or meshes a page
 
 static_assert(kMaxBlocks <= kMaxQueries);
 static_assert(kDefaultMaxResults <= kMaxMaxResults);
+static_assert(kMaxNearest <= kMaxMaxResults);
 static_assert(kDefaultReplyBytes < 4u << 20, "clients refuse messages over 4 MiB by default");
 static_assert(kDefaultReplyBytes <= kMaxReplyBytes);
 static_assert(kMaxInstances <= kMaxBvhValues);

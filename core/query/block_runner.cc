@@ -109,6 +109,18 @@ void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   append_runs(answer, i);
 }
 
+void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
+  const NearestRequest request = nearest_request(block_, nearest, i);
+  std::vector<Hit> rows;
+  if (!task_.ended()) rows = run_nearest(task_, request, Filter(block_, i));
+  const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
+  for (const Hit& row : absl::MakeConstSpan(rows).subspan(0, kept)) {
+    append_row(row, columns_, result_);
+    append_nearest_point(request, block_.frame, row, columns_, result_);
+  }
+  count_rows(kept, kept < rows.size(), i);
+}
+
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
   if (lookup.groups.empty()) return append_row(look_up(task_.snapshot(), lookup.ids[i]), columns_, result_);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];

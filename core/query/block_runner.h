@@ -25,6 +25,7 @@ class BlockRunner {
   void run_query(const BallColumns& balls, size_t i);
   void run_query(const BoxColumns& boxes, size_t i);
   void run_query(const LookupColumns& lookup, size_t i);
+  void run_query(const NearestColumns& nearest, size_t i);
   void append_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i);
   void append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest& request);
   void append_runs(const OverlapAnswer& answer, size_t i);

@@ -4,6 +4,8 @@
 #ifndef LOCUS_CORE_QUERY_PLACED_TRIANGLE_H_
 #define LOCUS_CORE_QUERY_PLACED_TRIANGLE_H_
 
+#include <array>
+
 #include "core/scene/instance.h"
 
 namespace locus {
@@ -20,10 +22,17 @@ class PlacedTriangles {
   const Instance& instance() const { return instance_; }
   Aabbf everything() const { return instance_.mesh->tree().bounds(); }
 
-  Aabbd bounds_of_triangle(const Triangle& triangle) const {
+  using Corners = std::array<Vec3d, 3>;
+  Corners corners_of(const Triangle& triangle) const {
+    const Transform& transform = instance_.transform;
+    return {transform.point_to_world(to_double(triangle.a)), transform.point_to_world(to_double(triangle.b)),
+            transform.point_to_world(to_double(triangle.c))};
+  }
+
+  Aabbd bounds_of_triangle(const Triangle& triangle) const { return bounds_of_corners(corners_of(triangle)); }
+  Aabbd bounds_of_corners(const Corners& corners) const {
     Aabbd bounds;
-    for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
-      bounds = merge(bounds, instance_.transform.point_to_world(to_double(vertex)));
+    for (const Vec3d corner : corners) bounds = merge(bounds, corner);
     return grown(bounds, margin_);
   }
 

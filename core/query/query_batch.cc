@@ -76,6 +76,15 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
+  // Numbers from 0 to infinity.
+  absl::Status check_reaches(absl::Span<const float> numbers, absl::string_view field) const {
+    for (size_t i = 0; i < numbers.size(); ++i) {
+      if (std::isnan(numbers[i])) return wrong(Reason::kNotFinite, field, i, "must be a number");
+      if (numbers[i] < 0) return wrong(Reason::kOutOfRange, field, i, "must not be negative");
+    }
+    return absl::OkStatus();
+  }
+
   absl::Status wrong(Reason reason, absl::string_view field, size_t index, absl::string_view message) const {
     return refuse_argument(reason, name(field), static_cast<uint32_t>(index), message);
   }
@@ -95,10 +104,7 @@ class BlockCheck {
       return s;
     if (absl::Status s = check_length(rays.t_max.size(), 1, ColumnNeed::kOptional, "rays.t_max"); !s.ok()) return s;
     if (absl::Status s = check_points(rays.origins, "rays.origins"); !s.ok()) return s;
-    for (size_t i = 0; i < rays.t_max.size(); ++i) {
-      if (std::isnan(rays.t_max[i])) return wrong(Reason::kNotFinite, "rays.t_max", i, "must be a number");
-      if (rays.t_max[i] < 0) return wrong(Reason::kOutOfRange, "rays.t_max", i, "must not be negative");
-    }
+    if (absl::Status s = check_reaches(rays.t_max, "rays.t_max"); !s.ok()) return s;
     return check_directions(rays.directions);
   }
 
@@ -131,6 +137,17 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
+  absl::Status check_kind(const NearestColumns& nearest) const {
+    if (absl::Status s = check_length(nearest.points.size(), 3, ColumnNeed::kEach, "nearest.points"); !s.ok()) return s;
+    if (absl::Status s = check_length(nearest.max_distances.size(), 1, ColumnNeed::kOptional, "nearest.max_distances");
+        !s.ok())
+      return s;
+    if (nearest.count > limits::kMaxNearest)
+      return refuse_limit(name("nearest.k"), "nearest", limits::kMaxNearest, nearest.count);
+    if (absl::Status s = check_points(nearest.points, "nearest.points"); !s.ok()) return s;
+    return check_reaches(nearest.max_distances, "nearest.max_distances");
+  }
+
   absl::Status check_kind(const LookupColumns& lookup) const {
     if (lookup.ids.empty() == lookup.groups.empty())
       return refuse_argument(Reason::kMalformed, name("lookup"), {}, "give ids or groups, one of them");
@@ -150,6 +167,7 @@ struct CountQueries {
   size_t operator()(const RayColumns& rays) const { return rays.origins.size() / 3; }
   size_t operator()(const BallColumns& balls) const { return balls.centers.size() / 3; }
   size_t operator()(const BoxColumns& boxes) const { return boxes.centers.size() / 3; }
+  size_t operator()(const NearestColumns& nearest) const { return nearest.points.size() / 3; }
   size_t operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? lookup.ids.size() : lookup.groups.size();
   }

@@ -70,6 +70,13 @@ struct BoxColumns {
   StaticDetail detail = StaticDetail::kInstances;
 };
 
+struct NearestColumns {
+  absl::Span<const float> points;         // 3N
+  absl::Span<const float> max_distances;  // [+inf], >= 0
+  uint32_t count = 0;                     // rows a query, at most [1]
+  StaticDetail detail = StaticDetail::kInstances;
+};
+
 // Either ids (one row each) or groups (counts and rows).
 struct LookupColumns {
   absl::Span<const uint64_t> ids;
@@ -80,13 +87,13 @@ struct QueryBlock {
   Vec3d frame;
   Source source = Source::kBoth;
   Precision precision = Precision::kExact;
-  ColumnSet columns;                         // [T, ID, TRIANGLE for rays; ID for the rest]
+  ColumnSet columns;                         // [by the kind]
   absl::Span<const uint32_t> masks;          // [all]
   absl::Span<const uint64_t> ignore_groups;  // [0 = none]
   absl::Span<const uint64_t> ignore_ids;     // for the whole block
   uint32_t max_results = 0;                  // [limits::kDefaultMaxResults]
   Id after_id = kNoId;                       // overlaps: only ids above it
-  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns> kind;
+  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns> kind;
 };
 
 struct QueryBatch {

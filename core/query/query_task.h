@@ -103,6 +103,13 @@ class QueryTask {
     else
       index.visit_region(visitor, work_);
   }
+  template <class Index, class Visitor>
+  void visit_nearest(const Index& index, const Vec3d& point, Visitor& visitor) {
+    if (brute_force_)
+      visit_all(index, visitor);
+    else
+      index.visit_nearest(point, visitor, work_);
+  }
 
   // The same of the scene's objects, which visitors take by reference.
   template <class Visitor>
@@ -113,6 +120,15 @@ class QueryTask {
     else
       snapshot_.objects.grid().visit_ray(
           slabs, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
+  }
+  template <class Visitor>
+  void visit_objects_near(const Vec3d& point, Visitor& visitor) {
+    const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
+    if (brute_force_)
+      snapshot_.objects.grid().for_each(visit);
+    else
+      snapshot_.objects.grid().visit_nearest(
+          point, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
   }
   template <class Visitor>
   void visit_objects_in_region(Visitor& visitor) {

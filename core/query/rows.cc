@@ -27,6 +27,10 @@ struct ServedColumns {
   }
   ColumnSet operator()(const BallColumns&) const { return overlap(); }
   ColumnSet operator()(const BoxColumns&) const { return overlap(); }
+  ColumnSet operator()(const NearestColumns&) const {
+    return {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+  }
   ColumnSet operator()(const LookupColumns&) const {
     return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
   }
@@ -42,6 +46,7 @@ struct DefaultColumns {
   }
   ColumnSet operator()(const BallColumns& balls) const { return overlap(balls.detail); }
   ColumnSet operator()(const BoxColumns& boxes) const { return overlap(boxes.detail); }
+  ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
   ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
   static ColumnSet overlap(StaticDetail detail) {
     if (detail == StaticDetail::kInstances) return {Column::kId};
@@ -57,6 +62,7 @@ struct LayoutOf {
   }
   RowLayout operator()(const BallColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const BoxColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const NearestColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? RowLayout::kDense : RowLayout::kCounted;
   }
@@ -175,6 +181,13 @@ void append_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Wind
   if (!columns.has(Column::kPoint)) return;
   Vec3f point;
   if (hit.id != kNoId) point = to_float(request.origin - frame + request.direction * double{hit.t});
+  append_point(result.points, point.x, point.y, point.z);
+}
+
+void append_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& row, ColumnSet columns,
+                          BlockResult& result) {
+  if (!columns.has(Column::kPoint)) return;
+  const Vec3f point = to_float(request.point - frame + nearest_offset(request, row));
   append_point(result.points, point.x, point.y, point.z);
 }
 

@@ -4,6 +4,7 @@
 
 #include "absl/strings/string_view.h"
 #include "core/query/hit.h"
+#include "core/query/nearest_query.h"
 #include "core/query/query_batch.h"
 #include "core/query/ray_query.h"
 #include "core/query/run_batch.h"
@@ -40,6 +41,10 @@ void append_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, 
 // Writes what only hits of rays have: uv, normal and point, the latter relative to the frame.
 void append_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, ColumnSet columns,
                     BlockResult& result);
+
+// Writes the point of a row of what is nearest, relative to the frame, where it is wanted.
+void append_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& row, ColumnSet columns,
+                          BlockResult& result);
 
 // Appends the first `rows` rows of `from`; both have the columns `columns`.
 void append_rows(const BlockResult& from, size_t first_row, size_t rows, ColumnSet columns, BlockResult& to);

@@ -1,4 +1,4 @@
-// CONSERVATIVE finds all that EXACT finds, and no later along a ray.
+// CONSERVATIVE finds all that EXACT finds, no later along a ray and no farther from a point.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -18,6 +18,11 @@ std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock block, Pre
   block.settings.columns = {Column::kId, Column::kTriangle};
   if (auto* rays = std::get_if<RayColumns>(&block.settings.kind); rays != nullptr) {
     rays->mode = RayMode::kAll;
+    block.settings.columns.add(Column::kT);
+  }
+  if (auto* nearest = std::get_if<NearestColumns>(&block.settings.kind); nearest != nullptr) {
+    nearest->detail = StaticDetail::kTriangles;
+    nearest->count = limits::kMaxNearest;
     block.settings.columns.add(Column::kT);
   }
   const BlockResult result = run_block(snapshot, block);

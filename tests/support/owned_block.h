@@ -15,9 +15,9 @@ namespace locus::test {
 // `settings` holds everything but columns; its kind says which of the columns below are meant.
 struct OwnedBlock {
   QueryBlock settings;
-  std::vector<float> points;  // origins or centres
+  std::vector<float> points;  // origins, centres or points
   std::vector<float> sizes;   // directions, radii or half extents
-  std::vector<float> extras;  // t_max or rotations
+  std::vector<float> extras;  // t_max, rotations or greatest distances
   std::vector<uint64_t> ids;  // of lookups
   std::vector<uint64_t> groups;
   std::vector<uint32_t> masks;
@@ -64,6 +64,10 @@ struct OwnedBlock {
     boxes.centers = points;
     boxes.half_extents = sizes;
     boxes.rotations = extras;
+  }
+  void fill(NearestColumns& nearest) const {
+    nearest.points = points;
+    nearest.max_distances = extras;
   }
   void fill(LookupColumns& lookup) const {
     lookup.ids = ids;

@@ -45,7 +45,7 @@ class QueryOracle {
     const Object* object = nullptr;
     const Instance* instance = nullptr;
     float u = 0, v = 0;
-    Vec3d normal;
+    Vec3d normal;  // of what is nearest: the way there
   };
   using Rows = std::vector<Row>;
 
@@ -271,6 +271,68 @@ class QueryOracle {
     }
   }
 
+  // The distance of an instance's triangle, squared, and the way to its nearest point.
+  static std::pair<double, Vec3d> way_to(Vec3d point, const Instance& instance, const Triangle& triangle,
+                                         bool conservative) {
+    const Aabbd bounds = PlacedTriangles(instance).bounds_of_triangle(triangle);
+    const double least = std::max(squared_distance(point, bounds), squared_distance(point, instance.bounds));
+    if (conservative) return {least, nearest_in(point, bounds) - point};
+    const Transform& transform = instance.transform;
+    const Vec3d a = transform.point_to_world(to_double(triangle.a)),
+                b = transform.point_to_world(to_double(triangle.b)),
+                c = transform.point_to_world(to_double(triangle.c));
+    return {std::max(least, squared_distance(point, a, b, c)),
+            nearest_on_triangle({}, a - point, b - point, c - point)};
+  }
+
+  static void near_rows(Vec3d point, const Instance& instance, bool every_triangle, bool conservative, Rows& rows) {
+    Rows own;
+    for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
+      const auto [squared, way] = way_to(point, instance, instance.mesh->triangle(number), conservative);
+      own.push_back({entry_of(std::sqrt(squared)), instance.id, number, 0, nullptr, &instance, 0, 0, way});
+    }
+    const auto nearer = [](const Row& a, const Row& b) {
+      return std::tie(a.t, a.triangle) < std::tie(b.t, b.triangle);
+    };
+    if (!every_triangle && !own.empty()) own = {*std::min_element(own.begin(), own.end(), nearer)};
+    rows.insert(rows.end(), own.begin(), own.end());
+  }
+
+  static void near_row(Vec3d point, const Object& object, bool conservative, Rows& rows) {
+    const Aabbd bounds = bounds_of(object.shape);
+    const double away = conservative ? std::sqrt(squared_distance(point, bounds)) : distance(point, object.shape);
+    Shape around = object.shape;
+    around.position = around.position - point;
+    const Vec3d way = conservative ? nearest_in(point, bounds) - point : nearest_on_shape({}, around);
+    rows.push_back({entry_of(away), object.id, kNoTriangle, 0, &object, nullptr, 0, 0, way});
+  }
+
+  void answer_kind(const QueryBlock& block, const NearestColumns& nearest, BlockResult& result) const {
+    const bool conservative = block.precision == Precision::kConservative;
+    const bool every_triangle = nearest.detail != StaticDetail::kInstances;
+    for (size_t i = 0; i < nearest.points.size() / 3; ++i) {
+      const Vec3d from = point(block, nearest.points, i);
+      Rows rows;
+      for (const Instance* instance : instances_)
+        if (block.source != Source::kDynamic && wanted(block, i, *instance))
+          near_rows(from, *instance, every_triangle, conservative, rows);
+      for (const Object& object : objects_)
+        if (block.source != Source::kStatic && wanted(block, i, object)) near_row(from, object, conservative, rows);
+      const float farthest = entry_for(nearest.max_distances, i, std::numeric_limits<float>::infinity());
+      std::erase_if(rows, [&](const Row& row) { return row.t > farthest; });
+      std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+        return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
+      });
+      if (rows.size() > std::max(1u, nearest.count)) rows.resize(std::max(1u, nearest.count));
+      result.counts.push_back(static_cast<uint32_t>(rows.size()));
+      for (const Row& row : rows) {
+        write(row, block, result);
+        if (columns_of(block).has(Column::kPoint))
+          write_vector(to_float(from - block.frame + row.normal), result.points);
+      }
+    }
+  }
+
   static void count(const QueryBlock& block, Rows& rows, size_t i, BlockResult& result) {
     const size_t most = block.max_results == 0 ? 1024 : block.max_results;
     if (rows.size() > most) {
@@ -285,6 +347,7 @@ class QueryOracle {
     ColumnSet operator()(const BallColumns& balls) const { return of(balls.detail); }
     ColumnSet operator()(const BoxColumns& boxes) const { return of(boxes.detail); }
     ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
+    ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
     static ColumnSet of(StaticDetail detail) {
       return detail == StaticDetail::kInstances ? ColumnSet{Column::kId} : ColumnSet{Column::kId, Column::kTriangle};
     }

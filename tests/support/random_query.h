@@ -136,6 +136,8 @@ inline constexpr Column kRayColumns[] = {Column::kT,      Column::kId,    Column
                                          Column::kLayers, Column::kPose};
 inline constexpr Column kOverlapColumns[] = {Column::kId,  Column::kTriangle, Column::kGroup,
                                              Column::kTag, Column::kLayers,   Column::kPose};
+inline constexpr Column kNearestColumns[] = {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
+                                             Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
 inline constexpr Column kLookupColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
 
 inline OwnedBlock block_at(const SceneSketch& sketch, Random& random) {
@@ -207,6 +209,22 @@ inline OwnedBlock box_block(const QueryScene& scene, const SceneSketch& sketch, 
   return block;
 }
 
+inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  constexpr uint32_t kCounts[] = {0, 1, 2, 5, 16, limits::kMaxNearest};
+  block.settings.kind = NearestColumns{{}, {}, random.pick(kCounts), random_detail(random)};
+  for (const Balld& ball : sketch.balls) append_point(block, ball.center);
+  for (int i = 0; i < 3; ++i) append_point(block, notable_point(sketch, random));
+  if (random.chance(0.5)) {
+    constexpr float kEnds[] = {0, 0.5f, 1, 2, 5, 100, 1e9f, std::numeric_limits<float>::infinity()};
+    for (size_t i = random.chance(0.5) ? 1 : block.points.size() / 3; i > 0; --i)
+      block.extras.push_back(random.pick(kEnds));
+  }
+  add_common(scene, random, block);
+  add_columns(kNearestColumns, random, block);
+  return block;
+}
+
 inline OwnedBlock lookup_block(const QueryScene& scene, Random& random) {
   OwnedBlock block;
   block.settings.kind = LookupColumns{};
@@ -234,6 +252,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
   for (int i = 0; i < 3; ++i) scene.blocks.push_back(internal::ray_block(scene, sketch, random));
   if (!sketch.balls.empty()) scene.blocks.push_back(internal::ball_block(scene, sketch, random));
   if (!sketch.boxes.empty()) scene.blocks.push_back(internal::box_block(scene, sketch, random));
+  if (!sketch.placements.empty()) scene.blocks.push_back(internal::nearest_block(scene, sketch, random));
   scene.blocks.push_back(internal::lookup_block(scene, random));
   return scene;
 }

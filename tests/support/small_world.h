@@ -77,6 +77,14 @@ inline OwnedBlock one_box(Vec3f center, Vec3f half, StaticDetail detail = Static
   return block;
 }
 
+// The `count` nearest to one point.
+inline OwnedBlock one_point(Vec3f point, uint32_t count = 0, StaticDetail detail = StaticDetail::kInstances) {
+  OwnedBlock block;
+  block.settings.kind = NearestColumns{{}, {}, count, detail};
+  block.points = {point.x, point.y, point.z};
+  return block;
+}
+
 inline OwnedBlock lookup_of_ids(std::vector<uint64_t> ids) {
   OwnedBlock block;
   block.settings.kind = LookupColumns{};

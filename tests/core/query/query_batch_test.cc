@@ -39,6 +39,13 @@ OwnedBlock twenty_balls() {
   return block;
 }
 
+OwnedBlock twenty_points() {
+  OwnedBlock block = one_point({}, 3);
+  block.points.assign(60, 1);
+  block.extras.assign(20, 1);
+  return block;
+}
+
 OwnedBlock twenty_boxes() {
   OwnedBlock block = one_box({}, {1, 1, 1});
   block.points.assign(60, 1);
@@ -62,7 +69,7 @@ void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& f
 }
 
 TEST(CheckBatchTest, BlocksThatAreRightPass) {
-  for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), lookup_of_ids({1}),
+  for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), twenty_points(), lookup_of_ids({1}),
                                   lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
     EXPECT_TRUE(status_with(block).ok());
 }
@@ -141,6 +148,34 @@ TEST(CheckBatchTest, CentresMustBeFinite) {
   expect_refusal(boxes, Reason::kNotFinite, "boxes.centers", 19);
 }
 
+TEST(CheckBatchTest, GreatestDistancesMayBeInfiniteButNotNegativeNorNan) {
+  OwnedBlock block = twenty_points();
+  block.extras[11] = kInf;
+  EXPECT_TRUE(status_with(block).ok());
+  block.extras[11] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "nearest.max_distances", 11);
+  for (const float wrong : {-kInf, -1.0f}) {
+    block.extras[11] = wrong;
+    expect_refusal(block, Reason::kOutOfRange, "nearest.max_distances", 11);
+  }
+}
+
+TEST(CheckBatchTest, HowManyAreNearestHasALimit) {
+  OwnedBlock block = twenty_points();
+  std::get<NearestColumns>(block.settings.kind).count = limits::kMaxNearest;
+  EXPECT_TRUE(status_with(block).ok());
+  std::get<NearestColumns>(block.settings.kind).count = limits::kMaxNearest + 1;
+  expect_refusal(block, Reason::kLimit, "nearest.k", -1);
+}
+
+TEST(CheckBatchTest, PointsMustBeFiniteAndInTheWorld) {
+  OwnedBlock block = twenty_points();
+  block.points[4] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "nearest.points", 1);
+  block.points[4] = 1.1e9f;
+  expect_refusal(block, Reason::kOutOfRange, "nearest.points", 1);
+}
+
 TEST(CheckBatchTest, RotationsMustBeOfUnitLengthWithinAThousandth) {
   OwnedBlock block = twenty_boxes();
   float& w = block.extras[4 * 6 + 3];
@@ -189,7 +224,8 @@ TEST(CheckBatchTest, ColumnsHaveNEntriesOneOrWhereAllowedNone) {
                               {"rays.t_max", twenty_rays, extras, 1, true, true},
                               {"balls.radii", twenty_balls, sizes, 1, true, false},
                               {"boxes.half_extents", twenty_boxes, sizes, 3, true, false},
-                              {"boxes.rotations", twenty_boxes, extras, 4, true, true}};
+                              {"boxes.rotations", twenty_boxes, extras, 4, true, true},
+                              {"nearest.max_distances", twenty_points, extras, 1, true, true}};
   for (const Column20& c : columns) {
     OwnedBlock block = c.block();
     const std::vector<float> whole = c.column(block);
@@ -298,6 +334,11 @@ TEST(CheckBatchTest, ColumnsThatAKindCannotGiveAreRefused) {
       block.settings.columns = {Column::kId, column};
       expect_refusal(block, Reason::kMalformed, "columns", -1);
     }
+  }
+  for (const Column column : {Column::kUv, Column::kNormal}) {
+    OwnedBlock block = twenty_points();
+    block.settings.columns = {Column::kId, column};
+    expect_refusal(block, Reason::kMalformed, "columns", -1);
   }
   OwnedBlock lookup = lookup_of_groups({1});
   lookup.settings.columns = {Column::kTriangle};

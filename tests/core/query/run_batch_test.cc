@@ -68,6 +68,11 @@ TEST(RunBatchTest, DefaultColumnsAreThoseOfTheKind) {
   const BlockResult triangles = run_block(*snapshot, one_box({}, {1, 1, 1}, StaticDetail::kTriangles));
   EXPECT_THAT(triangles.ids, ElementsAre(1, 2));
   EXPECT_THAT(triangles.triangles, ElementsAre(kNoTriangle, 0));
+  const BlockResult nearest = run_block(*snapshot, one_point({-5, 0, 0}, 2));
+  EXPECT_THAT(nearest.t, ElementsAre(4, 5));
+  EXPECT_THAT(nearest.ids, ElementsAre(1, 2));
+  EXPECT_THAT(nearest.triangles, ElementsAre(kNoTriangle, 0));
+  EXPECT_THAT(nearest.points, IsEmpty());
 }
 
 TEST(RunBatchTest, OnlyColumnsAskedForAreFilled) {
