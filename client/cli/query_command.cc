@@ -37,16 +37,19 @@ absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& b
 }
 
 void add_query_command(CLI::App& parent, Context& context) {
-  CLI::App& command = *parent.add_subcommand("query", "Ask what rays hit and what balls and boxes touch");
+  CLI::App& command =
+      *parent.add_subcommand("query", "Ask what rays hit, what balls and boxes touch, and what is nearest");
   command.footer(R"(Examples:
   locus query ray arena --from 0,1,0 --dir 0,0,-1
   locus query ball arena --at 0,0,0 --radius 10
   locus query box arena --at 0,0,0 --half 5,5,5
+  locus query nearest arena --at 0,0,0 --k 5
   locus -o csv query ray arena --from-csv rays.csv > hits.csv)");
   command.require_subcommand(1);
   add_query_ray(command, context);
   add_query_ball(command, context);
   add_query_box(command, context);
+  add_query_nearest(command, context);
 }
 
 }  // namespace locus::cli

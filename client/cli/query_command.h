@@ -15,6 +15,7 @@ namespace locus::cli {
 void add_query_ray(CLI::App& parent, Context& context);
 void add_query_ball(CLI::App& parent, Context& context);
 void add_query_box(CLI::App& parent, Context& context);
+void add_query_nearest(CLI::App& parent, Context& context);
 
 // Asks a batch of one block and gives its answer. DATA_LOSS if the server answers another number of blocks.
 absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::QueryBuilder& builder, Context& context);

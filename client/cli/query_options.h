@@ -34,7 +34,7 @@ struct QueryOptions {
 // SCENE and the shared options. `columns` are the names `--columns` knows besides the shared ones.
 void add_query_options(CLI::App& command, QueryOptions& options);
 
-// --detail of ball and box.
+// --detail of ball, box and nearest.
 void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
 
 // Usage error for options that exclude each other.

@@ -89,6 +89,34 @@ BoxBlock& BoxBlock::rotations(absl::Span<const float> rotations) {
   return *this;
 }
 
+NearestBlock& NearestBlock::k(uint32_t count) {
+  nearest_->set_k(count);
+  return *this;
+}
+
+NearestBlock& NearestBlock::detail(v1::StaticDetail detail) {
+  nearest_->set_detail(detail);
+  return *this;
+}
+
+NearestBlock& NearestBlock::point(const Float3& point, float max_distance, const Filter& filter) {
+  const int rows_before = nearest_->points_size() / 3;
+  append_triple(*nearest_->mutable_points(), point);
+  append_row(*nearest_->mutable_max_distances(), rows_before, max_distance, std::numeric_limits<float>::infinity());
+  filter_row(rows_before, filter);
+  return *this;
+}
+
+NearestBlock& NearestBlock::points(absl::Span<const float> points) {
+  append(*nearest_->mutable_points(), points);
+  return *this;
+}
+
+NearestBlock& NearestBlock::max_distances(absl::Span<const float> distances) {
+  assign(*nearest_->mutable_max_distances(), distances);
+  return *this;
+}
+
 LookupBlock& LookupBlock::id(uint64_t id) {
   lookup_->add_ids(id);
   return *this;

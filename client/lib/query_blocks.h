@@ -1,9 +1,9 @@
-// One block of a query batch, written in columns: rays, balls, boxes or a lookup, with the settings all kinds share.
-// Got from QueryBuilder, and valid until its build(). Nothing is checked here: the server refuses a wrong batch whole,
-// naming block, column and index. Not thread-safe.
+// One block of a query batch, written in columns: rays, balls, boxes, a lookup or what is nearest, with the settings
+// all kinds share. Got from QueryBuilder, and valid until its build(). Nothing is checked here: the server refuses a
+// wrong batch whole, naming block, column and index. Not thread-safe.
 //
-// A per-query column (t_max, masks, ignored groups, rotations) is either filled row by row, or set as a whole: N
-// entries, one for all, or none. Do not mix the two ways in one column of a block.
+// A per-query column (t_max, greatest distances, masks, ignored groups, rotations) is either filled row by row, or set
+// as a whole: N entries, one for all, or none. Do not mix the two ways in one column of a block.
 #ifndef LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 #define LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 
@@ -134,6 +134,26 @@ class BoxBlock : public BlockBuilder<BoxBlock> {
 
  private:
   v1::Boxes* boxes_;
+};
+
+// What is nearest to points: rows as of rays ALL, t the distance.
+class NearestBlock : public BlockBuilder<NearestBlock> {
+ public:
+  explicit NearestBlock(v1::QueryBlock& block) : BlockBuilder(block), nearest_(block.mutable_nearest()) {}
+
+  // How many a point, at most 65,536; 0 = 1.
+  NearestBlock& k(uint32_t count);
+  // INSTANCES counts an instance once, by its nearest triangle.
+  NearestBlock& detail(v1::StaticDetail detail);
+  NearestBlock& point(const Float3& point, float max_distance = std::numeric_limits<float>::infinity(),
+                      const Filter& filter = {});
+  // Appends N points: 3N floats.
+  NearestBlock& points(absl::Span<const float> points);
+  // Whole column: N entries or one for all; included.
+  NearestBlock& max_distances(absl::Span<const float> distances);
+
+ private:
+  v1::Nearest* nearest_;
 };
 
 // Either ids, one row each in their order, or groups, never both in one block.

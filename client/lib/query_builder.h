@@ -28,6 +28,7 @@ class QueryBuilder {
   RayBlock rays() { return RayBlock(*batch_.add_blocks()); }
   BallBlock balls() { return BallBlock(*batch_.add_blocks()); }
   BoxBlock boxes() { return BoxBlock(*batch_.add_blocks()); }
+  NearestBlock nearest() { return NearestBlock(*batch_.add_blocks()); }
   LookupBlock lookup() { return LookupBlock(*batch_.add_blocks()); }
 
   // The batch so far; the builder is left empty, with every setting at its default.

@@ -59,7 +59,8 @@ class ResultRows {
   std::vector<size_t> begins_;  // one more than queries: where each one's rows begin, and the number of rows
 };
 
-// Rays FIRST (one row a ray, a miss has id 0) and ALL (the rows of a ray ascend by t). Wants T and ID, as by default.
+// Rays FIRST (one row a ray, a miss has id 0) and ALL (the rows of a ray ascend by t), and what is nearest to points,
+// likewise by distance. Wants T and ID, as by default.
 class RayHits {
  public:
   static absl::StatusOr<RayHits> of(const v1::BlockResult& block);

@@ -60,6 +60,16 @@ absl::Status read_kind(const v1::Boxes& boxes, const std::string& field, QueryBl
   return status;
 }
 
+absl::Status read_kind(const v1::Nearest& nearest, const std::string& field, QueryBlock* out) {
+  NearestColumns columns;
+  columns.points = span_of(nearest.points());
+  columns.max_distances = span_of(nearest.max_distances());
+  columns.count = nearest.k();
+  const absl::Status status = read_enum(nearest.detail(), kDetails, field + ".nearest.detail", &columns.detail);
+  out->kind = columns;
+  return status;
+}
+
 absl::Status read_kind(const v1::Lookup& lookup, const std::string& field, QueryBlock* out) {
   if (lookup.ids().empty() == lookup.groups().empty())
     return refuse_argument(Reason::kMalformed, field + ".lookup", {}, "give ids or groups, one of the two");
@@ -84,13 +94,13 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
     case v1::QueryBlock::kSweeps:
       return not_served(field + ".sweeps");
     case v1::QueryBlock::kNearest:
-      return not_served(field + ".nearest");
+      return read_kind(block.nearest(), field, out);
     case v1::QueryBlock::kSight:
       return not_served(field + ".sight");
     case v1::QueryBlock::KIND_NOT_SET:
       break;
   }
-  return refuse_argument(Reason::kMalformed, field, {}, "say what is asked: rays, balls, boxes or lookup");
+  return refuse_argument(Reason::kMalformed, field, {}, "say what is asked: rays, balls, boxes, lookup or nearest");
 }
 
 absl::Status check_served(const v1::QueryBlock& block, const std::string& field) {

@@ -35,6 +35,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"mesh_vertices", limits::kMaxMeshVertices},
       {"meshes", static_cast<double>(host.config.max_meshes), static_cast<double>(host.registry.mesh_count())},
       {"name_length", limits::kMaxNameLength},
+      {"nearest", limits::kMaxNearest},
       {"objects", limits::kMaxObjects},
       {"page_size", limits::kMaxPageSize},
       {"pending_changes", limits::kMaxPendingChanges},
@@ -61,7 +62,7 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
   const auto body = [&](const Caller&) {
     response->set_version(kVersion);
     response->set_instruction_set("portable");
-    for (const char* feature : {"balls", "boxes", "download_mesh", "lookup", "rays", "static_from"})
+    for (const char* feature : {"balls", "boxes", "download_mesh", "lookup", "nearest", "rays", "static_from"})
       response->add_features(feature);
     for (const NamedLimit& limit : limits_of(host_)) {
       v1::Limit* out = response->add_limits();

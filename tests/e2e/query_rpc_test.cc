@@ -47,6 +47,12 @@ v1::QueryBatch ball_at(float x, float radius) {
   return batch;
 }
 
+v1::QueryBatch points_near(std::initializer_list<float> point) {
+  v1::QueryBatch batch;
+  fill(batch.add_blocks()->mutable_nearest()->mutable_points(), point);
+  return batch;
+}
+
 v1::QueryBatch box_at(float x, float half) {
   v1::QueryBatch batch;
   v1::Boxes* boxes = batch.add_blocks()->mutable_boxes();
@@ -93,6 +99,24 @@ TEST_F(QueryRpcTest, OverlapsListObjectsAndInstancesInOneOrder) {
   const v1::QueryResult result = ask(triangles);
   EXPECT_THAT(result.blocks(0).ids(), ElementsAre(100u, 100u));
   EXPECT_THAT(result.blocks(0).triangles(), ElementsAre(8u, 9u));
+}
+
+TEST_F(QueryRpcTest, NearestListsObjectsAndInstancesByDistance) {
+  v1::QueryBatch batch = points_near({10.f, 0.f, 0.f});
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(3u));
+  batch.mutable_blocks(0)->mutable_nearest()->set_k(3);
+  for (const v1::Column column : {v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_TRIANGLE, v1::COLUMN_POINT})
+    batch.mutable_blocks(0)->add_columns(column);
+  const v1::QueryResult result = ask(batch);
+  const v1::BlockResult& block = result.blocks(0);
+  EXPECT_THAT(block.counts(), ElementsAre(3u));
+  EXPECT_THAT(block.ids(), ElementsAre(3u, 4u, 100u));
+  EXPECT_THAT(block.t(), ElementsAre(0.f, 1.f, 1.f));
+  EXPECT_THAT(block.triangles(), ElementsAre(0xFFFFFFFFu, 0xFFFFFFFFu, 0u));
+  EXPECT_EQ(block.points_size(), 9);
+  EXPECT_THAT(block.truncated(), IsEmpty());
+  batch.mutable_blocks(0)->mutable_nearest()->add_max_distances(0.5f);
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(3u));
 }
 
 TEST_F(QueryRpcTest, SourceMasksAndIgnoresChoose) {
@@ -245,6 +269,12 @@ TEST_F(QueryRpcTest, WrongValuesRefuseTheBatchAndAreNamed) {
   refused(balls, "balls.radii", not_finite, 0, [](auto* block) { block->mutable_balls()->set_radii(0, kInfinity); });
   refused(balls, "balls.radii", length, {}, [](auto* block) { block->mutable_balls()->clear_radii(); });
   refused(balls, "balls.centers", not_finite, 0, [](auto* block) { block->mutable_balls()->set_centers(0, kNan); });
+  const v1::QueryBatch points = points_near({0.f, 0.f, 0.f});
+  refused(points, "nearest.max_distances", not_finite, 0,
+          [](auto* block) { block->mutable_nearest()->add_max_distances(kNan); });
+  refused(points, "nearest.max_distances", range, 0,
+          [](auto* block) { block->mutable_nearest()->add_max_distances(-1); });
+  refused(points, "nearest.points", length, {}, [](auto* block) { block->mutable_nearest()->add_points(1); });
   const v1::QueryBatch boxes = box_at(0, 1);
   refused(boxes, "boxes.half_extents", range, 0, [](auto* block) { block->mutable_boxes()->set_half_extents(2, -1); });
   refused(boxes, "boxes.rotations", range, 0, [](auto* block) {
@@ -272,6 +302,8 @@ TEST_F(QueryRpcTest, WrongFormRefusesTheBatchAndIsNamed) {
           [](auto* block) { block->mutable_balls()->set_detail(static_cast<v1::StaticDetail>(4)); });
   refused(".boxes.detail", {},
           [](auto* block) { block->mutable_boxes()->set_detail(static_cast<v1::StaticDetail>(4)); });
+  refused(".nearest.detail", {},
+          [](auto* block) { block->mutable_nearest()->set_detail(static_cast<v1::StaticDetail>(4)); });
   refused(".columns", 1, [](auto* block) {
     block->add_columns(v1::COLUMN_ID);
     block->add_columns(static_cast<v1::Column>(11));
@@ -297,7 +329,6 @@ TEST_F(QueryRpcTest, KindsAndFieldsThatAreNotServedAreNamed) {
   refused("capsules", [](auto* block) { block->mutable_capsules(); });
   refused("frustums", [](auto* block) { block->mutable_frustums(); });
   refused("sweeps", [](auto* block) { block->mutable_sweeps(); });
-  refused("nearest", [](auto* block) { block->mutable_nearest(); });
   refused("sight", [](auto* block) { block->mutable_sight(); });
   refused("as_of_ticks", [](auto* block) { block->add_as_of_ticks(1); });
   refused("as_of_fractions", [](auto* block) { block->add_as_of_fractions(0); });
@@ -322,6 +353,9 @@ TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {
   refused(batch, "blocks", "queries", limits::kMaxQueries, limits::kMaxQueries + 1.0);
   batch = ray_along_x();
   for (uint32_t i = 0; i <= limits::kMaxIgnoredIds; ++i) batch.mutable_blocks(0)->add_ignore_ids(i + 1);
+  v1::QueryBatch points = points_near({0.f, 0.f, 0.f});
+  points.mutable_blocks(0)->mutable_nearest()->set_k(limits::kMaxNearest + 1);
+  refused(points, "blocks[0].nearest.k", "nearest", limits::kMaxNearest, limits::kMaxNearest + 1.0);
   refused(batch, "blocks[0].ignore_ids", "ignored_ids", limits::kMaxIgnoredIds, limits::kMaxIgnoredIds + 1.0);
   batch = ray_along_x();
   batch.mutable_blocks(0)->set_max_results(limits::kMaxMaxResults + 1);

@@ -29,7 +29,7 @@ TEST_F(ServerRpcTest, TheServerSaysWhatItIsAndServes) {
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_FALSE(server.instruction_set().empty());
   EXPECT_THAT(server.features(),
-              ::testing::ElementsAre("balls", "boxes", "download_mesh", "lookup", "rays", "static_from"));
+              ::testing::ElementsAre("balls", "boxes", "download_mesh", "lookup", "nearest", "rays", "static_from"));
 }
 
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithWhatIsUsed) {

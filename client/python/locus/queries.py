@@ -1,4 +1,4 @@
-"""Query batches: blocks of rays, balls, boxes and lookups in columns, answered together at one revision."""
+"""Query batches: blocks of rays, balls, boxes, lookups and what is nearest in columns, answered together at one revision."""
 from __future__ import annotations
 
 from typing import NamedTuple, Optional, Sequence
@@ -10,7 +10,7 @@ from .values import Revision
 
 _REQUEST, _BATCH, _VIEW = schema.numbers("QueryRequest"), schema.numbers("QueryBatch"), schema.numbers("View")
 _BLOCK = schema.numbers("QueryBlock")
-_KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "lookup")}
+_KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "lookup", "nearest")}
 
 
 class Block(NamedTuple):
@@ -18,8 +18,8 @@ class Block(NamedTuple):
 
     - `frame`: three floats, added to every position of the block; positions in its result are relative to it.
     - `source`: where to look; `precision`: what decides.
-    - `columns`: what to return of each row, by default T, ID and TRIANGLE for rays, ID for balls and boxes (TRIANGLE
-      too where their detail is triangles), ID and POSE for lookups.
+    - `columns`: what to return of each row, by default T, ID and TRIANGLE for rays and what is nearest, ID for balls
+      and boxes (TRIANGLE too where their detail is triangles), ID and POSE for lookups.
     - `masks`: N uint32 or one; found is only what has (layers & mask) != 0.
     - `ignore_groups`: N uint64 or one; objects and instances of that group are passed over.
     - `ignore_ids`: at most 64 uint64 to pass over, for the whole block.
@@ -128,6 +128,18 @@ class QueryBatch:
         new.column("half_extents", half_extents, FLOAT32, 3)
         new.column("rotations", rotations, FLOAT32, 4)
         new.options(detail=detail)
+        return self._add(new, block)
+
+    def nearest(self, points: ColumnLike, *, k: int = 1, max_distances: ColumnLike = None,
+                detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
+        """What is nearest to N points? `points`: 3N float32; `k`: how many rows a point at most, by ascending distance,
+        which is in column T: 0 in an object, to the surface for meshes; `max_distances`: N float32 or one, included,
+        +infinity by default; `detail`: INSTANCES counts an instance once, by its nearest triangle.
+        """
+        new = _NewBlock(self._blocks, "nearest")
+        new.first("points", points, FLOAT32, 3)
+        new.column("max_distances", max_distances, FLOAT32)
+        new.options(k=k, detail=detail)
         return self._add(new, block)
 
     def lookup(self, ids: ColumnLike, *, block: Block = Block()) -> "QueryBatch":

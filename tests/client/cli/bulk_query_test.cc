@@ -119,6 +119,9 @@ TEST_F(BulkQueryTest, EveryKindAndModeTakesRows) {
   const TestFile boxes("{\"position\":[4,0,0]}\n", "boxes.ndjson");
   EXPECT_EQ(out_of({"-o", "ndjson", "query", "box", "world", "--from-ndjson", boxes.path(), "--half", "1,1,1"}),
             "{\"box\":0,\"id\":\"2\"}\n");
+  const TestFile points("at.x,at.y,at.z,max_distance\n3.5,0,0,\n2,2,0,0.5\n8,0,0,9\n", "points.csv");
+  EXPECT_EQ(out_of({"-o", "csv", "query", "nearest", "world", "--from-csv", points.path(), "--columns", "triangle"}),
+            "query,t,id,triangle\n0,0.0,2,\n2,0.0,3,\n");
 }
 
 TEST_F(BulkQueryTest, AJsonAnswerIsOneDocumentLikeThatOfOptions) {

@@ -76,6 +76,7 @@ TEST(HelpTest, EveryCommandExplainsItselfWithExamples) {
                                                           {"query", "ray"},
                                                           {"query", "ball"},
                                                           {"query", "box"},
+                                                          {"query", "nearest"},
                                                           {"render"},
                                                           {"run"},
                                                           {"wait"},
@@ -99,6 +100,8 @@ TEST(UsageTest, MistakesInTheLineAreUsageErrors) {
            {"query", "ray", "arena", "--from", "0,0,0"},
            {"query", "ray", "arena", "--from", "0,0,0", "--dir", "0,0,1", "--mode", "some"},
            {"query", "ray", "arena", "--from", "0,0,0", "--dir", "0,0,1", "--at-least", "1", "--exactly", "2"},
+           {"query", "nearest", "arena", "--k", "3"},
+           {"query", "nearest", "arena", "--at", "0,0,0", "--k", "-1"},
            {"insert", "arena", "cone", "--id", "1", "--at", "0,0,0"},
            {"insert", "arena", "ball", "--id", "1", "--at", "0,0,0"},
            {"insert", "arena", "point", "--id", "1", "--at", "0,0,0", "--radius", "1"},
@@ -262,6 +265,27 @@ TEST_F(RunTest, OverlapsAreRowsByQueryAndCutsAreListed) {
   EXPECT_EQ(box["found"][0]["box"], 0);
   EXPECT_TRUE(box["found"][0]["triangle"].is_null()) << "the fake sent no triangles";
   EXPECT_THAT(server_.queries.last_batch.blocks(0).boxes().rotations(), ElementsAre(0, 0, 1, 0));
+}
+
+TEST_F(RunTest, NearestAreRowsByDistanceWithTheirPoints) {
+  server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
+    v1::BlockResult& block = *result.add_blocks();
+    for (const uint32_t count : {1, 0}) block.add_counts(count);
+    block.add_t(0.5f);
+    block.add_ids(4);
+    block.add_triangles(17);
+    for (const float x : {1.f, 2.f, 3.f}) block.add_points(x);
+    return grpc::Status::OK;
+  };
+  const Json answer = json_of({"query", "nearest", "arena", "--at", "0,0,0", "--at", "1,1,1", "--k", "2",
+                               "--max-distance", "9", "--detail", "triangles"});
+  EXPECT_EQ(answer["found"].dump(), R"([{"query":0,"t":0.5,"id":"4","triangle":17,"point":[1.0,2.0,3.0]}])");
+  const v1::QueryBlock& block = server_.queries.last_batch.blocks(0);
+  EXPECT_THAT(block.nearest().points(), ElementsAre(0, 0, 0, 1, 1, 1));
+  EXPECT_THAT(block.nearest().max_distances(), ElementsAre(9));
+  EXPECT_EQ(block.nearest().k(), 2u);
+  EXPECT_EQ(block.nearest().detail(), v1::STATIC_DETAIL_TRIANGLES);
+  EXPECT_THAT(block.columns(), ElementsAre(v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_TRIANGLE, v1::COLUMN_POINT));
 }
 
 TEST_F(RunTest, PositionsThatAreNoFloatsTravelInAFrame) {

@@ -86,6 +86,21 @@ TEST(QueryBuilderTest, BlocksComeInTheOrderOpenedWithTheirOwnSettings) {
   EXPECT_THAT(batch.blocks(3).lookup().groups(), ElementsAre(3));
 }
 
+TEST(QueryBuilderTest, PointsComeRowByRowOrAsAColumn) {
+  QueryBuilder builder;
+  builder.nearest().k(4).detail(v1::STATIC_DETAIL_TRIANGLES).point({1, 2, 3}).point({4, 5, 6}, 7, {.ignore_group = 9});
+  builder.nearest().points({1, 2, 3, 4, 5, 6}).max_distances({8});
+  const v1::QueryBatch batch = builder.build();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(batch.blocks(0).nearest().k(), 4u);
+  EXPECT_EQ(batch.blocks(0).nearest().detail(), v1::STATIC_DETAIL_TRIANGLES);
+  EXPECT_THAT(batch.blocks(0).nearest().points(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(batch.blocks(0).nearest().max_distances(), ElementsAre(kInfinity, 7));
+  EXPECT_THAT(batch.blocks(0).ignore_groups(), ElementsAre(0, 9));
+  EXPECT_THAT(batch.blocks(1).nearest().points(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(batch.blocks(1).nearest().max_distances(), ElementsAre(8));
+}
+
 TEST(QueryBuilderTest, ViewsNameEpochAndRevision) {
   QueryBuilder builder;
   const v1::QueryBatch later = builder.at_least({4, 12}).max_work(3).explain().max_reply_bytes(5).build();

@@ -62,7 +62,7 @@ class Offers:
 
     def test_commands_on_every_level(self):
         self.assertEqual(self.offers("locus que"), {"query"})
-        self.assertLessEqual({"ray", "ball", "box"}, self.offers("locus query "))
+        self.assertLessEqual({"ray", "ball", "box", "nearest"}, self.offers("locus query "))
 
     def test_options_of_the_command_and_of_the_program(self):
         self.assertEqual(self.offers("locus query ray --mod"), {"--mode"})

@@ -48,6 +48,7 @@ TEST(ConvertQueriesTest, EveryEnumNumberHasItsMeaning) {
   block->mutable_rays()->set_cull(v1::CULL_FRONT);
   block->mutable_rays()->set_inside(v1::INSIDE_HOLLOW);
   batch.add_blocks()->mutable_balls()->set_detail(v1::STATIC_DETAIL_TRIANGLES_SORTED);
+  batch.add_blocks()->mutable_nearest()->set_detail(v1::STATIC_DETAIL_TRIANGLES);
   const absl::StatusOr<QueryBatch> queries = to_queries(batch);
   ASSERT_TRUE(queries.ok()) << queries.status();
   EXPECT_EQ(queries->blocks[0].source, Source::kDynamic);
@@ -59,6 +60,22 @@ TEST(ConvertQueriesTest, EveryEnumNumberHasItsMeaning) {
   EXPECT_EQ(rays.cull, Cull::kFront);
   EXPECT_EQ(rays.inside, Inside::kHollow);
   EXPECT_EQ(std::get<BallColumns>(queries->blocks[1].kind).detail, StaticDetail::kTrianglesSorted);
+  EXPECT_EQ(std::get<NearestColumns>(queries->blocks[2].kind).detail, StaticDetail::kTriangles);
+}
+
+TEST(ConvertQueriesTest, EveryFieldOfNearestArrives) {
+  v1::QueryBatch batch;
+  v1::Nearest* nearest = batch.add_blocks()->mutable_nearest();
+  for (const float x : {1.f, 2.f, 3.f}) nearest->add_points(x);
+  nearest->add_max_distances(4);
+  nearest->set_k(5);
+  const absl::StatusOr<QueryBatch> queries = to_queries(batch);
+  ASSERT_TRUE(queries.ok()) << queries.status();
+  const auto& columns = std::get<NearestColumns>(queries->blocks[0].kind);
+  EXPECT_EQ(std::vector<float>(columns.points.begin(), columns.points.end()), (std::vector<float>{1, 2, 3}));
+  EXPECT_EQ(std::vector<float>(columns.max_distances.begin(), columns.max_distances.end()), std::vector<float>{4});
+  EXPECT_EQ(columns.count, 5u);
+  EXPECT_EQ(columns.detail, StaticDetail::kInstances);
 }
 
 TEST(ConvertQueriesTest, EveryColumnOfAResultArrives) {

@@ -102,12 +102,12 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         self.assertEqual([bool(hit) for hit in block.hits], [row["hit"] for row in report["rays"]])
         self.assertEqual(block.rows, 0)
 
-    def check_overlaps(self, kind, options, batch):
+    def check_overlaps(self, kind, options, batch, key=None):
         report = self.report(kind, self.scene, *options)
         (block,) = self.ask(batch)
         rows = report[next(key for key, value in report.items() if isinstance(value, list))]
         found = [(query, one) for query in range(len(block.counts)) for one in block.ids[block.rows_of(query)].tolist()]
-        self.assertEqual(found, [(row[kind], int(row["id"])) for row in rows])
+        self.assertEqual(found, [(row[key or kind], int(row["id"])) for row in rows])
         self.assertGreater(len(rows), 20)
         if len(block.triangles):
             self.assertEqual([one if one != locus.NO_TRIANGLE else None for one in listed(block.triangles)],
@@ -129,6 +129,16 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         centers = triples(self.cloud(20))
         options = [f"--at={text(center)}" for center in centers] + ["--half=3,2,1", "--rotation=0.6,0,0,0.8"]
         self.check_overlaps("box", options, QueryBatch().boxes(centers, (3, 2, 1), rotations=(0.6, 0, 0, 0.8)))
+
+    def test_nearest(self):
+        points = triples(self.cloud(30))
+        options = [f"--at={text(point)}" for point in points] + ["--k=4", "--max-distance=20"]
+        batch = QueryBatch().nearest(points, k=4, max_distances=20)
+        self.check_overlaps("nearest", options, batch, "query")
+        (block,) = self.ask(batch)
+        for query in range(len(points)):
+            distances = listed(block.t)[block.rows_of(query)]
+            self.assertEqual(distances, sorted(distances))
 
     def test_lookups(self):
         ids = [1, 100, 159, 200, 300, 400]
@@ -251,6 +261,7 @@ class RequestBytesTest(unittest.TestCase):
                    block=settings)
         batch.balls([1, 2, 3], 4, detail=StaticDetail.TRIANGLES)
         batch.boxes([1, 2, 3], [4, 5, 6], rotations=[0, 0, 0, 1]).lookup([7, 8]).lookup_groups(9)
+        batch.nearest([1, 2, 3], k=5, max_distances=6, detail=StaticDetail.TRIANGLES)
         found = schema.message("QueryRequest").FromString(batch.request_bytes("arena"))
         wanted = schema.message("QueryRequest")(scene="arena")
         view, blocks = wanted.batch.view, wanted.batch.blocks
@@ -268,6 +279,8 @@ class RequestBytesTest(unittest.TestCase):
             rotations=struct.pack("<4f", 0, 0, 0, 1), detail=1))
         blocks.add().lookup.ids = struct.pack("<2Q", 7, 8)
         blocks.add().lookup.groups = struct.pack("<Q", 9)
+        blocks.add().nearest.MergeFrom(schema.message("Nearest")(
+            points=struct.pack("<3f", 1, 2, 3), max_distances=struct.pack("<f", 6), k=5, detail=2))
         self.assertEqual(found, wanted)
         self.assertEqual(schema.message("QueryBatch").FromString(batch.batch_bytes()), wanted.batch)
 
