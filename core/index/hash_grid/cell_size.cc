@@ -46,4 +46,9 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
   return exponent;
 }
 
+bool cell_exponent_serves(absl::Span<const SampledValue> sample, size_t population, int exponent) {
+  const double others = mean_others_per_cell(sample, population, exponent);
+  return others >= kFewestServing && others <= kMostServing;
+}
+
 }  // namespace locus::internal

@@ -11,9 +11,12 @@
 
 namespace locus::internal {
 
-inline constexpr size_t kCellSizeSample = 4096;   // values looked at for one choice, about
+inline constexpr size_t kCellSizeSample = 2048;   // values looked at for one choice, about
 inline constexpr double kMaxMeanPerCell = 24;     // values that share the cell of a random value, at most ...
 inline constexpr double kMeanPerCellMargin = 12;  // ... or so many more than at the smallest sensible cell
+
+inline constexpr double kFewestServing = 6;  // a choice is kept while as many share a cell, at least ...
+inline constexpr double kMostServing = 64;   // ... and at most
 
 struct SampledValue {
   Vec3d position;
@@ -25,6 +28,10 @@ struct SampledValue {
 // Values that no cell size separates do not count against larger cells. `sample` is not empty. Cost: at most about
 // fifty sorts of the sample. Pure.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
+
+// Whether cells of that exponent still do: a random value shares its cell with neither too few others nor too many. For
+// the many times when nothing has changed: one sort of the sample instead of fifty. Pure.
+bool cell_exponent_serves(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
 // Every value whose turn it is in an even selection of about kCellSizeSample of `population`.
 class EvenSample {

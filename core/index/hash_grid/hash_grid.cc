@@ -204,19 +204,21 @@ size_t HashGrid::apply(const GridBatch& batch) {
 }
 
 bool HashGrid::choice_is_stale() const {
-  if (size_ < first_choice_) return false;
-  return size_ >= 2 * size_at_choice_ || size_ <= size_at_choice_ / 8 || changes_since_choice_ >= 16 * size_;
+  return size_ >= first_choice_ &&
+         (size_ >= 2 * size_at_choice_ || size_ <= size_at_choice_ / 8 || changes_since_choice_ >= 16 * size_);
 }
 
 void HashGrid::choose_cell_size() {
+  const bool same_number = size_ < 2 * size_at_choice_ && size_ > size_at_choice_ / 8;
   internal::EvenSample sample(size_);
   for_each([&sample](const GridRef& value) {
     sample.offer(value.entry().position, 2.0 * double{value.reach()});
     return true;
   });
-  const int exponent = internal::choose_cell_exponent(sample.values(), size_);
-  size_at_choice_ = size_;
   changes_since_choice_ = 0;
+  if (same_number && internal::cell_exponent_serves(sample.values(), size_, base_exponent_)) return;
+  size_at_choice_ = size_;
+  const int exponent = internal::choose_cell_exponent(sample.values(), size_);
   if (exponent != base_exponent_) rebuild(exponent);
 }
 

@@ -6,7 +6,7 @@
 // Values are known by handles, small numbers that the caller gives out; a handle names one value at a time.
 //
 // Answers never depend on cell sizes: they only cull. The base cell is chosen anew from a sample of the values when
-// their number has doubled since, fallen to an eighth, or when all have moved a few times.
+// their number has doubled since or fallen to an eighth, and looked at when all have moved a few times.
 // Invariants: every value lies in the brick of its position on the level of its reach; no brick is empty; slots_ says
 // where each value is. |position| <= limits::kMaxCoordinate on each axis.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
@@ -25,8 +25,9 @@ namespace locus {
 struct HashGridOptions {
   // Edge of the base cell until the first choice, rounded up to a power of two between 2^-20 and 2^31.
   double cell_size = 8;
-  // Number of values at which the cell size is chosen from them for the first time; the largest number = never.
-  size_t first_choice = 1024;
+  // Number of values at which the cell size is chosen from them for the first time; the largest number = never. Up to
+  // about a thousand values the choice comes to one brick, which is a list in columns.
+  size_t first_choice = 8;
 };
 
 // What one batch changes. Handles are distinct within `removed` and `moves` together, and within `inserted`; a value

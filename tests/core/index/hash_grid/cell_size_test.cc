@@ -52,5 +52,13 @@ TEST(CellSizeTest, AHeapInOnePointDoesNotShrinkTheCellsOfTheOthers) {
   EXPECT_LE(exponent, 9);
 }
 
+TEST(CellSizeTest, AChoiceServesWhileNeitherTooFewNorTooManyShareACell) {
+  const std::vector<SampledValue> values = spread(4096, 100, 0.5);
+  const int chosen = choose_cell_exponent(values, 100'000);
+  EXPECT_TRUE(cell_exponent_serves(values, 100'000, chosen));
+  EXPECT_FALSE(cell_exponent_serves(values, 100'000, chosen - 3));
+  EXPECT_FALSE(cell_exponent_serves(values, 100'000, chosen + 2));
+}
+
 }  // namespace
 }  // namespace locus::internal
