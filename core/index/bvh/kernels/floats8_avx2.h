@@ -46,6 +46,13 @@ static inline Floats8 choose(Floats8 where, Floats8 yes, Floats8 no) {
   return {_mm256_blendv_ps(no.v, yes.v, where.v)};
 }
 
+// The largest lane, in all lanes.
+static inline Floats8 largest(Floats8 a) {
+  const __m256 halves = _mm256_max_ps(a.v, _mm256_permute2f128_ps(a.v, a.v, 1));
+  const __m256 pairs = _mm256_max_ps(halves, _mm256_permute_ps(halves, _MM_SHUFFLE(1, 0, 3, 2)));
+  return {_mm256_max_ps(pairs, _mm256_permute_ps(pairs, _MM_SHUFFLE(2, 3, 0, 1)))};
+}
+
 // One bit a lane. False for NaN.
 static inline uint32_t at_most(Floats8 a, Floats8 b) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
@@ -81,11 +88,26 @@ static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Flo
   return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
-// Likewise from far to near for that octant of directions, and how near they are.
+// A node's slots from far to near for that octant of directions: the lowest three bits of each number.
+static inline __m256i slots_in_order(const TriangleNode& node, uint32_t octant) {
+  const __m256i shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
+  return _mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(node.order[octant])), shifts);
+}
+
+// Likewise their slots from far to near for that octant of directions: the lowest three bits of what is written.
+static inline uint32_t pack_slots(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
+                                  uint32_t* slots) {
+  const __m256i order = slots_in_order(node, octant);
+  const __m256 met = _mm256_permutevar8x32_ps(_mm256_cmp_ps(near.v, far.v, _CMP_LE_OQ), order);
+  const auto set = static_cast<uint32_t>(_mm256_movemask_ps(met));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(slots), _mm256_permutevar8x32_epi32(order, packing(set)));
+  return static_cast<uint32_t>(__builtin_popcount(set));
+}
+
+// Likewise the children themselves, and how near they are.
 static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
                                    uint32_t* children, float* nears) {
-  const __m256i shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-  const __m256i order = _mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(node.order[octant])), shifts);
+  const __m256i order = slots_in_order(node, octant);
   const __m256i child =
       _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(node.child)), order);
   const __m256 sorted = _mm256_permutevar8x32_ps(near.v, order);

@@ -59,6 +59,12 @@ static inline Floats8 choose(Floats8 where, Floats8 yes, Floats8 no) {
   return {_mm_blendv_ps(no.low, yes.low, where.low), _mm_blendv_ps(no.high, yes.high, where.high)};
 }
 
+static inline Floats8 largest(Floats8 a) {
+  const __m128 halves = _mm_max_ps(a.low, a.high);
+  const __m128 pairs = _mm_max_ps(halves, _mm_movehl_ps(halves, halves));
+  return Floats8::all(_mm_cvtss_f32(_mm_max_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1))));
+}
+
 static inline uint32_t lanes_of(__m128 low, __m128 high) {
   return static_cast<uint32_t>(_mm_movemask_ps(low) | _mm_movemask_ps(high) << 4);
 }
@@ -75,6 +81,17 @@ static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Flo
   for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
     children[count] = node.child[slot];
     count += set >> slot & 1u;
+  }
+  return count;
+}
+
+static inline uint32_t pack_slots(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
+                                  uint32_t* slots) {
+  const uint32_t set = at_most(near, far), order = node.order[octant];
+  uint32_t count = 0;
+  for (uint32_t place = 0; place < kTreeWidth; ++place) {
+    slots[count] = order >> (3 * place);
+    count += set >> (slots[count] & 7u) & 1u;
   }
   return count;
 }

@@ -63,42 +63,51 @@ static inline Projected project(const Pairs& pairs) {
   return p;
 }
 
-// What float can tell, a bit for each pair.
+// What float can tell of a triangle and a ray.
 struct PairsMet {
-  uint32_t open;  // may hit within the limit
-  uint32_t sure;  // hits within the limit; kAny only
+  uint32_t open;  // may hit within the limit; one bit a pair
+  uint32_t inside, edge_on;
+  Floats8 least, most;       // of the edge functions
+  Floats8 earliest, latest;  // t is between them
 };
 
-// `front` and `back`: the pairs whose rays accept a triangle seen so.
-template <bool kAny>
-static inline PairsMet meet(const Pairs& pairs, uint32_t front, uint32_t back) {
+static inline PairsMet meet(const Pairs& pairs) {
   const Projected p = project(pairs);
-  const Floats8 zero = Floats8::all(0), minus_edge = zero - pairs.edge;
-  const Floats8 least = smaller(p.weight_a, smaller(p.weight_b, p.weight_c));
-  const Floats8 most = larger(p.weight_a, larger(p.weight_b, p.weight_c));
-  const uint32_t inside = at_most(minus_edge, least) | at_most(most, pairs.edge);
+  const Floats8 zero = Floats8::all(0);
+  PairsMet met;
+  met.least = smaller(p.weight_a, smaller(p.weight_b, p.weight_c));
+  met.most = larger(p.weight_a, larger(p.weight_b, p.weight_c));
+  met.inside = at_most(zero - pairs.edge, met.least) | at_most(met.most, pairs.edge);
   const Floats8 determinant = p.weight_a + p.weight_b + p.weight_c;
   const Floats8 inverse = Floats8::all(1) / determinant;
   const Floats8 behind = multiply_add(p.weight_a, p.a_z, multiply_add(p.weight_b, p.b_z, p.weight_c * p.c_z));
   const Floats8 t = zero - behind * pairs.reciprocal_z * inverse;
   const Floats8 off =
       planted(PlantedBug::kKernelTBound) ? zero : multiply_add(pairs.noise, size_of(inverse), pairs.t_floor);
-  const Floats8 earliest = t - off, latest = t + off;
-  const uint32_t edge_on = at_most(size_of(determinant), Floats8::all(8) * pairs.edge);
-  PairsMet met;
-  met.open = inside & (edge_on | (at_most(earliest, pairs.limit) & at_most(zero, latest)));
-  if (planted(PlantedBug::kKernelEdgeOn)) met.open &= ~edge_on;
-  met.sure = 0;
-  if constexpr (kAny) {
-    met.sure = inside & ~edge_on & below(zero, earliest) & at_most(latest, pairs.limit) &
-               ((front & below(pairs.edge, least)) | (back & below(most, minus_edge)));
-  }
+  met.earliest = t - off;
+  met.latest = t + off;
+  met.edge_on = at_most(size_of(determinant), Floats8::all(8) * pairs.edge);
+  met.open = met.inside & (met.edge_on | (at_most(met.earliest, pairs.limit) & at_most(zero, met.latest)));
+  if (planted(PlantedBug::kKernelEdgeOn)) met.open &= ~met.edge_on;
   return met;
 }
 
+// The pairs that hit within the limit for certain. `front` and `back`: those whose rays accept a triangle seen so.
+static inline uint32_t sure(const Pairs& pairs, const PairsMet& met, uint32_t front, uint32_t back) {
+  const Floats8 zero = Floats8::all(0);
+  return met.inside & ~met.edge_on & below(zero, met.earliest) & at_most(met.latest, pairs.limit) &
+         ((front & below(pairs.edge, met.least)) | (back & below(met.most, zero - pairs.edge)));
+}
+
+// One ray and a block's triangles: a bit for each.
+struct BlockMet {
+  uint32_t open;  // may be hit within the limit
+  uint32_t sure;  // are hit within the limit; kAny only
+};
+
 // One ray with a block's triangles.
 template <bool kAny>
-static inline PairsMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
+static inline BlockMet meet_block(const TriangleBlock& block, PreparedRay ray, float limit, const KernelRay& given) {
   const float edge =
       planted(PlantedBug::kKernelEdgeBound) ? 0 : ray.number(kEdgeScale) * block.extent + ray.number(kEdgeFloor);
   Pairs pairs;
@@ -118,10 +127,13 @@ static inline PairsMet meet_block(const TriangleBlock& block, PreparedRay ray, f
     pairs.ys[vertex] = Floats8::load(block.vertices[y + 3 * vertex]);
     pairs.zs[vertex] = Floats8::load(block.vertices[z + 3 * vertex]);
   }
-  PairsMet met = meet<kAny>(pairs, given.accept_front ? ~0u : 0u, given.accept_back ? ~0u : 0u);
+  BlockMet met;
+  const PairsMet triangles = meet(pairs);
   const uint32_t places = (1u << block.count) - 1u;
-  met.open &= places;
-  met.sure &= places;
+  met.open = triangles.open & places;
+  met.sure = 0;
+  if constexpr (kAny)
+    met.sure = sure(pairs, triangles, given.accept_front ? ~0u : 0u, given.accept_back ? ~0u : 0u) & places;
   return met;
 }
 

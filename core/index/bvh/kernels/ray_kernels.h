@@ -2,7 +2,7 @@
 // in float where float is certain by a written bound and in double elsewhere, by the very arithmetic of TriangleRay
 // (core/geometry/ray_triangle.h), so that their answers are its answers bit for bit; what neither settles is left
 // undecided, and the caller asks again, triangle by triangle. Plain data; functions without state, safe from any
-// thread; they take 200 KB of stack.
+// thread; they take 220 KB of stack.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 

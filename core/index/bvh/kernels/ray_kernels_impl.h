@@ -19,6 +19,7 @@ namespace locus {
 namespace {
 
 constexpr uint32_t kMostFlights = 32;    // rays on their way at once
+constexpr uint32_t kMostPackets = 2;     // of rays that go together, likewise
 constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; their numbers fit a byte
 
 // A ray on its way. Waiting nodes and blocks start no later than the limit; below them stands kNoChild.
@@ -62,14 +63,18 @@ class Voyage {
         count_(count),
         flights_(flights) {}
 
+  // What hangs on the outcome of a step comes in a second pass over its rays: the processor, which looks only so far
+  // ahead, is to find the steps of several rays there instead, none of which waits for another.
   inline void run() {
     Agenda now;
     for (uint32_t flight = 0; flight < kMostFlights && next_ != count_; ++flight) start(flight, now);
     while (!now.empty()) {
       Agenda then;
-      for (uint32_t i = 0; i < now.counts[kNode]; ++i) open_node(now.flights[kNode][i], then);
-      for (uint32_t i = 0; i < now.counts[kBlock]; ++i) open_block(now.flights[kBlock][i], then);
-      for (uint32_t i = 0; i < then.counts[kCandidates]; ++i) settle(then.flights[kCandidates][i], met_[i], then);
+      for (uint32_t i = 0; i < now.counts[kNode]; ++i) open_node(now.flights[kNode][i]);
+      for (uint32_t i = 0; i < now.counts[kNode]; ++i) go_on(now.flights[kNode][i], then);
+      for (uint32_t i = 0; i < now.counts[kBlock]; ++i) open_block(now.flights[kBlock][i]);
+      for (uint32_t i = 0; i < now.counts[kBlock]; ++i) leave_block(now.flights[kBlock][i], then);
+      for (uint32_t i = 0; i < then.counts[kCandidates]; ++i) settle(then.flights[kCandidates][i], then);
       then.counts[kCandidates] = 0;
       for (uint32_t i = 0; i < now.counts[kEnd]; ++i) end(now.flights[kEnd][i], then);
       now = then;
@@ -78,7 +83,7 @@ class Voyage {
 
  private:
   struct Met {
-    PairsMet triangles;
+    BlockMet block;
     uint32_t number;  // of the block
   };
 
@@ -97,8 +102,8 @@ class Voyage {
     then.add(number, kNode);
   }
 
-  // Puts the children that the ray may hit on the stack and goes to the nearest.
-  inline void open_node(uint32_t number, Agenda& then) {
+  // Puts the children that the ray may hit on the stack, the nearest last.
+  inline void open_node(uint32_t number) {
     Flight& flight = flights_[number];
     const PreparedRay ray = flight.ray;
     const uint32_t octant = ray.whole(kOctant);
@@ -120,7 +125,6 @@ class Voyage {
     else
       flight.top += pack_sorted(node, entered, left, octant, waiting, flight.nears + flight.top);
     ++flight.nodes;
-    go_on(number, then);
   }
 
   // Goes to the next of those that wait.
@@ -132,17 +136,22 @@ class Voyage {
     then.add(number, step);
   }
 
-  inline void open_block(uint32_t number, Agenda& then) {
+  inline void open_block(uint32_t number) {
     Flight& flight = flights_[number];
     const uint32_t block_number = flight.now & ~kBlockBit;
     const TriangleBlock& block = tree_.blocks[block_number];
     flight.tests += block.count;
-    Met& met = met_[then.counts[kCandidates]];
-    met.triangles = meet_block<kAny>(block, flight.ray, flight.limit, rays_[flight.index]);
+    Met& met = met_[number];
+    met.block = meet_block<kAny>(block, flight.ray, flight.limit, rays_[flight.index]);
     met.number = block_number;
+  }
+
+  // To what waits behind it, or to have decided first what it left open.
+  inline void leave_block(uint32_t number, Agenda& then) {
+    Flight& flight = flights_[number];
     // Branches would be guessed wrongly too often here.
     const uint32_t settle_first =
-        static_cast<uint32_t>(met.triangles.open != 0) | static_cast<uint32_t>(flight.tests > kMaxKernelTests);
+        static_cast<uint32_t>(met_[number].block.open != 0) | static_cast<uint32_t>(flight.tests > kMaxKernelTests);
     const uint32_t behind = flight.waiting[flight.top - 1], step = step_at(behind);
     fetch(behind, step);
     flight.top -= 1u - settle_first;
@@ -151,9 +160,10 @@ class Voyage {
   }
 
   // Decides what float left open in a block, and goes on.
-  inline void settle(uint32_t number, const Met& met, Agenda& then) {
+  inline void settle(uint32_t number, Agenda& then) {
+    const Met& met = met_[number];
     Flight& flight = flights_[number];
-    if (kAny && met.triangles.sure != 0) flight.found = true;
+    if (kAny && met.block.sure != 0) flight.found = true;
     const float limit = flight.limit;
     if (!kAny || !flight.found) decide_open(flight, met);
     if (flight.tests > kMaxKernelTests) flight.undecided = true;
@@ -164,7 +174,7 @@ class Voyage {
 
   inline void decide_open(Flight& flight, const Met& met) {
     const TriangleBlock& block = tree_.blocks[met.number];
-    for (uint32_t open = met.triangles.open; open != 0; open &= open - 1u) {
+    for (uint32_t open = met.block.open; open != 0; open &= open - 1u) {
       const int place = __builtin_ctz(open);
       const Verdict verdict = decide(block, place, rays_[flight.index], flight.ray);
       if (verdict.what == KernelVerdict::kUndecided) flight.undecided = true;
@@ -228,14 +238,34 @@ class Voyage {
 template <bool kAny>
 static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared,
                               KernelHit* hits, uint32_t count, uint8_t* rest) {
-  uint32_t left = 0;
-  for (uint32_t first = 0; first < count; first += kTreeWidth) {
-    const uint32_t size = count - first < kTreeWidth ? count - first : kTreeWidth;
-    if (size == kTreeWidth && go_together(prepared[first / kTreeWidth], tree.magnitude)) {
-      Packet<kAny>(tree, rays + first, prepared[first / kTreeWidth], hits + first).run();
-      continue;
+  uint32_t left = 0, first = 0;
+  // False where none is left.
+  const auto start_next = [&](Packet<kAny>& packet) {
+    while (first < count) {
+      const uint32_t now = first, size = count - now < kTreeWidth ? count - now : kTreeWidth;
+      first += size;
+      if (size == kTreeWidth && go_together(prepared[now / kTreeWidth], tree.magnitude)) {
+        packet.start(tree, rays + now, prepared[now / kTreeWidth], hits + now);
+        return true;
+      }
+      for (uint32_t i = now; i < first; ++i) rest[left++] = static_cast<uint8_t>(i);
     }
-    for (uint32_t i = first; i < first + size; ++i) rest[left++] = static_cast<uint8_t>(i);
+    return false;
+  };
+  Packet<kAny> packets[kMostPackets];
+  Packet<kAny>* under_way[kMostPackets];
+  uint32_t packet_count = 0;
+  while (packet_count < kMostPackets && start_next(packets[packet_count])) {
+    under_way[packet_count] = &packets[packet_count];
+    ++packet_count;
+  }
+  while (packet_count != 0) {
+    for (uint32_t i = 0; i < packet_count;) {
+      if (under_way[i]->step() || start_next(*under_way[i]))
+        ++i;
+      else
+        under_way[i] = under_way[--packet_count];
+    }
   }
   return left;
 }
