@@ -34,7 +34,7 @@ Arena::Arena(uint32_t count) : world_(Kind::kUniform, count), batches_(queries_o
 }
 
 void Arena::write(const Window& window, Seen& seen) {
-  const double start = wall_seconds();
+  const double start = wall_seconds(), start_computing = thread_seconds();
   double moved = 0;
   while (!stop_) {
     if (window.rate != kUnpaced) {
@@ -45,6 +45,7 @@ void Arena::write(const Window& window, Seen& seen) {
     moved += static_cast<double>(window.batch);
   }
   seen.moves_a_second = moved / (wall_seconds() - start);
+  seen.moves_a_computed_second = moved / (thread_seconds() - start_computing);
 }
 
 void Arena::read(size_t first_batch, Seen& seen) const {

@@ -30,7 +30,8 @@ struct Seen {
   std::vector<double> latencies;  // seconds of each batch of 100 queries, of all readers, but for the interrupted
   uint64_t interrupted = 0;       // batches during which the kernel gave the core to somebody else
   double moves_a_second = 0;
-  uint64_t wrong_counts = 0;  // revisions that did not hold every object once, of those that were counted
+  double moves_a_computed_second = 0;  // of the writer's thread, whatever else the machine did meanwhile
+  uint64_t wrong_counts = 0;           // revisions that did not hold every object once, of those that were counted
 };
 
 class Arena {
