@@ -91,7 +91,7 @@ bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickChange> chan
 }
 
 template <class PlaceOf>
-inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const PlaceOf& place_of) {
+inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const GridBlock* before, const PlaceOf& place_of) {
   std::vector<GridSlot>& slots = *slots_;
   for (size_t i = 0; i < sources_.size(); ++i) {
     const Source& source = sources_[i];
@@ -107,7 +107,8 @@ inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const PlaceOf& 
       block.put(slot, arrival.entry, source.position, handle, arrival.reach, place_->center);
     }
     if (block.has_forms()) block.put_form(slot, form_of(source));
-    slots[handle] = {number_, slot | flag};
+    if (source.block == nullptr || source.block != before || source.slot != slot)
+      slots[handle] = {number_, slot | flag};
   }
 }
 
@@ -124,7 +125,7 @@ BrickPtr BrickBuilder::sort_anew(const Brick* old, absl::Span<const BrickChange>
   for (const Source& source : sources_) ++offsets[source.cell + 1];
   for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] += offsets[cell];
   std::array<uint32_t, kBrickCells + 1> next = offsets;
-  write(*block, 0, [&](size_t i) { return next[sources_[i].cell]++; });
+  write(*block, 0, nullptr, [&](size_t i) { return next[sources_[i].cell]++; });
   auto brick = std::make_shared<Brick>();
   brick->place = *place_;
   brick->sorted = block;
@@ -135,23 +136,23 @@ BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange
   auto brick = std::make_shared<Brick>(old);
   if (brick->gone.empty()) brick->gone.resize(old.sorted->count() / 64 + 2);
   recent_changes_.assign(old.recent == nullptr ? 0 : old.recent->count(), kStays);
-  for (const BrickChange& change : changes) {
-    if (change.slot == BrickChange::kArrives) continue;
-    const uint32_t slot = change.slot & ~GridSlot::kRecent;
-    if (slot != change.slot) {
-      recent_changes_[slot] = change.number;
-      continue;
-    }
-    brick->gone[slot / 64] |= uint64_t{1} << (slot % 64);
-    ++brick->gone_count;
-    if (change.number != BrickChange::kLeaves) add_source(*old.sorted, slot, change.number);
-  }
+  for (const BrickChange& change : changes)
+    if (change.slot != BrickChange::kArrives && (change.slot & GridSlot::kRecent) != 0)
+      recent_changes_[change.slot & ~GridSlot::kRecent] = change.number;
+  // First those that were recent before, so that they keep their slots: to note where each is costs more than to copy
+  // it.
   if (old.recent != nullptr) add_sources(*old.recent, recent_changes_, nullptr);
+  for (const BrickChange& change : changes) {
+    if (change.slot == BrickChange::kArrives || (change.slot & GridSlot::kRecent) != 0) continue;
+    brick->gone[change.slot / 64] |= uint64_t{1} << (change.slot % 64);
+    ++brick->gone_count;
+    if (change.number != BrickChange::kLeaves) add_source(*old.sorted, change.slot, change.number);
+  }
   add_arrivals(changes);
   brick->recent = nullptr;
   if (!sources_.empty()) {
     const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources_.size()), any_form(&old, changes));
-    write(*block, GridSlot::kRecent, [](size_t i) { return static_cast<uint32_t>(i); });
+    write(*block, GridSlot::kRecent, old.recent.get(), [](size_t i) { return static_cast<uint32_t>(i); });
     brick->recent = block;
   }
   return brick->size() == 0 ? nullptr : brick;

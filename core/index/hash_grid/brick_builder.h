@@ -73,9 +73,10 @@ class BrickBuilder {
   void add_arrivals(absl::Span<const BrickChange> changes);
   GridForm form_of(const Source& source) const;
   bool any_form(const Brick* old, absl::Span<const BrickChange> changes) const;
-  // Writes the sources into `block` at the places that place_of(i) gives for source i.
+  // Writes the sources into `block` at the places that place_of(i) gives for source i. Slots in `before`, which may be
+  // null, are known already.
   template <class PlaceOf>
-  void write(GridBlock& block, uint32_t flag, const PlaceOf& place_of);
+  void write(GridBlock& block, uint32_t flag, const GridBlock* before, const PlaceOf& place_of);
 
   const BrickPlace* place_ = nullptr;
   uint32_t number_ = 0;

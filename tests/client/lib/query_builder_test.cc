@@ -91,7 +91,6 @@ TEST(QueryBuilderTest, PointsComeRowByRowOrAsAColumn) {
   builder.nearest().k(4).detail(v1::STATIC_DETAIL_TRIANGLES).point({1, 2, 3}).point({4, 5, 6}, 7, {.ignore_group = 9});
   builder.nearest().points({1, 2, 3, 4, 5, 6}).max_distances({8});
   const v1::QueryBatch batch = builder.build();
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   EXPECT_EQ(batch.blocks(0).nearest().k(), 4u);
   EXPECT_EQ(batch.blocks(0).nearest().detail(), v1::STATIC_DETAIL_TRIANGLES);
   EXPECT_THAT(batch.blocks(0).nearest().points(), ElementsAre(1, 2, 3, 4, 5, 6));
