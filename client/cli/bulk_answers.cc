@@ -48,6 +48,7 @@ absl::Status BulkAnswers::write_block(const v1::BlockResult& block, size_t rows,
   for (const uint32_t query : block.truncated()) {
     if (truncated_++ < kListedTruncated) truncated_rows_.push_back(layout.first_query + query);
   }
+  clamped_ += static_cast<size_t>(block.clamped_size());
   if (query_.any) {
     const absl::StatusOr<client::AnyHits> hits = client::AnyHits::of(block);
     if (!hits.ok()) return hits.status();
@@ -91,6 +92,7 @@ Json BulkAnswers::tail() const {
   }
   if (truncated_ > 0) tail["truncated"] = truncated_rows_;
   if (truncated_ > kListedTruncated) tail["truncated_in_all"] = truncated_;
+  if (clamped_ > 0) tail["clamped_in_all"] = clamped_;
   if (has_work_) tail["work"] = work_json(work_);
   return tail;
 }

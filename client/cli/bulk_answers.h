@@ -49,6 +49,7 @@ class BulkAnswers {
   uint64_t tick_ = 0;
   uint64_t rows_ = 0;
   uint64_t truncated_ = 0;
+  size_t clamped_ = 0;
   Json truncated_rows_ = Json::array();  // the first of them
   v1::Work work_;
   bool has_work_ = false;

@@ -199,6 +199,7 @@ absl::Status check(const QueryOptions& options, const BulkOptions& bulk) {
   status.Update(check(bulk));
   status.Update(at_most_one(options.masks, "--mask"));
   status.Update(at_most_one(options.ignore_groups, "--ignore-group"));
+  status.Update(at_most_one(options.past.as_of, "--as-of"));
   if (status.ok() && options.after_id.value != 0)
     return usage_error("--after-id goes on after one cut answer, not beside an input of many");
   if (status.ok() && bulk.follow && options.exactly) return usage_error("give --exactly or --follow, not both");

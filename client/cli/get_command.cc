@@ -21,6 +21,7 @@ struct GetOptions {
   std::string scene;
   std::vector<Number64> ids;
   std::vector<Number64> groups;
+  PastOptions past;
 };
 
 const std::vector<v1::Column>& columns() {
@@ -33,11 +34,14 @@ const std::vector<v1::Column>& columns() {
 v1::QueryBatch batch_of(const GetOptions& options, const Context& context) {
   client::QueryBuilder builder;
   see_own(options.scene, context, builder);
-  if (!options.ids.empty()) builder.lookup().ids(values_of(options.ids)).columns(columns());
+  if (!options.ids.empty()) {
+    client::LookupBlock block = builder.lookup();
+    apply_to_block(options.past, block.ids(values_of(options.ids)).columns(columns()));
+  }
   if (!options.groups.empty()) {
     client::LookupBlock block = builder.lookup();
     for (const Number64& group : options.groups) block.group(group.value);
-    block.columns(columns());
+    apply_to_block(options.past, block.columns(columns()));
   }
   return builder.build();
 }
@@ -90,10 +94,12 @@ void add_get_command(CLI::App& parent, Context& context) {
   command.footer(R"(Examples:
   locus get arena --id 7
   locus get arena --id 7 --id 8
-  locus -o json get arena --group 3)");
+  locus -o json get arena --group 3
+  locus get arena --id 7 --as-of 120+0.5)");
   add_scene_argument(command, options->scene);
   add_repeatable(command, "--id", options->ids, "ID", "An object or instance");
   add_repeatable(command, "--group", options->groups, "GROUP", "Everything in a group");
+  add_past_options(command, options->past);
   run_or_check_when_chosen(command, options, context, get);
 }
 

@@ -44,6 +44,7 @@ void add_query_command(CLI::App& parent, Context& context) {
   locus query ball arena --at 0,0,0 --radius 10
   locus query box arena --at 0,0,0 --half 5,5,5
   locus query nearest arena --at 0,0,0 --k 5
+  locus query ray arena --from 0,1,0 --dir 0,0,-1 --as-of 120+0.5
   locus -o csv query ray arena --from-csv rays.csv > hits.csv)");
   command.require_subcommand(1);
   add_query_ray(command, context);

@@ -61,6 +61,7 @@ void add_query_options(CLI::App& command, QueryOptions& options) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->transform(choices(column_names()));
+  add_past_options(command, options.past);
   add_view_options(command, options);
 }
 

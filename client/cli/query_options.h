@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "client/cli/arguments.h"
 #include "client/cli/context.h"
+#include "client/cli/past_options.h"
 #include "client/lib/query_builder.h"
 
 namespace locus::cli {
@@ -24,6 +25,7 @@ struct QueryOptions {
   std::vector<Number64> ignore_ids;
   uint32_t max_results = 0;
   Number64 after_id;
+  PastOptions past;
   std::optional<uint64_t> at_least;
   std::optional<uint64_t> exactly;
   Number64 epoch;
@@ -56,6 +58,7 @@ void apply_to_block(const QueryOptions& options, Block& block) {
       .ignore_ids(values_of(options.ignore_ids))
       .max_results(options.max_results)
       .after_id(options.after_id.value);
+  apply_to_block(options.past, block);
 }
 
 // Positions as a query sends them: floats relative to a frame. The frame is the origin where every coordinate is a

@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "client/cli/past_options.h"
 #include "client/lib/result_rows.h"
 
 namespace locus::cli {
@@ -111,6 +112,8 @@ Json result_head(const v1::QueryResult& result) {
   Json head = {{"epoch", id_json(result.epoch())}, {"revision", result.revision()}, {"tick", result.tick()}};
   for (const v1::BlockResult& block : result.blocks()) {
     for (const uint32_t query : block.truncated()) head["truncated"].push_back(query);
+    for (Json& time : resolved_json(block)) head["as_of"].push_back(std::move(time));
+    for (const uint32_t query : block.clamped()) head["clamped"].push_back(query);
   }
   if (result.has_work()) head["work"] = work_json(result.work());
   return head;

@@ -29,7 +29,8 @@ std::vector<std::string> row_keys(const RowLayout& layout);
 
 Json work_json(const v1::Work& work);
 
-// Epoch, revision and tick, the queries that were cut, and the work if it was reported.
+// Epoch, revision and tick, the queries that were cut, the times of the past that were asked and which of them were
+// clamped, and the work if it was reported.
 Json result_head(const v1::QueryResult& result);
 
 }  // namespace locus::cli

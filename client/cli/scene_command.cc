@@ -22,6 +22,8 @@ struct CreateOptions {
   std::vector<std::string> labels;
   v1::Winding winding = v1::WINDING_UNSPECIFIED;
   std::string static_from;
+  uint32_t history_ticks = 0;
+  uint64_t history_bytes = 0;
   bool if_absent = false;
 };
 
@@ -71,6 +73,13 @@ Report description_of(const v1::Scene& scene) {
   report.head["min"] = corner_of(scene.has_min(), scene.min());
   report.head["max"] = corner_of(scene.has_max(), scene.max());
   report.head["winding"] = scene.spec().winding() == v1::WINDING_CLOCKWISE ? "clockwise" : "counter-clockwise";
+  if (scene.spec().history_ticks() != 0) {
+    report.head["history"] = {{"ticks", scene.spec().history_ticks()},
+                              {"bytes", scene.spec().history_bytes()},
+                              {"oldest_tick", scene.oldest_tick()},
+                              {"recorded_ticks", scene.recorded_ticks()},
+                              {"used_bytes", scene.history_bytes()}};
+  }
   report.head["pending_changes"] = scene.pending_changes();
   if (!scene.last_build_error().empty()) report.head["last_build_error"] = scene.last_build_error();
   Json labels = Json::object();
@@ -88,6 +97,8 @@ absl::Status create(const CreateOptions& options, Context& context) {
   request.set_if_absent(options.if_absent);
   request.mutable_spec()->set_winding(options.winding);
   request.mutable_spec()->set_static_from(options.static_from);
+  request.mutable_spec()->set_history_ticks(options.history_ticks);
+  request.mutable_spec()->set_history_bytes(options.history_bytes);
   request.mutable_spec()->mutable_labels()->insert(labels->begin(), labels->end());
   const absl::StatusOr<client::Client*> client = context.connect();
   if (!client.ok()) return client.status();
@@ -145,6 +156,7 @@ void add_create(CLI::App& parent, Context& context) {
   command.footer(R"(Examples:
   locus scene create arena
   locus scene create arena --if-absent --label map=delta --label mode=ctf
+  locus scene create arena --history-ticks 64
   locus scene create arena-copy --static-from arena)");
   command.add_option("NAME", options->name, "Lower case letters, digits and dashes, at most 63")->required();
   command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
@@ -155,6 +167,10 @@ void add_create(CLI::App& parent, Context& context) {
       ->transform(choices(windings));
   command.add_option("--static-from", options->static_from, "Start with the instances of this scene")
       ->type_name("SCENE");
+  command.add_option("--history-ticks", options->history_ticks, "For how many ticks the past can be asked about [0]")
+      ->type_name("TICKS");
+  command.add_option("--history-bytes", options->history_bytes, "Memory the past may take [256 MiB]")
+      ->type_name("BYTES");
   run_when_chosen(command, options, context, create);
 }
 

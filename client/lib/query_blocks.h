@@ -73,6 +73,17 @@ class BlockBuilder {
     block_->set_after_id(id);
     return derived();
   }
+  // When each query asks: N ticks or one for all, and N fractions of the way to the next tick, one for all, or none.
+  Derived& as_of(absl::Span<const uint64_t> ticks, absl::Span<const float> fractions = {}) {
+    assign(*block_->mutable_as_of_ticks(), ticks);
+    assign(*block_->mutable_as_of_fractions(), fractions);
+    return derived();
+  }
+  // What to do about times that are not kept; refused by default.
+  Derived& outside_history(v1::OutsideHistory outside) {
+    block_->set_outside_history(outside);
+    return derived();
+  }
 
  protected:
   explicit BlockBuilder(v1::QueryBlock& block) : block_(&block) {}

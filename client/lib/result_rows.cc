@@ -71,6 +71,11 @@ bool ResultRows::truncated(size_t query) const {
   return std::binary_search(cut.begin(), cut.end(), query);
 }
 
+bool ResultRows::clamped(size_t query) const {
+  const auto& clamped = block_->clamped();
+  return std::binary_search(clamped.begin(), clamped.end(), query);
+}
+
 absl::StatusOr<RayHits> RayHits::of(const v1::BlockResult& block) {
   absl::StatusOr<ResultRows> rows = ResultRows::of(block);
   if (!rows.ok()) return rows.status();

@@ -37,6 +37,11 @@ class ResultRows {
   RowRange rows_of(size_t query) const { return {begins_[query], begins_[query + 1]}; }
   // Whether the query had more rows than are reported.
   bool truncated(size_t query) const;
+  // The time that each query asked about in fact; empty for blocks that ask about now.
+  absl::Span<const uint64_t> resolved_ticks() const { return block_->resolved_ticks(); }
+  absl::Span<const float> resolved_fractions() const { return block_->resolved_fractions(); }
+  // Whether the query asked about a time that is not kept.
+  bool clamped(size_t query) const;
 
   // Columns, one entry a row; empty if not asked for.
   absl::Span<const float> t() const { return block_->t(); }

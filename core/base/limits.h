@@ -48,6 +48,10 @@ inline constexpr uint64_t kRecentBytes = 16u << 20;    // ... while what they re
 inline constexpr uint32_t kDefaultWaitMs = 1000;       // at_least without a deadline
 inline constexpr uint32_t kTestsBetweenChecks = 4096;  // primitive tests between two looks at the deadline
 
+inline constexpr uint32_t kMaxHistoryTicks = 1u << 14;                 // per scene
+inline constexpr uint64_t kDefaultHistoryBytes = uint64_t{256} << 20;  // per scene that keeps any ...
+inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;        // ... and the most it may be given
+
 inline constexpr uint32_t kReceiveBytes = 32u << 20;          // one message
 inline constexpr uint32_t kMaxStreams = 1024;                 // open update and query streams
 inline constexpr uint32_t kMaxCalls = 256;                    // calls in work at once, streams apart
@@ -60,6 +64,7 @@ inline constexpr uint32_t kMaxListenAddresses = 16;
 inline constexpr uint32_t kMaxPageSize = 1000;  // scenes or meshes a page
 
 static_assert(kMaxBlocks <= kMaxQueries);
+static_assert(kDefaultHistoryBytes <= kMaxHistoryBytes);
 static_assert(kDefaultMaxResults <= kMaxMaxResults);
 static_assert(kMaxNearest <= kMaxMaxResults);
 static_assert(kDefaultReplyBytes < 4u << 20, "clients refuse messages over 4 MiB by default");

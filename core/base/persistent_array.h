@@ -9,6 +9,7 @@
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -44,6 +45,13 @@ class PersistentArray {
   // O(1), or one copy of a leaf; after a snapshot one copy of the list of leaves.
   void set(size_t place, T value);
 
+  // Bytes of leaves and of the list that `other` does not share. O(leaves).
+  size_t bytes_apart_from(const PersistentArray& other) const;
+  // fn(value, other's value) for each place whose leaf `other` does not share; null where it has no such place.
+  // O(leaves and places handed over).
+  template <class Fn>
+  void for_each_apart_from(const PersistentArray& other, const Fn& fn) const;
+
  private:
   static constexpr uint64_t kNoOwner = 0;
   struct Leaf {
@@ -58,6 +66,10 @@ class PersistentArray {
 
   explicit PersistentArray(std::shared_ptr<List> list) : list_(std::move(list)) {}
   void make_list_writable();
+  // Of leaf number `leaf`.
+  bool shares_leaf(const PersistentArray& other, size_t leaf) const {
+    return leaf < other.list_->leaves.size() && list_->leaves[leaf] == other.list_->leaves[leaf];
+  }
 
   std::shared_ptr<List> list_;
   uint64_t owner_ = kNoOwner;  // whose leaves may be changed in place
@@ -87,6 +99,26 @@ void PersistentArray<T, kLeafSize>::set(size_t place, T value) {
     leaf->owner = owner_;
   }
   leaf->values[place % kLeafSize] = std::move(value);
+}
+
+template <class T, size_t kLeafSize>
+size_t PersistentArray<T, kLeafSize>::bytes_apart_from(const PersistentArray& other) const {
+  if (list_ == other.list_) return 0;
+  size_t bytes = sizeof(List) + list_->leaves.size() * sizeof(list_->leaves[0]);
+  for (size_t leaf = 0; leaf < list_->leaves.size(); ++leaf)
+    if (!shares_leaf(other, leaf)) bytes += sizeof(Leaf);
+  return bytes;
+}
+
+template <class T, size_t kLeafSize>
+template <class Fn>
+void PersistentArray<T, kLeafSize>::for_each_apart_from(const PersistentArray& other, const Fn& fn) const {
+  if (list_ == other.list_) return;
+  for (size_t leaf = 0; leaf < list_->leaves.size(); ++leaf) {
+    if (shares_leaf(other, leaf)) continue;
+    for (size_t place = leaf * kLeafSize; place < std::min(size(), (leaf + 1) * kLeafSize); ++place)
+      fn((*this)[place], place < other.size() ? &other[place] : nullptr);
+  }
 }
 
 }  // namespace locus

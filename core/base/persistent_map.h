@@ -68,6 +68,8 @@ class PersistentMap {
   void for_each(Fn&& fn) const {
     if (root_) for_each_below(root_.get(), fn);
   }
+  // Bytes of nodes that `other` does not share at the same place. O(those nodes).
+  size_t bytes_apart_from(const PersistentMap& other) const { return bytes_apart(root_.get(), other.root_.get()); }
 
  private:
   static constexpr uint64_t kNoOwner = 0;
@@ -161,6 +163,7 @@ class PersistentMap {
   static void erase_below(NodePtr& link, const K& key, uint64_t hash, int depth, uint64_t owner);
   template <class Fn>
   static void for_each_below(Node* node, Fn& fn);
+  static size_t bytes_apart(const Node* node, const Node* other);
 
   NodePtr root_;
   size_t size_ = 0;
@@ -260,6 +263,19 @@ void PersistentMap<K, V, Hash>::for_each_below(Node* node, Fn& fn) {
   for (const NodePtr& child : branch_of(node)->children) {
     if (child) for_each_below(child.get(), fn);
   }
+}
+
+template <class K, class V, class Hash>
+size_t PersistentMap<K, V, Hash>::bytes_apart(const Node* node, const Node* other) {  // as deep as the trie
+  if (node == other || node == nullptr) return 0;
+  if (node->is_leaf) return sizeof(Leaf) + static_cast<const Leaf*>(node)->entries.capacity() * sizeof(Entry);
+  const auto* branch = static_cast<const Branch*>(node);
+  const auto* other_branch = other == nullptr || other->is_leaf ? nullptr : static_cast<const Branch*>(other);
+  size_t bytes = sizeof(Branch);
+  for (size_t digit = 0; digit < kFanOut; ++digit)
+    bytes += bytes_apart(branch->children[digit].get(),
+                         other_branch == nullptr ? nullptr : other_branch->children[digit].get());
+  return bytes;
 }
 
 }  // namespace locus

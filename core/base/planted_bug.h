@@ -12,6 +12,7 @@ enum class PlantedBug {
   kStaleSnapshot,      // a published snapshot keeps the objects of the revision before
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
   kUnsignedCellIndex,  // cell indices truncate towards zero instead of flooring
+  kRewindReach,        // between two ticks objects are looked for only where they were at the first
   kUnpaddedNear,       // the near side of the slab test of tree nodes goes without its pad
   kEdgeOnInDouble,     // triangles nearly edge-on are decided in double, like all others
   kNearestLimit,       // boxes as far as the farthest thing found near a point are left out

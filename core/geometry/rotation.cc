@@ -24,6 +24,18 @@ Quaternion normalized(const Quaternion& q) {
           static_cast<float>(q.w / n)};
 }
 
+Quaternion blended(const Quaternion& from, const Quaternion& to, double weight) {
+  if (from == to) return from;
+  const double ax = from.x, ay = from.y, az = from.z, aw = from.w;
+  const double bx = to.x, by = to.y, bz = to.z, bw = to.w;
+  const double keep = 1 - weight;
+  const double take = ax * bx + ay * by + az * bz + aw * bw < 0 ? -weight : weight;
+  const double x = ax * keep + bx * take, y = ay * keep + by * take;
+  const double z = az * keep + bz * take, w = aw * keep + bw * take;
+  const double n = std::sqrt(x * x + y * y + z * z + w * w);  // at least 0.7 for unit quaternions
+  return {static_cast<float>(x / n), static_cast<float>(y / n), static_cast<float>(z / n), static_cast<float>(w / n)};
+}
+
 Vec3d Rotation::extent_to_world(Vec3d half) const {
   return {dot(abs(row_x), half), dot(abs(row_y), half), dot(abs(row_z), half)};
 }

@@ -20,6 +20,10 @@ double unit_deviation(const Quaternion& q);
 // so that normalising again changes nothing. Not for a zero quaternion.
 Quaternion normalized(const Quaternion& q);
 
+// Part `weight`, 0 to 1, of the way from one unit quaternion to another, by the shorter arc: normalised linear
+// interpolation in double, rounded once. `from` itself, bit for bit, where both are the same.
+Quaternion blended(const Quaternion& from, const Quaternion& to, double weight);
+
 // Rows of a rotation matrix; `to_world` is matrix * vector, `to_local` its transpose * vector.
 struct Rotation {
   Vec3d row_x{1, 0, 0}, row_y{0, 1, 0}, row_z{0, 0, 1};

@@ -15,17 +15,15 @@ constexpr size_t kRaysAtOnce = 256;
 
 }  // namespace
 
-BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, uint64_t max_bytes)
+BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryMoments& moments, uint64_t max_bytes)
     : task_(task),
       block_(block),
+      moments_(moments),
       columns_(returned_columns(block)),
       max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {}
 
 BlockResult BlockRunner::run(size_t begin, size_t end) {
   task_.check();
-  const auto* lookup = std::get_if<LookupColumns>(&block_.kind);
-  if (lookup != nullptr && !lookup->groups.empty() && !task_.ended())
-    groups_ = look_up_groups(task_, lookup->groups, overlap_options(block_, StaticDetail::kInstances));
   std::visit([&](const auto& kind) { run_queries(kind, begin, end); }, block_.kind);
   task_.check();  // books what is not booked yet: many small pieces use up a budget like a large one
   result_.work = task_.work();
@@ -77,7 +75,7 @@ void BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) 
   const Winding winding = task_.snapshot().winding;
   for (size_t first = begin; first < end; first += kRaysAtOnce) {
     const size_t last = std::min(end, first + kRaysAtOnce);
-    const RayAnswers answers = run_rays(task_, block_, rays, winding, first, last);
+    const RayAnswers answers = run_rays(task_, block_, rays, moments_, winding, first, last);
     for (size_t i = first; i < last; ++i)
       append_ray(rays, answers[i - first], ray_request(block_, rays, winding, i), i);
   }
@@ -98,21 +96,23 @@ void BlockRunner::append_ray(const RayColumns& rays, const RayAnswer& answer, co
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
-    answer = run_ball(task_, ball_of(block_, balls, i), overlap_options(block_, balls.detail), Filter(block_, i));
+    answer = run_ball(task_, moments_.of(i), ball_of(block_, balls, i), overlap_options(block_, balls.detail),
+                      Filter(block_, i));
   append_runs(answer, i);
 }
 
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
-    answer = run_box(task_, box_of(block_, boxes, i), overlap_options(block_, boxes.detail), Filter(block_, i));
+    answer = run_box(task_, moments_.of(i), box_of(block_, boxes, i), overlap_options(block_, boxes.detail),
+                     Filter(block_, i));
   append_runs(answer, i);
 }
 
 void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   const NearestRequest request = nearest_request(block_, nearest, i);
   std::vector<Hit> rows;
-  if (!task_.ended()) rows = run_nearest(task_, request, Filter(block_, i));
+  if (!task_.ended()) rows = run_nearest(task_, moments_.of(i), request, Filter(block_, i));
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
   for (const Hit& row : absl::MakeConstSpan(rows).subspan(0, kept)) {
     append_row(row, columns_, result_);
@@ -121,8 +121,18 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   count_rows(kept, kept < rows.size(), i);
 }
 
+// One pass over the objects answers all queries in a row that ask about the same moment.
+void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
+  const bool same = groups_query_ && (!moments_.asks_past() || moments_.time(*groups_query_) == moments_.time(i));
+  if (same || task_.ended()) return;
+  groups_query_ = i;
+  groups_ = look_up_groups(task_, moments_.of(i), lookup.groups, overlap_options(block_, StaticDetail::kInstances));
+}
+
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
-  if (lookup.groups.empty()) return append_row(look_up(task_.snapshot(), lookup.ids[i]), columns_, result_);
+  if (lookup.groups.empty())
+    return append_row(look_up(task_.snapshot(), moments_.of(i), lookup.ids[i]), columns_, result_);
+  look_up_groups_at(lookup, i);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];
   append_runs(answer, i);
 }

@@ -13,7 +13,7 @@ class BlockRunner {
  public:
   // Rows beyond `max_bytes` of columns are dropped and their queries listed as truncated: nothing behind them would fit
   // the reply either.
-  BlockRunner(QueryTask& task, const QueryBlock& block, uint64_t max_bytes);
+  BlockRunner(QueryTask& task, const QueryBlock& block, const QueryMoments& moments, uint64_t max_bytes);
 
   // Queries begin to end (exclusive), in order. `truncated` counts from 0 at the block's first query.
   BlockResult run(size_t begin, size_t end);
@@ -29,14 +29,18 @@ class BlockRunner {
   void append_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i);
   void append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest& request);
   void append_runs(const OverlapAnswer& answer, size_t i);
+  void look_up_groups_at(const LookupColumns& lookup, size_t i);
   void count_rows(size_t rows, bool cut, size_t i);
 
   QueryTask& task_;
   const QueryBlock& block_;
+  const QueryMoments& moments_;
   const ColumnSet columns_;
   const uint64_t max_rows_;
   uint64_t rows_ = 0;
-  absl::flat_hash_map<Group, OverlapAnswer> groups_;  // answers of a lookup of groups
+  // Answers of a lookup of groups, at the moment of the query of that number.
+  absl::flat_hash_map<Group, OverlapAnswer> groups_;
+  std::optional<size_t> groups_query_;
   BlockResult result_;
 };
 

@@ -8,7 +8,7 @@
 
 #include "core/base/ids.h"
 #include "core/scene/instance.h"
-#include "core/scene/object_set.h"
+#include "core/scene/moment.h"
 
 namespace locus {
 
@@ -18,9 +18,16 @@ struct Hit {
   uint32_t triangle = kNoTriangle;                   // number in the mesh
   GridRef object;                                    // one of the two, or neither for a miss
   const Instance* instance = nullptr;
+  const Moment* moment = nullptr;  // of the object: when it was found
+
+  Shape object_shape() const { return moment == nullptr ? shape_of(object) : moment->shape(object); }
 };
 
-inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object, nullptr}; }
+// As it is in the snapshot; the next, as it was at a moment, which the hit borrows.
+inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object}; }
+inline Hit hit_on(const GridRef& object, float t, const Moment& moment) {
+  return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};
+}
 inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, GridRef(), &instance}; }
 
 // The order of ray hits: nearer first, then lower id, then lower triangle.

@@ -54,23 +54,25 @@ class NearestRows {
 
 class ObjectsNear {
  public:
-  ObjectsNear(QueryTask& task, const NearestRequest& request, const Filter& filter, NearestRows& rows)
-      : task_(task), request_(request), filter_(filter), rows_(rows) {}
+  ObjectsNear(QueryTask& task, const Moment& moment, const NearestRequest& request, const Filter& filter,
+              NearestRows& rows)
+      : task_(task), moment_(moment), request_(request), filter_(filter), rows_(rows) {}
 
   double limit() const { return rows_.limit(); }
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(object.entry())) return true;
-    const Shape shape = shape_of(object);
+    const Shape shape = moment_.shape(object);
     const double away = request_.precision == Precision::kConservative
                             ? std::sqrt(squared_distance(request_.point, bounds_of(shape)))
                             : distance(request_.point, shape);
-    rows_.offer(hit_on(object, rounded_distance(away)));
+    rows_.offer(hit_on(object, rounded_distance(away), moment_));
     return true;
   }
 
  private:
   QueryTask& task_;
+  const Moment& moment_;
   const NearestRequest& request_;
   const Filter& filter_;
   NearestRows& rows_;
@@ -229,11 +231,12 @@ NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& ne
           block.precision};
 }
 
-std::vector<Hit> run_nearest(QueryTask& task, const NearestRequest& request, const Filter& filter) {
+std::vector<Hit> run_nearest(QueryTask& task, const Moment& moment, const NearestRequest& request,
+                             const Filter& filter) {
   NearestRows rows(request);
   if (request.source != Source::kStatic) {
-    ObjectsNear visitor(task, request, filter, rows);
-    task.visit_objects_near(request.point, visitor);
+    ObjectsNear visitor(task, moment, request, filter, rows);
+    task.visit_objects_near(moment, request.point, visitor);
   }
   if (request.source != Source::kDynamic && !task.ended()) {
     InstancesNear visitor(task, request, filter, rows);
@@ -247,7 +250,7 @@ Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
   const bool by_bounds = request.precision == Precision::kConservative;
   // In axes around the point, where no digits are lost to far places.
   if (row.object) {
-    Shape shape = shape_of(row.object);
+    Shape shape = row.object_shape();
     if (by_bounds) return nearest_in(point, bounds_of(shape)) - point;
     shape.position = shape.position - point;
     return nearest_on_shape({}, shape);

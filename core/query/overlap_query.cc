@@ -7,6 +7,27 @@
 namespace locus {
 namespace {
 
+// What can be told of an object whose place is known but for some slack: that it overlaps, that it does not, or
+// nothing.
+enum class Verdict { kIn, kOut, kOpen };
+
+// What a verdict goes by. The object reaches no farther than `reach` from its place; it fills a ball of radius `solid`
+// around it; and its place is off by `slack` at most, which covers the rounding of predicates and of what is told here.
+struct LooselyPlaced {
+  Vec3d place;
+  double solid;
+  double reach;
+  double slack;
+};
+
+// Of an object that is `astray` from where it is filed.
+LooselyPlaced loosely_placed(const GridRef& object, double astray) {
+  const Vec3d place = object.entry().position;
+  const double reach = object.reach();
+  const double solid = object.entry().kind == ShapeKind::kBall ? reach : 0;
+  return {place, solid, reach, astray + internal::kBoundsGrowth * (max_component(abs(place)) + reach + astray)};
+}
+
 // A ball or box in world axes, and the same in an instance's mesh axes: what the collecting below needs to know of it.
 struct BallShape {
   using World = Balld;
@@ -21,6 +42,12 @@ struct BallShape {
   static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
   static bool overlaps_bounds(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
   static bool overlaps_object(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
+  static Verdict verdict(const Balld& ball, const LooselyPlaced& object) {
+    const double away = squared_length(object.place - ball.center);
+    const double far = ball.radius + object.reach + object.slack, near = ball.radius + object.solid - object.slack;
+    if (away > far * far) return Verdict::kOut;
+    return near > 0 && away < near * near ? Verdict::kIn : Verdict::kOpen;
+  }
   static bool overlaps_triangle(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
 };
 
@@ -38,29 +65,43 @@ struct BoxShape {
   static double reach(const Obbd& box) { return max_component(abs(box.center)) + max_component(box.half) * 2; }
   static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
+  static Verdict verdict(const Obbd& box, const LooselyPlaced& object) {
+    // How far outside of the box's sides; negative inside.
+    const double outside = max_component(abs(box.rotation.to_local(object.place - box.center)) - box.half);
+    if (outside > object.reach + object.slack) return Verdict::kOut;
+    return outside < -object.slack ? Verdict::kIn : Verdict::kOpen;
+  }
   static bool overlaps_triangle(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
 };
 
 template <class Kind>
 class ObjectRows {
  public:
-  ObjectRows(QueryTask& task, const typename Kind::World& shape, const OverlapOptions& options, const Filter& filter,
-             LowestRows& rows)
-      : task_(task), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
+  ObjectRows(QueryTask& task, const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options,
+             const Filter& filter, LowestRows& rows)
+      : task_(task), moment_(moment), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
 
   Aabbd bounds() const { return region_.bounds(); }
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;
-    const Shape shape = shape_of(object);
-    const bool found = options_.precision == Precision::kConservative ? Kind::overlaps_bounds(shape_, bounds_of(shape))
-                                                                      : Kind::overlaps_object(shape_, shape);
-    if (found) rows_.offer(hit_on(object, 0));
+    if (overlaps(object)) rows_.offer(hit_on(object, 0, moment_));
     return true;
   }
 
  private:
+  bool overlaps(const GridRef& object) const {
+    const bool exact = options_.precision == Precision::kExact;
+    if (exact && moment_.between()) {  // most objects need not be looked up in the next tick
+      const Verdict verdict = Kind::verdict(shape_, loosely_placed(object, moment_.astray(object)));
+      if (verdict != Verdict::kOpen) return verdict == Verdict::kIn;
+    }
+    const Shape shape = moment_.shape(object);
+    return exact ? Kind::overlaps_object(shape_, shape) : Kind::overlaps_bounds(shape_, bounds_of(shape));
+  }
+
   QueryTask& task_;
+  const Moment& moment_;
   const typename Kind::World& shape_;
   typename Kind::WorldRegion region_;
   const OverlapOptions& options_;
@@ -205,16 +246,16 @@ class InstanceSearch {
 };
 
 template <class Kind>
-OverlapAnswer run_overlap(QueryTask& task, const typename Kind::World& shape, const OverlapOptions& options,
-                          const Filter& filter) {
+OverlapAnswer run_overlap(QueryTask& task, const Moment& moment, const typename Kind::World& shape,
+                          const OverlapOptions& options, const Filter& filter) {
   LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
   if (options.source != Source::kDynamic) {
     InstanceSearch<Kind> search(task, shape, options, filter, rows);
     task.visit_region(task.snapshot().statics->tree(), search);
   }
   if (options.source != Source::kStatic && !task.ended()) {
-    ObjectRows<Kind> search(task, shape, options, filter, rows);
-    task.visit_objects_in_region(search);
+    ObjectRows<Kind> search(task, moment, shape, options, filter, rows);
+    task.visit_objects_in_region(moment, search);
   }
   return rows.finish();
 }
@@ -228,12 +269,14 @@ OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
   return {block.source, block.precision, detail, max_results, block.after_id};
 }
 
-OverlapAnswer run_ball(QueryTask& task, const Balld& ball, const OverlapOptions& options, const Filter& filter) {
-  return run_overlap<BallShape>(task, ball, options, filter);
+OverlapAnswer run_ball(QueryTask& task, const Moment& moment, const Balld& ball, const OverlapOptions& options,
+                       const Filter& filter) {
+  return run_overlap<BallShape>(task, moment, ball, options, filter);
 }
 
-OverlapAnswer run_box(QueryTask& task, const Obbd& box, const OverlapOptions& options, const Filter& filter) {
-  return run_overlap<BoxShape>(task, box, options, filter);
+OverlapAnswer run_box(QueryTask& task, const Moment& moment, const Obbd& box, const OverlapOptions& options,
+                      const Filter& filter) {
+  return run_overlap<BoxShape>(task, moment, box, options, filter);
 }
 
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {

@@ -20,8 +20,11 @@ struct OverlapOptions {
 
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
-OverlapAnswer run_ball(QueryTask& task, const Balld& ball, const OverlapOptions& options, const Filter& filter);
-OverlapAnswer run_box(QueryTask& task, const Obbd& box, const OverlapOptions& options, const Filter& filter);
+// `moment` says when; the answer borrows it.
+OverlapAnswer run_ball(QueryTask& task, const Moment& moment, const Balld& ball, const OverlapOptions& options,
+                       const Filter& filter);
+OverlapAnswer run_box(QueryTask& task, const Moment& moment, const Obbd& box, const OverlapOptions& options,
+                      const Filter& filter);
 
 // The ball or box of query `i` of a block, in world axes.
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i);

@@ -39,7 +39,28 @@ class BlockCheck {
       return refuse_limit(name("max_results"), "max_results", limits::kMaxMaxResults, block_.max_results);
     if (absl::Status s = check_column(block_.masks.size(), 1, n_, ColumnNeed::kOptional, name("masks")); !s.ok())
       return s;
-    return check_column(block_.ignore_groups.size(), 1, n_, ColumnNeed::kOptional, name("ignore_groups"));
+    if (absl::Status s = check_column(block_.ignore_groups.size(), 1, n_, ColumnNeed::kOptional, name("ignore_groups"));
+        !s.ok())
+      return s;
+    return check_as_of();
+  }
+
+  absl::Status check_as_of() const {
+    const absl::Span<const float> fractions = block_.as_of_fractions;
+    if (absl::Status s = check_column(block_.as_of_ticks.size(), 1, n_, ColumnNeed::kOptional, name("as_of_ticks"));
+        !s.ok())
+      return s;
+    if (absl::Status s = check_column(fractions.size(), 1, n_, ColumnNeed::kOptional, name("as_of_fractions")); !s.ok())
+      return s;
+    if (!fractions.empty() && block_.as_of_ticks.empty())
+      return refuse_argument(Reason::kMalformed, name("as_of_fractions"), {},
+                             "go with as_of_ticks: give those, or neither");
+    for (size_t i = 0; i < fractions.size(); ++i) {
+      if (!std::isfinite(fractions[i])) return wrong(Reason::kNotFinite, "as_of_fractions", i, "needs finite numbers");
+      if (fractions[i] < 0 || fractions[i] >= 1)
+        return wrong(Reason::kOutOfRange, "as_of_fractions", i, "must lie within 0 and 1, and below 1");
+    }
+    return absl::OkStatus();
   }
 
   absl::Status check_columns_of_kind() const {

@@ -17,6 +17,7 @@ namespace locus {
 
 enum class Source : uint8_t { kBoth, kStatic, kDynamic };
 enum class Precision : uint8_t { kExact, kConservative };
+enum class OutsideHistory : uint8_t { kReject, kClamp };
 enum class RayMode : uint8_t { kFirst, kAny, kAll };
 enum class StaticDetail : uint8_t { kInstances, kTriangles, kTrianglesSorted };
 
@@ -93,6 +94,9 @@ struct QueryBlock {
   absl::Span<const uint64_t> ignore_ids;     // for the whole block
   uint32_t max_results = 0;                  // [limits::kDefaultMaxResults]
   Id after_id = kNoId;                       // overlaps: only ids above it
+  absl::Span<const uint64_t> as_of_ticks;    // [now]
+  absl::Span<const float> as_of_fractions;   // [0], 0 <= f < 1; only with as_of_ticks
+  OutsideHistory outside = OutsideHistory::kReject;
   std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns> kind;
 };
 

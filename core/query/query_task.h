@@ -13,7 +13,7 @@
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/work.h"
 #include "core/query/query_batch.h"
-#include "core/scene/scene_snapshot.h"
+#include "core/scene/moment.h"
 
 namespace locus {
 
@@ -111,32 +111,32 @@ class QueryTask {
       index.visit_nearest(point, visitor, work_);
   }
 
-  // The same of the scene's objects, which visitors take by reference.
+  // The same of the scene's objects at a moment, which visitors take by reference.
   template <class Visitor>
-  void visit_objects_on_ray(const SlabRay<double>& slabs, Visitor& visitor) {
+  void visit_objects_on_ray(const Moment& moment, const SlabRay<double>& slabs, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_)
-      snapshot_.objects.grid().for_each(visit);
+      moment.objects().grid().for_each(visit);
     else
-      snapshot_.objects.grid().visit_ray(
+      moment.visit_ray(
           slabs, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
   }
   template <class Visitor>
-  void visit_objects_near(const Vec3d& point, Visitor& visitor) {
+  void visit_objects_near(const Moment& moment, const Vec3d& point, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_)
-      snapshot_.objects.grid().for_each(visit);
+      moment.objects().grid().for_each(visit);
     else
-      snapshot_.objects.grid().visit_nearest(
+      moment.visit_nearest(
           point, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
   }
   template <class Visitor>
-  void visit_objects_in_region(Visitor& visitor) {
+  void visit_objects_in_region(const Moment& moment, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_)
-      snapshot_.objects.grid().for_each(visit);
+      moment.objects().grid().for_each(visit);
     else
-      snapshot_.objects.grid().visit_region(std::as_const(visitor).bounds(), work_, visit);
+      moment.visit_region(std::as_const(visitor).bounds(), work_, visit);
   }
 
  private:

@@ -13,8 +13,10 @@ namespace {
 
 class ObjectVisitor {
  public:
-  ObjectVisitor(QueryTask& task, const RayRequest& request, const Filter& filter, HitCollector& collector)
+  ObjectVisitor(QueryTask& task, const Moment& moment, const RayRequest& request, const Filter& filter,
+                HitCollector& collector)
       : task_(task),
+        moment_(moment),
         ray_(Rayd{request.origin, request.direction}, request.inside),
         precision_(request.precision),
         filter_(filter),
@@ -25,8 +27,8 @@ class ObjectVisitor {
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(object.entry())) return true;
-    const std::optional<float> t = test(shape_of(object));
-    return !t || collector_.offer(hit_on(object, *t));
+    const std::optional<float> t = test(moment_.shape(object));
+    return !t || collector_.offer(hit_on(object, *t, moment_));
   }
 
  private:
@@ -38,6 +40,7 @@ class ObjectVisitor {
   }
 
   QueryTask& task_;
+  const Moment& moment_;
   ObjectRay ray_;
   Precision precision_;
   const Filter& filter_;
@@ -101,8 +104,8 @@ RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding 
   return request;
 }
 
-RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, Winding winding, size_t begin,
-                    size_t end) {
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryMoments& moments,
+                    Winding winding, size_t begin, size_t end) {
   std::vector<AskedRay> rays;
   rays.reserve(end - begin);
   for (size_t i = begin; i < end; ++i) rays.emplace_back(ray_request(block, columns, winding, i), Filter(block, i));
@@ -110,14 +113,15 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
   if (by_kernels) ask_meshes(task, rays);
   RayAnswers answers;
   answers.reserve(rays.size());
-  for (AskedRay& ray : rays) {
+  for (size_t i = begin; i < end; ++i) {
+    AskedRay& ray = rays[i - begin];
     if (!by_kernels && block.source != Source::kDynamic && !task.ended()) {
       InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
       task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
     }
     if (block.source != Source::kStatic && !ray.collector.done() && !task.ended()) {
-      ObjectVisitor visitor(task, ray.request, ray.filter, ray.collector);
-      task.visit_objects_on_ray(visitor.slabs(), visitor);
+      ObjectVisitor visitor(task, moments.of(i), ray.request, ray.filter, ray.collector);
+      task.visit_objects_on_ray(moments.of(i), visitor.slabs(), visitor);
     }
     answers.push_back(ray.collector.finish());
     answers.back().truncated |= task.ended();
@@ -130,7 +134,7 @@ Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding) {
   if (request.precision == Precision::kConservative) return surface;
   if (hit.object) {
     const ObjectRay ray(Rayd{request.origin, request.direction}, request.inside);
-    if (const std::optional<ShapeHit> found = ray_hit(ray, shape_of(hit.object))) surface.normal = found->normal;
+    if (const std::optional<ShapeHit> found = ray_hit(ray, hit.object_shape())) surface.normal = found->normal;
     return surface;
   }
   if (hit.instance == nullptr) return surface;

@@ -6,6 +6,7 @@
 
 #include "absl/container/inlined_vector.h"
 #include "core/query/hit.h"
+#include "core/query/query_moments.h"
 #include "core/query/query_task.h"
 
 namespace locus {
@@ -31,9 +32,10 @@ struct RayAnswer {
 };
 using RayAnswers = std::vector<RayAnswer>;
 
-// The answers to queries `begin` to `end` (exclusive) of a block. Many at once are answered faster than one by one.
-RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, Winding winding, size_t begin,
-                    size_t end);
+// The answers to queries `begin` to `end` (exclusive) of a block; they borrow `moments`. Many at once are answered
+// faster than one by one.
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryMoments& moments,
+                    Winding winding, size_t begin, size_t end);
 
 // Weights of the second and third vertex, and the unit normal to the triangle's front or out of the object, at a hit
 // that run_ray() found with kExact. Recomputed from the stored primitive.

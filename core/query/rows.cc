@@ -13,6 +13,7 @@ constexpr uint64_t kBlockOverhead = 256;
 constexpr uint64_t kReplyOverhead = 256;
 constexpr uint64_t kCountBytes = 4;
 constexpr uint64_t kTruncatedBytes = 4;
+constexpr uint64_t kMomentBytes = 16;  // its tick, its fraction, and whether it was clamped
 
 constexpr std::array<absl::string_view, 11> kColumnNames = {"UNSPECIFIED", "T",     "ID",  "TRIANGLE", "UV",  "NORMAL",
                                                             "POINT",       "GROUP", "TAG", "LAYERS",   "POSE"};
@@ -80,7 +81,8 @@ struct Labels {
 Labels labels_of(const Hit& hit) {
   if (hit.object) {
     const GridEntry& entry = hit.object.entry();
-    return {entry.group, entry.tag, entry.layers, entry.position, hit.object.form().rotation};
+    const Shape shape = hit.object_shape();
+    return {entry.group, entry.tag, entry.layers, shape.position, shape.rotation};
   }
   if (hit.instance != nullptr)
     return {hit.instance->group, hit.instance->tag, hit.instance->layers, hit.instance->transform.translation,
@@ -129,7 +131,8 @@ uint64_t fixed_reply_bytes(const QueryBatch& batch) {
     const uint64_t a_query = layout == RowLayout::kDense   ? row_bytes(returned_columns(block))
                              : layout == RowLayout::kBytes ? 1
                                                            : kCountBytes;
-    bytes += kBlockOverhead + query_count(block) * (a_query + kTruncatedBytes);
+    const uint64_t a_moment = block.as_of_ticks.empty() ? 0 : kMomentBytes;
+    bytes += kBlockOverhead + query_count(block) * (a_query + kTruncatedBytes + a_moment);
   }
   return bytes;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "core/query/block_runner.h"
 
 namespace locus {
@@ -30,6 +31,27 @@ std::vector<Piece> split(const QueryBatch& batch) {
     for (size_t begin = 0; begin < n; begin += step) pieces.push_back({b, begin, std::min(n, begin + step), {}});
   }
   return pieces;
+}
+
+absl::StatusOr<std::vector<QueryMoments>> resolve(const SceneSnapshot& snapshot, const QueryBatch& batch) {
+  std::vector<QueryMoments> moments;
+  moments.reserve(batch.blocks.size());
+  for (size_t b = 0; b < batch.blocks.size(); ++b) {
+    absl::StatusOr<QueryMoments> resolved =
+        QueryMoments::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"));
+    if (!resolved.ok()) return resolved.status();
+    moments.push_back(*std::move(resolved));
+  }
+  return moments;
+}
+
+void append_moments(const QueryMoments& moments, size_t queries, BlockResult& to) {
+  if (!moments.asks_past()) return;
+  for (size_t i = 0; i < queries; ++i) {
+    to.resolved_ticks.push_back(moments.time(i).tick);
+    to.resolved_fractions.push_back(moments.time(i).fraction);
+    if (moments.clamped(i)) to.clamped.push_back(static_cast<uint32_t>(i));
+  }
 }
 
 // Puts pieces together in order and cuts rows where the reply is full.
@@ -88,13 +110,16 @@ class Assembly {
 
 absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                       const RunOptions& options) {
+  const absl::StatusOr<std::vector<QueryMoments>> moments = resolve(snapshot, batch);
+  if (!moments.ok()) return moments.status();
   BatchControl control(batch.max_work, options.stop);
   std::vector<Piece> pieces = split(batch);
   Assembly assembly(batch);
   const auto run_piece = [&](Piece& piece) {
     const uint64_t start = options.clock ? options.clock() : 0;
     QueryTask task(snapshot, control, options.brute_force);
-    piece.result = BlockRunner(task, batch.blocks[piece.block], assembly.room()).run(piece.begin, piece.end);
+    piece.result = BlockRunner(task, batch.blocks[piece.block], (*moments)[piece.block], assembly.room())
+                       .run(piece.begin, piece.end);
     if (options.clock) piece.result.nanoseconds = options.clock() - start;
   };
   for (size_t first = 0; first < pieces.size() && !control.stopped(); first += kWavePieces) {
@@ -110,7 +135,10 @@ absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const Query
     }
   }
   if (control.stopped()) return control.status();
-  return assembly.finish();
+  BatchResult result = assembly.finish();
+  for (size_t b = 0; b < batch.blocks.size(); ++b)
+    append_moments((*moments)[b], query_count(batch.blocks[b]), result.blocks[b]);
+  return result;
 }
 
 }  // namespace locus

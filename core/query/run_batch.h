@@ -30,8 +30,13 @@ struct BlockResult {
   std::vector<uint32_t> layers;
   std::vector<double> positions;  // POSE: 3 a row
   std::vector<float> rotations;   // POSE: 4 a row
-  Work work;                      // not part of the answer: depends on the structure
-  uint64_t nanoseconds = 0;       // nor is this: by RunOptions::clock, all threads together
+  // Blocks that ask about the past: the moments that were asked in fact, one a query, and the queries, ascending, whose
+  // moment was not kept, so that the nearest was taken.
+  std::vector<uint64_t> resolved_ticks;
+  std::vector<float> resolved_fractions;
+  std::vector<uint32_t> clamped;
+  Work work;                 // not part of the answer: depends on the structure
+  uint64_t nanoseconds = 0;  // nor is this: by RunOptions::clock, all threads together
 };
 
 struct BatchResult {
@@ -53,7 +58,7 @@ struct RunOptions {
   bool brute_force = false;
 };
 
-// `batch` has passed check_batch().
+// `batch` has passed check_batch(). OUT_OF_RANGE for a time that is not kept, unless its block clamps.
 absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                       const RunOptions& options);
 

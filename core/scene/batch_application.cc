@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "absl/container/flat_hash_set.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
@@ -30,8 +29,9 @@ void read_labels(const Columns& columns, size_t i, Object& object) {
 
 }  // namespace
 
-BatchApplication::BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch)
-    : objects_(objects), statics_(statics), batch_(batch), count_(batch.clear ? 0 : objects.size()) {}
+BatchApplication::BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
+                                   Lives lives)
+    : objects_(objects), statics_(statics), batch_(batch), lives_(lives), count_(batch.clear ? 0 : objects.size()) {}
 
 void BatchApplication::run() {
   remove_ids();
@@ -138,7 +138,10 @@ void BatchApplication::insert(const InsertColumns& columns, const std::string& f
     if (!read_pose(poses, i, object.id, field, object.shape)) continue;
     if (!read_shape(columns, i, object.id, field, object.shape)) continue;
     read_labels(columns, i, object);
-    if (!current(object.id)) ++count_;
+    if (!current(object.id)) {
+      ++count_;
+      begin_life(object.id);
+    }
     put(object);
     ++applied_;
   }
@@ -155,6 +158,7 @@ void BatchApplication::move(const MoveColumns& columns, const std::string& field
     }
     Object object = *known;
     if (!read_pose(poses, i, id, field, object.shape)) continue;
+    if (columns.teleport) begin_life(id);
     put(object);
     ++applied_;
   }
@@ -174,17 +178,20 @@ void BatchApplication::relabel(const RelabelColumns& columns, const std::string&
   }
 }
 
-BatchApplication::Difference BatchApplication::difference() const {
+BatchApplication::Difference BatchApplication::difference() {
   Difference difference;
+  difference.reborn = std::move(reborn_);
+  const auto lives_on = [&difference](const Object& before, const std::optional<Object>& now) {
+    return now && *now == before && !difference.reborn.contains(before.id);
+  };
   if (batch_.clear)
     objects_.for_each([&](const Object& object) {
       const auto changed = changed_.find(object.id);
-      if (changed == changed_.end() || !changed->second || !(*changed->second == object))
-        difference.gone.push_back(object);
+      if (changed == changed_.end() || !lives_on(object, changed->second)) difference.gone.push_back(object);
     });
   for (const auto& [id, object] : changed_) {
     const std::optional<Object> before = objects_.find(id);
-    if (before && object && *object == *before) continue;
+    if (before && lives_on(*before, object)) continue;
     if (before && !batch_.clear) difference.gone.push_back(*before);
     if (object) difference.come.push_back(*object);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
 #include "core/scene/object_store.h"
 #include "core/scene/pose_reader.h"
 #include "core/scene/static_set.h"
@@ -15,10 +16,15 @@
 
 namespace locus {
 
+// Whether it matters that an object ended and another one began under its id in one batch, or that it jumped: only to
+// questions about the past.
+enum class Lives : uint8_t { kAlike, kTold };
+
 class BatchApplication {
  public:
   // All three are borrowed for the life of this object. `batch` has passed check_form().
-  BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch);
+  BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
+                   Lives lives = Lives::kAlike);
 
   // Clear, removes, inserts, moves, relabels: in this order, once.
   void run();
@@ -30,17 +36,21 @@ class BatchApplication {
   std::vector<ItemError>& errors() { return errors_; }
 
   // What run() came to: objects that go, as they were, and objects that come, as they are. A changed object is in both,
-  // one that ended as it began in neither.
+  // one that ended as it began in neither, unless it was reborn.
   struct Difference {
     std::vector<Object> gone;
     std::vector<Object> come;
+    absl::flat_hash_set<Id> reborn;  // where lives are told: new lives under ids of old ones, those that jumped too
     bool empty() const { return gone.empty() && come.empty(); }
   };
-  Difference difference() const;
+  Difference difference();
 
  private:
   std::optional<Object> current(Id id) const;
   void put(const Object& object) { changed_[object.id] = object; }
+  void begin_life(Id id) {
+    if (lives_ == Lives::kTold) reborn_.insert(id);
+  }
   void refuse(std::string field, size_t index, Id id, Reason reason);
   void remove_ids();
   void remove_groups();
@@ -54,6 +64,8 @@ class BatchApplication {
   const ObjectStore& objects_;
   const StaticSet& statics_;
   const UpdateBatch& batch_;
+  const Lives lives_;
+  absl::flat_hash_set<Id> reborn_;
   size_t count_;                                            // objects there are after what was applied so far
   absl::flat_hash_map<Id, std::optional<Object>> changed_;  // nothing = removed
   uint32_t applied_ = 0;

@@ -70,6 +70,10 @@ class ObjectSet {
   GridStatistics statistics() const { return grid_.statistics(); }
   // Of objects, bricks and the maps that find them. O(bricks).
   size_t bytes() const;
+  // Of what `other`, a set of the same scene, does not share. O(what differs).
+  size_t bytes_apart_from(const ObjectSet& other) const {
+    return grid_.bytes_apart_from(other.grid_) + handles_.bytes_apart_from(other.handles_);
+  }
 
  private:
   GridSnapshot grid_;

@@ -16,7 +16,31 @@ uint32_t ObjectStore::new_handle() {
   return handle;
 }
 
-size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
+void ObjectStore::free_handle(uint32_t handle) {
+  if (moves_ == nullptr) {
+    free_handles_.push_back(handle);
+  } else {
+    resting_.push_back({handle, tick_});
+  }
+}
+
+// Sets from the end of a tick hold no life that ended in it.
+void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
+  LOCUS_CHECK(moves_ != nullptr);
+  tick_ = tick;
+  moves_->start_tick(grid_.cell_size());
+  for (; !resting_.empty() && resting_.front().tick <= oldest_tick; resting_.pop_front())
+    free_handles_.push_back(resting_.front().handle);
+}
+
+size_t ObjectStore::move(absl::Span<const GridMove> moves) {
+  if (moves_ != nullptr)
+    for (const GridMove& move : moves) moves_->moved(grid_.at(move.handle), move.position);
+  return grid_.apply({{}, moves, {}});
+}
+
+size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
+                          const absl::flat_hash_set<Id>& reborn) {
   std::vector<uint32_t> leaving;
   leaving.reserve(removed.size());
   for (const Object& object : removed) {
@@ -28,7 +52,8 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   // Those that only change keep their handle.
   absl::flat_hash_map<Id, uint32_t> kept;
   if (!inserted.empty())
-    for (size_t i = 0; i < removed.size(); ++i) kept.emplace(removed[i].id, leaving[i]);
+    for (size_t i = 0; i < removed.size(); ++i)
+      if (!reborn.contains(removed[i].id)) kept.emplace(removed[i].id, leaving[i]);
   std::vector<GridItem> items;
   items.reserve(inserted.size());
   for (const Object& object : inserted) {
@@ -37,16 +62,19 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
     const uint32_t handle = changed ? before->second : new_handle();
     if (changed) {
       kept.erase(before);
+      if (moves_ != nullptr) moves_->moved(grid_.at(handle), object.shape.position);
     } else {
       handles_for_readers_.set(object.id, handle);
+      if (moves_ != nullptr) moves_->born(handle);
     }
     LOCUS_CHECK(handles_.emplace(object.id, handle).second);
     items.push_back(grid_item_of(object, handle));
   }
   for (size_t i = 0; i < removed.size(); ++i) {
-    if (handles_.contains(removed[i].id)) continue;
-    handles_for_readers_.erase(removed[i].id);
-    free_handles_.push_back(leaving[i]);
+    const uint32_t now = handle(removed[i].id);
+    if (now == leaving[i]) continue;
+    if (now == kNoHandle) handles_for_readers_.erase(removed[i].id);
+    free_handle(leaving[i]);
   }
   return grid_.apply({leaving, {}, items});
 }

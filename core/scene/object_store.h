@@ -1,18 +1,23 @@
 // The writer's side of a scene's objects: finds them by id and applies batches of changes, from which it makes sets for
 // readers. One thread at a time; sets belong to anybody.
 //
-// Invariant: every object has a handle of its own, which no other one gets while a set that holds it may be asked by
-// it; handles_ of the store and of its sets say which.
+// A handle names one life of an object, from its birth to its end. Invariant: every object has a handle of its own,
+// which no other life gets while a set that holds it may be asked by it; handles_ of the store and of its sets say
+// which. A store that follows lives keeps the handles of ended ones until release_handles().
 #ifndef LOCUS_CORE_SCENE_OBJECT_STORE_H_
 #define LOCUS_CORE_SCENE_OBJECT_STORE_H_
 
+#include <deque>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
 #include "absl/types/span.h"
 #include "core/index/hash_grid/hash_grid.h"
 #include "core/scene/object_set.h"
+#include "core/scene/tick_moves.h"
 
 namespace locus {
 
@@ -22,6 +27,13 @@ class ObjectStore {
 
   ObjectStore() = default;
   explicit ObjectStore(const HashGridOptions& options) : grid_(options) {}
+
+  // From now on, before the first object comes: keeps what questions about the past need.
+  void follow_lives() { moves_ = std::make_unique<TickMoves>(); }
+  // For a store that follows lives: `tick` begins; nothing asks sets from before `oldest_tick` any more.
+  void start_tick(uint64_t tick, uint64_t oldest_tick);
+  // How far objects moved since then; none for a store that does not follow lives.
+  Displacement displacement() { return moves_ == nullptr ? Displacement() : moves_->displacement(); }
 
   size_t size() const { return grid_.size(); }
   std::optional<Object> find(Id id) const;
@@ -39,11 +51,12 @@ class ObjectStore {
   void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
 
   // Removes the objects of one span, as they are, and inserts those of the other: a changed object is in both, under
-  // its id. All removed ones must be here, no inserted one may remain here. O(n) and the bricks that are touched.
-  // Returns the bytes of what the sets so far hold and later ones will not.
-  size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted);
+  // its id, and lives on unless it is among the `reborn`. All removed ones must be here, no inserted one may remain
+  // here. O(n) and the bricks that are touched. Returns the bytes of what the sets so far hold and later ones will not.
+  size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
+               const absl::flat_hash_set<Id>& reborn = {});
   // Handles are distinct. Returns as apply().
-  size_t move(absl::Span<const GridMove> moves) { return grid_.apply({{}, moves, {}}); }
+  size_t move(absl::Span<const GridMove> moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
   // False, and no change, when contains() is false.
   bool remove(const Object& object);
@@ -62,12 +75,20 @@ class ObjectStore {
 
  private:
   uint32_t new_handle();
+  void free_handle(uint32_t handle);
 
   HashGrid grid_;
   absl::flat_hash_map<Id, uint32_t> handles_;  // finds faster than the map that readers share
   PersistentMap<Id, uint32_t> handles_for_readers_;
   std::vector<uint32_t> free_handles_;
   uint32_t next_handle_ = 0;
+  struct Resting {
+    uint32_t handle;
+    uint64_t tick;
+  };
+  std::deque<Resting> resting_;       // of lives that ended, ascending by tick
+  uint64_t tick_ = 0;                 // as start_tick() said
+  std::unique_ptr<TickMoves> moves_;  // null unless lives are followed
 };
 
 }  // namespace locus

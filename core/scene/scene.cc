@@ -52,7 +52,9 @@ absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id)
 }  // namespace
 
 Scene::Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics)
-    : name_(std::move(name)), spec_(std::move(spec)), writer_(epoch, spec_.winding, std::move(statics)) {
+    : name_(std::move(name)),
+      spec_(std::move(spec)),
+      writer_(epoch, spec_.winding, std::move(statics), limits::kMaxObjects, spec_.history) {
   LOCUS_CHECK_NE(epoch, uint64_t{0});
   latest_ = writer_.published();
   recent_.push_back({latest_, 0});
@@ -183,6 +185,10 @@ SceneStatus Scene::status() const {
     snapshot = latest_;
   }
   status.memory_bytes = snapshot->statics->bytes() + snapshot->objects.bytes();
+  if (snapshot->history != nullptr) {
+    status.history_bytes = snapshot->history->bytes;
+    status.recorded_ticks = static_cast<uint32_t>(snapshot->history->records.size());
+  }
   return status;
 }
 

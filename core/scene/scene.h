@@ -22,6 +22,7 @@ namespace locus {
 struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
+  HistoryOptions history = {};
 };
 
 // Which revision a caller wants. Epoch 0 is not checked.
@@ -39,7 +40,9 @@ struct InstanceChange {
 };
 
 struct SceneStatus {
-  uint64_t memory_bytes = 0;  // of the latest revision, without meshes, which scenes share
+  uint64_t memory_bytes = 0;   // of the latest revision, without meshes, which scenes share
+  uint64_t history_bytes = 0;  // of the past, beyond that
+  uint32_t recorded_ticks = 0;
   uint32_t pending_changes = 0;
   std::string last_build_error;  // of the latest change that failed, whatever came after it
 };

@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "core/scene/history.h"
 #include "core/scene/object_set.h"
 #include "core/scene/static_set.h"
 
@@ -19,6 +20,11 @@ struct SceneSnapshot {
   Winding winding = Winding::kCounterClockwise;
   std::shared_ptr<const StaticSet> statics;
   ObjectSet objects;
+  HistoryPtr history;        // null where nothing of the past is kept
+  Displacement since_close;  // from the last record to here
+
+  // The oldest moment that can be asked about.
+  uint64_t oldest_tick() const { return history == nullptr ? tick : history->records.front()->tick; }
 };
 
 using SnapshotPtr = std::shared_ptr<const SceneSnapshot>;

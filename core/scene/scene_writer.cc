@@ -1,6 +1,7 @@
 #include "core/scene/scene_writer.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -60,15 +61,19 @@ void WriterTable::forget_acks() {
   kept_errors_ = 0;
 }
 
-SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics, size_t max_objects)
-    : epoch_(epoch), max_objects_(max_objects), winding_(winding), statics_(std::move(statics)) {
+SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics, size_t max_objects,
+                         const HistoryOptions& history)
+    : epoch_(epoch), max_objects_(max_objects), winding_(winding), statics_(std::move(statics)), recorder_(history) {
+  if (recorder_.on()) objects_.follow_lives();
   published_ = freeze();
 }
 
 SnapshotPtr SceneWriter::freeze() {
   const bool stale = planted(PlantedBug::kStaleSnapshot) && published_ != nullptr;
-  return std::make_shared<const SceneSnapshot>(
-      SceneSnapshot{epoch_, revision_, tick_, winding_, statics_, stale ? published_->objects : objects_.snapshot()});
+  ObjectSet objects = stale ? published_->objects : objects_.snapshot();
+  recorder_.measure(objects);
+  return std::make_shared<const SceneSnapshot>(SceneSnapshot{
+      epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(), objects_.displacement()});
 }
 
 SnapshotPtr SceneWriter::next_revision() {
@@ -101,7 +106,9 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch
     }
     return Applied{std::move(ack), nullptr, 0};
   }
-  absl::StatusOr<Applied> result = MoveApplication::serves(batch) ? apply_moves(batch) : apply_changes(batch);
+  const bool jumps = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
+                                                   [](const MoveColumns& move) { return move.teleport; });
+  absl::StatusOr<Applied> result = MoveApplication::serves(batch) && !jumps ? apply_moves(batch) : apply_changes(batch);
   if (result.ok()) writers_.record(batch.writer, batch.batch, result->ack);
   return result;
 }
@@ -122,6 +129,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   Applied result;
   moves_.run(objects_, batch);
   if (absl::Status status = book(batch, moves_, result); !status.ok()) return status;
+  start_tick(batch);
   if (moves_.changes()) result.replaced_bytes = objects_.move(moves_.moves());
   commit(batch, moves_.changes(), result);
   return result;
@@ -129,20 +137,38 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatch& batch) {
   Applied result;
-  BatchApplication application(objects_, *statics_, batch);
+  BatchApplication application(objects_, *statics_, batch, recorder_.on() ? Lives::kTold : Lives::kAlike);
   application.run();
   if (application.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
                        static_cast<double>(application.object_count()), 0);
   if (absl::Status status = book(batch, application, result); !status.ok()) return status;
   const BatchApplication::Difference difference = application.difference();
-  result.replaced_bytes = objects_.apply(difference.gone, difference.come);
-  commit(batch, !difference.empty(), result);
+  const bool forgets_now = forgets(batch);
+  start_tick(batch);
+  result.replaced_bytes = objects_.apply(difference.gone, difference.come, difference.reborn);
+  commit(batch, !difference.empty() || forgets_now, result);
   return result;
 }
 
+uint64_t SceneWriter::tick_of(const UpdateBatch& batch) const {
+  if (!batch.tick) return tick_;
+  return batch.restart_ticks ? *batch.tick : std::max(tick_, *batch.tick);
+}
+
+void SceneWriter::start_tick(const UpdateBatch& batch) {
+  const uint64_t tick = tick_of(batch);
+  if (!recorder_.on() || (tick == tick_ && !batch.restart_ticks)) return;
+  if (batch.restart_ticks) {
+    recorder_.drop();
+    return objects_.start_tick(tick, std::numeric_limits<uint64_t>::max());
+  }
+  recorder_.close(tick_, published_->objects, objects_.displacement(), tick);
+  objects_.start_tick(tick, recorder_.oldest_tick(tick));
+}
+
 void SceneWriter::commit(const UpdateBatch& batch, bool changes, Applied& result) {
-  const uint64_t tick = !batch.tick ? tick_ : batch.restart_ticks ? *batch.tick : std::max(tick_, *batch.tick);
+  const uint64_t tick = tick_of(batch);
   if (changes || tick != tick_) {
     tick_ = tick;
     result.snapshot = next_revision();

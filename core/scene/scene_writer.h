@@ -48,7 +48,7 @@ class WriterTable {
 class SceneWriter {
  public:
   SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics,
-              size_t max_objects = limits::kMaxObjects);
+              size_t max_objects = limits::kMaxObjects, const HistoryOptions& history = {});
 
   struct Applied {
     UpdateAck ack;
@@ -77,6 +77,11 @@ class SceneWriter {
   static absl::Status book(const UpdateBatch& batch, Application& application, Applied& result);
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
+  // Whether the batch drops anything of the past.
+  bool forgets(const UpdateBatch& batch) const { return batch.restart_ticks && recorder_.history() != nullptr; }
+  uint64_t tick_of(const UpdateBatch& batch) const;
+  // What the batch means to the past, before anything of it is applied: the end of the tick before, or of all.
+  void start_tick(const UpdateBatch& batch);
   // Applies the tick; the next revision if that changes anything or `changes` says so, and the ack's last part.
   void commit(const UpdateBatch& batch, bool changes, Applied& result);
 
@@ -89,6 +94,7 @@ class SceneWriter {
   ObjectStore objects_;
   MoveApplication moves_;
   WriterTable writers_;
+  HistoryRecorder recorder_;
   SnapshotPtr published_;
 };
 

@@ -14,11 +14,13 @@ constexpr std::array kPrecisions = {Precision::kExact, Precision::kExact, Precis
 constexpr std::array kRayModes = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};
 constexpr std::array kCulls = {Cull::kNone, Cull::kNone, Cull::kBack, Cull::kFront};
 constexpr std::array kInsides = {Inside::kSolid, Inside::kSolid, Inside::kHollow, Inside::kSkip};
+constexpr std::array kOutsides = {OutsideHistory::kReject, OutsideHistory::kReject, OutsideHistory::kClamp};
 constexpr std::array kDetails = {StaticDetail::kInstances, StaticDetail::kInstances, StaticDetail::kTriangles,
                                  StaticDetail::kTrianglesSorted};
 
 static_assert(kSources.size() == v1::Source_ARRAYSIZE && kPrecisions.size() == v1::Precision_ARRAYSIZE);
 static_assert(kRayModes.size() == v1::RayMode_ARRAYSIZE && kCulls.size() == v1::Cull_ARRAYSIZE);
+static_assert(kOutsides.size() == v1::OutsideHistory_ARRAYSIZE);
 static_assert(kInsides.size() == v1::Inside_ARRAYSIZE && kDetails.size() == v1::StaticDetail_ARRAYSIZE);
 static_assert(static_cast<int>(Column::kPose) == v1::COLUMN_POSE && v1::Column_ARRAYSIZE == v1::COLUMN_POSE + 1);
 
@@ -103,13 +105,6 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
   return refuse_argument(Reason::kMalformed, field, {}, "say what is asked: rays, balls, boxes, lookup or nearest");
 }
 
-absl::Status check_served(const v1::QueryBlock& block, const std::string& field) {
-  if (!block.as_of_ticks().empty()) return not_served(field + ".as_of_ticks");
-  if (!block.as_of_fractions().empty()) return not_served(field + ".as_of_fractions");
-  if (block.outside_history() != 0) return not_served(field + ".outside_history");
-  return absl::OkStatus();
-}
-
 absl::Status read_columns(const v1::QueryBlock& block, const std::string& field, ColumnSet* out) {
   for (int i = 0; i < block.columns_size(); ++i) {
     const int number = block.columns(i);
@@ -122,13 +117,17 @@ absl::Status read_columns(const v1::QueryBlock& block, const std::string& field,
 }
 
 absl::Status read_block(const v1::QueryBlock& block, const std::string& field, QueryBlock* out) {
-  if (absl::Status status = check_served(block, field); !status.ok()) return status;
   if (absl::Status status = read_kind(block, field, out); !status.ok()) return status;
   if (absl::Status status = read_enum(block.source(), kSources, field + ".source", &out->source); !status.ok())
     return status;
   if (absl::Status status = read_enum(block.precision(), kPrecisions, field + ".precision", &out->precision);
       !status.ok())
     return status;
+  if (absl::Status status = read_enum(block.outside_history(), kOutsides, field + ".outside_history", &out->outside);
+      !status.ok())
+    return status;
+  out->as_of_ticks = span_of(block.as_of_ticks());
+  out->as_of_fractions = span_of(block.as_of_fractions());
   out->frame = to_vec(block.frame());
   out->masks = span_of(block.masks());
   out->ignore_groups = span_of(block.ignore_groups());
@@ -175,6 +174,9 @@ void to_proto(const BlockResult& block, v1::BlockResult* out) {
   copy_column(block.layers, out->mutable_layers());
   copy_column(block.positions, out->mutable_positions());
   copy_column(block.rotations, out->mutable_rotations());
+  copy_column(block.resolved_ticks, out->mutable_resolved_ticks());
+  copy_column(block.resolved_fractions, out->mutable_resolved_fractions());
+  copy_column(block.clamped, out->mutable_clamped());
 }
 
 v1::Work to_proto(const Work& work, uint64_t nanoseconds) {

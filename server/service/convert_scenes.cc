@@ -16,19 +16,34 @@ Aabbd bounds_of_all(const SceneSnapshot& snapshot) {
 v1::SceneSpec to_proto(const SceneSpec& spec) {
   v1::SceneSpec out;
   for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
+  out.set_history_ticks(spec.history.ticks);
+  out.set_history_bytes(spec.history.bytes);
   out.set_durability(v1::DURABILITY_MEMORY);
   out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
   return out;
 }
 
 absl::Status check_served(const v1::SceneSpec& spec) {
-  if (spec.history_ticks() != 0) return not_served("spec.history_ticks");
-  if (spec.history_bytes() != 0) return not_served("spec.history_bytes");
   if (spec.idle_ttl_s() != 0) return not_served("spec.idle_ttl_s");
   if (spec.durability() == v1::DURABILITY_LOCAL) return not_served("spec.durability");
   if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
   if (!v1::Winding_IsValid(spec.winding())) return unknown_enum("spec.winding", spec.winding());
   return absl::OkStatus();
+}
+
+absl::StatusOr<HistoryOptions> to_history(const v1::SceneSpec& spec) {
+  if (spec.history_ticks() > limits::kMaxHistoryTicks)
+    return refuse_limit("spec.history_ticks", "history_ticks", limits::kMaxHistoryTicks, spec.history_ticks());
+  if (spec.history_bytes() > limits::kMaxHistoryBytes)
+    return refuse_limit("spec.history_bytes", "history_bytes", static_cast<double>(limits::kMaxHistoryBytes),
+                        static_cast<double>(spec.history_bytes()));
+  if (spec.history_ticks() == 0) {
+    if (spec.history_bytes() == 0) return HistoryOptions();
+    return refuse_argument(Reason::kMalformed, "spec.history_bytes", {},
+                           "goes with history_ticks: say how many ticks are to be kept, or leave both at 0");
+  }
+  return HistoryOptions{spec.history_ticks(),
+                        spec.history_bytes() == 0 ? limits::kDefaultHistoryBytes : spec.history_bytes()};
 }
 
 }  // namespace
@@ -70,7 +85,10 @@ absl::Status check_labels(const google::protobuf::Map<std::string, std::string>&
 absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   if (absl::Status status = check_served(spec); !status.ok()) return status;
   if (absl::Status status = check_labels(spec.labels(), "spec.labels"); !status.ok()) return status;
+  const absl::StatusOr<HistoryOptions> history = to_history(spec);
+  if (!history.ok()) return history.status();
   SceneSpec out;
+  out.history = *history;
   out.labels.insert(spec.labels().begin(), spec.labels().end());
   out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
   return out;
@@ -86,7 +104,9 @@ v1::Scene to_proto(const Scene& scene) {
   out.set_epoch(snapshot->epoch);
   out.set_revision(snapshot->revision);
   out.set_tick(snapshot->tick);
-  out.set_oldest_tick(snapshot->tick);
+  out.set_oldest_tick(snapshot->oldest_tick());
+  out.set_recorded_ticks(status.recorded_ticks);
+  out.set_history_bytes(status.history_bytes);
   out.set_objects(snapshot->objects.size());
   out.set_instances(snapshot->statics->size());
   out.set_triangles(snapshot->statics->triangle_count());

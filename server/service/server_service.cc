@@ -22,6 +22,8 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"blocks", limits::kMaxBlocks},
       {"calls", static_cast<double>(host.calls.max()), static_cast<double>(host.calls.used())},
       {"coordinate", limits::kMaxCoordinate},
+      {"history_bytes", static_cast<double>(limits::kMaxHistoryBytes)},
+      {"history_ticks", limits::kMaxHistoryTicks},
       {"ignored_ids", limits::kMaxIgnoredIds},
       {"instances", limits::kMaxInstances},
       {"label_length", limits::kMaxLabelLength},
@@ -62,7 +64,8 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
   const auto body = [&](const Caller&) {
     response->set_version(kVersion);
     response->set_instruction_set("portable");
-    for (const char* feature : {"balls", "boxes", "download_mesh", "lookup", "nearest", "rays", "static_from"})
+    for (const char* feature :
+         {"as_of", "balls", "boxes", "download_mesh", "history", "lookup", "nearest", "rays", "static_from"})
       response->add_features(feature);
     for (const NamedLimit& limit : limits_of(host_)) {
       v1::Limit* out = response->add_limits();

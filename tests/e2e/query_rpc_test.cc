@@ -330,9 +330,6 @@ TEST_F(QueryRpcTest, KindsAndFieldsThatAreNotServedAreNamed) {
   refused("frustums", [](auto* block) { block->mutable_frustums(); });
   refused("sweeps", [](auto* block) { block->mutable_sweeps(); });
   refused("sight", [](auto* block) { block->mutable_sight(); });
-  refused("as_of_ticks", [](auto* block) { block->add_as_of_ticks(1); });
-  refused("as_of_fractions", [](auto* block) { block->add_as_of_fractions(0); });
-  refused("outside_history", [](auto* block) { block->set_outside_history(v1::OUTSIDE_HISTORY_CLAMP); });
 }
 
 TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {

@@ -98,12 +98,6 @@ TEST_F(SceneRpcTest, FieldsOfTheSpecThatAreNotServedAreNamed) {
     expect_refused(create("arena", spec), {grpc::StatusCode::UNIMPLEMENTED, v1::REASON_NOT_SERVED, field});
   };
   v1::SceneSpec spec;
-  spec.set_history_ticks(1);
-  refused("spec.history_ticks", spec);
-  spec.Clear();
-  spec.set_history_bytes(1);
-  refused("spec.history_bytes", spec);
-  spec.Clear();
   spec.set_idle_ttl_s(1);
   refused("spec.idle_ttl_s", spec);
   spec.Clear();

@@ -10,6 +10,7 @@
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
 #include "tests/support/region_trials.h"
+#include "tests/support/rewind_lockstep.h"
 #include "tests/support/scene_lockstep.h"
 #include "tests/support/scene_search.h"
 
@@ -34,6 +35,8 @@ std::string compare_moving_grids_with_list() {
 }
 
 std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_count(20), 60); }
+
+std::string compare_rewinds_with_model() { return search_rewind_lockstep(scaled_count(10), 40); }
 
 #ifdef LOCUS_X86_KERNELS
 // One object serves for all instruction sets: they are compiled from one source.
@@ -69,6 +72,7 @@ constexpr Trial kTrials[] = {
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},
     {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},
     {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
+    {"RewindThatLooksOnlyWhereObjectsWere", PlantedBug::kRewindReach, compare_rewinds_with_model},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

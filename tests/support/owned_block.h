@@ -23,6 +23,8 @@ struct OwnedBlock {
   std::vector<uint32_t> masks;
   std::vector<uint64_t> ignore_groups;
   std::vector<uint64_t> ignore_ids;
+  std::vector<uint64_t> as_of_ticks;
+  std::vector<float> as_of_fractions;
 
   // Borrows from this.
   QueryBlock view() const {
@@ -30,6 +32,8 @@ struct OwnedBlock {
     block.masks = masks;
     block.ignore_groups = ignore_groups;
     block.ignore_ids = ignore_ids;
+    block.as_of_ticks = as_of_ticks;
+    block.as_of_fractions = as_of_fractions;
     std::visit([this](auto& kind) { fill(kind); }, block.kind);
     return block;
   }
@@ -47,6 +51,8 @@ struct OwnedBlock {
     cut(part.groups, 1, n, begin, end);
     cut(part.masks, 1, n, begin, end);
     cut(part.ignore_groups, 1, n, begin, end);
+    cut(part.as_of_ticks, 1, n, begin, end);
+    cut(part.as_of_fractions, 1, n, begin, end);
     return part;
   }
 
@@ -126,7 +132,10 @@ inline std::string difference(const BlockResult& got, const BlockResult& expecte
         column_difference("groups", got.groups, expected.groups), column_difference("tags", got.tags, expected.tags),
         column_difference("layers", got.layers, expected.layers),
         column_difference("positions", got.positions, expected.positions),
-        column_difference("rotations", got.rotations, expected.rotations)}) {
+        column_difference("rotations", got.rotations, expected.rotations),
+        column_difference("resolved_ticks", got.resolved_ticks, expected.resolved_ticks),
+        column_difference("resolved_fractions", got.resolved_fractions, expected.resolved_fractions),
+        column_difference("clamped", got.clamped, expected.clamped)}) {
     if (!what.empty()) return what;
   }
   return "";

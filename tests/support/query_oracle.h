@@ -28,6 +28,10 @@ class QueryOracle {
     }
     snapshot.objects.for_each([this](const Object& object) { objects_.push_back(object); });
   }
+  // With objects of another time.
+  QueryOracle(const SceneSnapshot& snapshot, std::vector<Object> objects) : QueryOracle(snapshot) {
+    objects_ = std::move(objects);
+  }
 
   // Knows no limit of the reply's size.
   BlockResult answer(const QueryBlock& block) const {

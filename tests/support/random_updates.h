@@ -120,6 +120,7 @@ class RandomUpdates {
     MoveColumns move;
     move.ids = columns.ids(draw_ids(n));
     draw_pose(columns, n, move);
+    move.teleport = random_.chance(0.2);
     return move;
   }
 

@@ -36,6 +36,9 @@ class SceneFixture : public ::testing::Test {
  protected:
   static constexpr uint64_t kEpoch = 77;
 
+  SceneFixture() : SceneFixture(SceneSpec()) {}
+  explicit SceneFixture(const SceneSpec& spec) : scene_("scene", spec, kEpoch, StaticSet::empty()) {}
+
   MoveColumns move_to(std::vector<Id> ids, std::vector<float> positions) {
     MoveColumns move;
     move.ids = columns_.ids(std::move(ids));
@@ -113,7 +116,7 @@ class SceneFixture : public ::testing::Test {
 
   Columns columns_;
   std::shared_ptr<const StaticMesh> mesh_ = make_mesh("triangle", 1);
-  Scene scene_{"scene", {}, kEpoch, StaticSet::empty()};
+  Scene scene_;
 };
 
 }  // namespace locus::test

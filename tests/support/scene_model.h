@@ -1,14 +1,16 @@
 // What a scene promises about update batches, over a std::map and one item after the other: the reference of the random
-// tests. Knows neither index nor sharing nor differences.
+// tests. Knows neither index nor sharing nor differences. Of a scene with history it keeps every tick in full.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/scene/object.h"
 #include "core/scene/update_batch.h"
@@ -25,7 +27,40 @@ class SceneModel {
     ItemError error;  // reason, field and index of a refusal
   };
 
+  // `history_ticks` as in HistoryOptions.
+  explicit SceneModel(uint64_t history_ticks = 0) : history_ticks_(history_ticks) {}
+
   const Objects& objects() const { return objects_; }
+  uint64_t tick() const { return tick_; }
+  uint64_t oldest_tick() const { return past_.empty() ? tick_ : past_.begin()->first; }
+  size_t recorded_ticks() const { return past_.size(); }
+  // As they were then; nothing for a time that is not kept.
+  std::optional<std::vector<Object>> objects_at(uint64_t tick, float fraction) const {
+    std::vector<Object> objects;
+    if (tick == tick_ && fraction == 0) {
+      for (const auto& [id, object] : objects_) objects.push_back(object);
+      return objects;
+    }
+    if (tick >= tick_ || tick < oldest_tick()) return std::nullopt;
+    const auto next = past_.upper_bound(tick);
+    const auto& [at, then] = *std::prev(next);
+    const bool last = next == past_.end();
+    const double gone = static_cast<double>(tick - at) + static_cast<double>(fraction);
+    const double weight = gone / static_cast<double>((last ? tick_ : next->first) - at);
+    for (const auto& [id, object] : then.objects) {
+      objects.push_back(object);
+      const Objects& later = last ? objects_ : next->second.objects;
+      const Lives& lives = last ? lives_ : next->second.lives;
+      const auto life = lives.find(id);
+      if (gone == 0 || life == lives.end() || life->second != then.lives.at(id)) continue;
+      Shape& shape = objects.back().shape;
+      const Shape& end = later.at(id).shape;
+      for (int axis = 0; axis < 3; ++axis)
+        shape.position[axis] = shape.position[axis] + (end.position[axis] - shape.position[axis]) * weight;
+      shape.rotation = blended(shape.rotation, end.rotation, weight);
+    }
+    return objects;
+  }
   const std::set<Id>& instances() const { return instances_; }
 
   // Takes an instance away, if `removed` is not 0, and places one as `placed`. False when that is refused.
@@ -48,6 +83,7 @@ class SceneModel {
     }
     ack_ = {};
     next_ = batch.clear ? Objects{} : objects_;
+    next_lives_ = lives_;
     apply_items(batch);
     if (batch.all_or_nothing && ack_.refused > 0) return {absl::StatusCode::kInvalidArgument, {}, ack_.errors.front()};
     commit(batch);
@@ -59,11 +95,24 @@ class SceneModel {
   void commit(const UpdateBatch& batch) {
     uint64_t tick = batch.tick.value_or(tick_);
     if (!batch.restart_ticks) tick = std::max(tick, tick_);
-    if (tick != tick_ || next_ != objects_) ++revision_;
+    std::erase_if(next_lives_, [this](const auto& life) { return !next_.contains(life.first); });
+    const bool forgets = batch.restart_ticks && !past_.empty();
+    const bool reborn = history_ticks_ != 0 && next_lives_ != lives_;
+    if (tick != tick_ || next_ != objects_ || forgets || reborn) ++revision_;
+    if (history_ticks_ != 0) remember(batch, tick);
     tick_ = tick;
     objects_ = std::move(next_);
+    lives_ = std::move(next_lives_);
     ack_.revision = revision_;
     ack_.tick = tick_;
+  }
+
+  void remember(const UpdateBatch& batch, uint64_t tick) {
+    if (batch.restart_ticks) return past_.clear();
+    if (tick == tick_) return;
+    past_[tick_] = {objects_, lives_};
+    while (past_.size() > 1 && tick >= history_ticks_ && std::next(past_.begin())->first <= tick - history_ticks_)
+      past_.erase(past_.begin());
   }
 
   UpdateAck now() const {
@@ -87,6 +136,7 @@ class SceneModel {
       if (group != 0) std::erase_if(next_, [group](const auto& entry) { return entry.second.group == group; });
       count(group == 0 ? Reason::kOutOfRange : Reason::kUnspecified, "remove_groups", i, kNoId);
     }
+    std::erase_if(next_lives_, [this](const auto& life) { return !next_.contains(life.first); });
     for (size_t list = 0; list < batch.inserts.size(); ++list)
       for (size_t i = 0; i < batch.inserts[list].ids.size(); ++i)
         insert(batch, batch.inserts[list], i, "inserts[" + std::to_string(list) + "]");
@@ -182,6 +232,7 @@ class SceneModel {
       if (fault.first.empty()) fault = read_shape(columns, i, object.shape);
     }
     read_labels(columns, i, object);
+    if (fault.first.empty() && !next_.contains(object.id)) next_lives_[object.id] = ++last_life_;
     if (fault.first.empty()) next_[object.id] = object;
     count(fault.second, field + fault.first, i, object.id);
   }
@@ -193,6 +244,7 @@ class SceneModel {
     Shape shape = known->second.shape;
     const Fault fault = read_pose(batch, columns, i, shape);
     if (fault.first.empty()) known->second.shape = shape;
+    if (fault.first.empty() && columns.teleport) next_lives_[id] = ++last_life_;
     count(fault.second, field + fault.first, i, id);
   }
 
@@ -203,6 +255,16 @@ class SceneModel {
     count(Reason::kUnspecified, field, i, columns.ids[i]);
   }
 
+  using Lives = std::map<Id, uint64_t>;  // numbers that no other life has
+  struct Then {
+    Objects objects;
+    Lives lives;
+  };
+
+  uint64_t history_ticks_;
+  std::map<uint64_t, Then> past_;  // by tick
+  Lives lives_, next_lives_;
+  uint64_t last_life_ = 0;
   std::set<Id> instances_;
   Objects objects_;
   Objects next_;

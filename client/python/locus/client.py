@@ -89,9 +89,11 @@ class Client:
         return bool(self._unary(_HEALTH, _HEALTH.request(service=service), repeat=True).status == _SERVING)
 
     def create_scene(self, name: str, *, if_absent: bool = False, labels: Optional[Mapping[str, str]] = None,
-                     winding: Winding = Winding.UNSPECIFIED, static_from: str = "") -> Scene:
+                     winding: Winding = Winding.UNSPECIFIED, static_from: str = "", history_ticks: int = 0,
+                     history_bytes: int = 0) -> Scene:
         """Creates an empty scene, or one that starts with the instances of `static_from`.
 
+        `history_ticks`: for how many ticks the past can be asked about; `history_bytes`: memory it may take, 0 = 256 MiB.
         `if_absent` returns a scene of that name as it is; otherwise that is ALREADY_EXISTS.
         """
         rpc = _rpc("Scene", "CreateScene")
@@ -99,6 +101,8 @@ class Client:
         request.spec.labels.update(labels or {})
         request.spec.winding = winding
         request.spec.static_from = static_from
+        request.spec.history_ticks = history_ticks
+        request.spec.history_bytes = history_bytes
         return Scene.of(self._unary(rpc, request, scene=name).scene)
 
     def scene(self, name: str) -> Scene:

@@ -5,7 +5,7 @@ from typing import NamedTuple, Optional, Sequence
 
 from . import columns, schema, wire
 from .columns import FLOAT32, UINT32, UINT64, ColumnLike
-from .enums import Column, Cull, Inside, Precision, RayMode, Source, StaticDetail
+from .enums import Column, Cull, Inside, OutsideHistory, Precision, RayMode, Source, StaticDetail
 from .values import Revision
 
 _REQUEST, _BATCH, _VIEW = schema.numbers("QueryRequest"), schema.numbers("QueryBatch"), schema.numbers("View")
@@ -25,6 +25,9 @@ class Block(NamedTuple):
     - `ignore_ids`: at most 64 uint64 to pass over, for the whole block.
     - `max_results`: most rows a query, 0 = 1,024.
     - `after_id`: only rows with a higher id, to go on after a cut.
+    - `as_of_ticks`: N uint64 or one; asks about objects as they were when that tick ended. `as_of_fractions`: N float32
+      or one, 0 <= f < 1, with them: how far from there to the next tick. `outside_history`: what to do about times that
+      are not kept; they are refused by default.
     """
 
     frame: Optional[ColumnLike] = None
@@ -36,6 +39,9 @@ class Block(NamedTuple):
     ignore_ids: ColumnLike = None
     max_results: int = 0
     after_id: int = 0
+    as_of_ticks: ColumnLike = None
+    as_of_fractions: ColumnLike = None
+    outside_history: OutsideHistory = OutsideHistory.UNSPECIFIED
 
     def write(self, block: wire.Parts, path: str, count: int) -> None:
         """Into the protocol's QueryBlock of `count` queries, called `path` in errors. Defaults cost nothing."""
@@ -58,6 +64,13 @@ class Block(NamedTuple):
             block.add_varint(_BLOCK["max_results"], self.max_results)
         if self.after_id:
             block.add_fixed64(_BLOCK["after_id"], self.after_id)
+        if self.as_of_ticks is not None:
+            block.add(_BLOCK["as_of_ticks"], columns.borrow_for(path + "as_of_ticks", self.as_of_ticks, UINT64, count))
+        if self.as_of_fractions is not None:
+            fractions = columns.borrow_for(path + "as_of_fractions", self.as_of_fractions, FLOAT32, count)
+            block.add(_BLOCK["as_of_fractions"], fractions)
+        if self.outside_history:
+            block.add_varint(_BLOCK["outside_history"], self.outside_history)
 
 
 class QueryBatch:

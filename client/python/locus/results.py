@@ -88,6 +88,12 @@ class BlockResult:
                         FLOAT64, 3)
     rotations = _Column("4R float32: the rotation as stored, x, y, z, w; 0 for a miss.", FLOAT32, 4)
 
+    resolved_ticks = _Column("N uint64: the ticks that were asked in fact; empty without `as_of_ticks`.", UINT64,
+                             by_row=False)
+    resolved_fractions = _Column("N float32: the fractions that were asked in fact; empty without `as_of_ticks`.",
+                                 FLOAT32, by_row=False)
+    clamped = _Column("Numbers of the queries whose time was not kept: uint32, ascending.", UINT32, by_row=False)
+
     @property
     def work(self) -> Optional[Work]:
         """The work of this block; None without `explain`."""

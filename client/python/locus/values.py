@@ -54,6 +54,7 @@ class Scene(Revision):
 
     `objects`, `instances` and `triangles` are counts, `memory_bytes` an estimate without meshes. `bounds` holds the
     lower and upper corner, each x, y, z in the caller's unit, possibly somewhat too wide; None in an empty scene.
+    Of a past of at most `history_ticks` ticks, `recorded_ticks` from `oldest_tick` on are kept, in `history_bytes`.
     """
 
     name: str
@@ -68,6 +69,10 @@ class Scene(Revision):
     labels: Dict[str, str]
     winding: Winding
     bounds: Optional[Tuple[Tuple[float, float, float], Tuple[float, float, float]]]
+    history_ticks: int = 0
+    oldest_tick: int = 0
+    recorded_ticks: int = 0
+    history_bytes: int = 0
 
     @classmethod
     def of(cls, message: Any) -> "Scene":
@@ -77,7 +82,8 @@ class Scene(Revision):
         state = message.state if message.state in SceneState._value2member_map_ else 0
         return cls(message.epoch, message.revision, message.name, SceneState(state), message.tick, message.objects,
                    message.instances, message.triangles, message.memory_bytes, message.pending_changes,
-                   message.last_build_error, dict(message.spec.labels), Winding(message.spec.winding), bounds)
+                   message.last_build_error, dict(message.spec.labels), Winding(message.spec.winding), bounds,
+                   message.spec.history_ticks, message.oldest_tick, message.recorded_ticks, message.history_bytes)
 
 
 @dataclasses.dataclass(frozen=True)

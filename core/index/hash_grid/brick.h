@@ -45,6 +45,7 @@ struct BrickPlace {
 
 struct Brick {
   BrickPlace place;
+  uint32_t number = 0;                      // in the list of bricks, from its first version to its last
   std::shared_ptr<const GridBlock> sorted;  // never null
   std::shared_ptr<const GridBlock> recent;  // null when there are none
   std::vector<uint64_t> gone;
@@ -59,6 +60,13 @@ struct Brick {
   // Without the sorted block, which other versions may share.
   size_t own_bytes() const {
     return sizeof(Brick) + (recent == nullptr ? 0 : recent->bytes()) + gone.size() * sizeof(gone[0]);
+  }
+  // Without what `other`, perhaps a later version of this brick, shares; null shares nothing.
+  size_t bytes_apart_from(const Brick* other) const {
+    if (other == this) return 0;
+    if (other == nullptr) return bytes();
+    return bytes() - (sorted == other->sorted ? sorted->bytes() : 0) -
+           (recent != nullptr && recent == other->recent ? recent->bytes() : 0);
   }
 };
 

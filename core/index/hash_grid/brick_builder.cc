@@ -128,6 +128,7 @@ BrickPtr BrickBuilder::sort_anew(const Brick* old, absl::Span<const BrickChange>
   write(*block, 0, nullptr, [&](size_t i) { return next[sources_[i].cell]++; });
   auto brick = std::make_shared<Brick>();
   brick->place = *place_;
+  brick->number = number_;
   brick->sorted = block;
   return brick;
 }

@@ -19,7 +19,8 @@ namespace locus {
 class GridRef {
  public:
   GridRef() = default;
-  GridRef(const internal::GridBlock& block, uint32_t slot) : block_(&block), slot_(slot) {}
+  GridRef(const internal::GridBlock& block, uint32_t slot, uint32_t brick)
+      : block_(&block), slot_(slot), brick_(brick) {}
 
   explicit operator bool() const { return block_ != nullptr; }
   const GridEntry& entry() const { return block_->entry(slot_); }
@@ -27,10 +28,14 @@ class GridRef {
   float reach() const { return block_->reach(slot_); }
   GridForm form() const { return block_->form(slot_); }
   GridItem item() const { return block_->item(slot_); }
+  // Where it lies: its place in its block, and the number of its brick.
+  uint32_t slot() const { return slot_; }
+  uint32_t brick() const { return brick_; }
 
  private:
   const internal::GridBlock* block_ = nullptr;
   uint32_t slot_ = 0;
+  uint32_t brick_ = 0;
 };
 
 namespace internal {
@@ -91,8 +96,9 @@ inline GridLine cull_line_of(const Brick& brick, const SlabRay<double>& ray, dou
 template <class Cull, class Visit>
 class RowScan {
  public:
-  RowScan(const GridBlock& block, const uint64_t* gone, const Cull& cull, const Visit& visit, Work& work)
-      : block_(block), cull_(cull), visit_(visit), work_(work) {
+  RowScan(const GridBlock& block, const uint64_t* gone, uint32_t brick, const Cull& cull, const Visit& visit,
+          Work& work)
+      : block_(block), brick_(brick), cull_(cull), visit_(visit), work_(work) {
     rows_ = {block.column(0), block.column(1), block.column(2), block.column(3), gone, 0, {}, {}};
   }
 
@@ -118,13 +124,14 @@ class RowScan {
     for (uint32_t i = 0; i < kept; ++i) __builtin_prefetch(&block_.entry(slots_[i]));
     for (uint32_t i = 0; i < kept; ++i) {
       ++work_.tests;
-      if (!visit_(GridRef(block_, slots_[i]))) return false;
+      if (!visit_(GridRef(block_, slots_[i], brick_))) return false;
     }
     return true;
   }
 
  private:
   const GridBlock& block_;
+  const uint32_t brick_;
   const Cull& cull_;
   const Visit& visit_;
   Work& work_;
@@ -137,7 +144,7 @@ class RowScan {
 template <class Cull, class Visit>
 bool scan_cells(const Brick& brick, const KeyRange& cells, Work& work, const Cull& cull, const Visit& visit) {
   const GridBlock& sorted = *brick.sorted;
-  RowScan<Cull, Visit> scan(sorted, brick.gone.empty() ? nullptr : brick.gone.data(), cull, visit, work);
+  RowScan<Cull, Visit> scan(sorted, brick.gone.empty() ? nullptr : brick.gone.data(), brick.number, cull, visit, work);
   uint32_t begin = 0, end = 0;
   bool first = true;
   for (int64_t z = cells.lo.z; z <= cells.hi.z; ++z) {
@@ -160,7 +167,7 @@ bool scan_cells(const Brick& brick, const KeyRange& cells, Work& work, const Cul
 template <class Cull, class Visit>
 bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& visit) {
   if (brick.recent == nullptr) return true;
-  RowScan<Cull, Visit> scan(*brick.recent, nullptr, cull, visit, work);
+  RowScan<Cull, Visit> scan(*brick.recent, nullptr, brick.number, cull, visit, work);
   return scan.add(0, brick.recent->count()) && scan.flush();
 }
 
@@ -168,9 +175,9 @@ bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& 
 template <class Visit>
 bool for_each_value(const Brick& brick, const Visit& visit) {
   for (uint32_t slot = 0; slot < brick.sorted->count(); ++slot)
-    if (!brick.is_gone(slot) && !visit(GridRef(*brick.sorted, slot))) return false;
+    if (!brick.is_gone(slot) && !visit(GridRef(*brick.sorted, slot, brick.number))) return false;
   for (uint32_t slot = 0; brick.recent != nullptr && slot < brick.recent->count(); ++slot)
-    if (!visit(GridRef(*brick.recent, slot))) return false;
+    if (!visit(GridRef(*brick.recent, slot, brick.number))) return false;
   return true;
 }
 

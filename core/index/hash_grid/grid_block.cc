@@ -17,6 +17,7 @@ GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((c
   if (has_forms) forms_ = reinterpret_cast<GridForm*>(memory_.get() + floats + handles + entries);
   for (int number = 0; number < 4; ++number)
     std::fill(floats_ + number * stride_ + count, floats_ + (number + 1) * stride_, 0.0f);
+  std::fill(handles_ + count, handles_ + stride_, ~0u);  // no value's
 }
 
 uint32_t GridBlock::find(uint32_t handle) const {
@@ -28,6 +29,15 @@ uint32_t GridBlock::find(uint32_t handle) const {
   }
   while (slot < count_ && handles_[slot] != handle) ++slot;
   return slot;
+}
+
+uint32_t GridBlock::find_near(uint32_t handle, uint32_t slot) const {
+  constexpr uint32_t kPlaces = 2 * kLanes;
+  if (stride_ < kPlaces) return find(handle);
+  const uint32_t begin = std::min(slot < kLanes ? 0 : slot - kLanes, stride_ - kPlaces);
+  uint32_t place = 0;  // counted from 1; the handle is there once at most
+  for (uint32_t i = 0; i < kPlaces; ++i) place |= handles_[begin + i] == handle ? i + 1 : 0;
+  return place == 0 ? count_ : begin + place - 1;
 }
 
 }  // namespace locus::internal

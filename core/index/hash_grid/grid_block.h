@@ -67,6 +67,8 @@ class GridBlock {
   GridItem item(uint32_t slot) const { return {entry(slot), handle(slot), reach(slot), form(slot)}; }
   // Where the value of that handle is; count() if it is not here. O(count), a vector at a time.
   uint32_t find(uint32_t handle) const;
+  // The same, looking only at the few places around `slot`.
+  uint32_t find_near(uint32_t handle, uint32_t slot) const;
 
   std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }
   const std::array<uint32_t, kBrickCells + 1>& offsets() const { return offsets_; }

@@ -37,16 +37,52 @@ GridSnapshot::GridSnapshot(std::vector<internal::GridLevel> levels, internal::Br
   for (const internal::GridLevel& level : levels_) size_ += level.size;
 }
 
-GridRef GridSnapshot::at(uint32_t handle) const {
-  const internal::Brick& brick = *bricks_[bricks_by_handle_[handle]];
+GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
   // A value that moved within the brick may lie in both; the one in `sorted` is gone then.
   if (brick.recent != nullptr) {
     const uint32_t slot = brick.recent->find(handle);
-    if (slot != brick.recent->count()) return {*brick.recent, slot};
+    if (slot != brick.recent->count()) return {*brick.recent, slot, brick.number};
   }
   const uint32_t slot = brick.sorted->find(handle);
-  LOCUS_CHECK_LT(slot, brick.sorted->count());
-  return {*brick.sorted, slot};
+  return slot == brick.sorted->count() || brick.is_gone(slot) ? GridRef() : GridRef(*brick.sorted, slot, brick.number);
+}
+
+GridRef GridSnapshot::at(uint32_t handle) const {
+  const GridRef value = find_in(*bricks_[bricks_by_handle_[handle]], handle);
+  LOCUS_CHECK(value);
+  return value;
+}
+
+GridRef GridSnapshot::find(uint32_t handle) const {
+  if (handle >= bricks_by_handle_.size()) return {};
+  const uint32_t number = bricks_by_handle_[handle];  // where it was last, if it is not in use
+  if (number >= bricks_.size() || bricks_[number] == nullptr) return {};
+  return find_in(*bricks_[number], handle);
+}
+
+GridRef GridSnapshot::find_like(const GridRef& value) const {
+  const uint32_t handle = value.handle();
+  if (value.brick() < bricks_.size() && bricks_[value.brick()] != nullptr) {
+    const internal::Brick& brick = *bricks_[value.brick()];
+    const uint32_t slot = brick.sorted->find_near(handle, value.slot());
+    if (slot < brick.sorted->count() && !brick.is_gone(slot)) return {*brick.sorted, slot, brick.number};
+  }
+  return find(handle);
+}
+
+size_t GridSnapshot::bytes_apart_from(const GridSnapshot& other) const {
+  size_t bytes = bricks_.bytes_apart_from(other.bricks_) + bricks_by_handle_.bytes_apart_from(other.bricks_by_handle_);
+  bricks_.for_each_apart_from(other.bricks_,
+                              [&bytes](const internal::BrickPtr& brick, const internal::BrickPtr* theirs) {
+                                if (brick != nullptr)
+                                  bytes += brick->bytes_apart_from(theirs == nullptr ? nullptr : theirs->get());
+                              });
+  for (const internal::GridLevel& level : levels_) {
+    const bool shared = std::any_of(other.levels_.begin(), other.levels_.end(),
+                                    [&level](const internal::GridLevel& one) { return one.table == level.table; });
+    bytes += sizeof(level) + (shared ? 0 : level.table->bytes());
+  }
+  return bytes;
 }
 
 GridStatistics GridSnapshot::statistics() const {

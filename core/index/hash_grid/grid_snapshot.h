@@ -62,9 +62,11 @@ class GridSnapshot {
   void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
 
   // visit(GridRef) for every value whose own interval on the ray has near <= far, far >= 0 and near <= limit(), and for
-  // others near the ray; roughly near to far on each level. limit() may fall meanwhile; false ends the visit.
+  // others near the ray; roughly near to far on each level. limit() may fall meanwhile; false ends the visit. For
+  // values that are elsewhere than filed, by up to `astray`, likewise.
   template <class Limit, class Visit>
-  void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
+  void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
+                 double astray = 0) const;
 
   // visit(GridRef) for every value whose bounds have a squared_distance() from `point` of at most limit(), and for
   // others near it; on each level the nearest bricks first. limit() may fall meanwhile; false ends the visit. Cost: a
@@ -78,12 +80,20 @@ class GridSnapshot {
 
   // The value of a handle that is in use here. O(values in its brick).
   GridRef at(uint32_t handle) const;
+  // The value of any handle that was ever in use in the grid; nothing where it is not in use here. O(values in a
+  // brick).
+  GridRef find(uint32_t handle) const;
+  // The same for the handle of a value of another snapshot of the grid: quick where it lies about there here, too.
+  GridRef find_like(const GridRef& value) const;
 
   // O(bricks).
   GridStatistics statistics() const;
+  // Bytes of what `other`, another snapshot of the grid, does not share. O(bricks that differ).
+  size_t bytes_apart_from(const GridSnapshot& other) const;
 
  private:
   const internal::Brick* find_brick(const internal::GridLevel& level, const internal::GridKey& key) const;
+  static GridRef find_in(const internal::Brick& brick, uint32_t handle);
   // fn(brick) for those bricks of the range that exist, until fn returns false, which is then returned.
   template <class Fn>
   bool for_each_brick(const internal::GridLevel& level, const internal::KeyRange& bricks, Work& work,
@@ -93,8 +103,8 @@ class GridSnapshot {
              const Limit& limit, Work& work, const Visit& visit) const;
   // For rays that would name more bricks than there are.
   template <class Limit, class Visit>
-  bool visit_by_distance(const internal::GridLevel& level, const SlabRay<double>& ray, const Limit& limit, Work& work,
-                         const Visit& visit) const;
+  bool visit_by_distance(const internal::GridLevel& level, double margin, const SlabRay<double>& ray,
+                         const Limit& limit, Work& work, const Visit& visit) const;
 
   std::vector<internal::GridLevel> levels_;  // coarse to fine
   internal::BrickArray bricks_;
@@ -149,11 +159,17 @@ void GridSnapshot::visit_region(const Aabbd& region, Work& work, const Visit& vi
 }
 
 template <class Limit, class Visit>
-void GridSnapshot::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const {
+void GridSnapshot::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
+                             double astray) const {
   for (const internal::GridLevel& level : levels_) {
-    const internal::SlabMarch slabs(ray, level.extent, limit());
+    internal::LevelExtent extent = level.extent;
+    if (astray > 0) {
+      extent.reach += astray;
+      extent.bounds = grown(extent.bounds, astray);
+    }
+    const internal::SlabMarch slabs(ray, extent, limit());
     const bool go_on = slabs.bricks() > static_cast<double>(level.table->size())
-                           ? visit_by_distance(level, ray, limit, work, visit)
+                           ? visit_by_distance(level, extent.reach, ray, limit, work, visit)
                            : march(level, slabs, ray, limit, work, visit);
     if (!go_on) return;
   }
@@ -198,15 +214,14 @@ bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabM
 }
 
 template <class Limit, class Visit>
-bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, const SlabRay<double>& ray, const Limit& limit,
-                                     Work& work, const Visit& visit) const {
+bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double margin, const SlabRay<double>& ray,
+                                     const Limit& limit, Work& work, const Visit& visit) const {
   struct Candidate {
     double near;
     const internal::Brick* brick;
   };
   const GridKernels& kernels = active_grid_kernels();
   absl::InlinedVector<Candidate, 32> candidates;
-  const double margin = level.extent.reach;
   level.table->for_each([&](uint32_t number) {
     ++work.cells;
     const internal::Brick& brick = *bricks_[number];

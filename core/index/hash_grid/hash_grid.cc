@@ -27,7 +27,7 @@ GridRef HashGrid::at(uint32_t handle) const {
   const GridSlot& slot = slots_[handle];
   const internal::Brick& brick = *bricks_[slot.brick];
   const bool recent = (slot.slot & GridSlot::kRecent) != 0;
-  return {recent ? *brick.recent : *brick.sorted, slot.slot & ~GridSlot::kRecent};
+  return {recent ? *brick.recent : *brick.sorted, slot.slot & ~GridSlot::kRecent, slot.brick};
 }
 
 void HashGrid::prefetch_value(uint32_t handle) const { __builtin_prefetch(&at(handle).entry()); }

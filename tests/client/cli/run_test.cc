@@ -102,6 +102,9 @@ TEST(UsageTest, MistakesInTheLineAreUsageErrors) {
            {"query", "ray", "arena", "--from", "0,0,0", "--dir", "0,0,1", "--at-least", "1", "--exactly", "2"},
            {"query", "nearest", "arena", "--k", "3"},
            {"query", "nearest", "arena", "--at", "0,0,0", "--k", "-1"},
+           {"query", "ball", "arena", "--at", "0,0,0", "--radius", "1", "--as-of", "12+"},
+           {"query", "ball", "arena", "--at", "0,0,0", "--radius", "1", "--as-of", "-1"},
+           {"query", "ball", "arena", "--at", "0,0,0", "--radius", "1", "--as-of", "12", "--outside", "guess"},
            {"insert", "arena", "cone", "--id", "1", "--at", "0,0,0"},
            {"insert", "arena", "ball", "--id", "1", "--at", "0,0,0"},
            {"insert", "arena", "point", "--id", "1", "--at", "0,0,0", "--radius", "1"},
@@ -286,6 +289,25 @@ TEST_F(RunTest, NearestAreRowsByDistanceWithTheirPoints) {
   EXPECT_EQ(block.nearest().k(), 2u);
   EXPECT_EQ(block.nearest().detail(), v1::STATIC_DETAIL_TRIANGLES);
   EXPECT_THAT(block.columns(), ElementsAre(v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_TRIANGLE, v1::COLUMN_POINT));
+}
+
+TEST_F(RunTest, TimesOfThePastAreAskedByQueryAndShownAsTheyWereResolved) {
+  server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
+    v1::BlockResult& block = *result.add_blocks();
+    for (int i = 0; i < 2; ++i) block.add_counts(0);
+    for (const uint64_t tick : {12, 14}) block.add_resolved_ticks(tick);
+    for (const float fraction : {0.5f, 0.0f}) block.add_resolved_fractions(fraction);
+    block.add_clamped(1);
+    return grpc::Status::OK;
+  };
+  const Json answer = json_of({"query", "ball", "arena", "--at", "0,0,0", "--at", "1,1,1", "--radius", "2", "--as-of",
+                               "12+0.5", "--as-of", "99", "--outside", "clamp"});
+  EXPECT_EQ(answer["as_of"].dump(), R"(["12+0.5","14"])");
+  EXPECT_EQ(answer["clamped"].dump(), "[1]");
+  const v1::QueryBlock& block = server_.queries.last_batch.blocks(0);
+  EXPECT_THAT(block.as_of_ticks(), ElementsAre(12, 99));
+  EXPECT_THAT(block.as_of_fractions(), ElementsAre(0.5f, 0));
+  EXPECT_EQ(block.outside_history(), v1::OUTSIDE_HISTORY_CLAMP);
 }
 
 TEST_F(RunTest, PositionsThatAreNoFloatsTravelInAFrame) {

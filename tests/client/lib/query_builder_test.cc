@@ -42,6 +42,15 @@ TEST(QueryBuilderTest, DefaultsLeaveNoColumn) {
   EXPECT_THAT(block.ignore_groups(), IsEmpty());
 }
 
+TEST(QueryBuilderTest, TimesOfThePastAreColumns) {
+  QueryBuilder builder;
+  builder.lookup().id(7).as_of({{12}}, {{0.5f}}).outside_history(v1::OUTSIDE_HISTORY_CLAMP);
+  const v1::QueryBlock block = builder.build().blocks(0);
+  EXPECT_THAT(block.as_of_ticks(), ElementsAre(12));
+  EXPECT_THAT(block.as_of_fractions(), ElementsAre(0.5f));
+  EXPECT_EQ(block.outside_history(), v1::OUTSIDE_HISTORY_CLAMP);
+}
+
 TEST(QueryBuilderTest, WholeSpansAppend) {
   const std::vector<float> origins = {0, 0, 0, 1, 1, 1};
   const std::vector<float> directions = {0, 0, 1};

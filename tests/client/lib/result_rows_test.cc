@@ -28,6 +28,19 @@ v1::BlockResult overlaps_of_three() {
   return block;
 }
 
+TEST(ResultRowsTest, TimesThatWereAskedAndClampedAreShownByQuery) {
+  v1::BlockResult block = first_hits();
+  for (const uint64_t tick : {5, 9}) block.add_resolved_ticks(tick);
+  for (const float fraction : {0.5f, 0.0f}) block.add_resolved_fractions(fraction);
+  block.add_clamped(1);
+  const absl::StatusOr<ResultRows> rows = ResultRows::of(block);
+  ASSERT_TRUE(rows.ok()) << rows.status();
+  EXPECT_THAT(rows->resolved_ticks(), ElementsAre(5, 9));
+  EXPECT_THAT(rows->resolved_fractions(), ElementsAre(0.5f, 0.0f));
+  EXPECT_FALSE(rows->clamped(0));
+  EXPECT_TRUE(rows->clamped(1));
+}
+
 TEST(RayHitsTest, FirstHasOneRowARayAndMissesAreMisses) {
   const v1::BlockResult block = first_hits();
   const absl::StatusOr<RayHits> hits = RayHits::of(block);

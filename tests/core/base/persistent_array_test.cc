@@ -60,5 +60,23 @@ TEST(PersistentArrayDeathTest, CopyingWhatIsBeingWrittenIsAProgrammersError) {
   EXPECT_DEATH(Array copy(array), "owner");
 }
 
+TEST(PersistentArrayTest, WhatIsApartIsWhatWasWrittenSince) {
+  Array array;
+  for (uint32_t place = 0; place < 1000; ++place) array.set(place, 1);
+  const Array before = array.snapshot();
+  EXPECT_EQ(before.bytes_apart_from(before), 0u);
+  array.set(500, 2);
+  const Array after = array.snapshot();
+  size_t changed = 0, seen = 0;
+  before.for_each_apart_from(after, [&](const auto& mine, const auto* theirs) {
+    ++seen;
+    if (theirs == nullptr || mine != *theirs) ++changed;
+  });
+  EXPECT_EQ(changed, 1u);
+  EXPECT_LT(seen, 1000u);
+  EXPECT_GT(before.bytes_apart_from(after), 0u);
+  EXPECT_LT(before.bytes_apart_from(after), before.bytes_apart_from(Array()));
+}
+
 }  // namespace
 }  // namespace locus

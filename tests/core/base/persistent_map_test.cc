@@ -177,5 +177,15 @@ TEST(PersistentMapTest, ReadersOfCopiesNeverSeeTheWriter) {
   EXPECT_EQ(published->size(), kKeys);
 }
 
+TEST(PersistentMapTest, WhatIsApartIsWhatWasWrittenSince) {
+  PersistentMap<uint64_t, uint64_t> map;
+  for (uint64_t key = 0; key < 1000; ++key) map.set(key, 1);
+  const auto before = map.snapshot();
+  EXPECT_EQ(before.bytes_apart_from(map), 0u);
+  map.set(500, 2);
+  EXPECT_GT(before.bytes_apart_from(map), 0u);
+  EXPECT_LT(before.bytes_apart_from(map) * 10, before.bytes_apart_from({}));
+}
+
 }  // namespace
 }  // namespace locus

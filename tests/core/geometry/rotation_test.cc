@@ -87,5 +87,26 @@ TEST(RotationTest, QuaternionsNearlyOfUnitLengthAreNormalised) {
   EXPECT_LT(unit_deviation(q), 1e-7);
 }
 
+TEST(RotationTest, BlendingGoesTheShorterWayAtUnitLength) {
+  constexpr uint64_t kSeed = 95;
+  Random random(kSeed);
+  for (int i = 0; i < 1000; ++i) {
+    const Quaternion a = random.rotation(), b = random.rotation();
+    const double weight = random.unit();
+    const Quaternion between = blended(a, b, weight);
+    const Quaternion the_other_way_told = blended(a, {-b.x, -b.y, -b.z, -b.w}, weight);
+    ASSERT_LT(unit_deviation(between), 1e-6) << "seed " << kSeed << " case " << i;
+    ASSERT_EQ(between, the_other_way_told) << "seed " << kSeed << " case " << i;
+  }
+  const Quaternion half = blended({0, 0, 0, 1}, {0, 0, 1, 0}, 0.5);
+  EXPECT_NEAR(half.z, half.w, 1e-7);
+}
+
+TEST(RotationTest, BlendingEqualsGivesThemBitForBit) {
+  const Quaternion q{0.1f, 0.7f, 0.3f, 0.64031242f};
+  EXPECT_EQ(blended(q, q, 0.3), q);
+  EXPECT_EQ(blended(q, {0, 0, 0, 1}, 0), normalized(q));
+}
+
 }  // namespace
 }  // namespace locus

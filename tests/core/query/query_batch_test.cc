@@ -357,5 +357,26 @@ TEST(CheckBatchTest, ZeroIsNoIdAndNoGroup) {
   expect_refusal(lookup_of_groups({3, 0}), Reason::kOutOfRange, "lookup.groups", 1);
 }
 
+TEST(QueryBatchTest, TimesOfThePastAreChecked) {
+  OwnedBlock block = twenty_balls();
+  block.as_of_ticks.assign(20, 5);
+  block.as_of_fractions.assign(20, 0.5f);
+  EXPECT_TRUE(status_with(block).ok());
+  block.as_of_fractions[7] = 1;
+  expect_refusal(block, Reason::kOutOfRange, "as_of_fractions", 7);
+  block.as_of_fractions[7] = -1e-6f;
+  expect_refusal(block, Reason::kOutOfRange, "as_of_fractions", 7);
+  block.as_of_fractions[7] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "as_of_fractions", 7);
+  block.as_of_fractions.resize(2);
+  expect_refusal(block, Reason::kColumnLength, "as_of_fractions", -1);
+  block.as_of_fractions.clear();
+  block.as_of_ticks.resize(3);
+  expect_refusal(block, Reason::kColumnLength, "as_of_ticks", -1);
+  block.as_of_ticks.clear();
+  block.as_of_fractions = {0.5f};
+  expect_refusal(block, Reason::kMalformed, "as_of_fractions", -1);
+}
+
 }  // namespace
 }  // namespace locus::test

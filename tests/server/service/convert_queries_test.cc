@@ -94,6 +94,9 @@ TEST(ConvertQueriesTest, EveryColumnOfAResultArrives) {
   block.layers = {12};
   block.positions = {13, 14, 15};
   block.rotations = {0, 0, 0, 1};
+  block.resolved_ticks = {16};
+  block.resolved_fractions = {0.75f};
+  block.clamped = {17};
   v1::BlockResult out;
   to_proto(block, &out);
   EXPECT_THAT(out.counts(), ElementsAre(2u));
@@ -110,6 +113,9 @@ TEST(ConvertQueriesTest, EveryColumnOfAResultArrives) {
   EXPECT_THAT(out.layers(), ElementsAre(12u));
   EXPECT_THAT(out.positions(), ElementsAre(13., 14., 15.));
   EXPECT_THAT(out.rotations(), ElementsAre(0.f, 0.f, 0.f, 1.f));
+  EXPECT_THAT(out.resolved_ticks(), ElementsAre(16u));
+  EXPECT_THAT(out.resolved_fractions(), ElementsAre(0.75f));
+  EXPECT_THAT(out.clamped(), ElementsAre(17u));
 }
 
 TEST(ConvertQueriesTest, ViewsSayWhichRevision) {

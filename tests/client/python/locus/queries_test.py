@@ -255,7 +255,8 @@ class RequestBytesTest(unittest.TestCase):
     def test_every_field_stands_where_the_schema_puts_it(self):
         settings = Block(frame=(1.5, 0, -2), source=locus.Source.STATIC, precision=locus.Precision.CONSERVATIVE,
                          columns=[Column.ID, Column.LAYERS], masks=[1, 2], ignore_groups=[3], ignore_ids=[4, 5], max_results=600,
-                         after_id=2**63)
+                         after_id=2**63, as_of_ticks=[11, 12], as_of_fractions=0.5,
+                         outside_history=locus.OutsideHistory.CLAMP)
         batch = QueryBatch(at_least=locus.Revision(7, 8), max_work=9, explain=True, max_reply_bytes=10)
         batch.rays([0] * 6, [1, 0, 0], t_max=[5, 6], mode=RayMode.ALL, cull=locus.Cull.BACK, inside=locus.Inside.SKIP,
                    block=settings)
@@ -268,7 +269,9 @@ class RequestBytesTest(unittest.TestCase):
         view.epoch, view.at_least = 7, 8
         wanted.batch.max_work, wanted.batch.explain, wanted.batch.max_reply_bytes = 9, True, 10
         first = blocks.add(source=2, precision=2, columns=[2, 9], masks=struct.pack("<2I", 1, 2), max_results=600,
-                           ignore_groups=struct.pack("<Q", 3), ignore_ids=struct.pack("<2Q", 4, 5), after_id=2**63)
+                           ignore_groups=struct.pack("<Q", 3), ignore_ids=struct.pack("<2Q", 4, 5), after_id=2**63,
+                           as_of_ticks=struct.pack("<2Q", 11, 12), as_of_fractions=struct.pack("<f", 0.5),
+                           outside_history=2)
         first.frame.x, first.frame.y, first.frame.z = 1.5, 0, -2
         first.rays.MergeFrom(schema.message("Rays")(origins=bytes(24), directions=struct.pack("<3f", 1, 0, 0),
                                                     t_max=struct.pack("<2f", 5, 6), mode=3, cull=2, inside=3))

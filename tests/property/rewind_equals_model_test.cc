@@ -1,0 +1,17 @@
+// Questions about the past of scenes where anything may happen, and to a model that keeps every tick in full.
+#include <gtest/gtest.h>
+
+#include "tests/support/rewind_lockstep.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+TEST(RewindEqualsModelTest, ThroughManyShortLives) { EXPECT_EQ(search_rewind_lockstep(scaled_count(70), 60), ""); }
+
+TEST(RewindEqualsModelTest, ThroughLongLives) {
+  EXPECT_EQ(search_rewind_lockstep(4, static_cast<int>(scaled_count(600))), "");
+}
+
+}  // namespace
+}  // namespace locus::test
