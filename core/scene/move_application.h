@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/types/span.h"
+#include "core/base/scratch.h"
 #include "core/scene/object_store.h"
 #include "core/scene/pose_reader.h"
 #include "core/scene/update_batch.h"
@@ -20,6 +21,9 @@ class MoveApplication {
 
   // `batch` has passed check_form(), and serves() is true of it. O(items).
   void run(const ObjectStore& objects, const UpdateBatch& batch);
+
+  // Forgets what the last run() came to.
+  void clear() { clear_scratch(moves_); }
 
   // What the last run() came to. A handle occurs once: of several moves of one object the last counts.
   absl::Span<const GridMove> moves() const { return moves_; }

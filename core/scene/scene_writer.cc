@@ -132,6 +132,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   start_tick(batch);
   if (moves_.changes()) result.replaced_bytes = objects_.move(moves_.moves());
   commit(batch, moves_.changes(), result);
+  moves_.clear();
   return result;
 }
 

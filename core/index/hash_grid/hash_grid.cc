@@ -7,6 +7,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/planted_bug.h"
+#include "core/base/scratch.h"
 #include "core/index/hash_grid/cell_size.h"
 
 namespace locus {
@@ -173,8 +174,6 @@ void HashGrid::rebuild_bricks(absl::Span<const GridMove> moves) {
 void HashGrid::apply_to_bricks(const GridBatch& batch) {
   touched_.clear();
   change_counts_.clear();
-  changes_.clear();
-  arrivals_.clear();
   for (const uint32_t handle : batch.removed) {
     const auto is_it = [handle](const GridItem& item) { return item.handle == handle; };
     if (planted(PlantedBug::kGhostAfterMove) && std::any_of(batch.inserted.begin(), batch.inserted.end(), is_it))
@@ -185,6 +184,9 @@ void HashGrid::apply_to_bricks(const GridBatch& batch) {
   for (const GridItem& item : batch.inserted) insert(item);
   group_changes();
   rebuild_bricks(batch.moves);
+  clear_scratch(changes_);
+  clear_scratch(grouped_);
+  clear_scratch(arrivals_);
   std::erase_if(levels_, [](const std::unique_ptr<Level>& level) { return level->size == 0; });
 }
 
