@@ -1,5 +1,5 @@
-// Vectors that a writer keeps from batch to batch, so that small batches ask for no memory: what a large one made of them
-// is given back, so that a scene at rest holds what it is and no more.
+// Vectors that a writer keeps from batch to batch, so that small batches ask for no memory: what a large one made of
+// them is given back, so that a scene at rest holds what it is and no more.
 #ifndef LOCUS_CORE_BASE_SCRATCH_H_
 #define LOCUS_CORE_BASE_SCRATCH_H_
 
