@@ -89,7 +89,8 @@ absl::Status run_dynamic_suite(const Options& options, const Progress& progress,
     for (const uint32_t count : kCounts) {
       if (options.quick && count != kCounts[0]) continue;
       const std::string name = absl::StrCat(name_of(kind), "/", name_of_count(count));
-      if (!wants_any(options, name) || (options.filter.wants_every() && !is_usual(kind, count))) continue;
+      const bool usual = options.quick || is_usual(kind, count);
+      if (!wants_any(options, name) || (options.filter.wants_every() && !usual)) continue;
       progress(name);
       World world(kind, count);
       run_world(options, world, report);

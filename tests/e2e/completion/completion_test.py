@@ -66,7 +66,7 @@ class Offers:
 
     def test_options_of_the_command_and_of_the_program(self):
         self.assertEqual(self.offers("locus query ray --mod"), {"--mode"})
-        self.assertEqual(self.offers("locus query ray --out"), {"--output"})
+        self.assertEqual(self.offers("locus query ray --out"), {"--output", "--outside"})
         self.assertNotIn("--inside", self.offers("locus query ball --ins"))
 
     def test_the_words_an_option_takes(self):
