@@ -18,16 +18,17 @@ enum class PlantedBug {
   kNearestLimit,       // boxes as far as the farthest thing found near a point are left out
   kNearestTreePad,     // float decides distances to the boxes of triangles without its pad
   // The ray kernels:
-  kKernelEdgeBound,   // float decides edges without its error bound
-  kKernelTBound,      // float decides t without its error bound
-  kKernelTreePad,     // boxes of nodes go without their pad
-  kKernelEdgeOn,      // triangles seen nearly edge-on are left out instead of decided in double
-  kKernelFloatAxis,   // float chooses the axis of projection, ties and all
-  kKernelWinding,     // rays backwards along their axis see triangles turned over
-  kKernelCull,        // culling takes every triangle for one seen from its front
-  kKernelLimit,       // a hit exactly at the limit is lost
-  kKernelTie,         // of equal hits the highest number wins
-  kKernelPruneEqual,  // boxes that start exactly at the best hit are left out
+  kKernelEdgeBound,         // float decides edges without its error bound
+  kKernelTBound,            // float decides t without its error bound
+  kKernelTreePad,           // boxes of nodes go without their pad
+  kKernelEdgeOn,            // triangles seen nearly edge-on are left out instead of decided in double
+  kKernelFloatAxis,         // float chooses the axis of projection, ties and all
+  kKernelWinding,           // rays backwards along their axis see triangles turned over
+  kKernelCull,              // culling takes every triangle for one seen from its front
+  kKernelLimit,             // a hit exactly at the limit is lost
+  kKernelTie,               // of equal hits the highest number wins
+  kKernelPruneEqual,        // boxes that start exactly at the best hit are left out
+  kKernelHitAfterGivingUp,  // what a packet meets last answers a ray that it left undecided
   // The region kernels:
   kRegionReach,       // boxes of nodes are held against the ball without a pad
   kRegionInside,      // float decides what is inside the ball without its error bound

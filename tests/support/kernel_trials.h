@@ -101,6 +101,26 @@ inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mes
   return KernelTrial(std::move(name), mesh, questions);
 }
 
+// Runs of rays that go together along a triangle that they see nearly edge-on, which is left undecided, while others of
+// its block are hit.
+inline KernelTrial edge_on_beam_trial() {
+  Random random(15);
+  const std::vector<Triangle> city = box_city(6, 1);
+  std::vector<KernelQuestion> questions;
+  while (questions.size() < scaled_count(3'000)) {
+    const Triangle& target = random.pick(city);
+    const Vec3d a = to_double(target.a), along = internal::place_within(target, random) - a;
+    const double off = random.magnitude(-36, -22);
+    for (int ray = 0; ray < 8; ++ray) {
+      KernelQuestion question;
+      question.origin = a - along * random.between(0.5, 0.51) + random.vector(off);
+      question.direction = along + random.vector(off);
+      questions.push_back(question);
+    }
+  }
+  return KernelTrial("beams edge-on", city, questions);
+}
+
 inline std::vector<KernelTrial> beam_trials() {
   std::vector<KernelTrial> trials;
   trials.push_back(beam_trial("beams at a sphere", bumpy_sphere(14, 0.1, 1), 10));
@@ -111,6 +131,7 @@ inline std::vector<KernelTrial> beam_trials() {
                                 internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), scale, {}), 13));
   trials.push_back(beam_trial("beams at a far sphere",
                               internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), 1, {1e5f, -2e5f, 5e4f}), 14));
+  trials.push_back(edge_on_beam_trial());
   return trials;
 }
 

@@ -281,8 +281,10 @@ class Packet {
     kept_[i] = 0;
   }
 
-  // Decides a pair that float left open.
+  // Decides a pair that float left open. Not of a ray that looks for nothing more: one given up stays so, whatever else
+  // of the same block it hits.
   inline void settle(const TriangleBlock& block, int place, uint32_t i) {
+    if (limits_[i] < 0 && !planted(PlantedBug::kKernelHitAfterGivingUp)) return;
     const Verdict verdict = decide(block, place, rays_[i], PreparedRay(*prepared_, i));
     if (verdict.what == KernelVerdict::kUndecided) give_up(i);
     if (verdict.what != KernelVerdict::kHit) return;
