@@ -27,7 +27,8 @@ CASES = {"ray/incoherent/first": RAYS, "ray/incoherent/any": ANY, "ray/short/fir
 DYNAMIC_PEERS = {"bullet": {"bullet"}, "boost": {"boost_rtree"}, "nanoflann": {"nanoflann"},
                  "ours": {"flat_hash_map", "sorted_rebuild"}}
 ONE_SIZE_ONLY = {"boost_rtree", "nanoflann", "flat_hash_map"}
-NOT_ASKED = {"box": {"nanoflann"}, "ray": {"nanoflann", "boost_rtree"}, "reinsert": {"nanoflann", "sorted_rebuild"}}
+NOT_ASKED = {"box": {"nanoflann"}, "ray": {"nanoflann", "boost_rtree"}, "nearest": {"bullet", "flat_hash_map"},
+             "reinsert": {"nanoflann", "sorted_rebuild"}}
 KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed")
 
 
@@ -51,7 +52,8 @@ def expected_dynamic_cells():
               for peer in ("no_writer", "spinning")}
     cells |= {("unpaced/1reader/10k" + batch, "no_reader") for batch in ("", "/batch100", "/batch10000")}
     for kind in KINDS:
-        for case in ("move", "ball", "ball_batch", "box", "box_batch", "ray", "ray_batch", "insert", "reinsert", "memory"):
+        for case in ("move", "ball", "ball_batch", "box", "box_batch", "ray", "ray_batch", "nearest", "nearest_batch",
+                     "insert", "reinsert", "memory"):
             left_out = NOT_ASKED.get(case.replace("_batch", ""), set()) | (
                 ONE_SIZE_ONLY if kind in ("giant", "mixed") else set())
             cells |= {(f"{case}/{kind}/10k", peer) for peer in peers - left_out}

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
-#include "core/geometry/shape.h"
+#include "core/geometry/point_shape.h"
 
 namespace locus::bench::dynamic {
 namespace {
@@ -22,10 +22,16 @@ Part part_of(const Answers& answers, size_t begin, size_t count) {
           distances.empty() ? distances : distances.subspan(begin, count)};
 }
 
-bool is_same(const Part& a, const Part& b) {
+bool are_as_far(Task task, const Part& a, const Part& b) {
   if (a.ids.size() != b.ids.size()) return false;
+  const float tolerance = task == Task::kNearest ? kSameNearDistance : kSameDistance;
   for (size_t i = 0; i < a.distances.size(); ++i)
-    if (std::fabs(a.distances[i] - b.distances[i]) > kSameDistance) return false;
+    if (std::fabs(a.distances[i] - b.distances[i]) > tolerance) return false;
+  return true;
+}
+
+bool is_same(Task task, const Part& a, const Part& b) {
+  if (!are_as_far(task, a, b)) return false;
   const auto sum = [](absl::Span<const uint64_t> ids) { return std::accumulate(ids.begin(), ids.end(), uint64_t{0}); };
   return sum(a.ids) == sum(b.ids);
 }
@@ -66,12 +72,31 @@ std::vector<uint64_t> true_ray(const World& world, const Rayf& ray) {
   return ids;
 }
 
+std::vector<uint64_t> true_nearest(const World& world, Vec3f center) {
+  const Objects objects = world.objects();
+  std::vector<std::pair<double, uint64_t>> all;
+  for (size_t i = 0; i < objects.ids.size(); ++i)
+    all.emplace_back(distance(to_double(center), shape_of(objects, i)), objects.ids[i]);
+  const size_t count = std::min<size_t>(kNearestCount, all.size());
+  std::partial_sort(all.begin(), all.begin() + static_cast<ptrdiff_t>(count), all.end());
+  std::vector<uint64_t> ids;
+  for (size_t i = 0; i < count; ++i) ids.push_back(all[i].second);
+  return ids;
+}
+
+std::vector<uint64_t> truth_of(const World& world, Task task, const Queries& queries, size_t query) {
+  if (task == Task::kRay) return true_ray(world, queries.rays[query]);
+  if (task == Task::kNearest) return true_nearest(world, queries.centers[query]);
+  return true_region(world, task, queries.centers[query]);
+}
+
 bool is_right(const World& world, Task task, const Queries& queries, size_t query, const Part& ours) {
-  std::vector<uint64_t> truth =
-      task == Task::kRay ? true_ray(world, queries.rays[query]) : true_region(world, task, queries.centers[query]);
+  std::vector<uint64_t> truth = truth_of(world, task, queries, query);
   std::vector<uint64_t> given(ours.ids.begin(), ours.ids.end());
-  std::sort(truth.begin(), truth.end());
-  std::sort(given.begin(), given.end());
+  if (task != Task::kNearest) {  // whose order is part of the answer
+    std::sort(truth.begin(), truth.end());
+    std::sort(given.begin(), given.end());
+  }
   return truth == given;
 }
 
@@ -87,11 +112,12 @@ void compare(const std::string& case_name, Task task, const World& world, const 
     const Part their_part = part_of(theirs, their_begin, theirs.counts[i]);
     our_begin += ours.counts[i];
     their_begin += theirs.counts[i];
-    if (is_same(our_part, their_part)) continue;
+    if (is_same(task, our_part, their_part)) continue;
     if (!is_right(world, task, queries, i, our_part)) {
       report.disagreements.push_back(absl::StrCat(case_name, ", query ", i, ": ours is wrong; ", peer, " differs"));
       return;
     }
+    if (task == Task::kNearest && are_as_far(task, our_part, their_part)) continue;  // others of those that tie
     if (differ++ == 0) first = i;
   }
   if (differ == 0) return;

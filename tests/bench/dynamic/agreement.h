@@ -14,8 +14,9 @@ namespace locus::bench::dynamic {
 // At most so many queries in so many, at least one.
 inline constexpr size_t kDifferingQueries = 20;
 inline constexpr size_t kDifferingQueriesOf = 10'000;
-// Distances along rays differ where they are further apart than this.
+// Distances differ where they are further apart than this: along rays, and to what is nearest.
 inline constexpr float kSameDistance = 0.02f;
+inline constexpr float kSameNearDistance = 0.001f;
 
 // Both answer all of `queries`, in their order.
 void compare(const std::string& case_name, Task task, const World& world, const Queries& queries, const Answers& ours,

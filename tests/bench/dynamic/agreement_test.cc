@@ -19,6 +19,7 @@ class DynamicAgreementTest : public testing::Test {
     contender.load(world.objects());
     contender.balls(queries.centers, balls);
     contender.rays(queries.rays, rays);
+    contender.nearest(queries.centers, nearest);
   }
 
   void compare_balls(const Answers& ours, const Answers& theirs) {
@@ -38,7 +39,7 @@ class DynamicAgreementTest : public testing::Test {
 
   const World world{Kind::kUniform, 1000, 100};
   const Queries queries;
-  Answers balls, rays;
+  Answers balls, rays, nearest;
   Report report;
 };
 
@@ -72,6 +73,29 @@ TEST_F(DynamicAgreementTest, ARayThatEndsElsewhereDiffers) {
   theirs.distances[0] += 2 * kSameDistance;
   compare("ray", Task::kRay, world, queries, rays, "peer", theirs, report);
   EXPECT_THAT(report.notes, ElementsAre(HasSubstr("peer is wrong in 1 of 1000")));
+}
+
+TEST_F(DynamicAgreementTest, AnotherNearestObjectThatIsAsFarIsTheSame) {
+  Answers theirs = nearest;
+  theirs.ids[0] = 1;
+  compare("nearest", Task::kNearest, world, queries, nearest, "peer", theirs, report);
+  EXPECT_THAT(report.notes, IsEmpty());
+  EXPECT_THAT(report.disagreements, IsEmpty());
+}
+
+TEST_F(DynamicAgreementTest, AFartherNearestObjectDiffers) {
+  Answers theirs = nearest;
+  theirs.distances[0] += 2 * kSameNearDistance;
+  theirs.ids[0] = 1;
+  compare("nearest", Task::kNearest, world, queries, nearest, "peer", theirs, report);
+  EXPECT_THAT(report.notes, ElementsAre(HasSubstr("peer is wrong in 1 of 1000")));
+}
+
+TEST_F(DynamicAgreementTest, AnotherNearestObjectOfOursIsADisagreementEvenIfAsFar) {
+  Answers ours = nearest;
+  ours.ids[0] = 1;
+  compare("nearest", Task::kNearest, world, queries, ours, "peer", nearest, report);
+  EXPECT_THAT(report.disagreements, ElementsAre(HasSubstr("query 0: ours is wrong")));
 }
 
 }  // namespace

@@ -58,6 +58,17 @@ class BoostTree : public Contender {
     each_region(centers, answers,
                 [&](Vec3f center, std::vector<uint64_t>& ids) { collect(center, ids, scalar_box_meets); });
   }
+  void nearest(absl::Span<const Vec3f> centers, Answers& answers) override {
+    for (const Vec3f& center : centers) {
+      NearestFound found;
+      const auto take = [&](const Value& value) {
+        const Body& body = bodies_[value.second];
+        found.offer(squared_length(body.position - center), body.id);
+      };
+      tree_.query(index::nearest(point_of(center), kNearestCount), boost::make_function_output_iterator(take));
+      found.append_to(answers, [](float squared) { return surface_distance(squared, kRadius); });
+    }
+  }
 
  private:
   Value value_of(uint32_t number) const { return {point_of(bodies_[number].position), number}; }

@@ -27,7 +27,7 @@ class Leaves : public btDbvt::ICollide {
 class BulletTree : public Contender {
  public:
   BulletTree() : Contender("bullet") {}
-  bool does(Task) const override { return true; }
+  bool does(Task task) const override { return task != Task::kNearest; }
 
   void load(const Objects& objects) override {
     map_ = std::make_unique<IdMap>(objects.ids);

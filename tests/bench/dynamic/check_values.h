@@ -15,8 +15,8 @@ uint32_t ticks_before_queries(uint32_t count);
 
 // Reports sums that are not those known for this world, which has gone that many ticks. Worlds without known values
 // pass.
-void check_values(const std::string& case_name, Task task, const World& world, const std::string& contender,
-                  const Answers& answers, Report& report);
+void check_values(const std::string& case_name, Task task, const World& world, const Queries& queries,
+                  const std::string& contender, const Answers& answers, Report& report);
 
 }  // namespace locus::bench::dynamic
 

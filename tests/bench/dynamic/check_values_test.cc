@@ -22,23 +22,36 @@ Answers answers_of(size_t ids, float distance) {
 TEST(CheckValuesTest, KnownSumsPass) {
   const World world(Kind::kUniform, 10'000);
   Report report;
-  check_values("ball", Task::kBall, world, "peer", answers_of(9'700, 0), report);
-  check_values("ray", Task::kRay, world, "peer", answers_of(58, 1131.4f / 58), report);
+  check_values("ball", Task::kBall, world, {}, "peer", answers_of(9'700, 0), report);
+  check_values("ray", Task::kRay, world, {}, "peer", answers_of(58, 1131.4f / 58), report);
   EXPECT_THAT(report.disagreements, IsEmpty());
 }
 
 TEST(CheckValuesTest, OtherSumsAreDisagreements) {
   const World world(Kind::kUniform, 10'000);
   Report report;
-  check_values("ball", Task::kBall, world, "peer", answers_of(9'500, 0), report);
-  check_values("ray", Task::kRay, world, "peer", answers_of(58, 20), report);
+  check_values("ball", Task::kBall, world, {}, "peer", answers_of(9'500, 0), report);
+  check_values("ray", Task::kRay, world, {}, "peer", answers_of(58, 20), report);
   EXPECT_THAT(report.disagreements, ElementsAre(HasSubstr("ball, peer: ids a ball is 0.9500, and must be 0.9700"),
                                                 HasSubstr("sum of distances is 1160.0000")));
 }
 
+TEST(CheckValuesTest, WhatIsNearestIsSummedUpToItsCentres) {
+  const World world(Kind::kUniform, 10'000);
+  const Queries queries = queries_of(world);
+  Answers answers;
+  answers.ids.assign(kQueries, world.objects().ids[0]);
+  answers.counts.assign(kQueries, 1);
+  Report report;
+  check_values("nearest", Task::kNearest, world, queries, "peer", answers, report);
+  ASSERT_EQ(report.disagreements.size(), 1u);
+  EXPECT_THAT(report.disagreements[0], HasSubstr("sum of distances to centres is"));
+  EXPECT_THAT(report.disagreements[0], HasSubstr("must be 2419380.3"));
+}
+
 TEST(CheckValuesTest, WorldsWithoutKnownValuesPass) {
   Report report;
-  check_values("ball", Task::kBall, World(Kind::kFar, 10'000), "peer", answers_of(1, 0), report);
+  check_values("ball", Task::kBall, World(Kind::kFar, 10'000), {}, "peer", answers_of(1, 0), report);
   EXPECT_THAT(report.disagreements, IsEmpty());
 }
 

@@ -3,6 +3,9 @@
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_CONTENDER_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_CONTENDER_H_
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -17,7 +20,7 @@ namespace locus::bench::dynamic {
 
 inline constexpr float kReach = 10;  // the radius of every ball, half the edge of every box
 inline constexpr float kRayLength = 100;
-inline constexpr uint32_t kNearest = 8;
+inline constexpr uint32_t kNearestCount = 8;
 
 // Balls of N objects: positions are 3N.
 struct Objects {
@@ -50,7 +53,7 @@ struct Answers {
   }
 };
 
-enum class Task : uint8_t { kMove, kReinsert, kBall, kBox, kRay };
+enum class Task : uint8_t { kMove, kReinsert, kBall, kBox, kRay, kNearest };
 
 class Contender {
  public:
@@ -71,10 +74,12 @@ class Contender {
   virtual void forget_past() {}
 
   // Appended: everything that shares a point with the ball or box of kReach around each centre, in any order; the first
-  // object on each ray, if there is one, and its distance.
+  // object on each ray, if there is one, and its distance; the kNearestCount objects nearest to each centre, the
+  // nearest first, and their distances, which are 0 inside.
   virtual void balls(absl::Span<const Vec3f>, Answers&) {}
   virtual void boxes(absl::Span<const Vec3f>, Answers&) {}
   virtual void rays(absl::Span<const Rayf>, Answers&) {}
+  virtual void nearest(absl::Span<const Vec3f>, Answers&) {}
 
  private:
   const std::string name_;
@@ -107,6 +112,40 @@ void each_ray(absl::Span<const Rayf> rays, Answers& answers, Find find) {
     answers.distances.push_back(hit.distance);
   }
 }
+
+// The kNearestCount of what was offered, by any figure that grows with the distance, ascending.
+class NearestFound {
+ public:
+  // What an offer has to stay below.
+  float limit() const {
+    return count_ < kNearestCount ? std::numeric_limits<float>::infinity() : figures_[kNearestCount - 1];
+  }
+  void offer(float figure, uint64_t id) {
+    if (figure >= limit()) return;
+    size_t at = count_ < kNearestCount ? count_++ : kNearestCount - 1;
+    for (; at > 0 && figures_[at - 1] > figure; --at) {
+      figures_[at] = figures_[at - 1];
+      ids_[at] = ids_[at - 1];
+    }
+    figures_[at] = figure;
+    ids_[at] = id;
+  }
+  // `to_distance` of each figure.
+  template <class ToDistance>
+  void append_to(Answers& answers, const ToDistance& to_distance) const {
+    answers.counts.push_back(static_cast<uint32_t>(count_));
+    answers.ids.insert(answers.ids.end(), ids_.begin(), ids_.begin() + count_);
+    for (size_t i = 0; i < count_; ++i) answers.distances.push_back(to_distance(figures_[i]));
+  }
+
+ private:
+  std::array<float, kNearestCount> figures_{};
+  std::array<uint64_t, kNearestCount> ids_{};
+  size_t count_ = 0;
+};
+
+// To the surface of a ball of this radius, from the squared distance to its centre.
+inline float surface_distance(float squared, float radius) { return std::max(0.0f, std::sqrt(squared) - radius); }
 
 // Makes contenders of one kind.
 struct Maker {

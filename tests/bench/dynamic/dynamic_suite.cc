@@ -16,8 +16,8 @@ namespace {
 
 constexpr uint32_t kCounts[] = {10'000, 100'000, 1'000'000};
 // Of one world each.
-constexpr const char* kCases[] = {"memory",    "ball",      "box",  "ray",    "ball_batch",
-                                  "box_batch", "ray_batch", "move", "insert", "reinsert"};
+constexpr const char* kCases[] = {"memory",    "ball",      "box",           "ray",  "nearest", "ball_batch",
+                                  "box_batch", "ray_batch", "nearest_batch", "move", "insert",  "reinsert"};
 
 // What runs without a filter.
 bool is_usual(Kind kind, uint32_t count) {

@@ -23,7 +23,7 @@ struct Points {
 class NanoflannTree : public Contender {
  public:
   NanoflannTree() : Contender("nanoflann"), tree_(3, points_, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {}
-  bool does(Task task) const override { return task == Task::kMove || task == Task::kBall; }
+  bool does(Task task) const override { return task == Task::kMove || task == Task::kBall || task == Task::kNearest; }
 
   void load(const Objects& objects) override {
     map_ = std::make_unique<IdMap>(objects.ids);
@@ -43,6 +43,18 @@ class NanoflannTree : public Contender {
       tree_.radiusSearch(&center.x, kGrown * kGrown, matches_, nanoflann::SearchParams(0, 0, false));
       for (const auto& match : matches_) ids.push_back(ids_[match.first]);
     });
+  }
+  void nearest(absl::Span<const Vec3f> centers, Answers& answers) override {
+    std::array<uint32_t, kNearestCount> numbers{};
+    std::array<float, kNearestCount> squared{};
+    for (const Vec3f& center : centers) {
+      const size_t found = tree_.knnSearch(&center.x, kNearestCount, numbers.data(), squared.data());
+      answers.counts.push_back(static_cast<uint32_t>(found));
+      for (size_t i = 0; i < found; ++i) {
+        answers.ids.push_back(ids_[numbers[i]]);
+        answers.distances.push_back(surface_distance(squared[i], kRadius));
+      }
+    }
   }
 
  private:

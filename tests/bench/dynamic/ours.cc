@@ -3,6 +3,7 @@
 #include <array>
 
 #include "core/base/check.h"
+#include "core/geometry/point_shape.h"
 #include "core/index/regions.h"
 #include "core/query/run_batch.h"
 
@@ -37,6 +38,32 @@ FirstHit first_of(const SceneSnapshot& snapshot, const ObjectRay& ray) {
   return first;
 }
 
+// The kNearestCount nearest objects, by (distance, id).
+class NearestObjects {
+ public:
+  double limit() const { return limit_; }
+  void offer(double distance, uint64_t id) {
+    const std::pair<double, uint64_t> found = {distance, id};
+    if (count_ == kNearestCount && !(found < found_[kNearestCount - 1])) return;
+    size_t at = count_ < kNearestCount ? count_++ : kNearestCount - 1;
+    for (; at > 0 && found < found_[at - 1]; --at) found_[at] = found_[at - 1];
+    found_[at] = found;
+    if (count_ == kNearestCount) limit_ = squared_limit(found_[kNearestCount - 1].first);
+  }
+  void append_to(Answers& answers) const {
+    answers.counts.push_back(static_cast<uint32_t>(count_));
+    for (size_t i = 0; i < count_; ++i) {
+      answers.distances.push_back(static_cast<float>(found_[i].first));
+      answers.ids.push_back(found_[i].second);
+    }
+  }
+
+ private:
+  std::array<std::pair<double, uint64_t>, kNearestCount> found_;
+  size_t count_ = 0;
+  double limit_ = std::numeric_limits<double>::infinity();
+};
+
 absl::Span<const float> numbers_of(const Vec3f& first, size_t count) {
   static_assert(sizeof(Vec3f) == 3 * sizeof(float));
   return {&first.x, 3 * count};
@@ -45,7 +72,7 @@ absl::Span<const float> numbers_of(const Vec3f& first, size_t count) {
 class Batches : public Contender {
  public:
   explicit Batches(const Ours& ours) : Contender("ours_batch"), ours_(ours) {}
-  bool does(Task task) const override { return task == Task::kBall || task == Task::kBox || task == Task::kRay; }
+  bool does(Task task) const override { return task != Task::kMove && task != Task::kReinsert; }
   void load(const Objects&) override {}
   void move(const Moves&) override {}
 
@@ -81,6 +108,14 @@ class Batches : public Contender {
       answers.distances.push_back(result.t[i]);
     }
   }
+  void nearest(absl::Span<const Vec3f> centers, Answers& answers) override {
+    NearestColumns columns;
+    columns.points = numbers_of(centers.front(), centers.size());
+    columns.count = kNearestCount;
+    const BlockResult result = run(columns, {Column::kId, Column::kT});
+    append(result, answers);
+    answers.distances.insert(answers.distances.end(), result.t.begin(), result.t.end());
+  }
 
  private:
   template <class Columns>
@@ -99,7 +134,9 @@ class Batches : public Contender {
   }
   template <class Columns>
   void ask(const Columns& columns, Answers& answers) const {
-    const BlockResult result = run(columns, {Column::kId});
+    append(run(columns, {Column::kId}), answers);
+  }
+  static void append(const BlockResult& result, Answers& answers) {
     answers.ids.insert(answers.ids.end(), result.ids.begin(), result.ids.end());
     answers.counts.insert(answers.counts.end(), result.counts.begin(), result.counts.end());
   }
@@ -169,6 +206,21 @@ void Ours::rays(absl::Span<const Rayf> rays, Answers& answers) {
   each_ray(rays, answers, [&](const Rayf& ray) {
     return first_of(*snapshot_, ObjectRay({to_double(ray.origin), to_double(ray.direction), kRayLength}));
   });
+}
+
+void Ours::nearest(absl::Span<const Vec3f> centers, Answers& answers) {
+  for (const Vec3f& center : centers) {
+    const Vec3d point = to_double(center);
+    Work work;
+    NearestObjects found;
+    snapshot_->objects.grid().visit_nearest(
+        point, [&found] { return found.limit(); }, work,
+        [&](const GridRef& object) {
+          found.offer(distance(point, shape_of(object)), object.entry().id);
+          return true;
+        });
+    found.append_to(answers);
+  }
 }
 
 void Ours::forget_past() { scene_.forget_recent(); }

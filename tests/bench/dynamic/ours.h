@@ -24,6 +24,7 @@ class Ours : public Contender {
   void balls(absl::Span<const Vec3f> centers, Answers& answers) override;
   void boxes(absl::Span<const Vec3f> centers, Answers& answers) override;
   void rays(absl::Span<const Rayf> rays, Answers& answers) override;
+  void nearest(absl::Span<const Vec3f> centers, Answers& answers) override;
 
   SnapshotPtr latest() const { return scene_.latest(); }
 

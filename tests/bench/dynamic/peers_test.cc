@@ -24,6 +24,23 @@ Answers wrong_answers(size_t queries) {
   return answers;
 }
 
+// Of what ties, peers may find any: so they are compared with us, and we with the truth.
+void expect_right_nearest(Contender& contender, const World& world) {
+  if (!contender.does(Task::kNearest)) return;
+  const Queries queries = queries_of(world, 20);
+  Ours ours;
+  ours.load(world.objects());
+  Answers our_answers, answers;
+  ours.nearest(queries.centers, our_answers);
+  contender.nearest(queries.centers, answers);
+  Report report;
+  compare("case", Task::kNearest, world, queries, our_answers, contender.name(), answers, report);
+  EXPECT_THAT(report.disagreements, IsEmpty());
+  EXPECT_THAT(report.notes, IsEmpty());
+  compare("case", Task::kNearest, world, queries, our_answers, "nobody", wrong_answers(20), report);
+  EXPECT_THAT(report.disagreements, testing::ElementsAre(testing::HasSubstr("nobody is wrong")));
+}
+
 void expect_right(Contender& contender, const World& world) {
   const Queries queries = queries_of(world, 20);
   for (const Task task : {Task::kBall, Task::kBox, Task::kRay}) {
@@ -37,6 +54,7 @@ void expect_right(Contender& contender, const World& world) {
     ASSERT_EQ(report.disagreements.size(), 1u) << contender.name();
     EXPECT_THAT(report.disagreements[0], testing::HasSubstr("nobody is wrong")) << contender.name();
   }
+  expect_right_nearest(contender, world);
 }
 
 TEST(PeersTest, FindWhatWasLoaded) {
@@ -108,12 +126,13 @@ TEST(PeersTest, AWholeBatchAnswersAsTheIndexDoes) {
   ours.load(world.objects());
   const Queries queries = queries_of(world, 50);
   const std::unique_ptr<Contender> batches = batches_of(ours);
-  for (const Task task : {Task::kBall, Task::kBox, Task::kRay}) {
+  for (const Task task : {Task::kBall, Task::kBox, Task::kRay, Task::kNearest}) {
     Answers alone, whole;
     for (auto [contender, answers] : {std::pair<Contender*, Answers*>{&ours, &alone}, {batches.get(), &whole}}) {
       if (task == Task::kBall) contender->balls(queries.centers, *answers);
       if (task == Task::kBox) contender->boxes(queries.centers, *answers);
       if (task == Task::kRay) contender->rays(queries.rays, *answers);
+      if (task == Task::kNearest) contender->nearest(queries.centers, *answers);
     }
     Report report;
     compare("case", task, world, queries, alone, "batch", whole, report);

@@ -18,8 +18,10 @@ struct QueryCase {
   const char* batch_name;
   Task task;
 };
-constexpr QueryCase kCases[] = {
-    {"ball", "ball_batch", Task::kBall}, {"box", "box_batch", Task::kBox}, {"ray", "ray_batch", Task::kRay}};
+constexpr QueryCase kCases[] = {{"ball", "ball_batch", Task::kBall},
+                                {"box", "box_batch", Task::kBox},
+                                {"ray", "ray_batch", Task::kRay},
+                                {"nearest", "nearest_batch", Task::kNearest}};
 
 // One of kParts.
 template <class T>
@@ -32,6 +34,7 @@ void ask(Contender& contender, Task task, const Queries& queries, size_t part, A
   if (task == Task::kBall) contender.balls(part_of(queries.centers, part), answers);
   if (task == Task::kBox) contender.boxes(part_of(queries.centers, part), answers);
   if (task == Task::kRay) contender.rays(part_of(queries.rays, part), answers);
+  if (task == Task::kNearest) contender.nearest(part_of(queries.centers, part), answers);
 }
 
 void ask_all(Contender& contender, Task task, const Queries& queries, Answers& answers) {
@@ -79,7 +82,7 @@ class QueryRace {
       entry.parts = parts_of(thread_seconds() - start);
       const std::string& contender = entry.contender->name();
       compare(name, case_.task, run_.world, run_.queries, ours, contender, theirs, run_.report);
-      check_values(name, case_.task, run_.world, contender, theirs, run_.report);
+      check_values(name, case_.task, run_.world, run_.queries, contender, theirs, run_.report);
     }
   }
 

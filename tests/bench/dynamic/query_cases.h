@@ -1,5 +1,5 @@
-// The cases ball, box and ray of one world, by our index alone, and ball_batch, box_batch and ray_batch by whole
-// batches. One thread.
+// The cases ball, box, ray and nearest of one world, by our index alone, and the same with _batch by whole batches. One
+// thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_QUERY_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_QUERY_CASES_H_
 

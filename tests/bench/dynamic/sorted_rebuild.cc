@@ -26,7 +26,9 @@ class SortedRebuild : public Contender {
     const size_t count = objects.ids.size();
     ids_.assign(objects.ids.begin(), objects.ids.end());
     radii_.assign(objects.radii.begin(), objects.radii.end());
-    largest_ = *std::max_element(radii_.begin(), radii_.end());
+    const auto [smallest, largest] = std::minmax_element(radii_.begin(), radii_.end());
+    smallest_ = *smallest;
+    largest_ = *largest;
     positions_.resize(count);
     for (size_t i = 0; i < count; ++i) positions_[i] = point_at(objects.positions, i);
     cells_.resize(count);
@@ -56,6 +58,15 @@ class SortedRebuild : public Contender {
   }
   void rays(absl::Span<const Rayf> rays, Answers& answers) override {
     each_ray(rays, answers, [&](const Rayf& ray) { return first_of(ray); });
+  }
+  void nearest(absl::Span<const Vec3f> centers, Answers& answers) override {
+    for (const Vec3f& center : centers) {
+      if (smallest_ == largest_)
+        nearest_of<true>(center).append_to(answers,
+                                           [this](float squared) { return surface_distance(squared, largest_); });
+      else
+        nearest_of<false>(center).append_to(answers, [](float distance) { return std::max(0.0f, distance); });
+    }
   }
 
  private:
@@ -152,13 +163,57 @@ class SortedRebuild : public Contender {
     return first;
   }
 
+  // By rings of cells around that of the centre. The figures are squared distances to centres where there is one size,
+  // which says as much, else distances to surfaces, negative inside.
+  template <bool kOneSize>
+  NearestFound nearest_of(Vec3f center) const {
+    NearestFound found;
+    const std::array<int, 3> home = {cell_of(center, 0), cell_of(center, 1), cell_of(center, 2)};
+    float inside = std::numeric_limits<float>::infinity();  // to the nearest side of the home cell
+    for (int axis = 0; axis < 3; ++axis) {
+      const float from_low = center[axis] - low_[axis] - static_cast<float>(home[static_cast<size_t>(axis)]) * cell_;
+      inside = std::min({inside, from_low, cell_ - from_low});
+    }
+    const int last = *std::max_element(last_.begin(), last_.end());
+    for (int ring = 0; ring <= last; ++ring) {
+      const float away = static_cast<float>(ring - 1) * cell_ + std::max(0.0f, inside);
+      if (ring > 0 && found.limit() <= (kOneSize ? away * away : away - largest_)) break;
+      each_run_of_ring(home, ring, [&](uint32_t begin, uint32_t end) {
+        for (uint32_t i = begin; i < end; ++i) {
+          const float squared = squared_length(Vec3f{x_[i], y_[i], z_[i]} - center);
+          found.offer(kOneSize ? squared : std::sqrt(squared) - r_[i], sorted_ids_[i]);
+        }
+      });
+    }
+    return found;
+  }
+  // The cells whose largest distance from `home` on an axis is `ring`.
+  template <class Visit>
+  void each_run_of_ring(const std::array<int, 3>& home, int ring, const Visit& visit) const {
+    const auto row = [&](int x, int y, int first_z, int last_z) {
+      first_z = std::max(first_z, 0);
+      last_z = std::min(last_z, last_[2]);
+      if (first_z <= last_z) visit(begins_[cell_at(x, y, first_z)], begins_[cell_at(x, y, last_z) + 1]);
+    };
+    for (int x = std::max(home[0] - ring, 0); x <= std::min(home[0] + ring, last_[0]); ++x) {
+      for (int y = std::max(home[1] - ring, 0); y <= std::min(home[1] + ring, last_[1]); ++y) {
+        if (std::max(std::abs(x - home[0]), std::abs(y - home[1])) == ring) {
+          row(x, y, home[2] - ring, home[2] + ring);
+        } else {
+          row(x, y, home[2] - ring, home[2] - ring);
+          row(x, y, home[2] + ring, home[2] + ring);
+        }
+      }
+    }
+  }
+
   std::unique_ptr<IdMap> map_;
   // By number.
   std::vector<uint64_t> ids_;
   std::vector<Vec3f> positions_;
   std::vector<float> radii_;
   std::vector<uint32_t> cells_;
-  float largest_ = 0;  // of radii_
+  float smallest_ = 0, largest_ = 0;  // of radii_
   // The grid: cell `c` is the places begins_[c] ... begins_[c + 1].
   Vec3f low_;
   float cell_ = 1, per_cell_ = 1;
