@@ -51,6 +51,7 @@ def expected_dynamic_cells():
     cells |= {(f"concurrent_{share}/1reader/10k", peer) for share in ("p50", "p99", "p999")
               for peer in ("no_writer", "spinning")}
     cells |= {("unpaced/1reader/10k" + batch, "no_reader") for batch in ("", "/batch100", "/batch10000")}
+    cells |= {(f"rewind/{age}/10k", "now") for age in ("1tick", "10ticks", "30ticks")}
     for kind in KINDS:
         for case in ("move", "ball", "ball_batch", "box", "box_batch", "ray", "ray_batch", "nearest", "nearest_batch",
                      "insert", "reinsert", "memory"):

@@ -9,6 +9,7 @@
 #include "tests/bench/dynamic/move_cases.h"
 #include "tests/bench/dynamic/peers.h"
 #include "tests/bench/dynamic/query_cases.h"
+#include "tests/bench/dynamic/rewind_cases.h"
 #include "tests/bench/frame/heap.h"
 
 namespace locus::bench::dynamic {
@@ -97,6 +98,7 @@ absl::Status run_dynamic_suite(const Options& options, const Progress& progress,
     }
   }
   run_growth_case(options, progress, report);
+  run_rewind_cases(options, progress, report);
   run_concurrent_cases(options, progress, report);
   return absl::OkStatus();
 }

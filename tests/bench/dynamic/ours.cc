@@ -71,7 +71,7 @@ absl::Span<const float> numbers_of(const Vec3f& first, size_t count) {
 
 class Batches : public Contender {
  public:
-  explicit Batches(const Ours& ours) : Contender("ours_batch"), ours_(ours) {}
+  Batches(const Ours& ours, std::optional<AsOf> time) : Contender("ours_batch"), ours_(ours), time_(time) {}
   bool does(Task task) const override { return task != Task::kMove && task != Task::kReinsert; }
   void load(const Objects&) override {}
   void move(const Moves&) override {}
@@ -126,6 +126,10 @@ class Batches : public Contender {
     block.columns = wanted;
     block.max_results = limits::kMaxMaxResults;
     block.kind = columns;
+    if (time_) {
+      block.as_of_ticks = absl::MakeConstSpan(&time_->tick, 1);
+      block.as_of_fractions = absl::MakeConstSpan(&time_->fraction, 1);
+    }
     const absl::Status checked = check_batch(batch);
     LOCUS_CHECK_EQ(checked, absl::OkStatus());
     absl::StatusOr<BatchResult> result = run_batch(*ours_.latest(), batch, {});
@@ -142,12 +146,14 @@ class Batches : public Contender {
   }
 
   const Ours& ours_;
+  const std::optional<AsOf> time_;
   std::vector<Vec3f> origins_, directions_;
 };
 
 }  // namespace
 
-Ours::Ours() : Contender("locus"), scene_("bench", {}, 1, StaticSet::empty()) {}
+Ours::Ours(const HistoryOptions& history)
+    : Contender("locus"), scene_("bench", {{}, Winding::kCounterClockwise, history}, 1, StaticSet::empty()) {}
 
 void Ours::apply(const UpdateBatch& batch, size_t items) {
   const absl::StatusOr<UpdateAck> ack = scene_.apply(batch);
@@ -163,6 +169,7 @@ void Ours::move(const Moves& moves) {
   columns.ids = moves.ids;
   columns.positions = moves.positions;
   UpdateBatch batch;
+  batch.tick = ++tick_;
   batch.moves.push_back(columns);
   apply(batch, moves.ids.size());
 }
@@ -225,6 +232,8 @@ void Ours::nearest(absl::Span<const Vec3f> centers, Answers& answers) {
 
 void Ours::forget_past() { scene_.forget_recent(); }
 
-std::unique_ptr<Contender> batches_of(const Ours& ours) { return std::make_unique<Batches>(ours); }
+std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time) {
+  return std::make_unique<Batches>(ours, time);
+}
 
 }  // namespace locus::bench::dynamic

@@ -4,16 +4,20 @@
 #define LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 
 #include <memory>
+#include <optional>
 
+#include "core/scene/moment.h"
 #include "core/scene/scene.h"
 #include "tests/bench/dynamic/contender.h"
 
 namespace locus::bench::dynamic {
 
-// Updates go through the writer, each call one batch; queries are asked of the index of the latest revision.
+// Updates go through the writer, each call one batch, each move() a tick; queries are asked of the index of the latest
+// revision.
 class Ours : public Contender {
  public:
-  Ours();
+  // `history`: of the past that is kept.
+  explicit Ours(const HistoryOptions& history = {});
   bool does(Task) const override { return true; }
 
   void load(const Objects& objects) override;
@@ -27,16 +31,18 @@ class Ours : public Contender {
   void nearest(absl::Span<const Vec3f> centers, Answers& answers) override;
 
   SnapshotPtr latest() const { return scene_.latest(); }
+  SceneStatus status() const { return scene_.status(); }
 
  private:
   void apply(const UpdateBatch& batch, size_t items);
 
   Scene scene_;
   SnapshotPtr snapshot_;  // the latest
+  uint64_t tick_ = 0;
 };
 
-// Queries only, of `ours`: each call is one batch of one block.
-std::unique_ptr<Contender> batches_of(const Ours& ours);
+// Queries only, of `ours`: each call is one batch of one block, about now or about `time`.
+std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time = {});
 
 }  // namespace locus::bench::dynamic
 
