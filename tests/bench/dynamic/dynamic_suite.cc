@@ -11,6 +11,7 @@
 #include "tests/bench/dynamic/query_cases.h"
 #include "tests/bench/dynamic/rewind_cases.h"
 #include "tests/bench/frame/heap.h"
+#include "tests/bench/frame/peer_library.h"
 
 namespace locus::bench::dynamic {
 namespace {
@@ -84,7 +85,7 @@ void run_world(const Options& options, World& world, Report& report) {
 }  // namespace
 
 absl::Status run_dynamic_suite(const Options& options, const Progress& progress, Report& report) {
-  report.notes = missing_peers();
+  report.notes = missing_peers({kBullet, kBoost, kNanoflann});
   report.notes.emplace_back("worlds of several sizes: boost_rtree, nanoflann and flat_hash_map take one size only");
   for (const Kind kind : kKinds) {
     for (const uint32_t count : kCounts) {

@@ -1,7 +1,5 @@
 #include "tests/bench/dynamic/peers.h"
 
-#include "tests/bench/frame/missing_peer.h"
-
 namespace locus::bench::dynamic {
 
 std::vector<Maker> peer_makers() {
@@ -17,20 +15,6 @@ std::vector<Maker> peer_makers() {
 #endif
       {"flat_hash_map", true, naive_grid}, {"sorted_rebuild", false, sorted_rebuild},
   };
-}
-
-std::vector<std::string> missing_peers() {
-  std::vector<std::string> sentences;
-#ifndef LOCUS_BENCH_BULLET
-  sentences.push_back(missing_peer("libbullet-dev"));
-#endif
-#ifndef LOCUS_BENCH_BOOST
-  sentences.push_back(missing_peer("libboost-dev"));
-#endif
-#ifndef LOCUS_BENCH_NANOFLANN
-  sentences.push_back(missing_peer("libnanoflann-dev"));
-#endif
-  return sentences;
 }
 
 }  // namespace locus::bench::dynamic

@@ -4,7 +4,6 @@
 #define LOCUS_TESTS_BENCH_DYNAMIC_PEERS_H_
 
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "tests/bench/dynamic/contender.h"
@@ -24,9 +23,6 @@ std::unique_ptr<Contender> sorted_rebuild();
 
 // All there are.
 std::vector<Maker> peer_makers();
-
-// One sentence for each peer that was not there when this program was configured.
-std::vector<std::string> missing_peers();
 
 }  // namespace locus::bench::dynamic
 

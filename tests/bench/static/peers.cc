@@ -1,6 +1,5 @@
 #include "tests/bench/static/peers.h"
 
-#include "tests/bench/frame/missing_peer.h"
 #ifdef LOCUS_BENCH_EMBREE
 #include "tests/bench/static/embree.h"
 #include "tests/bench/static/embree_collide.h"
@@ -42,23 +41,6 @@ std::vector<std::unique_ptr<Builder>> all_builders([[maybe_unused]] const BenchM
   builders.push_back(embree_builder(mesh));
 #endif
   return builders;
-}
-
-std::vector<std::string> missing_peers() {
-  std::vector<std::string> sentences;
-#ifndef LOCUS_BENCH_EMBREE
-  sentences.push_back(missing_peer("libembree-dev"));
-#endif
-#ifndef LOCUS_BENCH_BULLET
-  sentences.push_back(missing_peer("libbullet-dev"));
-#endif
-#ifndef LOCUS_BENCH_BOOST
-  sentences.push_back(missing_peer("libboost-dev"));
-#endif
-#ifndef LOCUS_BENCH_CGAL
-  sentences.push_back(missing_peer("libcgal-dev"));
-#endif
-  return sentences;
 }
 
 }  // namespace locus::bench

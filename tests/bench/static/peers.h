@@ -1,5 +1,5 @@
-// All peers of the static suite that this build has, and the words for those it has not. CMake decides by what is
-// installed; deploy/packages.sh has the set `bench`.
+// All peers of the static suite that this build has. CMake decides by what is installed; deploy/packages.sh has the set
+// `bench`.
 #ifndef LOCUS_TESTS_BENCH_STATIC_PEERS_H_
 #define LOCUS_TESTS_BENCH_STATIC_PEERS_H_
 
@@ -15,9 +15,6 @@ Peers all_peers(const BenchMesh& mesh, Needs needs, std::vector<std::string>& no
 
 // Of the cases build and memory.
 std::vector<std::unique_ptr<Builder>> all_builders(const BenchMesh& mesh);
-
-// One sentence for each peer that was not there when this program was configured.
-std::vector<std::string> missing_peers();
 
 }  // namespace locus::bench
 

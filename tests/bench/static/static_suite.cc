@@ -1,6 +1,7 @@
 #include "tests/bench/static/static_suite.h"
 
 #include "core/index/bvh/kernels/dispatch.h"
+#include "tests/bench/frame/peer_library.h"
 #include "tests/bench/static/bench_mesh.h"
 #include "tests/bench/static/build_cases.h"
 #include "tests/bench/static/mesh_list.h"
@@ -28,7 +29,7 @@ void run_mesh(const Options& options, const Progress& progress, const BenchMesh&
 }  // namespace
 
 absl::Status run_static_suite(const Options& options, const Progress& progress, Report& report) {
-  report.notes = missing_peers();
+  report.notes = missing_peers({kEmbree, kBullet, kBoost, kCgal});
   const absl::string_view instructions = instruction_set();
   report.notes.push_back(absl::StrCat("our kernels: ", instructions));
   for (const std::string& name : meshes_of(options, report.notes)) {

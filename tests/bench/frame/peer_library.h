@@ -1,0 +1,58 @@
+// Which libraries of peers this program was configured with, and the words for those that are not there. For every
+// suite. Plain data and pure functions.
+#ifndef LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
+#define LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
+
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/types/span.h"
+
+namespace locus::bench {
+
+struct PeerLibrary {
+  const char* package;  // Debian's
+  bool is_here;
+};
+
+#ifdef LOCUS_BENCH_EMBREE
+inline constexpr PeerLibrary kEmbree = {"libembree-dev", true};
+#else
+inline constexpr PeerLibrary kEmbree = {"libembree-dev", false};
+#endif
+#ifdef LOCUS_BENCH_BULLET
+inline constexpr PeerLibrary kBullet = {"libbullet-dev", true};
+#else
+inline constexpr PeerLibrary kBullet = {"libbullet-dev", false};
+#endif
+#ifdef LOCUS_BENCH_BOOST
+inline constexpr PeerLibrary kBoost = {"libboost-dev", true};
+#else
+inline constexpr PeerLibrary kBoost = {"libboost-dev", false};
+#endif
+#ifdef LOCUS_BENCH_CGAL
+inline constexpr PeerLibrary kCgal = {"libcgal-dev", true};
+#else
+inline constexpr PeerLibrary kCgal = {"libcgal-dev", false};
+#endif
+#ifdef LOCUS_BENCH_NANOFLANN
+inline constexpr PeerLibrary kNanoflann = {"libnanoflann-dev", true};
+#else
+inline constexpr PeerLibrary kNanoflann = {"libnanoflann-dev", false};
+#endif
+
+// One sentence for each that was not there when this program was configured.
+inline std::vector<std::string> missing_peers(absl::Span<const PeerLibrary> libraries) {
+  std::vector<std::string> sentences;
+  for (const PeerLibrary& library : libraries)
+    if (!library.is_here)
+      sentences.push_back(
+          absl::StrCat("a peer is missing: ", library.package,
+                       " was not installed when this program was configured; run deploy/packages.sh bench"));
+  return sentences;
+}
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
