@@ -27,6 +27,8 @@ class MoveApplication {
 
   // What the last run() came to. A handle occurs once: of several moves of one object the last counts.
   absl::Span<const GridMove> moves() const { return moves_; }
+  // Their numbers by handle, as GridBatch wants them.
+  absl::Span<const uint32_t> moves_by_handle() const { return last_move_; }
   // Whether any of them changes anything.
   bool changes() const { return changes_; }
   uint32_t applied() const { return applied_; }

@@ -33,10 +33,10 @@ void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
     free_handles_.push_back(resting_.front().handle);
 }
 
-size_t ObjectStore::move(absl::Span<const GridMove> moves) {
+size_t ObjectStore::move(absl::Span<const GridMove> moves, absl::Span<const uint32_t> moves_by_handle) {
   if (moves_ != nullptr)
     for (const GridMove& move : moves) moves_->moved(grid_.at(move.handle), move.position);
-  return grid_.apply({{}, moves, {}});
+  return grid_.apply({{}, moves, {}, moves_by_handle});
 }
 
 size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,

@@ -1,17 +1,19 @@
 // Bricks, the unit in which the hash grid stores and shares values: 4x4x4 cells with one sorted block of values, and
-// the few values that came or moved since that block was sorted. Immutable once shared; any thread. A small batch
-// replaces the few, a large one or many small ones sort the block anew.
+// a log of the few values that came or moved since that block was sorted. Immutable once shared; any thread. A small
+// batch makes a version that shares both blocks: it adds to the log what earlier versions do not know of, and marks
+// what is gone from either. A large one, or many small ones, sort everything anew.
 //
-// Invariants: a value is alive in `sorted` (its bit in `gone` is not set) or in `recent`, never in both; every value
-// lies in this brick by its position; `gone` is empty or has a bit for each value of `sorted` and 64 more.
+// Invariants: a value is alive in `sorted` (its bit in `gone` is not set) or in `recent` (likewise), never in both and
+// never twice; every value lies in this brick by its position; `gone` is empty or has a bit for each value of `sorted`
+// and 64 more.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_H_
 
 #include <algorithm>
+#include <array>
 #include <memory>
-#include <vector>
 
-#include "absl/types/span.h"
+#include "absl/container/inlined_vector.h"
 #include "core/index/hash_grid/cell_key.h"
 #include "core/index/hash_grid/grid_block.h"
 
@@ -44,29 +46,47 @@ struct BrickPlace {
 };
 
 struct Brick {
+  static constexpr uint32_t kMostRecent = 128;
+
   BrickPlace place;
   uint32_t number = 0;                      // in the list of bricks, from its first version to its last
+  float largest_reach = 0;                  // no value here has a larger one
   std::shared_ptr<const GridBlock> sorted;  // never null
-  std::shared_ptr<const GridBlock> recent;  // null when there are none
-  std::vector<uint64_t> gone;
+  std::shared_ptr<GridBlock> recent;        // a log; null when recent_count is 0
   uint32_t gone_count = 0;
+  uint32_t recent_count = 0;  // this version's share of the log
+  uint32_t recent_gone_count = 0;
+  std::array<uint64_t, kMostRecent / 64 + 1> recent_gone{};
+  static constexpr size_t kGoneInPlace = 20;
+  absl::InlinedVector<uint64_t, kGoneInPlace> gone;
 
-  uint32_t size() const { return sorted->count() - gone_count + (recent == nullptr ? 0 : recent->count()); }
+  uint32_t size() const { return sorted->count() - gone_count + recent_count - recent_gone_count; }
   bool is_gone(uint32_t slot) const { return !gone.empty() && (gone[slot / 64] >> (slot % 64) & 1) != 0; }
-  float largest_reach() const {
-    return recent == nullptr ? sorted->largest_reach() : std::max(sorted->largest_reach(), recent->largest_reach());
+  bool is_recent_gone(uint32_t slot) const { return (recent_gone[slot / 64] >> (slot % 64) & 1) != 0; }
+  // The slot in `recent` of a handle's value; recent_count if it is not there.
+  uint32_t find_recent(uint32_t handle) const {
+    if (recent_count == 0) return 0;
+    const uint32_t slot = recent->find_last(handle, recent_count);
+    return slot == recent_count || is_recent_gone(slot) ? recent_count : slot;
   }
-  size_t bytes() const { return own_bytes() + sorted->bytes(); }
-  // Without the sorted block, which other versions may share.
-  size_t own_bytes() const {
-    return sizeof(Brick) + (recent == nullptr ? 0 : recent->bytes()) + gone.size() * sizeof(gone[0]);
+  // Asks for the memory of the brick, and of what its blocks are, before it is needed.
+  void prefetch() const {
+    for (size_t line = 0; line < sizeof(Brick); line += 64)
+      __builtin_prefetch(reinterpret_cast<const char*>(this) + line);
   }
+  void prefetch_blocks() const {
+    __builtin_prefetch(sorted.get());
+    if (recent != nullptr) __builtin_prefetch(recent.get());
+  }
+
+  size_t bytes() const { return bytes_apart_from(nullptr); }
   // Without what `other`, perhaps a later version of this brick, shares; null shares nothing.
   size_t bytes_apart_from(const Brick* other) const {
     if (other == this) return 0;
-    if (other == nullptr) return bytes();
-    return bytes() - (sorted == other->sorted ? sorted->bytes() : 0) -
-           (recent != nullptr && recent == other->recent ? recent->bytes() : 0);
+    const bool shares_sorted = other != nullptr && sorted == other->sorted;
+    const bool shares_recent = recent == nullptr || (other != nullptr && recent == other->recent);
+    return sizeof(Brick) + (gone.size() <= kGoneInPlace ? 0 : gone.size() * sizeof(gone[0])) +
+           (shares_sorted ? 0 : sorted->bytes()) + (shares_recent ? 0 : recent->bytes());
   }
 };
 

@@ -9,39 +9,57 @@ namespace {
 
 // A brick of fewer values is sorted anew whatever changes: that costs no more.
 constexpr uint32_t kFewestSorted = 128;
-// Beyond these a brick is sorted anew, since every query goes through what changed lately.
-constexpr uint32_t kMostRecent = 64;
 constexpr uint32_t kSortedPerChange = 8;  // sorted values for each change of one batch
 constexpr uint32_t kSortedPerGone = 4;    // sorted values for each that is gone
+constexpr size_t kAhead = 16;             // values whose memory is asked for before their turn
 
 // In the lists of changes by slot. Numbers of moves are smaller.
 constexpr uint32_t kStays = ~0u - 1;
 
+bool arrives(const BrickChange& change) { return change.slot == BrickChange::kArrives; }
+
 }  // namespace
 
-BrickPtr BrickBuilder::apply(const Brick* old, const BrickPlace& place, uint32_t number,
-                             absl::Span<const BrickChange> changes, const BatchParts& parts,
-                             std::vector<GridSlot>& slots) {
-  place_ = &place;
-  number_ = number;
+void BrickBuilder::begin(const BatchParts& parts, std::vector<GridSlot>& slots) {
   parts_ = parts;
   slots_ = &slots;
   sources_.clear();
-  return is_few(old, changes.size()) ? change_few(*old, changes) : sort_anew(old, changes);
 }
 
-bool BrickBuilder::is_few(const Brick* old, size_t changes) {
+BrickPtr BrickBuilder::apply(const Brick* old, const BrickPlace& place, uint32_t number,
+                             absl::Span<const BrickChange> changes) {
+  place_ = &place;
+  number_ = number;
+  largest_reach_ = old == nullptr ? 0 : old->largest_reach;
+  if (is_few(old, changes) && (old->sorted->has_forms() || (!parts_.turns && !any_form_arrives(changes))))
+    return change_few(*old, changes);
+  sources_.clear();
+  return sort_anew(old, changes);
+}
+
+BrickPtr BrickBuilder::build(const Brick* old, const BrickPlace& place, uint32_t number,
+                             absl::Span<const BrickSource> sources, absl::Span<const BrickChange> changes) {
+  place_ = &place;
+  number_ = number;
+  largest_reach_ = old == nullptr ? 0 : old->largest_reach;
+  if (changes.empty()) return sorted_by_cell(old, sources);
+  sources_.assign(sources.begin(), sources.end());
+  add_arrivals(changes);
+  return sorted_by_cell(old, sources_);
+}
+
+bool BrickBuilder::is_few(const Brick* old, absl::Span<const BrickChange> changes) {
   if (old == nullptr || old->sorted->count() < kFewestSorted) return false;
-  const uint32_t recent = old->recent == nullptr ? 0 : old->recent->count();
-  return changes * kSortedPerChange <= old->sorted->count() && recent + changes <= kMostRecent &&
-         (old->gone_count + changes) * kSortedPerGone <= old->sorted->count();
+  return changes.size() * kSortedPerChange <= old->sorted->count() &&
+         old->recent_count + changes.size() <= Brick::kMostRecent &&
+         (old->gone_count + changes.size()) * kSortedPerGone <= old->sorted->count();
 }
 
 void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> changes) {
   sorted_changes_.assign(old.sorted->count(), kStays);
-  recent_changes_.assign(old.recent == nullptr ? 0 : old.recent->count(), kStays);
+  recent_changes_.assign(old.recent_count, kStays);
   for (const BrickChange& change : changes) {
-    if (change.slot == BrickChange::kArrives) continue;
+    if (arrives(change)) continue;
     if (change.number != BrickChange::kLeaves) __builtin_prefetch(&parts_.moves[change.number]);
     const uint32_t slot = change.slot & ~GridSlot::kRecent;
     std::vector<uint32_t>& marks = (change.slot & GridSlot::kRecent) != 0 ? recent_changes_ : sorted_changes_;
@@ -50,113 +68,145 @@ void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> 
   }
 }
 
-inline void BrickBuilder::add_source(const GridBlock& block, uint32_t slot, uint32_t change) {
-  if (change == kStays) {
-    const Vec3d position = block.entry(slot).position;
-    sources_.push_back({position, &block, slot, kNoMove, cell_of(position)});
-  } else {
-    const Vec3d position = parts_.moves[change].position;
-    sources_.push_back({position, &block, slot, change, cell_of(position)});
-  }
-}
-
-// Those of `brick`, if given, that were gone before are left out, and so are those that leave.
-void BrickBuilder::add_sources(const GridBlock& block, const std::vector<uint32_t>& changes, const Brick* brick) {
-  for (uint32_t slot = 0; slot < block.count(); ++slot) {
-    const uint32_t change = changes[slot];
-    if (change != BrickChange::kLeaves && (brick == nullptr || !brick->is_gone(slot))) add_source(block, slot, change);
-  }
+inline void BrickBuilder::add_source(const GridBlock& block, uint32_t origin, uint32_t change) {
+  if (change == BrickChange::kLeaves) return;
+  const bool stays = change == kStays;
+  const Vec3d position = stays ? block.entry(origin & ~GridSlot::kRecent).position : parts_.moves[change].position;
+  sources_.push_back({origin, stays ? BrickSource::kNoMove : change, static_cast<uint32_t>(place_->cell_of(position))});
 }
 
 void BrickBuilder::add_arrivals(absl::Span<const BrickChange> changes) {
   for (const BrickChange& change : changes) {
-    if (change.slot != BrickChange::kArrives) continue;
+    if (!arrives(change)) continue;
     const Vec3d position = parts_.arrivals[change.number].entry.position;
-    sources_.push_back({position, nullptr, change.number, kNoMove, cell_of(position)});
+    sources_.push_back({change.number | BrickSource::kArrival, BrickSource::kNoMove,
+                        static_cast<uint32_t>(place_->cell_of(position))});
   }
 }
 
-GridForm BrickBuilder::form_of(const Source& source) const {
-  GridForm form = source.block == nullptr ? parts_.arrivals[source.slot].form : source.block->form(source.slot);
-  if (source.move != kNoMove && parts_.moves[source.move].turns) form.rotation = parts_.moves[source.move].rotation;
+GridForm BrickBuilder::form_of(const Brick* old, const BrickSource& source) const {
+  if ((source.origin & BrickSource::kArrival) != 0) return parts_.arrivals[source.origin & ~BrickSource::kArrival].form;
+  const GridBlock& block = (source.origin & GridSlot::kRecent) != 0 ? *old->recent : *old->sorted;
+  GridForm form = block.form(source.origin & ~GridSlot::kRecent);
+  if (source.move != BrickSource::kNoMove && parts_.moves[source.move].turns)
+    form.rotation = parts_.moves[source.move].rotation;
   return form;
 }
 
-bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickChange> changes) const {
-  if (parts_.turns) return true;
-  if (old != nullptr && (old->sorted->has_forms() || (old->recent != nullptr && old->recent->has_forms()))) return true;
+bool BrickBuilder::any_form_arrives(absl::Span<const BrickChange> changes) const {
   return std::any_of(changes.begin(), changes.end(), [this](const BrickChange& change) {
-    return change.slot == BrickChange::kArrives && !(parts_.arrivals[change.number].form == GridForm());
+    return arrives(change) && !(parts_.arrivals[change.number].form == GridForm());
   });
 }
 
+bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickSource> sources) const {
+  if (parts_.turns || (old != nullptr && old->sorted->has_forms())) return true;
+  // Arrivals are last.
+  for (size_t i = sources.size(); i != 0 && (sources[i - 1].origin & BrickSource::kArrival) != 0; --i)
+    if (!(parts_.arrivals[sources[i - 1].origin & ~BrickSource::kArrival].form == GridForm())) return true;
+  return false;
+}
+
+// `from`: the old brick's sorted and recent values.
+inline void BrickBuilder::prefetch(const GridBlock::Values* from, const BrickSource& source) const {
+  if (source.move != BrickSource::kNoMove) __builtin_prefetch(&parts_.moves[source.move]);
+  if ((source.origin & BrickSource::kArrival) != 0) return;
+  const GridBlock::Values& values = from[source.origin >> 31];
+  const uint32_t slot = source.origin & ~GridSlot::kRecent;
+  __builtin_prefetch(&values.entries[slot]);
+  __builtin_prefetch(&(*slots_)[values.handles[slot]], 1);
+}
+
+// Puts the sources into the slots that place_of() gives, which is called for one after the other.
 template <class PlaceOf>
-inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const GridBlock* before, const PlaceOf& place_of) {
-  std::vector<GridSlot>& slots = *slots_;
-  for (size_t i = 0; i < sources_.size(); ++i) {
-    const Source& source = sources_[i];
-    const uint32_t slot = place_of(i);
+inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* old,
+                                absl::Span<const BrickSource> sources, const PlaceOf& place_of) {
+  const GridBlock::Places places(block, place_->center);
+  // Of the recent values, where there are none, nothing is asked.
+  const GridBlock& sorted = old == nullptr ? block : *old->sorted;
+  const GridBlock::Values from[2] = {
+      GridBlock::Values(sorted), GridBlock::Values(old == nullptr || old->recent == nullptr ? sorted : *old->recent)};
+  const GridMove* const moves = parts_.moves.data();
+  GridSlot* const slots = slots_->data();
+  const uint32_t number = number_;
+  const bool has_forms = block.has_forms();
+  float largest_reach = largest_reach_;
+  for (size_t i = 0; i < sources.size(); ++i) {
+    if (i + kAhead < sources.size()) prefetch(from, sources[i + kAhead]);
+    const BrickSource source = sources[i];
+    const uint32_t slot = place_of(source);
     uint32_t handle = 0;
-    if (source.block != nullptr) {
-      handle = source.block->handle(source.slot);
-      block.put(slot, source.block->entry(source.slot), source.position, handle, source.block->reach(source.slot),
-                place_->center);
-    } else {
-      const GridItem& arrival = parts_.arrivals[source.slot];
+    if ((source.origin & BrickSource::kArrival) != 0) {
+      const GridItem& arrival = parts_.arrivals[source.origin & ~BrickSource::kArrival];
       handle = arrival.handle;
-      block.put(slot, arrival.entry, source.position, handle, arrival.reach, place_->center);
+      largest_reach = std::max(largest_reach, arrival.reach);
+      places.put(slot, arrival.entry, arrival.entry.position, handle, arrival.reach);
+    } else {
+      const GridBlock::Values& values = from[source.origin >> 31];
+      const uint32_t before = source.origin & ~GridSlot::kRecent;
+      const GridEntry& entry = values.entries[before];
+      handle = values.handles[before];
+      const Vec3d position = source.move == BrickSource::kNoMove ? entry.position : moves[source.move].position;
+      places.put(slot, entry, position, handle, values.reaches[before]);
     }
-    if (block.has_forms()) block.put_form(slot, form_of(source));
-    if (source.block == nullptr || source.block != before || source.slot != slot)
-      slots[handle] = {number_, slot | flag};
+    if (has_forms) block.put_form(slot, form_of(old, source));
+    slots[handle] = {number, slot | flag};
   }
+  largest_reach_ = largest_reach;
 }
 
 BrickPtr BrickBuilder::sort_anew(const Brick* old, absl::Span<const BrickChange> changes) {
   if (old != nullptr) {
     mark_changes(*old, changes);
-    add_sources(*old->sorted, sorted_changes_, old);
-    if (old->recent != nullptr) add_sources(*old->recent, recent_changes_, nullptr);
+    for (uint32_t slot = 0; slot < old->sorted->count(); ++slot)
+      if (!old->is_gone(slot)) add_source(*old->sorted, slot, sorted_changes_[slot]);
+    for (uint32_t slot = 0; slot < old->recent_count; ++slot)
+      if (!old->is_recent_gone(slot)) add_source(*old->recent, slot | GridSlot::kRecent, recent_changes_[slot]);
   }
   add_arrivals(changes);
-  if (sources_.empty()) return nullptr;
-  const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources_.size()), any_form(old, changes));
+  return sorted_by_cell(old, sources_);
+}
+
+// Counting sort.
+BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSource> sources) {
+  if (sources.empty()) return nullptr;
+  const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources.size()), any_form(old, sources));
   std::array<uint32_t, kBrickCells + 1>& offsets = block->offsets();
-  for (const Source& source : sources_) ++offsets[source.cell + 1];
+  for (const BrickSource& source : sources) ++offsets[source.cell + 1];
   for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] += offsets[cell];
   std::array<uint32_t, kBrickCells + 1> next = offsets;
-  write(*block, 0, nullptr, [&](size_t i) { return next[sources_[i].cell]++; });
+  write(*block, 0, old, sources, [&next](const BrickSource& source) { return next[source.cell]++; });
   auto brick = std::make_shared<Brick>();
   brick->place = *place_;
   brick->number = number_;
   brick->sorted = block;
+  brick->largest_reach = largest_reach_;
   return brick;
 }
 
+// What earlier versions do not know of follows in their log.
 BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange> changes) {
   auto brick = std::make_shared<Brick>(old);
   if (brick->gone.empty()) brick->gone.resize(old.sorted->count() / 64 + 2);
-  recent_changes_.assign(old.recent == nullptr ? 0 : old.recent->count(), kStays);
-  for (const BrickChange& change : changes)
-    if (change.slot != BrickChange::kArrives && (change.slot & GridSlot::kRecent) != 0)
-      recent_changes_[change.slot & ~GridSlot::kRecent] = change.number;
-  // First those that were recent before, so that they keep their slots: to note where each is costs more than to copy
-  // it.
-  if (old.recent != nullptr) add_sources(*old.recent, recent_changes_, nullptr);
+  if (brick->recent == nullptr)
+    brick->recent = std::make_shared<GridBlock>(Brick::kMostRecent, old.sorted->has_forms());
+  sources_.clear();
   for (const BrickChange& change : changes) {
-    if (change.slot == BrickChange::kArrives || (change.slot & GridSlot::kRecent) != 0) continue;
-    brick->gone[change.slot / 64] |= uint64_t{1} << (change.slot % 64);
-    ++brick->gone_count;
-    if (change.number != BrickChange::kLeaves) add_source(*old.sorted, change.slot, change.number);
+    if (arrives(change)) {
+      sources_.push_back({change.number | BrickSource::kArrival, BrickSource::kNoMove, 0});
+      continue;
+    }
+    const bool recent = (change.slot & GridSlot::kRecent) != 0;
+    const uint32_t slot = change.slot & ~GridSlot::kRecent;
+    (recent ? brick->recent_gone.data() : brick->gone.data())[slot / 64] |= uint64_t{1} << (slot % 64);
+    ++(recent ? brick->recent_gone_count : brick->gone_count);
+    if (change.number != BrickChange::kLeaves) sources_.push_back({change.slot, change.number, 0});
   }
-  add_arrivals(changes);
-  brick->recent = nullptr;
-  if (!sources_.empty()) {
-    const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources_.size()), any_form(&old, changes));
-    write(*block, GridSlot::kRecent, old.recent.get(), [](size_t i) { return static_cast<uint32_t>(i); });
-    brick->recent = block;
-  }
-  return brick->size() == 0 ? nullptr : brick;
+  write(*brick->recent, GridSlot::kRecent, &old, sources_, [&](const BrickSource&) { return brick->recent_count++; });
+  brick->largest_reach = largest_reach_;
+  if (brick->recent_count == 0) brick->recent = nullptr;
+  if (brick->size() == 0) return nullptr;
+  return brick;
 }
 
 }  // namespace locus::internal

@@ -6,27 +6,10 @@
 #include <vector>
 
 #include "absl/types/span.h"
-#include "core/index/hash_grid/brick.h"
+#include "core/base/scratch.h"
+#include "core/index/hash_grid/brick_sources.h"
 
-namespace locus {
-
-// A new pose for a value that the grid holds.
-struct GridMove {
-  uint32_t handle = 0;
-  bool turns = false;  // else it keeps its rotation
-  Quaternion rotation;
-  Vec3d position;
-};
-
-namespace internal {
-
-// Where the writer finds a value again.
-struct GridSlot {
-  static constexpr uint32_t kRecent = 1u << 31;  // in `slot`: of Brick::recent, else of Brick::sorted
-
-  uint32_t brick = 0;
-  uint32_t slot = 0;
-};
+namespace locus::internal {
 
 // One change of one brick.
 struct BrickChange {
@@ -46,47 +29,45 @@ struct BatchParts {
 
 class BrickBuilder {
  public:
+  // A batch begins: what its changes mean, and where to write where each value is now that is not where it was, by
+  // handle. Both until end().
+  void begin(const BatchParts& parts, std::vector<GridSlot>& slots);
+  void end() { clear_scratch(sources_); }
+
   // Null when no value remains. `old` is null for a brick that was empty; each value occurs at most once in `changes`,
-  // but one that leaves may also arrive. Writes where each value is now that is not where it was, by handle; `number`
-  // is the brick's. O(values of the brick) or, for few changes, O(changes and what changed lately).
-  BrickPtr apply(const Brick* old, const BrickPlace& place, uint32_t number, absl::Span<const BrickChange> changes,
-                 const BatchParts& parts, std::vector<GridSlot>& slots);
+  // but one that leaves may also arrive. `number` is the brick's. O(values of the brick) or, for few changes,
+  // O(changes).
+  BrickPtr apply(const Brick* old, const BrickPlace& place, uint32_t number, absl::Span<const BrickChange> changes);
+
+  // The same from what remains of `old` and the arrivals, which are all that `changes` hold.
+  BrickPtr build(const Brick* old, const BrickPlace& place, uint32_t number, absl::Span<const BrickSource> sources,
+                 absl::Span<const BrickChange> changes);
 
  private:
-  // A value of the next version: where it is to be, and where it was, or which arrival it is.
-  struct Source {
-    Vec3d position;
-    const GridBlock* block;  // null for an arrival
-    uint32_t slot;           // in `block`, or the arrival's number
-    uint32_t move;           // kNoMove where it stays as it was
-    uint32_t cell;
-  };
-  static constexpr uint32_t kNoMove = ~0u;
-
-  uint32_t cell_of(Vec3d position) const { return static_cast<uint32_t>(place_->cell_of(position)); }
-  static bool is_few(const Brick* old, size_t changes);
+  static bool is_few(const Brick* old, absl::Span<const BrickChange> changes);
   BrickPtr sort_anew(const Brick* old, absl::Span<const BrickChange> changes);
   BrickPtr change_few(const Brick& old, absl::Span<const BrickChange> changes);
   void mark_changes(const Brick& old, absl::Span<const BrickChange> changes);
-  void add_source(const GridBlock& block, uint32_t slot, uint32_t change);
-  void add_sources(const GridBlock& block, const std::vector<uint32_t>& changes, const Brick* brick);
+  void add_source(const GridBlock& block, uint32_t origin, uint32_t change);
   void add_arrivals(absl::Span<const BrickChange> changes);
-  GridForm form_of(const Source& source) const;
-  bool any_form(const Brick* old, absl::Span<const BrickChange> changes) const;
-  // Writes the sources into `block` at the places that place_of(i) gives for source i. Slots in `before`, which may be
-  // null, are known already.
+  BrickPtr sorted_by_cell(const Brick* old, absl::Span<const BrickSource> sources);
+  void prefetch(const GridBlock::Values* from, const BrickSource& source) const;
   template <class PlaceOf>
-  void write(GridBlock& block, uint32_t flag, const GridBlock* before, const PlaceOf& place_of);
+  void write(GridBlock& block, uint32_t flag, const Brick* old, absl::Span<const BrickSource> sources,
+             const PlaceOf& place_of);
+  GridForm form_of(const Brick* old, const BrickSource& source) const;
+  bool any_form(const Brick* old, absl::Span<const BrickSource> sources) const;
+  bool any_form_arrives(absl::Span<const BrickChange> changes) const;
 
   const BrickPlace* place_ = nullptr;
   uint32_t number_ = 0;
   BatchParts parts_;
   std::vector<GridSlot>* slots_ = nullptr;
   std::vector<uint32_t> sorted_changes_, recent_changes_;  // by slot: the number of the move, kLeaves or kStays
-  std::vector<Source> sources_;
+  std::vector<BrickSource> sources_;
+  float largest_reach_ = 0;  // of the brick at work
 };
 
-}  // namespace internal
-}  // namespace locus
+}  // namespace locus::internal
 
 #endif  // LOCUS_CORE_INDEX_HASH_GRID_BRICK_BUILDER_H_

@@ -49,7 +49,7 @@ inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};
 // How much wider than its reach a value of `brick` may be, and how far off its columns in float.
 inline double cull_margin(const Brick& brick) {
   const double coordinate = brick.place.edge;  // twice the largest of the float columns
-  const double reach = brick.largest_reach();
+  const double reach = brick.largest_reach;
   const double magnitude = max_component(abs(brick.place.center)) + brick.place.edge;
   return double{kCullSlack} * (coordinate + reach) + kBoundsGrowth * (magnitude + reach);
 }
@@ -166,9 +166,25 @@ bool scan_cells(const Brick& brick, const KeyRange& cells, Work& work, const Cul
 // The same for the values that came or moved lately, wherever in the brick they are.
 template <class Cull, class Visit>
 bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& visit) {
-  if (brick.recent == nullptr) return true;
-  RowScan<Cull, Visit> scan(*brick.recent, nullptr, brick.number, cull, visit, work);
-  return scan.add(0, brick.recent->count()) && scan.flush();
+  if (brick.recent_count == 0) return true;
+  const GridBlock& recent = *brick.recent;
+  const uint32_t whole = brick.recent_count / GridBlock::kLanes * GridBlock::kLanes;
+  RowScan<Cull, Visit> scan(recent, brick.recent_gone.data(), brick.number, cull, visit, work);
+  if (!scan.add(0, whole) || !scan.flush()) return false;
+  if (whole == brick.recent_count) return true;
+  // Copied: the rest of their vector belongs to the writer.
+  const uint32_t rest = brick.recent_count - whole;
+  float columns[4][GridBlock::kLanes] = {};
+  for (int number = 0; number < 4; ++number) std::copy_n(recent.column(number) + whole, rest, columns[number]);
+  const uint64_t gone[2] = {brick.recent_gone[whole / 64] >> (whole % 64), 0};
+  const GridRows rows = {columns[0], columns[1], columns[2], columns[3], gone, 1, {0}, {rest}};
+  uint32_t slots[2 * GridBlock::kLanes];
+  const uint32_t kept = cull(rows, slots);
+  for (uint32_t i = 0; i < kept; ++i) {
+    ++work.tests;
+    if (!visit(GridRef(recent, whole + slots[i], brick.number))) return false;
+  }
+  return true;
 }
 
 // Each value, until visit() is false, which is then returned.
@@ -176,8 +192,8 @@ template <class Visit>
 bool for_each_value(const Brick& brick, const Visit& visit) {
   for (uint32_t slot = 0; slot < brick.sorted->count(); ++slot)
     if (!brick.is_gone(slot) && !visit(GridRef(*brick.sorted, slot, brick.number))) return false;
-  for (uint32_t slot = 0; brick.recent != nullptr && slot < brick.recent->count(); ++slot)
-    if (!visit(GridRef(*brick.recent, slot, brick.number))) return false;
+  for (uint32_t slot = 0; slot < brick.recent_count; ++slot)
+    if (!brick.is_recent_gone(slot) && !visit(GridRef(*brick.recent, slot, brick.number))) return false;
   return true;
 }
 

@@ -31,6 +31,12 @@ uint32_t GridBlock::find(uint32_t handle) const {
   return slot;
 }
 
+uint32_t GridBlock::find_last(uint32_t handle, uint32_t count) const {
+  for (uint32_t slot = count; slot != 0; --slot)
+    if (handles_[slot - 1] == handle) return slot - 1;
+  return count;
+}
+
 uint32_t GridBlock::find_near(uint32_t handle, uint32_t slot) const {
   constexpr uint32_t kPlaces = 2 * kLanes;
   if (stride_ < kPlaces) return find(handle);

@@ -39,10 +39,8 @@ GridSnapshot::GridSnapshot(std::vector<internal::GridLevel> levels, internal::Br
 
 GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
   // A value that moved within the brick may lie in both; the one in `sorted` is gone then.
-  if (brick.recent != nullptr) {
-    const uint32_t slot = brick.recent->find(handle);
-    if (slot != brick.recent->count()) return {*brick.recent, slot, brick.number};
-  }
+  if (const uint32_t slot = brick.find_recent(handle); slot != brick.recent_count)
+    return {*brick.recent, slot, brick.number};
   const uint32_t slot = brick.sorted->find(handle);
   return slot == brick.sorted->count() || brick.is_gone(slot) ? GridRef() : GridRef(*brick.sorted, slot, brick.number);
 }

@@ -11,6 +11,11 @@
 #include "core/index/hash_grid/cell_size.h"
 
 namespace locus {
+namespace {
+
+constexpr size_t kChangesPerLook = 64;  // of each value, before the cell size is looked at again
+
+}  // namespace
 
 using internal::BrickChange;
 using internal::BrickPlace;
@@ -110,10 +115,16 @@ void HashGrid::insert(const GridItem& item) {
 // To another brick.
 void HashGrid::move_away(const GridMove& move) {
   Level& level = *known_[slots_[move.handle].brick].level;
-  GridItem item = at(move.handle).item();
+  const GridItem item = at(move.handle).item();
+  if (!planted(PlantedBug::kGhostAfterMove)) remove(move.handle);
+  arrive_from(item, move, level);
+}
+
+// `before`: what it was.
+void HashGrid::arrive_from(const GridItem& before, const GridMove& move, Level& level) {
+  GridItem item = before;
   item.entry.position = move.position;
   if (move.turns) item.form.rotation = move.rotation;
-  if (!planted(PlantedBug::kGhostAfterMove)) remove(move.handle);
   arrive(item, level, internal::brick_of(internal::cell_of(move.position, level.cells_per_unit)));
 }
 
@@ -153,22 +164,53 @@ void HashGrid::drop_brick(uint32_t brick) {
 
 void HashGrid::rebuild_bricks(absl::Span<const GridMove> moves) {
   const bool turns = std::any_of(moves.begin(), moves.end(), [](const GridMove& move) { return move.turns; });
-  const internal::BatchParts parts{moves, arrivals_, turns};
-  uint32_t begin = 0;
+  builder_.begin({moves, arrivals_, turns}, slots_);
   for (size_t i = 0; i < touched_.size(); ++i) {
+    prefetch_changes(i);
     const uint32_t brick = touched_[i];
-    const uint32_t end = change_counts_[i];
-    internal::BrickPtr next = builder_.apply(bricks_[brick].get(), known_[brick].place, brick,
-                                             absl::MakeConstSpan(grouped_).subspan(begin, end - begin), parts, slots_);
-    begin = end;
-    if (const internal::Brick* old = bricks_[brick].get(); old != nullptr)
-      replaced_bytes_ += next != nullptr && next->sorted == old->sorted ? old->own_bytes() : old->bytes();
-    if (next == nullptr) {
-      drop_brick(brick);
+    const internal::Brick* const old = bricks_[brick].get();
+    const BrickPlace& place = known_[brick].place;
+    if (i < remains_.size() && remains_[i].gathered) {
+      replace_brick(brick, builder_.build(old, place, brick, remains_[i].sources, changes_of(i)));
     } else {
-      bricks_.set(brick, std::move(next));
+      replace_brick(brick, builder_.apply(old, place, brick, changes_of(i)));
     }
   }
+}
+
+void HashGrid::replace_brick(uint32_t brick, internal::BrickPtr next) {
+  if (const internal::Brick* old = bricks_[brick].get(); old != nullptr)
+    replaced_bytes_ += old->bytes_apart_from(next.get());
+  if (next == nullptr) {
+    drop_brick(brick);
+  } else {
+    bricks_.set(brick, std::move(next));
+  }
+}
+
+// Of the touched brick of that number.
+absl::Span<const BrickChange> HashGrid::changes_of(size_t touched) const {
+  const uint32_t begin = touched == 0 ? 0 : change_counts_[touched - 1];
+  return absl::MakeConstSpan(grouped_).subspan(begin, change_counts_[touched] - begin);
+}
+
+// Scattered changes find nothing in the cache: what the next bricks need is asked for while others are at work.
+void HashGrid::prefetch_changes(size_t touched) const {
+  constexpr size_t kBrickAhead = 12, kBlocksAhead = 8, kValuesAhead = 4;
+  const auto brick_at = [this](size_t number) {
+    return number < touched_.size() ? bricks_[touched_[number]].get() : nullptr;
+  };
+  if (const internal::Brick* brick = brick_at(touched + kBrickAhead); brick != nullptr) brick->prefetch();
+  if (const internal::Brick* brick = brick_at(touched + kBlocksAhead); brick != nullptr) brick->prefetch_blocks();
+  const internal::Brick* const brick = brick_at(touched + kValuesAhead);
+  if (brick == nullptr) return;
+  for (const BrickChange& change : changes_of(touched + kValuesAhead)) {
+    if (change.slot == BrickChange::kArrives) continue;
+    const uint32_t slot = change.slot & ~GridSlot::kRecent;
+    ((change.slot & GridSlot::kRecent) != 0 ? *brick->recent : *brick->sorted).prefetch_value(slot);
+  }
+  if (brick->recent != nullptr && brick->recent_count < internal::Brick::kMostRecent)
+    brick->recent->prefetch_place(brick->recent_count);
 }
 
 void HashGrid::apply_to_bricks(const GridBatch& batch) {
@@ -180,14 +222,57 @@ void HashGrid::apply_to_bricks(const GridBatch& batch) {
       continue;
     remove(handle);
   }
-  move_all(batch.moves);
+  if (moves_nearly_all(batch)) {
+    gather_all(batch);
+  } else {
+    move_all(batch.moves);
+  }
   for (const GridItem& item : batch.inserted) insert(item);
   group_changes();
   rebuild_bricks(batch.moves);
+  clear_batch();
+  std::erase_if(levels_, [](const std::unique_ptr<Level>& level) { return level->size == 0; });
+}
+
+void HashGrid::clear_batch() {
   clear_scratch(changes_);
   clear_scratch(grouped_);
   clear_scratch(arrivals_);
-  std::erase_if(levels_, [](const std::unique_ptr<Level>& level) { return level->size == 0; });
+  clear_scratch(remains_);
+  clear_scratch(sources_);
+  builder_.end();
+}
+
+bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
+  return !batch.moves_by_handle.empty() && batch.removed.empty() && batch.inserted.empty() && !batch.moves.empty() &&
+         batch.moves.size() >= size_ / 2;
+}
+
+// Instead of move_all(): goes from brick to brick, and looks up the move of each value. Values lie together there, in
+// the order of cells that most of them stay in, so that nothing needs to be found or sorted by brick.
+void HashGrid::gather_all(const GridBatch& batch) {
+  const internal::MoveFinder moves(batch.moves, batch.moves_by_handle);
+  const auto bricks = static_cast<uint32_t>(known_.size());  // others are new, and hold arrivals only
+  sources_.resize(size_);
+  internal::BrickSource* to = sources_.data();
+  for (uint32_t number = 0; number < bricks; ++number) {
+    const internal::Brick* const brick = bricks_[number].get();
+    if (brick == nullptr) continue;
+    Level& level = *known_[number].level;
+    const auto leave = [&](const internal::GridBlock& block, uint32_t slot, const GridMove& move) {
+      --level.size;
+      --size_;
+      arrive_from(block.item(slot), move, level);
+    };
+    size_t moved = 0;
+    internal::BrickSource* const end = internal::gather_brick(*brick, moves, to, moved, leave);
+    if (moved == 0) continue;
+    const uint32_t touched = touch(number);
+    if (remains_.size() <= touched) remains_.resize(touched + 1);
+    remains_[touched] = {true, absl::MakeConstSpan(to, static_cast<size_t>(end - to))};
+    to = end;
+  }
+  remains_.resize(touched_.size());
 }
 
 size_t HashGrid::apply(const GridBatch& batch) {
@@ -206,8 +291,8 @@ size_t HashGrid::apply(const GridBatch& batch) {
 }
 
 bool HashGrid::choice_is_stale() const {
-  return size_ >= first_choice_ &&
-         (size_ >= 2 * size_at_choice_ || size_ <= size_at_choice_ / 8 || changes_since_choice_ >= 16 * size_);
+  return size_ >= first_choice_ && (size_ >= 2 * size_at_choice_ || size_ <= size_at_choice_ / 8 ||
+                                    changes_since_choice_ >= kChangesPerLook * size_);
 }
 
 void HashGrid::choose_cell_size() {

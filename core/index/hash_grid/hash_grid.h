@@ -6,7 +6,7 @@
 // Values are known by handles, small numbers that the caller gives out; a handle names one value at a time.
 //
 // Answers never depend on cell sizes: they only cull. The base cell is chosen anew from a sample of the values when
-// their number has doubled since or fallen to an eighth, and looked at when all have moved a few times.
+// their number has doubled since or fallen to an eighth, and looked at when all have moved some dozen times.
 // Invariants: every value lies in the brick of its position on the level of its reach; no brick is empty; slots_ says
 // where each value is. |position| <= limits::kMaxCoordinate on each axis.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
@@ -36,6 +36,9 @@ struct GridBatch {
   absl::Span<const uint32_t> removed;
   absl::Span<const GridMove> moves;
   absl::Span<const GridItem> inserted;
+  // By handle the number of its move in `moves`; means nothing for a handle that moves[number] is not of. May be empty,
+  // and is not borrowed beyond the call: with it, moves of nearly all values cost less.
+  absl::Span<const uint32_t> moves_by_handle = {};
 };
 
 class HashGrid {
@@ -86,6 +89,7 @@ class HashGrid {
 
   void remove(uint32_t handle);
   void move_away(const GridMove& move);
+  void arrive_from(const GridItem& item, const GridMove& move, Level& level);
   void insert(const GridItem& item);
   void arrive(const GridItem& item, Level& level, const internal::GridKey& key);
   Level& level_for(float reach);
@@ -93,11 +97,17 @@ class HashGrid {
   uint32_t touch(uint32_t brick);
   void change(uint32_t brick, const internal::BrickChange& change);
   void group_changes();
+  absl::Span<const internal::BrickChange> changes_of(size_t touched) const;
+  void prefetch_changes(size_t touched) const;
   void rebuild_bricks(absl::Span<const GridMove> moves);
+  void clear_batch();
+  void replace_brick(uint32_t brick, internal::BrickPtr next);
   void drop_brick(uint32_t brick);
   internal::BrickTable& writable_table(Level& level);
   void move_all(absl::Span<const GridMove> moves);
   void apply_to_bricks(const GridBatch& batch);
+  bool moves_nearly_all(const GridBatch& batch) const;
+  void gather_all(const GridBatch& batch);
   bool choice_is_stale() const;
   void choose_cell_size();
   void rebuild(int base_exponent);
@@ -128,6 +138,13 @@ class HashGrid {
   std::vector<internal::BrickChange> grouped_;
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
+  // Where it moves nearly all.
+  struct Remains {
+    bool gathered = false;  // else the brick's changes say all
+    absl::Span<const internal::BrickSource> sources;
+  };
+  std::vector<Remains> remains_;  // by number among the touched
+  std::vector<internal::BrickSource> sources_;
 };
 
 }  // namespace locus

@@ -184,7 +184,7 @@ TEST(HashGridTest, CellSizeFollowsTheValuesAndChangesNoAnswer) {
   EXPECT_GE(sizes.size(), 2u);
   EXPECT_LT(grid.statistics().cell_size, 2);
   std::vector<Object> before = scene.values;
-  for (int round = 0; round < 12; ++round) {
+  for (int round = 0; round < 34; ++round) {
     std::vector<Object> spread = scene.values;
     for (Object& object : spread) object.shape.position = object.shape.position * (1000 + round);
     grid.apply(before, spread);

@@ -1,0 +1,158 @@
+// Moves alone: a few, half or all of the values at once, with the numbers of moves by handle and without, and snapshots
+// that share what later moves add to.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "core/base/mutex.h"
+#include "core/index/hash_grid/hash_grid.h"
+#include "core/index/index_queries.h"
+#include "core/scene/object_store.h"
+#include "tests/support/random.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+std::vector<Object> crowd(size_t count, double half, Random& random, bool with_forms) {
+  std::vector<Object> objects(count);
+  for (size_t i = 0; i < count; ++i) {
+    objects[i].id = i + 1;
+    objects[i].tag = 7 * i;
+    objects[i].shape = {ShapeKind::kBall, random.vector(half), {}, {}, static_cast<float>(random.between(0.1, 2))};
+    if (with_forms && i % 3 == 0) objects[i].shape = {ShapeKind::kBox, random.vector(half), {}, {0.5f, 1, 2}, 0};
+  }
+  return objects;
+}
+
+// The store, and what must be in it.
+class Crowd {
+ public:
+  Crowd(size_t count, bool with_forms, uint64_t seed)
+      : random_(seed), objects_(crowd(count, kHalf, random_, with_forms)), turns_(with_forms) {
+    store_.apply({}, objects_);
+  }
+
+  Random& random() { return random_; }
+  const std::vector<Object>& objects() const { return objects_; }
+  ObjectSet snapshot() { return store_.snapshot(); }
+
+  // Of about that share of the objects, each at most once.
+  void move(double share, bool with_numbers) {
+    std::vector<GridMove> moves;
+    std::vector<uint32_t> by_handle(with_numbers ? store_.handle_count() : 0, 12345);
+    for (Object& object : objects_) {
+      if (!random_.chance(share)) continue;
+      Shape& shape = object.shape;
+      shape.position = random_.chance(0.1) ? random_.vector(kHalf) : shape.position + random_.vector(1);
+      const bool turns = turns_ && random_.chance(0.3);
+      if (turns) shape.rotation = random_.rotation();
+      const uint32_t handle = store_.handle(object.id);
+      if (with_numbers) by_handle[handle] = static_cast<uint32_t>(moves.size());
+      moves.push_back({handle, turns, shape.rotation, shape.position});
+    }
+    store_.move(moves, by_handle);
+  }
+  // One goes, and comes back elsewhere.
+  void replace_one() {
+    Object& object = objects_[random_.below(objects_.size())];
+    const Object before = object;
+    object.shape.position = random_.vector(kHalf);
+    store_.apply({&before, 1}, {&object, 1}, {before.id});
+  }
+
+ private:
+  static constexpr double kHalf = 40;
+
+  Random random_;
+  std::vector<Object> objects_;
+  bool turns_;
+  ObjectStore store_;
+};
+
+void expect_holds(const ObjectSet& set, const std::vector<Object>& objects) {
+  ASSERT_EQ(set.size(), objects.size());
+  size_t seen = 0;
+  set.for_each([&](const Object& object) {
+    ++seen;
+    EXPECT_EQ(object, objects[object.id - 1]);
+  });
+  EXPECT_EQ(seen, objects.size());
+  for (const Object& object : objects) EXPECT_EQ(set.find(object.id), object);
+}
+
+void expect_finds(const ObjectSet& set, const std::vector<Object>& objects, Random& random) {
+  for (int i = 0; i < 5; ++i) {
+    const Balld ball{random.vector(45), random.between(1, 20)};
+    std::vector<Object> found;
+    ball_overlap(set, ball, found);
+    size_t expected = 0;
+    for (const Object& object : objects) expected += ball_overlaps(ball, object.shape) ? 1 : 0;
+    EXPECT_EQ(found.size(), expected);
+    for (const Object& object : found) EXPECT_EQ(object, objects[object.id - 1]);
+  }
+}
+
+class HashGridMovesTest : public ::testing::TestWithParam<bool> {};
+
+TEST_P(HashGridMovesTest, OfAnyShareOfTheValuesAnswerAsTheModelAndSnapshotsStay) {
+  Crowd crowd(4'000, GetParam(), 3);
+  std::vector<std::pair<ObjectSet, std::vector<Object>>> kept;
+  for (uint64_t batch = 0; batch < scaled_count(150); ++batch) {
+    Random& random = crowd.random();
+    if (random.chance(0.1)) kept.emplace_back(crowd.snapshot(), crowd.objects());
+    const double shares[] = {0.0005, 0.002, 0.01, 0.05, 0.3, 0.6, 1};
+    crowd.move(shares[random.below(7)], random.chance(0.5));
+    if (random.chance(0.2)) crowd.replace_one();
+    expect_finds(crowd.snapshot(), crowd.objects(), random);
+    if (batch % 10 == 0) expect_holds(crowd.snapshot(), crowd.objects());
+  }
+  for (const auto& [set, objects] : kept) {
+    expect_holds(set, objects);
+    expect_finds(set, objects, crowd.random());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Forms, HashGridMovesTest, ::testing::Bool(),
+                         [](const auto& test) { return test.param ? "Any" : "BallsOnly"; });
+
+// Few moves at a time go into a block that versions share: the writer adds to it while readers of earlier versions
+// read.
+TEST(HashGridMovesThreadsTest, ReadersSeeTheirVersionWhileTheWriterAddsToWhatTheyShare) {
+  struct Version {
+    ObjectSet set;
+    std::vector<Object> objects;
+  };
+  Crowd crowd(2'000, false, 4);
+  Mutex mutex;
+  auto published = std::make_shared<const Version>(Version{crowd.snapshot(), crowd.objects()});
+  const auto latest = [&] {
+    const MutexLock lock(mutex);
+    return published;
+  };
+  std::atomic<bool> done{false};
+  std::atomic<uint64_t> reads{0};
+  const auto read = [&](uint64_t seed) {
+    for (Random random(seed); !done.load(); ++reads) {
+      const std::shared_ptr<const Version> version = latest();
+      expect_finds(version->set, version->objects, random);
+      const Object& one = random.pick(version->objects);
+      EXPECT_EQ(version->set.find(one.id), one);
+    }
+  };
+  std::thread first(read, 1), second(read, 2);
+  for (uint64_t batch = 0; batch < scaled_count(400) || reads.load() < scaled_count(200); ++batch) {
+    crowd.move(0.003, false);
+    auto next = std::make_shared<const Version>(Version{crowd.snapshot(), crowd.objects()});
+    const MutexLock lock(mutex);
+    published.swap(next);
+  }
+  done.store(true);
+  first.join();
+  second.join();
+  expect_holds(latest()->set, latest()->objects);
+}
+
+}  // namespace
+}  // namespace locus::test
