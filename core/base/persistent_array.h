@@ -2,15 +2,17 @@
 // after each copy, the list of leaves. For the one writer of a scene, whose readers keep copies of earlier revisions.
 //
 // Threads: as for a standard container, each array object by itself; arrays that share leaves are independent of each
-// other, as with PersistentMap.
+// other in every way: any thread may write to, copy or drop its own while others read theirs.
 //
 // Invariants: a leaf or list reachable from two arrays is never changed again. Each names the owner that made it; an
-// array changes in place only what its present owner made, and snapshot() forgets its owner.
+// array changes in place only what its present owner made, and snapshot() forgets its owner: no reference count is ever
+// asked. Source of owners: Clojure's transient collections (Hickey).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -18,9 +20,18 @@
 #include <vector>
 
 #include "core/base/check.h"
-#include "core/base/persistent_map.h"
 
 namespace locus {
+
+namespace internal {
+// Who may change a leaf in place.
+inline constexpr uint64_t kNoOwner = 0;
+// Never kNoOwner and never the same twice.
+inline uint64_t new_owner() {
+  static std::atomic<uint64_t> last{kNoOwner};
+  return last.fetch_add(1, std::memory_order_relaxed) + 1;
+}
+}  // namespace internal
 
 template <class T, size_t kLeafSize>
 class PersistentArray {
@@ -29,12 +40,14 @@ class PersistentArray {
   PersistentArray(PersistentArray&&) noexcept = default;
   PersistentArray& operator=(PersistentArray&&) noexcept = default;
   // Only of a snapshot that was not written to: whoever writes says snapshot() instead.
-  PersistentArray(const PersistentArray& other) : list_(other.list_) { LOCUS_CHECK_EQ(other.owner_, kNoOwner); }
+  PersistentArray(const PersistentArray& other) : list_(other.list_) {
+    LOCUS_CHECK_EQ(other.owner_, internal::kNoOwner);
+  }
   PersistentArray& operator=(const PersistentArray& other) { return *this = PersistentArray(other); }
 
   // What a reader keeps. O(1).
   PersistentArray snapshot() {
-    owner_ = kNoOwner;
+    owner_ = internal::kNoOwner;
     return PersistentArray(list_);
   }
 
@@ -53,13 +66,12 @@ class PersistentArray {
   void for_each_apart_from(const PersistentArray& other, const Fn& fn) const;
 
  private:
-  static constexpr uint64_t kNoOwner = 0;
   struct Leaf {
-    uint64_t owner = kNoOwner;
+    uint64_t owner = internal::kNoOwner;
     std::array<T, kLeafSize> values{};
   };
   struct List {
-    uint64_t owner = kNoOwner;
+    uint64_t owner = internal::kNoOwner;
     size_t size = 0;
     std::vector<std::shared_ptr<Leaf>> leaves;
   };
@@ -72,12 +84,12 @@ class PersistentArray {
   }
 
   std::shared_ptr<List> list_;
-  uint64_t owner_ = kNoOwner;  // whose leaves may be changed in place
+  uint64_t owner_ = internal::kNoOwner;  // whose leaves may be changed in place
 };
 
 template <class T, size_t kLeafSize>
 void PersistentArray<T, kLeafSize>::make_list_writable() {
-  if (owner_ == kNoOwner) owner_ = internal::new_map_owner();
+  if (owner_ == internal::kNoOwner) owner_ = internal::new_owner();
   if (list_->owner == owner_) return;
   list_ = std::make_shared<List>(*list_);
   list_->owner = owner_;

@@ -70,13 +70,12 @@ void MoveApplication::run(const ObjectStore& objects, Vec3d frame, const MoveCol
   moves_.reserve(moves_.size() + columns.ids.size());
   for (size_t begin = 0; begin < columns.ids.size(); begin += kItemsAtOnce) {
     const absl::Span<const uint64_t> ids = columns.ids.subspan(begin, kItemsAtOnce);
-    handles_.clear();
-    for (const Id id : ids) objects.prefetch_handle(id);
-    for (const Id id : ids) {
-      handles_.push_back(objects.handle(id));
-      if (handles_.back() == ObjectStore::kNoHandle) continue;
-      objects.prefetch_slot(handles_.back());
-      __builtin_prefetch(&last_move_[handles_.back()]);
+    handles_.resize(ids.size());
+    objects.find_handles(ids, absl::MakeSpan(handles_));
+    for (const uint32_t handle : handles_) {
+      if (handle == ObjectStore::kNoHandle) continue;
+      objects.prefetch_slot(handle);
+      __builtin_prefetch(&last_move_[handle]);
     }
     for (size_t i = 0; i < ids.size(); ++i) move(poses, handles_[i], {list, static_cast<uint32_t>(begin + i), ids[i]});
   }

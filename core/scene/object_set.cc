@@ -50,19 +50,13 @@ GridItem grid_item_of(const Object& object, uint32_t handle) {
 }
 
 GridRef ObjectSet::find_ref(Id id) const {
-  const uint32_t* handle = handles_.find(id);
-  return handle == nullptr ? GridRef() : grid_.at(*handle);
+  const uint32_t handle = handles_.find(id);
+  return handle == PersistentIdTable<>::kNone ? GridRef() : grid_.at(handle);
 }
 
 std::optional<Object> ObjectSet::find(Id id) const {
   const GridRef value = find_ref(id);
   return value ? std::optional<Object>(object_of(value)) : std::nullopt;
-}
-
-size_t ObjectSet::bytes() const {
-  // An entry of the map costs about what its leaf and its share of the branches do.
-  constexpr size_t kBytesPerId = 40;
-  return grid_.statistics().bytes + size() * (kBytesPerId + sizeof(uint32_t));
 }
 
 }  // namespace locus

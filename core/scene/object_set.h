@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "core/base/persistent_map.h"
+#include "core/base/persistent_id_table.h"
 #include "core/index/hash_grid/grid_snapshot.h"
 #include "core/index/spatial_index.h"
 #include "core/scene/object.h"
@@ -24,8 +24,7 @@ class ObjectSet {
   using Value = Object;
 
   ObjectSet() = default;
-  ObjectSet(GridSnapshot grid, PersistentMap<Id, uint32_t> handles)
-      : grid_(std::move(grid)), handles_(std::move(handles)) {}
+  ObjectSet(GridSnapshot grid, PersistentIdTable<> handles) : grid_(std::move(grid)), handles_(std::move(handles)) {}
 
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
@@ -68,8 +67,8 @@ class ObjectSet {
   }
 
   GridStatistics statistics() const { return grid_.statistics(); }
-  // Of objects, bricks and the maps that find them. O(bricks).
-  size_t bytes() const;
+  // Of objects, bricks and what finds them. O(bricks).
+  size_t bytes() const { return bytes_apart_from(ObjectSet()); }
   // Of what `other`, a set of the same scene, does not share. O(what differs).
   size_t bytes_apart_from(const ObjectSet& other) const {
     return grid_.bytes_apart_from(other.grid_) + handles_.bytes_apart_from(other.handles_);
@@ -77,7 +76,7 @@ class ObjectSet {
 
  private:
   GridSnapshot grid_;
-  PersistentMap<Id, uint32_t> handles_;
+  PersistentIdTable<> handles_;
 };
 
 }  // namespace locus

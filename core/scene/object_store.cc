@@ -1,8 +1,31 @@
 #include "core/scene/object_store.h"
 
+#include <algorithm>
+#include <utility>
+
+#include "absl/container/flat_hash_map.h"
 #include "core/base/check.h"
 
 namespace locus {
+namespace {
+
+constexpr size_t kAhead = 16;  // objects whose memory is on its way before they are looked up
+constexpr uint32_t kNewLife = ~0u;
+
+// For each of `inserted` the number among `removed` of the object that lives on as it; kNewLife where none does.
+std::vector<uint32_t> lives_that_go_on(absl::Span<const Object> removed, absl::Span<const Object> inserted,
+                                       const absl::flat_hash_set<Id>& reborn) {
+  std::vector<uint32_t> before(inserted.size(), kNewLife);
+  if (removed.empty() || inserted.empty()) return before;
+  absl::flat_hash_map<Id, uint32_t> numbers;
+  for (uint32_t i = 0; i < removed.size(); ++i)
+    if (!reborn.contains(removed[i].id)) numbers.emplace(removed[i].id, i);
+  for (size_t i = 0; i < inserted.size(); ++i)
+    if (const auto found = numbers.find(inserted[i].id); found != numbers.end()) before[i] = found->second;
+  return before;
+}
+
+}  // namespace
 
 std::optional<Object> ObjectStore::find(Id id) const {
   const uint32_t known = handle(id);
@@ -39,44 +62,48 @@ size_t ObjectStore::move(absl::Span<const GridMove> moves, absl::Span<const uint
   return grid_.apply({{}, moves, {}, moves_by_handle});
 }
 
+// All of which are here.
+std::vector<uint32_t> ObjectStore::handles_of(absl::Span<const Object> objects) const {
+  std::vector<Id> ids;
+  ids.reserve(objects.size());
+  for (const Object& object : objects) ids.push_back(object.id);
+  std::vector<uint32_t> handles(ids.size());
+  find_handles(ids, absl::MakeSpan(handles));
+  for (const uint32_t known : handles) LOCUS_CHECK_NE(known, kNoHandle);
+  return handles;
+}
+
+GridItem ObjectStore::begin_life(const Object& object) {
+  const uint32_t handle = new_handle();
+  LOCUS_CHECK(handles_.set(object.id, handle));
+  if (moves_ != nullptr) moves_->born(handle);
+  return grid_item_of(object, handle);
+}
+
+GridItem ObjectStore::go_on(const Object& object, uint32_t handle) {
+  if (moves_ != nullptr) moves_->moved(grid_.at(handle), object.shape.position);
+  return grid_item_of(object, handle);
+}
+
 size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                           const absl::flat_hash_set<Id>& reborn) {
-  std::vector<uint32_t> leaving;
-  leaving.reserve(removed.size());
-  for (const Object& object : removed) {
-    const uint32_t known = handle(object.id);
-    LOCUS_CHECK_NE(known, kNoHandle);
-    leaving.push_back(known);
-    handles_.erase(object.id);
-  }
-  // Those that only change keep their handle.
-  absl::flat_hash_map<Id, uint32_t> kept;
-  if (!inserted.empty())
-    for (size_t i = 0; i < removed.size(); ++i)
-      if (!reborn.contains(removed[i].id)) kept.emplace(removed[i].id, leaving[i]);
+  const std::vector<uint32_t> leaving = handles_of(removed);
+  const std::vector<uint32_t> before = lives_that_go_on(removed, inserted, reborn);
+  std::vector<uint8_t> ends(removed.size(), 1);
+  for (const uint32_t number : before)
+    if (number != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[number], uint8_t{0}), 1);
+  for (size_t i = 0; i < removed.size(); ++i)
+    if (ends[i] != 0) LOCUS_CHECK(handles_.erase(removed[i].id));
+  handles_.fit(handles_.size() + static_cast<size_t>(std::count(before.begin(), before.end(), kNewLife)));
   std::vector<GridItem> items;
   items.reserve(inserted.size());
-  for (const Object& object : inserted) {
-    const auto before = kept.find(object.id);
-    const bool changed = before != kept.end();
-    const uint32_t handle = changed ? before->second : new_handle();
-    if (changed) {
-      kept.erase(before);
-      if (moves_ != nullptr) moves_->moved(grid_.at(handle), object.shape.position);
-    } else {
-      handles_for_readers_.set(object.id, handle);
-      if (moves_ != nullptr) moves_->born(handle);
-    }
-    LOCUS_CHECK(handles_.emplace(object.id, handle).second);
-    items.push_back(grid_item_of(object, handle));
+  for (size_t i = 0; i < inserted.size(); ++i) {
+    if (i + kAhead < inserted.size()) handles_.prefetch(inserted[i + kAhead].id);
+    items.push_back(before[i] == kNewLife ? begin_life(inserted[i]) : go_on(inserted[i], leaving[before[i]]));
   }
-  for (size_t i = 0; i < removed.size(); ++i) {
-    const uint32_t now = handle(removed[i].id);
-    if (now == leaving[i]) continue;
-    if (now == kNoHandle) handles_for_readers_.erase(removed[i].id);
-    free_handle(leaving[i]);
-  }
-  return grid_.apply({leaving, {}, items});
+  for (size_t i = 0; i < removed.size(); ++i)
+    if (ends[i] != 0) free_handle(leaving[i]);
+  return grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
 }
 
 bool ObjectStore::remove(const Object& object) {

@@ -12,7 +12,6 @@
 #include <optional>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/container/flat_hash_set.h"
 #include "absl/types/span.h"
 #include "core/index/hash_grid/hash_grid.h"
@@ -23,7 +22,7 @@ namespace locus {
 
 class ObjectStore {
  public:
-  static constexpr uint32_t kNoHandle = ~0u;
+  static constexpr uint32_t kNoHandle = PersistentIdTable<>::kNone;
 
   ObjectStore() = default;
   explicit ObjectStore(const HashGridOptions& options) : grid_(options) {}
@@ -37,17 +36,15 @@ class ObjectStore {
 
   size_t size() const { return grid_.size(); }
   std::optional<Object> find(Id id) const;
-  bool contains(const Object& object) const { return handles_.contains(object.id); }
+  bool contains(const Object& object) const { return handle(object.id) != kNoHandle; }
   // kNoHandle for an unknown id. Both O(1).
-  uint32_t handle(Id id) const {
-    const auto known = handles_.find(id);
-    return known == handles_.end() ? kNoHandle : known->second;
-  }
+  uint32_t handle(Id id) const { return handles_.find(id); }
+  // Of many, handles[i] for ids[i]: sooner than one by one.
+  void find_handles(absl::Span<const Id> ids, absl::Span<uint32_t> handles) const { handles_.find(ids, handles); }
   // One more than the highest handle that was ever given out.
   size_t handle_count() const { return next_handle_; }
   GridRef at(uint32_t handle) const { return grid_.at(handle); }
-  // Ask for the memory of handle() and at(), some time before it is needed.
-  void prefetch_handle(Id id) const { handles_.prefetch(id); }
+  // Asks for the memory of at(), some time before it is needed.
   void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
 
   // Removes the objects of one span, as they are, and inserts those of the other: a changed object is in both, under
@@ -71,15 +68,17 @@ class ObjectStore {
   }
 
   // What readers get. O(1) in the number of objects.
-  ObjectSet snapshot() { return {grid_.snapshot(), handles_for_readers_.snapshot()}; }
+  ObjectSet snapshot() { return {grid_.snapshot(), handles_.snapshot()}; }
 
  private:
   uint32_t new_handle();
   void free_handle(uint32_t handle);
+  std::vector<uint32_t> handles_of(absl::Span<const Object> objects) const;
+  GridItem begin_life(const Object& object);
+  GridItem go_on(const Object& object, uint32_t handle);
 
   HashGrid grid_;
-  absl::flat_hash_map<Id, uint32_t> handles_;  // finds faster than the map that readers share
-  PersistentMap<Id, uint32_t> handles_for_readers_;
+  PersistentIdTable<> handles_;
   std::vector<uint32_t> free_handles_;
   uint32_t next_handle_ = 0;
   struct Resting {
