@@ -29,9 +29,19 @@ void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displ
   while (first + 1 < next.records.size() && next_tick >= options_.ticks &&
          next.records[first + 1]->tick <= next_tick - options_.ticks)
     ++first;
-  next.records.erase(next.records.begin(), next.records.begin() + static_cast<std::ptrdiff_t>(first));
+  drop_first(next, first);
   publish(std::move(next));
   measured_ = false;
+}
+
+void HistoryRecorder::drop() {
+  if (history_ != nullptr) dropped_bytes_ += history_->bytes;
+  history_ = nullptr;
+}
+
+void HistoryRecorder::drop_first(History& history, size_t count) {
+  for (size_t i = 0; i < count; ++i) dropped_bytes_ += history.records[i]->bytes;
+  history.records.erase(history.records.begin(), history.records.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
 void HistoryRecorder::measure(const ObjectSet& now) {
@@ -46,7 +56,7 @@ void HistoryRecorder::publish(History history) {
   size_t first = history.records.size();
   while (first > 0 && history.bytes + history.records[first - 1]->bytes <= options_.bytes)
     history.bytes += history.records[--first]->bytes;
-  history.records.erase(history.records.begin(), history.records.begin() + static_cast<std::ptrdiff_t>(first));
+  drop_first(history, first);
   history_ = history.records.empty() ? nullptr : std::make_shared<const History>(std::move(history));
 }
 

@@ -48,16 +48,20 @@ class HistoryRecorder {
   void close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last, uint64_t next_tick);
   // What the present is now, so that memory is counted for the last record, too. Once after close().
   void measure(const ObjectSet& now);
-  void drop() { history_ = nullptr; }
+  void drop();
+  // Of all records so far that are not kept any more.
+  uint64_t dropped_bytes() const { return dropped_bytes_; }
   // Nothing that is only in records below this tick is kept.
   uint64_t oldest_tick(uint64_t present) const { return history_ == nullptr ? present : history_->records[0]->tick; }
 
  private:
+  void drop_first(History& history, size_t count);
   void publish(History history);
 
   HistoryOptions options_;
   HistoryPtr history_;
   bool measured_ = true;
+  uint64_t dropped_bytes_ = 0;
 };
 
 }  // namespace locus

@@ -7,6 +7,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/scene/snapshot_bytes.h"
 
 namespace locus {
 namespace {
@@ -41,6 +42,18 @@ absl::Status too_late(uint64_t newest, uint64_t asked) {
                 absl::StrCat("revision ", asked, " was not reached in time; the scene is at ", newest), refusal);
 }
 
+absl::Status readers_too_slow(uint64_t budget) {
+  Refusal refusal;
+  refusal.reason = Reason::kLimit;
+  refusal.limit = "pinned_bytes";
+  refusal.limit_value = static_cast<double>(budget);
+  return refuse(
+      absl::StatusCode::kDeadlineExceeded,
+      absl::StrCat("limit pinned_bytes is ", budget, "; readers that hold more were told to end and have not; ",
+                   "nothing was applied, so send the batch again"),
+      refusal);
+}
+
 // The placement that asked for the id at `position` of all placed ones.
 absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id) {
   size_t list = 0;
@@ -54,10 +67,11 @@ absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id)
 Scene::Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics)
     : name_(std::move(name)),
       spec_(std::move(spec)),
-      writer_(epoch, spec_.winding, std::move(statics), limits::kMaxObjects, spec_.history) {
+      writer_(epoch, spec_.winding, std::move(statics), limits::kMaxObjects, spec_.history),
+      pins_(std::make_shared<PinLedger>(spec_.pinned_bytes)) {
   LOCUS_CHECK_NE(epoch, uint64_t{0});
   latest_ = writer_.published();
-  recent_.push_back({latest_, 0});
+  recent_.push_back(latest_);
 }
 
 absl::Status Scene::closed_status() const {
@@ -72,14 +86,23 @@ absl::Status Scene::check_open() const {
   return closed_ ? closed_status() : absl::OkStatus();
 }
 
-absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch) {
+absl::Status Scene::wait_for_readers(Deadline until) const {
+  return pins_->wait_until_returned(until) ? absl::OkStatus() : readers_too_slow(pins_->budget());
+}
+
+absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until) {
   if (absl::Status status = check_form(batch); !status.ok()) return status;
-  const MutexLock lock(writer_mutex_);
-  if (absl::Status status = check_open(); !status.ok()) return status;
-  absl::StatusOr<SceneWriter::Applied> applied = writer_.apply(batch);
-  if (!applied.ok()) return applied.status();
-  if (applied->snapshot != nullptr) publish(std::move(applied->snapshot), applied->replaced_bytes);
-  return std::move(applied->ack);
+  while (true) {
+    // Not under the writer's lock, where others could not wait for so long as they like.
+    if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
+    const MutexLock lock(writer_mutex_);
+    if (absl::Status status = check_open(); !status.ok()) return status;
+    if (pins_->over()) continue;  // through another batch meanwhile
+    absl::StatusOr<SceneWriter::Applied> applied = writer_.apply(batch);
+    if (!applied.ok()) return applied.status();
+    if (applied->snapshot != nullptr) publish(applied->snapshot);
+    return std::move(applied->ack);
+  }
 }
 
 absl::Status Scene::admit_change() {
@@ -105,9 +128,11 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 }
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
-  const SnapshotPtr base = latest();
-  const auto is_object = [&base](Id id) { return static_cast<bool>(base->objects.find_ref(id)); };
-  absl::StatusOr<StaticSet::Changed> changed = base->statics->apply(change, is_object, base->revision << 24);
+  if (absl::Status status = wait_for_readers(PinLedger::kNever); !status.ok()) return status;
+  // Building takes a while: no revision is held meanwhile but for its instances.
+  const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
+  const std::shared_ptr<const StaticSet> statics = latest()->statics;
+  absl::StatusOr<StaticSet::Changed> changed = statics->apply(change, is_object, latest()->revision << 24);
   if (!changed.ok()) return changed.status();
   const MutexLock lock(writer_mutex_);
   if (absl::Status status = check_open(); !status.ok()) return status;
@@ -116,24 +141,27 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
     if (writer_.is_object(changed->placed[i])) return taken_meanwhile(change, i, changed->placed[i]);
   SnapshotPtr snapshot = writer_.replace_statics(std::move(changed->set));
   InstanceChange result{std::move(changed->placed), snapshot->revision, snapshot->epoch};
-  publish(std::move(snapshot), 0);
+  publish(snapshot);
   return result;
 }
 
-void Scene::publish(SnapshotPtr snapshot, uint64_t replaced_bytes) {
-  std::vector<Recent> retired;  // freed after the lock: freeing a large snapshot takes a while
-  const MutexLock lock(mutex_);
-  latest_ = std::move(snapshot);
-  recent_.push_back({latest_, replaced_bytes});
-  recent_bytes_ += replaced_bytes;
-  while (recent_.size() > 1 && (recent_.size() > limits::kRecentRevisions || recent_bytes_ > limits::kRecentBytes)) {
-    // What the oldest held alone is what the next one replaced.
-    retired.push_back(std::move(recent_.front()));
-    recent_.pop_front();
-    recent_bytes_ -= recent_.front().replaced_bytes;
-    recent_.front().replaced_bytes = 0;
+void Scene::publish(const SnapshotPtr& snapshot) {
+  std::vector<SnapshotPtr> retired;  // freed after the lock: freeing a large snapshot takes a while
+  {
+    const MutexLock lock(mutex_);
+    latest_ = snapshot;
+    recent_.push_back(snapshot);
+    const auto too_much = [&] {
+      return recent_.size() > limits::kRecentRevisions ||
+             snapshot->replaced_bytes - recent_.front()->replaced_bytes > limits::kRecentBytes;
+    };
+    while (recent_.size() > 1 && too_much()) {
+      retired.push_back(std::move(recent_.front()));
+      recent_.pop_front();
+    }
+    published_.notify_all();
   }
-  published_.notify_all();
+  pins_->judge(*snapshot);
 }
 
 SnapshotPtr Scene::latest() const {
@@ -142,12 +170,12 @@ SnapshotPtr Scene::latest() const {
 }
 
 absl::StatusOr<SnapshotPtr> Scene::recent(uint64_t revision) const {
-  const uint64_t oldest = recent_.front().snapshot->revision;
+  const uint64_t oldest = recent_.front()->revision;
   if (revision < oldest || revision > latest_->revision) return outside_recent(oldest, latest_->revision, revision);
-  return recent_[revision - oldest].snapshot;
+  return recent_[revision - oldest];
 }
 
-absl::StatusOr<SnapshotPtr> Scene::view(const View& view, std::chrono::steady_clock::time_point deadline) const {
+absl::StatusOr<SnapshotPtr> Scene::view(const View& view, Deadline deadline) const {
   const MutexLock lock(mutex_);
   if (closed_) return closed_status();
   if (view.epoch != 0 && view.epoch != latest_->epoch) return restarted(latest_->epoch, view.epoch);
@@ -161,17 +189,23 @@ absl::StatusOr<SnapshotPtr> Scene::view(const View& view, std::chrono::steady_cl
   return latest_;
 }
 
+absl::StatusOr<SnapshotPin> Scene::pin(const View& view, Deadline deadline) const {
+  absl::StatusOr<SnapshotPtr> snapshot = this->view(view, deadline);
+  if (!snapshot.ok()) return snapshot.status();
+  return SnapshotPin(pins_, *std::move(snapshot));
+}
+
 void Scene::forget_recent() {
-  std::deque<Recent> forgotten;  // freed after the lock, as in publish()
+  std::deque<SnapshotPtr> forgotten;  // freed after the lock, as in publish()
   const MutexLock lock(mutex_);
   forgotten.swap(recent_);
-  recent_.push_back({latest_, 0});
-  recent_bytes_ = 0;
+  recent_.push_back(latest_);
 }
 
 void Scene::close() {
   const MutexLock lock(mutex_);
   closed_ = true;
+  pins_->close();
   published_.notify_all();
 }
 
@@ -184,7 +218,10 @@ SceneStatus Scene::status() const {
     status.last_build_error = last_build_error_;
     snapshot = latest_;
   }
-  status.memory_bytes = snapshot->statics->bytes() + snapshot->objects.bytes();
+  status.memory_bytes = bytes_of(*snapshot);
+  const PinLedger::Use pinned = pins_->use(*snapshot, status.memory_bytes);
+  status.pinned_bytes = pinned.held;
+  status.max_pinned_bytes = pinned.budget;
   if (snapshot->history != nullptr) {
     status.history_bytes = snapshot->history->bytes;
     status.recorded_ticks = static_cast<uint32_t>(snapshot->history->records.size());

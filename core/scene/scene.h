@@ -13,6 +13,7 @@
 #include <string>
 
 #include "core/base/mutex.h"
+#include "core/scene/pin_ledger.h"
 #include "core/scene/scene_snapshot.h"
 #include "core/scene/scene_writer.h"
 #include "core/scene/update_batch.h"
@@ -23,6 +24,7 @@ struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
   HistoryOptions history = {};
+  uint64_t pinned_bytes = 0;  // as PinLedger takes it
 };
 
 // Which revision a caller wants. Epoch 0 is not checked.
@@ -43,6 +45,8 @@ struct SceneStatus {
   uint64_t memory_bytes = 0;   // of the latest revision, without meshes, which scenes share
   uint64_t history_bytes = 0;  // of the past, beyond that
   uint32_t recorded_ticks = 0;
+  uint64_t pinned_bytes = 0;      // that older revisions hold because they are still read ...
+  uint64_t max_pinned_bytes = 0;  // ... and the most that may be
   uint32_t pending_changes = 0;
   std::string last_build_error;  // of the latest change that failed, whatever came after it
 };
@@ -55,19 +59,31 @@ class Scene {
   const std::string& name() const { return name_; }
   const SceneSpec& spec() const { return spec_; }
 
-  // One batch, one revision (none if it changes nothing). Refuses by check_form(), by writer and batch numbers
-  // (BATCH_GAP), by `all_or_nothing`, or NOT_FOUND once the scene is closed; then nothing has changed.
-  absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  using Deadline = std::chrono::steady_clock::time_point;
 
-  // Removes and places instances as one revision; builds outside the writer's lock, one change at a time.
+  // One batch, one revision (none if it changes nothing). Waits while readers hold more than they may: see PinLedger.
+  // Refuses by check_form(), by writer and batch numbers (BATCH_GAP), by `all_or_nothing`, DEADLINE_EXCEEDED where it
+  // waited until `until`, or NOT_FOUND once the scene is closed; then nothing has changed.
+  absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = PinLedger::kNever)
+      LOCUS_EXCLUDES(writer_mutex_, mutex_);
+
+  // Removes and places instances as one revision; builds outside the writer's lock, one change at a time. Waits
+  // for readers as apply() does, without an end.
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   SnapshotPtr latest() const LOCUS_EXCLUDES(mutex_);
 
   // The snapshot a view names; at_least waits until `deadline`. FAILED_PRECONDITION SCENE_RESTARTED for another epoch,
   // OUT_OF_RANGE for `exactly` outside the recent revisions, DEADLINE_EXCEEDED, or NOT_FOUND once the scene is closed.
-  absl::StatusOr<SnapshotPtr> view(const View& view, std::chrono::steady_clock::time_point deadline) const
-      LOCUS_EXCLUDES(mutex_);
+  absl::StatusOr<SnapshotPtr> view(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
+
+  // The same for whoever reads for longer than a moment, and so must end when told to.
+  absl::StatusOr<SnapshotPin> pin(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
+  // Until those who were told to end have, or the scene is closed; DEADLINE_EXCEEDED, naming the limit, from `until`
+  // on.
+  absl::Status wait_for_readers(Deadline until) const LOCUS_EXCLUDES(mutex_);
+  // For whoever has waited too long: PinLedger::cut_off().
+  void cut_off_readers() { pins_->cut_off(); }
 
   // Keeps no revision but the latest for `exactly` views, until more come: gives memory back when it is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
@@ -78,7 +94,7 @@ class Scene {
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
  private:
-  void publish(SnapshotPtr snapshot, uint64_t replaced_bytes) LOCUS_EXCLUDES(mutex_);
+  void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   absl::Status closed_status() const;
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
   absl::Status admit_change() LOCUS_EXCLUDES(mutex_);
@@ -94,15 +110,11 @@ class Scene {
   mutable Mutex mutex_;
   mutable ConditionVariable published_;
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
-  struct Recent {
-    SnapshotPtr snapshot;
-    uint64_t replaced_bytes;
-  };
-  std::deque<Recent> recent_ LOCUS_GUARDED_BY(mutex_);  // oldest first, latest_ last
-  uint64_t recent_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
+  std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);  // oldest first, latest_ last
   uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
+  const std::shared_ptr<PinLedger> pins_;  // pins may outlive the scene
 };
 
 }  // namespace locus

@@ -72,8 +72,9 @@ SnapshotPtr SceneWriter::freeze() {
   const bool stale = planted(PlantedBug::kStaleSnapshot) && published_ != nullptr;
   ObjectSet objects = stale ? published_->objects : objects_.snapshot();
   recorder_.measure(objects);
-  return std::make_shared<const SceneSnapshot>(SceneSnapshot{
-      epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(), objects_.displacement()});
+  return std::make_shared<const SceneSnapshot>(
+      SceneSnapshot{epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(),
+                    objects_.displacement(), replaced_bytes_ + recorder_.dropped_bytes()});
 }
 
 SnapshotPtr SceneWriter::next_revision() {
@@ -83,6 +84,7 @@ SnapshotPtr SceneWriter::next_revision() {
 }
 
 SnapshotPtr SceneWriter::replace_statics(std::shared_ptr<const StaticSet> statics) {
+  replaced_bytes_ += statics_->bytes();
   statics_ = std::move(statics);
   return next_revision();
 }
@@ -104,7 +106,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch
       ack = ack_now();
       ack.duplicate = true;
     }
-    return Applied{std::move(ack), nullptr, 0};
+    return Applied{std::move(ack), nullptr};
   }
   const bool jumps = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
                                                    [](const MoveColumns& move) { return move.teleport; });
@@ -130,7 +132,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   moves_.run(objects_, batch);
   if (absl::Status status = book(batch, moves_, result); !status.ok()) return status;
   start_tick(batch);
-  if (moves_.changes()) result.replaced_bytes = objects_.move(moves_.moves(), moves_.moves_by_handle());
+  if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves(), moves_.moves_by_handle());
   commit(batch, moves_.changes(), result);
   moves_.clear();
   return result;
@@ -147,7 +149,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
   const BatchApplication::Difference difference = application.difference();
   const bool forgets_now = forgets(batch);
   start_tick(batch);
-  result.replaced_bytes = objects_.apply(difference.gone, difference.come, difference.reborn);
+  replaced_bytes_ += objects_.apply(difference.gone, difference.come, difference.reborn);
   commit(batch, !difference.empty() || forgets_now, result);
   return result;
 }

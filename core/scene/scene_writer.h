@@ -52,8 +52,7 @@ class SceneWriter {
 
   struct Applied {
     UpdateAck ack;
-    SnapshotPtr snapshot;         // null when nothing changed
-    uint64_t replaced_bytes = 0;  // of what the revision before holds and this one does not
+    SnapshotPtr snapshot;  // null when nothing changed
   };
   // `batch` has passed check_form(). Item errors are in the ack; with all_or_nothing any of them refuses the batch. So
   // does one object too many, with RESOURCE_EXHAUSTED.
@@ -95,6 +94,7 @@ class SceneWriter {
   MoveApplication moves_;
   WriterTable writers_;
   HistoryRecorder recorder_;
+  uint64_t replaced_bytes_ = 0;  // of objects and statics so far
   SnapshotPtr published_;
 };
 

@@ -38,11 +38,19 @@ It ends on SIGTERM or SIGINT once calls in work are done, with exit code 0; a
 second signal ends it at once.)";
 
 // CLI11 has made a plain number of the size by now.
-std::string check_memory(const std::string& text) {
+bool is_size(const std::string& text, uint64_t least, uint64_t most) {
   uint64_t bytes = 0;
-  const bool good =
-      absl::SimpleAtoi(text, &bytes) && (bytes == 0 || (bytes >= limits::kLeastMemory && bytes <= limits::kMostMemory));
+  return absl::SimpleAtoi(text, &bytes) && (bytes == 0 || (bytes >= least && bytes <= most));
+}
+
+std::string check_memory(const std::string& text) {
+  const bool good = is_size(text, limits::kLeastMemory, limits::kMostMemory);
   return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 64MiB .. 1PiB");
+}
+
+std::string check_pinned(const std::string& text) {
+  const bool good = is_size(text, limits::kLeastPinnedBytes, limits::kMostMemory);
+  return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 1MiB .. 1PiB");
 }
 
 // The options as CLI11 sees them, writing to `config`. CLI11 keeps pointers into it.
@@ -81,6 +89,11 @@ void add_options(CLI::App& app, ServerConfig& config) {
                  "Memory to hold before more is refused, such as 512MiB; 0 = 3/4 of what there is")
       ->transform(CLI::AsSizeValue(false).description("SIZE"))
       ->check(CLI::Validator(check_memory, ""))
+      ->capture_default_str();
+  app.add_option("--pinned-limit", config.pinned_limit,
+                 "Replaced memory that readers may hold, per scene; 0 = 256MiB or 4 times the scene")
+      ->transform(CLI::AsSizeValue(false).description("SIZE"))
+      ->check(CLI::Validator(check_pinned, ""))
       ->capture_default_str();
   app.add_option("--drain-grace-s", config.drain_grace_s, "Seconds that calls in work may take after SIGTERM")
       ->check(CLI::Range(0u, limits::kMaxDrainGraceS))

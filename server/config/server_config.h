@@ -55,6 +55,11 @@ struct ServerConfig {
   // Lower it to leave memory to others; above the default the kernel may end the process.
   uint64_t memory_limit = 0;
 
+  // Bytes of what updates replaced that batches and dumps may keep from being freed by reading older revisions of a
+  // scene; beyond that the oldest are ended and updates wait. 0 = 256 MiB, or four times what the scene takes where
+  // that is more. Lower it where memory is short; a batch that outlasts a few whole ticks is then refused sooner.
+  uint64_t pinned_limit = 0;
+
   // Seconds that calls in work may take to finish after SIGTERM. Raise it where batches run long; keep it below what
   // the service manager waits before it kills.
   uint32_t drain_grace_s = 10;

@@ -33,10 +33,13 @@ void write_work(const BatchResult& answer, v1::QueryResult* result) {
         to_proto(answer.blocks[i].work, answer.blocks[i].nanoseconds);
 }
 
-RunOptions run_options(Host& host, const Caller& caller, bool explain) {
+RunOptions run_options(Host& host, const Caller& caller, const SnapshotPin& pin, bool explain) {
   RunOptions options;
   options.parallel_for = [&host](size_t n, const std::function<void(size_t)>& fn) { host.pool.parallel_for(n, fn); };
-  options.stop = [&caller] { return caller.stop(); };
+  options.stop = [&caller, &pin] {
+    absl::Status told = pin.status();
+    return told.ok() ? caller.stop() : told;
+  };
   if (explain) options.clock = &nanoseconds_now;
   return options;
 }
@@ -49,10 +52,10 @@ absl::Status answer_queries(Host& host, const Caller& caller, const std::string&
   if (!scene.ok()) return scene.status();
   const absl::StatusOr<QueryBatch> queries = read_batch(batch);
   if (!queries.ok()) return queries.status();
-  const absl::StatusOr<SnapshotPtr> snapshot = wait_for(**scene, to_view(batch.view()), wait_until, caller);
+  const absl::StatusOr<SnapshotPin> snapshot = wait_for(**scene, to_view(batch.view()), wait_until, caller);
   if (!snapshot.ok()) return snapshot.status();
   const absl::StatusOr<BatchResult> answer =
-      run_batch(**snapshot, *queries, run_options(host, caller, batch.explain()));
+      run_batch(**snapshot, *queries, run_options(host, caller, *snapshot, batch.explain()));
   if (!answer.ok()) return answer.status();
   write_result(**snapshot, *answer, result);
   if (batch.explain()) write_work(*answer, result);

@@ -15,8 +15,10 @@ using std::chrono::system_clock;
 
 constexpr const char* kSceneMetadata = "x-scene";
 constexpr uint32_t kBusyRetryMs = 100;
-// How late a wait for a revision notices that nobody needs it any more.
+// How late who waits notices that nobody needs it any more.
 constexpr milliseconds kWaitSlice{50};
+// How long readers that were told to end may take for that.
+constexpr milliseconds kReadersMayTake{1000};
 constexpr std::chrono::hours kNoDeadline{24 * 365};
 
 SteadyTime to_steady(system_clock::time_point deadline) {
@@ -59,13 +61,26 @@ absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& nam
   return caller.host().registry.find_scene(name);
 }
 
-absl::StatusOr<SnapshotPtr> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller) {
+absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller) {
   while (true) {
     const SteadyTime slice = std::min(until, steady_clock::now() + kWaitSlice);
-    absl::StatusOr<SnapshotPtr> snapshot = scene.view(view, slice);
+    absl::StatusOr<SnapshotPin> snapshot = scene.pin(view, slice);
     if (snapshot.status().code() != absl::StatusCode::kDeadlineExceeded || slice == until) return snapshot;
     if (absl::Status status = caller.stop(); !status.ok()) return status;
     if (caller.host().drain.draining()) return draining();
+  }
+}
+
+absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop) {
+  const SteadyTime start = steady_clock::now();
+  while (true) {
+    const SteadyTime now = steady_clock::now();
+    absl::Status late = scene.wait_for_readers(now + kWaitSlice);
+    if (late.ok()) return late;
+    absl::Status stopped = stop();
+    if (stopped.code() == absl::StatusCode::kDeadlineExceeded) return late;
+    if (!stopped.ok()) return stopped;
+    if (now - start > kReadersMayTake) scene.cut_off_readers();
   }
 }
 

@@ -35,6 +35,9 @@ class Caller {
   // MALFORMED where the metadata `x-scene` is there and names another scene.
   absl::Status check_scene(const std::string& scene) const;
 
+  // Ends the call at once, CANCELLED, whatever it waits for.
+  void cut_off() const { context_.TryCancel(); }
+
   const Host& host() const { return host_; }
 
  private:
@@ -46,9 +49,13 @@ class Caller {
 // The name and x-scene checks of a call about one scene, and the scene.
 absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field);
 
-// The snapshot that `view` names, waited for until `until`. Wakes up at once when it is published or the scene is
-// deleted, and within a moment when the call ends or the server drains: then UNAVAILABLE, DRAINING.
-absl::StatusOr<SnapshotPtr> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
+// A hold on the snapshot that `view` names, waited for until `until`. Wakes up at once when it is published or the
+// scene is deleted, and within a moment when the call ends or the server drains: then UNAVAILABLE, DRAINING.
+absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
+
+// Waits while readers of the scene that were told to end have not; those that stay for long are cut off. Asks `stop`
+// now and then, and ends with its status where that is not OK, or, at the call's deadline, with what it waited for.
+absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
 
 enum class WhileDraining { kRefuse, kServe };
 

@@ -107,6 +107,8 @@ v1::Scene to_proto(const Scene& scene) {
   out.set_oldest_tick(snapshot->oldest_tick());
   out.set_recorded_ticks(status.recorded_ticks);
   out.set_history_bytes(status.history_bytes);
+  out.set_pinned_bytes(status.pinned_bytes);
+  out.set_max_pinned_bytes(status.max_pinned_bytes);
   out.set_objects(snapshot->objects.size());
   out.set_instances(snapshot->statics->size());
   out.set_triangles(snapshot->statics->triangle_count());

@@ -136,6 +136,8 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   const uint64_t epoch = (*scene)->latest()->epoch;
   const absl::StatusOr<uint64_t> number =
       host.changes.submit(epoch, [scene = *scene, owned = *owned, outcome, room = *room](uint64_t change_number) {
+        // Whoever asked may be gone by now; readers end in any case.
+        (void)wait_for_readers(*scene, [] { return absl::OkStatus(); });
         absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
         log_change(*scene, change_number, change);
         outcome->set(std::move(change));

@@ -167,11 +167,15 @@ absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneReq
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
   const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.scene(), "scene");
   if (!scene.ok()) return scene.status();
-  const absl::StatusOr<SnapshotPtr> snapshot =
-      wait_for(**scene, to_view(request.view()), caller.wait_until(false), caller);
+  absl::StatusOr<SnapshotPin> snapshot = wait_for(**scene, to_view(request.view()), caller.wait_until(false), caller);
   if (!snapshot.ok()) return snapshot.status();
-  const auto take = [&](const v1::DumpSceneResponse& piece) { return caller.stop().ok() && writer.Write(piece); };
+  // Its caller may take what is written as slowly as it likes.
+  snapshot->when_stuck([&caller] { caller.cut_off(); });
+  const auto take = [&](const v1::DumpSceneResponse& piece) {
+    return snapshot->status().ok() && caller.stop().ok() && writer.Write(piece);
+  };
   if (dump_snapshot(**snapshot, names_of(host.registry), take)) return absl::OkStatus();
+  if (absl::Status told = snapshot->status(); !told.ok()) return told;
   const absl::Status status = caller.stop();
   return status.ok() ? absl::CancelledError("the caller stopped reading") : status;
 }

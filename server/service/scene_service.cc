@@ -95,8 +95,9 @@ absl::Status SceneService::create(const Caller& caller, const v1::CreateSceneReq
                                   v1::CreateSceneResponse* response) {
   if (absl::Status status = check_scene_name(request.name(), "name"); !status.ok()) return status;
   if (absl::Status status = caller.check_scene(request.name()); !status.ok()) return status;
-  const absl::StatusOr<SceneSpec> spec = to_spec(request.spec());
+  absl::StatusOr<SceneSpec> spec = to_spec(request.spec());
   if (!spec.ok()) return spec.status();
+  spec->pinned_bytes = host_.config.pinned_limit;
   const std::string& static_from = request.spec().static_from();
   if (!static_from.empty())
     if (absl::Status status = check_scene_name(static_from, "spec.static_from"); !status.ok()) return status;

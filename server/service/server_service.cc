@@ -41,6 +41,8 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"objects", limits::kMaxObjects},
       {"page_size", limits::kMaxPageSize},
       {"pending_changes", limits::kMaxPendingChanges},
+      {"pinned_bytes",
+       static_cast<double>(host.config.pinned_limit != 0 ? host.config.pinned_limit : limits::kPinnedBytes)},
       {"queries", limits::kMaxQueries},
       {"receive_bytes", static_cast<double>(host.config.max_receive_bytes)},
       {"recent_revisions", limits::kRecentRevisions},

@@ -17,6 +17,15 @@ absl::StatusOr<MemoryBudget::Claim> make_room(Host& host, const UpdateBatch& bat
   return host.memory.claim_anyway(cost.bytes);
 }
 
+absl::StatusOr<UpdateAck> apply_in_time(const Caller& caller, Scene& scene, const UpdateBatch& batch) {
+  while (true) {
+    if (absl::Status status = wait_for_readers(scene, [&caller] { return caller.stop(); }); !status.ok()) return status;
+    absl::StatusOr<UpdateAck> ack = scene.apply(batch, SteadyTime::min());
+    // Another batch was faster, and now there is something to wait for again.
+    if (ack.status().code() != absl::StatusCode::kDeadlineExceeded) return ack;
+  }
+}
+
 absl::Status apply(Host& host, const Caller& caller, const std::string& name, const v1::UpdateBatch& batch,
                    v1::UpdateAck* out) {
   const absl::StatusOr<ScenePtr> scene = find_scene(caller, name, "scene");
@@ -25,7 +34,7 @@ absl::Status apply(Host& host, const Caller& caller, const std::string& name, co
   if (!updates.ok()) return updates.status();
   const absl::StatusOr<MemoryBudget::Claim> room = make_room(host, *updates);
   if (!room.ok()) return room.status();
-  const absl::StatusOr<UpdateAck> ack = (*scene)->apply(*updates);
+  const absl::StatusOr<UpdateAck> ack = apply_in_time(caller, **scene, *updates);
   if (!ack.ok()) return ack.status();
   *out = to_proto(*ack);
   return absl::OkStatus();

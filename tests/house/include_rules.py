@@ -66,7 +66,7 @@ INTRINSICS = "immintrin.h"
 KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
 # How an array asks for large pages: advice that changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
-CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/scene\.(h|cc)")
+CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|pin_ledger)\.(h|cc)")
 
 # A folder and the folder that holds it, where both are one room that was divided for its size only.
 ONE_ROOM = {"client/cli/import/quake": "client/cli/import"}
@@ -130,7 +130,7 @@ def core_stands_alone(tree):
 
 
 def core_reads_no_clock(tree):
-    return [f"{path}: <chrono> is for core/base/mutex.h and core/scene/scene.* only"
+    return [f"{path}: <chrono> is for core/base/mutex.h, core/scene/scene.* and core/scene/pin_ledger.* only"
             for path in tree.code("core") if not CLOCK_FILES.fullmatch(path)
             for _, target in includes(tree.files[path]) if target == "chrono"]
 

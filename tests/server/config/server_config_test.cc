@@ -77,6 +77,7 @@ TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
       {{"--listen", "nowhere"}, "nowhere"},           {{"--no-such-option"}, "--no-such-option"},
       {{"--memory-limit", "lots"}, "--memory-limit"}, {{"--memory-limit", "1"}, "64MiB"},
       {{"--memory-limit", "2PiB"}, "1PiB"},           {{"--memory-limit", "-1"}, "--memory-limit"},
+      {{"--pinned-limit", "1023"}, "1MiB"},           {{"--pinned-limit", "2PiB"}, "1PiB"},
       {{"--config", file_}, "no-such-option"},        {{"--config", "/no/such/file"}, "/no/such/file"},
   };
   for (const auto& [arguments, named] : cases) {
@@ -110,7 +111,9 @@ TEST_F(ServerConfigTest, ThreadsAndMemoryFollowTheMachineUnlessGiven) {
   const ServerConfig followed = *read({}).config;
   EXPECT_EQ(followed.threads, std::min(machine.cores, limits::kMaxThreads));
   EXPECT_EQ(followed.memory_limit, machine.memory_bytes / 4 * 3);
-  const ServerConfig given = *read({"--threads", "7", "--memory-limit", "512MiB"}).config;
+  EXPECT_EQ(followed.pinned_limit, 0u);
+  const ServerConfig given = *read({"--threads", "7", "--memory-limit", "512MiB", "--pinned-limit", "2MiB"}).config;
+  EXPECT_EQ(given.pinned_limit, uint64_t{2} << 20);
   EXPECT_EQ(given.threads, 7u);
   EXPECT_EQ(given.memory_limit, uint64_t{512} << 20);
 }

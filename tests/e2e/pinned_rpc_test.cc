@@ -1,0 +1,94 @@
+// Readers that hold more of a scene than they may: they are ended, and updates wait for that only.
+#include <atomic>
+#include <thread>
+
+#include "tests/support/rpc_test.h"
+
+namespace locus::test {
+namespace {
+
+constexpr uint64_t kPinnedLimit = 4096;
+
+server::ServerConfig with_little() {
+  server::ServerConfig config = test_config();
+  config.pinned_limit = kPinnedLimit;
+  return config;
+}
+
+class PinnedRpcTest : public RpcTest {
+ protected:
+  PinnedRpcTest() : RpcTest(with_little()) {}
+
+  // All objects at one place: 1 to `count`.
+  static v1::UpdateBatch insert_heap(uint64_t count) {
+    v1::UpdateBatch batch = insert_balls(1, count);
+    fill(batch.mutable_inserts(0)->mutable_positions(), {});
+    batch.mutable_inserts(0)->mutable_positions()->Resize(static_cast<int>(3 * count), 0.0f);
+    return batch;
+  }
+  static v1::UpdateBatch move_heap(uint64_t count, float to) {
+    v1::UpdateBatch batch;
+    v1::Move* move = batch.add_moves();
+    for (uint64_t id = 1; id <= count; ++id) move->add_ids(id);
+    move->mutable_positions()->Resize(static_cast<int>(3 * count), to);
+    return batch;
+  }
+};
+
+TEST_F(PinnedRpcTest, ABatchThatHoldsTooMuchIsEndedAndUpdatesGoOn) {
+  constexpr uint64_t kObjects = 4'000;
+  ASSERT_TRUE(apply(insert_heap(kObjects)).ok());
+  // Seconds of work, were it not ended.
+  v1::QueryBatch batch;
+  v1::QueryBlock* block = batch.add_blocks();
+  block->set_max_results(1);
+  block->mutable_balls()->mutable_centers()->Resize(3 * limits::kMaxQueries, 0.0f);
+  block->mutable_balls()->add_radii(10);
+  std::atomic<bool> ended{false};
+  std::thread reader([&] {
+    const grpc::Status status = query(batch);
+    ended = true;
+    expect_refused(status, {grpc::StatusCode::RESOURCE_EXHAUSTED, v1::REASON_LIMIT, ""});
+    EXPECT_EQ(error_of(status).limit(), "pinned_bytes");
+    EXPECT_EQ(error_of(status).limit_value(), kPinnedLimit);
+    EXPECT_GT(error_of(status).asked(), kPinnedLimit);
+  });
+  uint64_t updates = 0;
+  while (!ended) {
+    ++updates;
+    ASSERT_TRUE(apply(move_heap(kObjects, float(updates % 2))).ok());
+  }
+  reader.join();
+  EXPECT_EQ(get("world").revision(), 1 + updates);
+  EXPECT_EQ(get("world").pinned_bytes(), 0u);
+}
+
+TEST_F(PinnedRpcTest, ADumpThatNobodyReadsIsCutOffAndUpdatesGoOn) {
+  constexpr uint64_t kObjects = 300'000;  // more than what is under way without being read
+  ASSERT_TRUE(apply(insert_heap(kObjects)).ok());
+  v1::DumpSceneRequest request;
+  request.set_scene("world");
+  grpc::ClientContext context;
+  set_timeout(context);
+  const auto reader = stubs().scenes->DumpScene(&context, request);
+  v1::DumpSceneResponse piece;
+  ASSERT_TRUE(reader->Read(&piece));
+  ASSERT_TRUE(apply(move_heap(kObjects, 1)).ok());
+  ASSERT_TRUE(apply(move_heap(kObjects, 2)).ok());
+  ASSERT_TRUE(apply(move_heap(kObjects, 3)).ok());
+  while (reader->Read(&piece)) {
+  }
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(PinnedRpcTest, TheLimitIsListedAndASceneSaysItsOwn) {
+  EXPECT_EQ(get("world").max_pinned_bytes(), kPinnedLimit);
+  v1::GetServerResponse server;
+  ASSERT_TRUE(call(*stubs().server, &v1::ServerService::Stub::GetServer, v1::GetServerRequest(), &server).ok());
+  for (const v1::Limit& limit : server.limits())
+    if (limit.name() == "pinned_bytes") return EXPECT_EQ(limit.value(), kPinnedLimit);
+  FAIL() << "no limit pinned_bytes";
+}
+
+}  // namespace
+}  // namespace locus::test
