@@ -12,8 +12,9 @@ namespace {
 // Bytes are counted again only once this part of the budget was replaced since the last time, so that pins just below
 // the budget do not make every batch count. What pins hold may pass the budget by as much.
 constexpr uint64_t kCountShare = 64;
-// What a revision holds and a later one does not takes at most so many times what was replaced in between.
-constexpr uint64_t kMostOfReplaced = 2;
+// What a revision holds and a later one does not takes at most so many times what is known to be replaced in between:
+// the maps that find it are not known. Measured: up to 2.2 times.
+constexpr uint64_t kMostOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 
 absl::Status told_to_end(uint64_t revision, uint64_t budget, uint64_t held) {
