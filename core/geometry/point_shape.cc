@@ -20,6 +20,9 @@ Vec3d nearest_in_core(Vec3d local, const Shape& shape) {
   return {};
 }
 
+// max(a, sqrt(b)), mostly without a root.
+double at_least_root(double a, double b) { return a > 0 && a * a > b * (1 + 0x1p-50) ? a : std::max(a, std::sqrt(b)); }
+
 }  // namespace
 
 double core_radius(const Shape& shape) {
@@ -42,9 +45,13 @@ double squared_distance_to_core(Vec3d point, const Shape& shape) {
 }
 
 double distance(Vec3d point, const Shape& shape) {
+  if (shape.kind == ShapeKind::kBall) {  // the same as below, which most objects can do without
+    const double apart = std::sqrt(squared_length(point - shape.position));
+    return at_least_root(apart - shape.radius, squared_distance(point, bounds_of(Balld{shape.position, shape.radius})));
+  }
   const double apart = std::sqrt(squared_distance_to_core(point, shape));
   if (shape.kind == ShapeKind::kPoint) return apart;  // its bounds are as far
-  return std::max(apart - core_radius(shape), std::sqrt(squared_distance(point, bounds_of(shape))));
+  return at_least_root(apart - core_radius(shape), squared_distance(point, bounds_of(shape)));
 }
 
 Vec3d nearest_on_shape(Vec3d point, const Shape& shape) {

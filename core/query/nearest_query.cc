@@ -19,7 +19,12 @@ double squared_limit_of(float farthest) { return squared_limit(raised(farthest))
 class NearestRows {
  public:
   explicit NearestRows(const NearestRequest& request)
-      : count_(request.count), farthest_(request.max_distance), limit_(squared_limit_of(farthest_)) {}
+      : count_(request.count),
+        in_order_(request.count <= kMostInOrder),
+        farthest_(request.max_distance),
+        limit_(squared_limit_of(farthest_)) {
+    rows_.reserve(std::min<size_t>(count_, kMostInOrder));
+  }
 
   // Nothing beyond it is wanted; a row exactly there may be, if its id is lower.
   float farthest() const { return farthest_; }
@@ -29,24 +34,36 @@ class NearestRows {
   void offer(const Hit& row) {
     if (!(row.t <= farthest_)) return;
     if (rows_.size() == count_) {
-      if (!nearer(row, rows_.front())) return;
-      std::pop_heap(rows_.begin(), rows_.end(), nearer);
+      if (!nearer(row, last())) return;
+      if (!in_order_) std::pop_heap(rows_.begin(), rows_.end(), nearer);
       rows_.pop_back();
     }
-    rows_.push_back(row);
-    std::push_heap(rows_.begin(), rows_.end(), nearer);  // farthest first
-    if (rows_.size() < count_ || rows_.front().t == farthest_) return;
-    farthest_ = rows_.front().t;
+    insert(row);
+    if (rows_.size() < count_ || last().t == farthest_) return;
+    farthest_ = last().t;
     limit_ = squared_limit_of(farthest_);
   }
 
   std::vector<Hit> finish() {
-    std::sort_heap(rows_.begin(), rows_.end(), nearer);
+    if (!in_order_) std::sort_heap(rows_.begin(), rows_.end(), nearer);
     return std::move(rows_);
   }
 
  private:
+  // Few rows are kept in order, since objects are offered nearly in order; more are a heap with the last on top.
+  static constexpr size_t kMostInOrder = 32;
+
+  const Hit& last() const { return in_order_ ? rows_.back() : rows_.front(); }
+  void insert(const Hit& row) {
+    rows_.push_back(row);
+    if (!in_order_) return std::push_heap(rows_.begin(), rows_.end(), nearer);
+    auto at = rows_.end() - 1;
+    for (; at != rows_.begin() && nearer(row, *(at - 1)); --at) *at = *(at - 1);
+    *at = row;
+  }
+
   const size_t count_;
+  const bool in_order_;
   float farthest_;
   double limit_;
   std::vector<Hit> rows_;

@@ -68,6 +68,13 @@ GridRef GridSnapshot::find_like(const GridRef& value) const {
   return find(handle);
 }
 
+double GridSnapshot::values_per_cell(const internal::GridLevel& level, const Vec3d& point) const {
+  const Vec3d inside = nearest_in(point, level.extent.bounds);
+  const internal::Brick* brick =
+      find_brick(level, internal::brick_of(internal::cell_of(inside, level.extent.cells_per_unit)));
+  return brick == nullptr ? 0 : internal::values_per_cell(*brick, inside);
+}
+
 size_t GridSnapshot::bytes_apart_from(const GridSnapshot& other) const {
   size_t bytes = bricks_.bytes_apart_from(other.bricks_) + bricks_by_handle_.bytes_apart_from(other.bricks_by_handle_);
   bricks_.for_each_apart_from(other.bricks_,

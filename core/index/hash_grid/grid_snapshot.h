@@ -16,6 +16,7 @@
 #include "core/base/persistent_array.h"
 #include "core/index/hash_grid/brick_scan.h"
 #include "core/index/hash_grid/brick_table.h"
+#include "core/index/hash_grid/nearest_walk.h"
 
 namespace locus {
 
@@ -69,8 +70,8 @@ class GridSnapshot {
                  double astray = 0) const;
 
   // visit(GridRef) for every value whose bounds have a squared_distance() from `point` of at most limit(), and for
-  // others near it; on each level the nearest bricks first. limit() may fall meanwhile; false ends the visit. Cost: a
-  // look at every brick, and the cells within the limit.
+  // others near it; on each level about from near to far. limit() may fall meanwhile; false ends the visit. Cost: the
+  // cells within the last value's distance, or a look at every brick where those are fewer.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 
@@ -101,6 +102,12 @@ class GridSnapshot {
   template <class Limit, class Visit>
   bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, const SlabRay<double>& ray,
              const Limit& limit, Work& work, const Visit& visit) const;
+  // About how many values share a cell there.
+  double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
+  // For shells that would name more bricks than there are, from the present one on.
+  template <class Limit, class Visit>
+  bool visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells, const Vec3d& point,
+                            const Limit& limit, Work& work, const Visit& visit) const;
   // For rays that would name more bricks than there are.
   template <class Limit, class Visit>
   bool visit_by_distance(const internal::GridLevel& level, double margin, const SlabRay<double>& ray,
@@ -245,30 +252,47 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double ma
 
 template <class Limit, class Visit>
 void GridSnapshot::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
-  const GridKernels& kernels = active_grid_kernels();
-  absl::InlinedVector<std::pair<double, const internal::Brick*>, 32> near;
+  internal::NearCandidates candidates;
   for (const internal::GridLevel& level : levels_) {
-    near.clear();
-    level.table->for_each([&](uint32_t number) {
-      ++work.cells;
-      const internal::Brick& brick = *bricks_[number];
-      const double away = squared_distance(point, internal::box_of_values(brick, level.extent.reach));
-      if (away <= limit()) near.emplace_back(away, &brick);
-      return true;
-    });
-    std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (const auto& [away, brick] : near) {
-      if (away > limit()) break;
-      // Whatever is within the limit reaches into this box: its margin is that of squares and roots.
-      const double half = std::sqrt(limit()) * (1 + 0x1p-40) + 0x1p-40 * max_component(abs(point)) + 0x1p-530;
-      const Aabbd region = grown(Aabbd{point, point}, half);
-      const internal::KeyRange cells = internal::within_brick(internal::cells_near(level, region), brick->place.key);
-      const GridBox box = internal::cull_box_of(*brick, region);
-      const auto cull = [&](const GridRows& rows, uint32_t* slots) { return kernels.cull_box(rows, box, slots); };
-      if (!internal::scan_cells(*brick, cells, work, cull, visit) || !internal::scan_recent(*brick, work, cull, visit))
-        return;
+    internal::NearestShells shells(point, level.extent, values_per_cell(level, point));
+    while (shells.next(limit())) {
+      const internal::KeyRange cells = internal::cells_near(level, shells.region());
+      const internal::KeyRange bricks = internal::bricks_of(cells);
+      if (bricks.count() > static_cast<double>(level.table->size())) {
+        if (!visit_nearest_bricks(level, shells, point, limit, work, visit)) return;
+        break;
+      }
+      for_each_brick(level, bricks, work, [&](const internal::Brick& brick) {
+        candidates.collect(brick, internal::within_brick(cells, brick.place.key), point, shells.above(), shells.upto(),
+                           work);
+        return true;
+      });
+      if (!candidates.visit(limit, work, visit)) return;
     }
   }
+}
+
+template <class Limit, class Visit>
+bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells,
+                                        const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
+  absl::InlinedVector<std::pair<double, const internal::Brick*>, 32> near;
+  level.table->for_each([&](uint32_t number) {
+    ++work.cells;
+    const internal::Brick& brick = *bricks_[number];
+    const double away = squared_distance(point, internal::box_of_values(brick, level.extent.reach));
+    if (away <= limit()) near.emplace_back(away, &brick);
+    return true;
+  });
+  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  internal::NearCandidates candidates;
+  for (const auto& [away, brick] : near) {
+    if (away > limit()) break;
+    const internal::KeyRange cells =
+        internal::within_brick(internal::cells_near(level, shells.region_within(limit())), brick->place.key);
+    candidates.collect(*brick, cells, point, shells.above(), internal::key_limit(limit()), work);
+    if (!candidates.visit(limit, work, visit)) return false;
+  }
+  return true;
 }
 
 template <class Visit>

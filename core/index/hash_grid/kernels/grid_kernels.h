@@ -13,6 +13,7 @@
 namespace locus {
 
 inline constexpr float kCullSlack = 0x1p-20f;
+inline constexpr uint32_t kMostSorted = 64;
 
 // Some rows of consecutive values of one block.
 struct GridRows {
@@ -43,6 +44,13 @@ struct GridBall {
   float radius;
 };
 
+// The values around a point whose key, the squared distance of their bounds, is above one number and up to another.
+struct GridNear {
+  float point[3];
+  float margin;  // added to every reach
+  float above, upto;
+};
+
 struct GridKernels {
   const char* name;
   // Each writes the slots, in order, of values that reach the box, the line or the ball, and returns how many. There is
@@ -50,6 +58,10 @@ struct GridKernels {
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
+  // Likewise, and each one's key, which is none too large.
+  uint32_t (*collect_near)(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys);
+  // Sorts at most kMostSorted numbers, of which no two are equal.
+  void (*sort_few)(int32_t* numbers, uint32_t count);
 };
 
 const GridKernels& grid_kernels_portable();

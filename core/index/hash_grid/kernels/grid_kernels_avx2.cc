@@ -4,7 +4,7 @@
 namespace locus {
 
 const GridKernels& grid_kernels_avx2() {
-  static constexpr GridKernels kKernels = {"avx2", cull_box, cull_line, cull_ball};
+  static constexpr GridKernels kKernels = {"avx2", cull_box, cull_line, cull_ball, collect_near, sort_few};
   return kKernels;
 }
 

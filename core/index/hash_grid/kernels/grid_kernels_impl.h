@@ -103,6 +103,106 @@ uint32_t cull_line(const GridRows& rows, const GridLine& line, uint32_t* slots) 
   });
 }
 
+// How far beyond `reach` from zero.
+inline Floats gap_of(Floats along, Floats reach) {
+  const Floats away = along < 0 ? -along : along;
+  const Floats gap = away - reach;
+  return gap > 0 ? gap : Floats{};
+}
+
+#ifdef __AVX2__
+// For each set of lanes, their numbers in order, a byte each.
+struct LanesOfSets {
+  constexpr LanesOfSets() {
+    for (uint32_t set = 0; set < 256; ++set) {
+      uint32_t next = 0;
+      for (uint64_t lane = 0; lane < kLanes; ++lane)
+        if ((set >> lane & 1) != 0) lanes[set] |= lane << (8 * next++);
+    }
+  }
+  uint64_t lanes[256] = {};
+};
+constexpr LanesOfSets kLanesOfSets;
+#endif
+
+// Writes the lanes of `kept`, one after the other, and whatever behind them.
+inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slots, float* keys) {
+#ifdef __AVX2__
+  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfSets.lanes[kept])));
+  const __m256 first = _mm256_permutevar8x32_ps(reinterpret_cast<__m256>(key), lanes);
+  std::memcpy(keys, &first, sizeof(first));
+  const __m256i places = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
+  std::memcpy(slots, &places, sizeof(places));
+#else
+  float all_keys[kLanes];
+  std::memcpy(all_keys, &key, sizeof(all_keys));
+  for (; kept != 0; kept &= kept - 1) {
+    const auto lane = static_cast<uint32_t>(__builtin_ctz(kept));
+    *keys++ = all_keys[lane];
+    *slots++ = slot + lane;
+  }
+#endif
+}
+
+// The vectors of all rows, one after the other: few loops of unknown length are more than one.
+struct RowVectors {
+  static constexpr uint32_t kUsual = 4;  // of a row
+  static constexpr uint32_t kMost = GridRows::kMostValues / kLanes + GridRows::kMost + kUsual;
+
+  explicit RowVectors(const GridRows& rows) {
+    for (uint32_t row = 0; row < rows.count; ++row) {
+      const uint32_t begin = rows.begin[row], values = rows.end[row] - begin;
+      const uint32_t vectors = (values + kLanes - 1) / kLanes;
+      for (uint32_t i = 0; i < kUsual; ++i) slot[count + i] = begin + i * kLanes;
+      for (uint32_t i = kUsual; i < vectors; ++i) slot[count + i] = begin + i * kLanes;
+      for (uint32_t i = 0; i < kUsual; ++i) lanes[count + i] = 0xFF;
+      for (uint32_t i = kUsual; i < vectors; ++i) lanes[count + i] = 0xFF;
+      count += vectors;
+      if (vectors != 0) lanes[count - 1] = 0xFFu >> (vectors * kLanes - values);
+    }
+  }
+
+  uint32_t count = 0;
+  uint32_t slot[kMost];
+  uint32_t lanes[kMost];
+};
+
+uint32_t collect_near(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys) {
+  const Floats point_x = all(near.point[0]), point_y = all(near.point[1]), point_z = all(near.point[2]);
+  const Floats margin = all(near.margin), above = all(near.above), upto = all(near.upto);
+  const RowVectors vectors(rows);
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < vectors.count; ++i) {
+    const uint32_t slot = vectors.slot[i];
+    const Floats reach = load(rows.reach + slot) + margin;
+    const Floats x = gap_of(load(rows.x + slot) - point_x, reach);
+    const Floats y = gap_of(load(rows.y + slot) - point_y, reach);
+    const Floats z = gap_of(load(rows.z + slot) - point_z, reach);
+    const Floats key = x * x + y * y + z * z;
+    uint32_t kept = bits_of((key > above) & (key <= upto)) & vectors.lanes[i];
+    if (rows.gone != nullptr) kept &= ~gone_bits(rows.gone, slot);
+    write_lanes(kept, slot, key, slots + count, keys + count);
+    count += static_cast<uint32_t>(__builtin_popcount(kept));
+  }
+  return count;
+}
+
+void sort_few(int32_t* numbers, uint32_t count) {
+  int32_t given[kMostSorted + kLanes];
+  std::memcpy(given, numbers, count * sizeof(int32_t));
+  for (uint32_t i = 0; i < kLanes; ++i) given[count + i] = INT32_MAX;
+  for (uint32_t i = 0; i < count; ++i) {
+    const Lanes number = Lanes{} + given[i];
+    uint32_t place = 0;  // how many are below
+    for (uint32_t j = 0; j < count; j += kLanes) {
+      Lanes others;
+      std::memcpy(&others, given + j, sizeof(others));
+      place += static_cast<uint32_t>(__builtin_popcount(bits_of(others < number)));
+    }
+    numbers[place] = given[i];
+  }
+}
+
 }  // namespace
 }  // namespace locus
 

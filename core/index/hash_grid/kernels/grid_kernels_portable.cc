@@ -4,7 +4,7 @@
 namespace locus {
 
 const GridKernels& grid_kernels_portable() {
-  static constexpr GridKernels kKernels = {"portable", cull_box, cull_line, cull_ball};
+  static constexpr GridKernels kKernels = {"portable", cull_box, cull_line, cull_ball, collect_near, sort_few};
   return kKernels;
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <vector>
@@ -122,6 +123,58 @@ TEST_P(GridKernelsTest, KeepValuesThatReachALine) {
   expect_kept(
       columns, random,
       [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_line(rows, line, slots); }, keep);
+}
+
+TEST_P(GridKernelsTest, CollectValuesByTheSquaredDistanceOfTheirBoundsAndSayIt) {
+  Random random(4);
+  Columns4 columns = random_columns(300, random);
+  const GridNear near{{1, -2, 3}, 0.01f, 4, 50};
+  const auto key_of = [&](uint32_t slot) {
+    const double gaps[] = {std::fabs(columns.x[slot] - 1.0), std::fabs(columns.y[slot] + 2.0),
+                           std::fabs(columns.z[slot] - 3.0)};
+    double key = 0;
+    for (const double gap : gaps) {
+      const double beyond = std::max(0.0, gap - columns.reach[slot] - 0.01);
+      key += beyond * beyond;
+    }
+    return key;
+  };
+  const auto keep = [&](uint32_t slot) { return std::min(verdict(4, key_of(slot)), verdict(key_of(slot), 50)); };
+  const auto ask = [&](const GridRows& rows, uint32_t* slots) {
+    float keys[GridRows::kMostValues + 8];
+    const uint32_t count = active_grid_kernels().collect_near(rows, near, slots, keys);
+    for (uint32_t i = 0; i < count; ++i) EXPECT_NEAR(double{keys[i]}, key_of(slots[i]), 1e-4);
+    return count;
+  };
+  expect_kept(columns, random, ask, keep);
+}
+
+TEST_P(GridKernelsTest, CollectFromLongRowsAndEmptyOnes) {
+  Random random(5);
+  Columns4 columns = random_columns(500, random);
+  GridRows rows = columns.rows();
+  rows.count = 3;
+  rows.begin[0] = rows.end[0] = 3;
+  rows.begin[1] = 3, rows.end[1] = 499;
+  rows.begin[2] = rows.end[2] = 499;
+  const GridNear everything{{}, 0, -1, 1e9f};
+  uint32_t slots[GridRows::kMostValues + 8];
+  float keys[GridRows::kMostValues + 8];
+  ASSERT_EQ(active_grid_kernels().collect_near(rows, everything, slots, keys), 496u);
+  for (uint32_t i = 0; i < 496; ++i) EXPECT_EQ(slots[i], i + 3);
+}
+
+TEST_P(GridKernelsTest, SortAnyNumberOfDifferentNumbers) {
+  Random random(6);
+  for (uint32_t count = 0; count <= kMostSorted; ++count) {
+    std::vector<int32_t> numbers;
+    for (uint32_t i = 0; i < count; ++i)
+      numbers.push_back(static_cast<int32_t>(random.next() & 0x7FFFFF00u) | static_cast<int32_t>(i));
+    std::vector<int32_t> sorted = numbers;
+    std::sort(sorted.begin(), sorted.end());
+    active_grid_kernels().sort_few(numbers.data(), count);
+    EXPECT_EQ(numbers, sorted);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(InstructionSets, GridKernelsTest, ::testing::ValuesIn(instruction_sets()));
