@@ -22,8 +22,8 @@ struct SceneSnapshot {
   ObjectSet objects;
   HistoryPtr history;        // null where nothing of the past is kept
   Displacement since_close;  // from the last record to here
-  // Of what revisions up to this one replaced, but for the maps that find it, which take less. What was born and
-  // replaced between two revisions, or is kept in the past, is in it: so it is more than either holds alone.
+  // Of what revisions up to this one replaced, but for the maps that find it. What was born and replaced between two
+  // revisions, or is kept in the past, is in it, so that neither holds all of it alone.
   uint64_t replaced_bytes = 0;
 
   // The oldest moment that can be asked about.

@@ -1,4 +1,5 @@
 // Readers that hold more of a scene than they may: they are ended, and updates wait for that only.
+#include <algorithm>
 #include <atomic>
 #include <thread>
 
@@ -85,9 +86,10 @@ TEST_F(PinnedRpcTest, TheLimitIsListedAndASceneSaysItsOwn) {
   EXPECT_EQ(get("world").max_pinned_bytes(), kPinnedLimit);
   v1::GetServerResponse server;
   ASSERT_TRUE(call(*stubs().server, &v1::ServerService::Stub::GetServer, v1::GetServerRequest(), &server).ok());
-  for (const v1::Limit& limit : server.limits())
-    if (limit.name() == "pinned_bytes") return EXPECT_EQ(limit.value(), kPinnedLimit);
-  FAIL() << "no limit pinned_bytes";
+  const auto listed = std::find_if(server.limits().begin(), server.limits().end(),
+                                   [](const v1::Limit& limit) { return limit.name() == "pinned_bytes"; });
+  ASSERT_NE(listed, server.limits().end());
+  EXPECT_EQ(listed->value(), kPinnedLimit);
 }
 
 }  // namespace
