@@ -23,7 +23,7 @@ class PinnedRpcTest : public RpcTest {
   // All objects at one place: 1 to `count`.
   static v1::UpdateBatch insert_heap(uint64_t count) {
     v1::UpdateBatch batch = insert_balls(1, count);
-    fill(batch.mutable_inserts(0)->mutable_positions(), {});
+    batch.mutable_inserts(0)->clear_positions();
     batch.mutable_inserts(0)->mutable_positions()->Resize(static_cast<int>(3 * count), 0.0f);
     return batch;
   }
