@@ -72,7 +72,8 @@ double GridSnapshot::values_per_cell(const internal::GridLevel& level, const Vec
   const Vec3d inside = nearest_in(point, level.extent.bounds);
   const internal::Brick* brick =
       find_brick(level, internal::brick_of(internal::cell_of(inside, level.extent.cells_per_unit)));
-  return brick == nullptr ? 0 : internal::values_per_cell(*brick, inside);
+  const double nearby = brick == nullptr ? 0 : internal::values_per_cell(*brick, inside);
+  return nearby > 0 ? nearby : internal::values_per_cell(level.extent, level.size);
 }
 
 size_t GridSnapshot::bytes_apart_from(const GridSnapshot& other) const {

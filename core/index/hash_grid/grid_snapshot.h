@@ -252,13 +252,14 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double ma
 
 template <class Limit, class Visit>
 void GridSnapshot::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
+  constexpr size_t kFewBricks = 1024;  // so many are looked at shell by shell, even if they are all there are
   internal::NearCandidates candidates;
   for (const internal::GridLevel& level : levels_) {
     internal::NearestShells shells(point, level.extent, values_per_cell(level, point));
     while (shells.next(limit())) {
       const internal::KeyRange cells = internal::cells_near(level, shells.region());
       const internal::KeyRange bricks = internal::bricks_of(cells);
-      if (bricks.count() > static_cast<double>(level.table->size())) {
+      if (bricks.count() > static_cast<double>(std::max(level.table->size(), kFewBricks))) {
         if (!visit_nearest_bricks(level, shells, point, limit, work, visit)) return;
         break;
       }
@@ -283,10 +284,12 @@ bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const 
     if (away <= limit()) near.emplace_back(away, &brick);
     return true;
   });
-  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  const auto farther = [](const auto& a, const auto& b) { return a.first > b.first; };
+  std::make_heap(near.begin(), near.end(), farther);
   internal::NearCandidates candidates;
-  for (const auto& [away, brick] : near) {
-    if (away > limit()) break;
+  for (; !near.empty() && near.front().first <= limit(); near.pop_back()) {
+    const internal::Brick* brick = near.front().second;
+    std::pop_heap(near.begin(), near.end(), farther);
     const internal::KeyRange cells =
         internal::within_brick(internal::cells_near(level, shells.region_within(limit())), brick->place.key);
     candidates.collect(*brick, cells, point, shells.above(), internal::key_limit(limit()), work);

@@ -5,9 +5,9 @@
 namespace locus::internal {
 namespace {
 
-constexpr double kFirstValues = 12;  // that the first shell is to hold, about
-constexpr double kWidest = 2;        // the first shell, in cells
-constexpr double kWider = 1.6;       // each next one
+constexpr double kFirstValues = 12;   // that the first shell is to hold, about
+constexpr uint32_t kEnoughToSay = 4;  // of values, how many there are around
+constexpr double kWider = 1.6;        // each next one
 
 GridNear near_of(const Brick& brick, const Vec3d& point, float above, float upto) {
   const Vec3d to_point = point - brick.place.center;
@@ -69,15 +69,21 @@ double values_per_cell(const Brick& brick, const Vec3d& point) {
                 brick.sorted->offsets()[row + static_cast<size_t>(low[0])];
     }
   }
+  if (values < kEnoughToSay) return brick.size() < kEnoughToSay ? 0 : brick.size() / double{kBrickCells};
   return static_cast<double>(values) / ((high[0] - low[0] + 1) * (high[1] - low[1] + 1) * (high[2] - low[2] + 1));
+}
+
+double values_per_cell(const LevelExtent& level, size_t values) {
+  const Vec3d cells = (level.bounds.max - level.bounds.min) * level.cells_per_unit;
+  return static_cast<double>(values) / ((cells.x + 1) * (cells.y + 1) * (cells.z + 1));
 }
 
 NearestShells::NearestShells(const Vec3d& point, const LevelExtent& level, double per_cell)
     : point_(point), level_(level), slack_(slack_of(point, level)) {
   constexpr float kBall = 4.18879f;  // the volume of one with the radius 1
-  const double cells = std::cbrt(static_cast<float>(kFirstValues) / (kBall * static_cast<float>(per_cell) + 0.01f));
+  const double cells = std::cbrt(static_cast<float>(kFirstValues) / (kBall * static_cast<float>(per_cell)));
   away_ = std::sqrt(squared_distance(point, level.bounds));
-  width_ = std::min(cells, kWidest) / level.cells_per_unit;
+  width_ = cells / level.cells_per_unit;
 }
 
 Aabbd NearestShells::region_within(double limit) const {

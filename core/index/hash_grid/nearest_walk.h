@@ -19,8 +19,10 @@ namespace locus::internal {
 // No key of bounds within the squared distance `limit` is greater.
 float key_limit(double limit);
 
-// About how many values there are in a cell near `point`, which lies in the brick.
+// About how many values there are in a cell near `point`, which lies in the brick; 0 where there are too few to say.
 double values_per_cell(const Brick& brick, const Vec3d& point);
+// The same of `values` anywhere on the level.
+double values_per_cell(const LevelExtent& level, size_t values);
 
 // The shells around a point on one level.
 class NearestShells {
