@@ -44,7 +44,7 @@ inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;  // clients refuse 4 M
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
 inline constexpr uint32_t kRecentRevisions = 64;               // kept for `exactly` views ...
-inline constexpr uint64_t kRecentBytes = 16u << 20;            // ... while what they replaced takes at most this much
+inline constexpr uint64_t kRecentBytes = 2u << 20;             // ... while what they replaced takes at most this much
 inline constexpr uint64_t kPinnedBytes = uint64_t{256} << 20;  // that batches may keep from being freed, per scene ...
 inline constexpr uint32_t kPinnedShare = 4;                    // ... or so often what the scene itself takes
 inline constexpr uint64_t kLeastPinnedBytes = 1u << 20;        // where that is set

@@ -20,14 +20,16 @@ bool MoveApplication::serves(const UpdateBatch& batch) {
 
 void MoveApplication::run(const ObjectStore& objects, const UpdateBatch& batch) {
   moves_.clear();
+  rotations_.clear();
   changes_ = false;
   applied_ = refused_ = 0;
   errors_.clear();
   last_move_.resize(std::max(last_move_.size(), objects.handle_count()));
   for (size_t list = 0; list < batch.moves.size(); ++list) run(objects, batch.frame, batch.moves[list], list);
-  changes_ = std::any_of(moves_.begin(), moves_.end(), [&objects](const GridMove& move) {
+  changes_ = std::any_of(moves_.begin(), moves_.end(), [&](const GridMove& move) {
     const GridRef now = objects.at(move.handle);
-    return !(move.position == now.entry().position) || (move.turns && !(move.rotation == now.form().rotation));
+    return !(move.position == now.entry().position) ||
+           (move.rotation != GridMove::kKeeps && !(rotations_[move.rotation] == now.form().rotation));
   });
 }
 
@@ -59,8 +61,8 @@ inline void MoveApplication::move(const PoseReader& poses, uint32_t handle, cons
   GridMove& move = move_of(handle);
   move.position = position;
   if (poses.turns()) {
-    move.turns = true;
-    move.rotation = rotation;
+    move.rotation = static_cast<uint32_t>(rotations_.size());
+    rotations_.push_back(rotation);
   }
   ++applied_;
 }

@@ -23,12 +23,13 @@ class MoveApplication {
   void run(const ObjectStore& objects, const UpdateBatch& batch);
 
   // Forgets what the last run() came to.
-  void clear() { clear_scratch(moves_); }
+  void clear() {
+    clear_scratch(moves_);
+    clear_scratch(rotations_);
+  }
 
   // What the last run() came to. A handle occurs once: of several moves of one object the last counts.
-  absl::Span<const GridMove> moves() const { return moves_; }
-  // Their numbers by handle, as GridBatch wants them.
-  absl::Span<const uint32_t> moves_by_handle() const { return last_move_; }
+  GridMoves moves() const { return {moves_, rotations_, last_move_}; }
   // Whether any of them changes anything.
   bool changes() const { return changes_; }
   uint32_t applied() const { return applied_; }
@@ -47,6 +48,7 @@ class MoveApplication {
   GridMove& move_of(uint32_t handle);
 
   std::vector<GridMove> moves_;
+  std::vector<Quaternion> rotations_;
   std::vector<uint32_t> last_move_;  // by handle; counts only if the move of that number is of that handle
   std::vector<uint32_t> handles_;    // of the items at work
   bool changes_ = false;

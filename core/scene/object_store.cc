@@ -56,10 +56,10 @@ void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
     free_handles_.push_back(resting_.front().handle);
 }
 
-size_t ObjectStore::move(absl::Span<const GridMove> moves, absl::Span<const uint32_t> moves_by_handle) {
+size_t ObjectStore::move(const GridMoves& moves) {
   if (moves_ != nullptr)
-    for (const GridMove& move : moves) moves_->moved(grid_.at(move.handle), move.position);
-  return grid_.apply({{}, moves, {}, moves_by_handle});
+    for (const GridMove& move : moves.moves) moves_->moved(grid_.at(move.handle), move.position);
+  return grid_.apply({{}, moves, {}});
 }
 
 // All of which are here.

@@ -52,8 +52,8 @@ class ObjectStore {
   // here. O(n) and the bricks that are touched. Returns the bytes of what the sets so far hold and later ones will not.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                const absl::flat_hash_set<Id>& reborn = {});
-  // Handles are distinct; `moves_by_handle` as in GridBatch. Returns as apply().
-  size_t move(absl::Span<const GridMove> moves, absl::Span<const uint32_t> moves_by_handle = {});
+  // Returns as apply().
+  size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
   // False, and no change, when contains() is false.
   bool remove(const Object& object);

@@ -132,7 +132,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   moves_.run(objects_, batch);
   if (absl::Status status = book(batch, moves_, result); !status.ok()) return status;
   start_tick(batch);
-  if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves(), moves_.moves_by_handle());
+  if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves());
   commit(batch, moves_.changes(), result);
   moves_.clear();
   return result;

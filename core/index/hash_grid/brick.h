@@ -33,6 +33,16 @@ struct BrickPlace {
     return cell_along(position.x - low.x) | cell_along(position.y - low.y) << kBrickBits |
            cell_along(position.z - low.z) << (2 * kBrickBits);
   }
+  // Both in one: the cell of a position in the brick, and something negative for one that is not, but for the same
+  // rounding at its borders.
+  int cell_if_here(Vec3d position) const {
+    // One more than the cells, so that what is before the first is not rounded into it.
+    const int64_t x = static_cast<int64_t>((position.x - low.x) * cells_per_unit + 1) - 1;
+    const int64_t y = static_cast<int64_t>((position.y - low.y) * cells_per_unit + 1) - 1;
+    const int64_t z = static_cast<int64_t>((position.z - low.z) * cells_per_unit + 1) - 1;
+    if (((x | y | z) & ~((int64_t{1} << kBrickBits) - 1)) != 0) return -1;
+    return static_cast<int>(x | y << kBrickBits | z << (2 * kBrickBits));
+  }
   // As brick_of() its cell says. No branches.
   bool holds(Vec3d position) const {
     return ((position.x >= low.x) & (position.x < high.x) & (position.y >= low.y) & (position.y < high.y) &

@@ -31,7 +31,8 @@ BrickPtr BrickBuilder::apply(const Brick* old, const BrickPlace& place, uint32_t
   place_ = &place;
   number_ = number;
   largest_reach_ = old == nullptr ? 0 : old->largest_reach;
-  if (is_few(old, changes) && (old->sorted->has_forms() || (!parts_.turns && !any_form_arrives(changes))))
+  if (is_few(old, changes) &&
+      (old->sorted->has_forms() || (parts_.moves.rotations.empty() && !any_form_arrives(changes))))
     return change_few(*old, changes);
   sources_.clear();
   return sort_anew(old, changes);
@@ -60,7 +61,7 @@ void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> 
   recent_changes_.assign(old.recent_count, kStays);
   for (const BrickChange& change : changes) {
     if (arrives(change)) continue;
-    if (change.number != BrickChange::kLeaves) __builtin_prefetch(&parts_.moves[change.number]);
+    if (change.number != BrickChange::kLeaves) __builtin_prefetch(&parts_.moves.moves[change.number]);
     const uint32_t slot = change.slot & ~GridSlot::kRecent;
     std::vector<uint32_t>& marks = (change.slot & GridSlot::kRecent) != 0 ? recent_changes_ : sorted_changes_;
     LOCUS_DCHECK(slot < marks.size());
@@ -71,7 +72,8 @@ void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> 
 inline void BrickBuilder::add_source(const GridBlock& block, uint32_t origin, uint32_t change) {
   if (change == BrickChange::kLeaves) return;
   const bool stays = change == kStays;
-  const Vec3d position = stays ? block.entry(origin & ~GridSlot::kRecent).position : parts_.moves[change].position;
+  const Vec3d position =
+      stays ? block.entry(origin & ~GridSlot::kRecent).position : parts_.moves.moves[change].position;
   sources_.push_back({origin, stays ? BrickSource::kNoMove : change, static_cast<uint32_t>(place_->cell_of(position))});
 }
 
@@ -88,8 +90,9 @@ GridForm BrickBuilder::form_of(const Brick* old, const BrickSource& source) cons
   if ((source.origin & BrickSource::kArrival) != 0) return parts_.arrivals[source.origin & ~BrickSource::kArrival].form;
   const GridBlock& block = (source.origin & GridSlot::kRecent) != 0 ? *old->recent : *old->sorted;
   GridForm form = block.form(source.origin & ~GridSlot::kRecent);
-  if (source.move != BrickSource::kNoMove && parts_.moves[source.move].turns)
-    form.rotation = parts_.moves[source.move].rotation;
+  if (source.move == BrickSource::kNoMove) return form;
+  const uint32_t rotation = parts_.moves.moves[source.move].rotation;
+  if (rotation != GridMove::kKeeps) form.rotation = parts_.moves.rotations[rotation];
   return form;
 }
 
@@ -100,7 +103,7 @@ bool BrickBuilder::any_form_arrives(absl::Span<const BrickChange> changes) const
 }
 
 bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickSource> sources) const {
-  if (parts_.turns || (old != nullptr && old->sorted->has_forms())) return true;
+  if (!parts_.moves.rotations.empty() || (old != nullptr && old->sorted->has_forms())) return true;
   // Arrivals are last.
   for (size_t i = sources.size(); i != 0 && (sources[i - 1].origin & BrickSource::kArrival) != 0; --i)
     if (!(parts_.arrivals[sources[i - 1].origin & ~BrickSource::kArrival].form == GridForm())) return true;
@@ -109,7 +112,7 @@ bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickSource> sour
 
 // `from`: the old brick's sorted and recent values.
 inline void BrickBuilder::prefetch(const GridBlock::Values* from, const BrickSource& source) const {
-  if (source.move != BrickSource::kNoMove) __builtin_prefetch(&parts_.moves[source.move]);
+  if (source.move != BrickSource::kNoMove) __builtin_prefetch(&parts_.moves.moves[source.move]);
   if ((source.origin & BrickSource::kArrival) != 0) return;
   const GridBlock::Values& values = from[source.origin >> 31];
   const uint32_t slot = source.origin & ~GridSlot::kRecent;
@@ -126,7 +129,7 @@ inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* ol
   const GridBlock& sorted = old == nullptr ? block : *old->sorted;
   const GridBlock::Values from[2] = {
       GridBlock::Values(sorted), GridBlock::Values(old == nullptr || old->recent == nullptr ? sorted : *old->recent)};
-  const GridMove* const moves = parts_.moves.data();
+  const GridMove* const moves = parts_.moves.moves.data();
   GridSlot* const slots = slots_->data();
   const uint32_t number = number_;
   const bool has_forms = block.has_forms();

@@ -22,9 +22,8 @@ struct BrickChange {
 
 // What the numbers of changes mean. All borrowed.
 struct BatchParts {
-  absl::Span<const GridMove> moves;
+  GridMoves moves;
   absl::Span<const GridItem> arrivals;
-  bool turns = false;  // whether any of the moves does
 };
 
 class BrickBuilder {

@@ -10,11 +10,21 @@
 namespace locus {
 
 // A new pose for a value that the grid holds.
-struct GridMove {
-  uint32_t handle = 0;
-  bool turns = false;  // else it keeps its rotation
-  Quaternion rotation;
+struct alignas(32) GridMove {
+  static constexpr uint32_t kKeeps = ~0u;
+
   Vec3d position;
+  uint32_t handle = 0;
+  uint32_t rotation = kKeeps;  // the number of its new one among the batch's
+};
+
+// The moves of a batch. All borrowed.
+struct GridMoves {
+  absl::Span<const GridMove> moves;  // of distinct handles
+  absl::Span<const Quaternion> rotations = {};
+  // By handle the number of its move; means nothing for a handle that moves[number] is not of. May be empty: with it,
+  // moves of nearly all values cost less.
+  absl::Span<const uint32_t> by_handle = {};
 };
 
 namespace internal {
@@ -37,21 +47,20 @@ struct BrickSource {
   uint32_t cell;  // where it is to be; not of what goes to the recent values
 };
 
-// The moves of a batch, as values ask for them. All borrowed.
+// The moves of a batch, as values ask for them. There are some, by handle, too.
 class MoveFinder {
  public:
-  // `numbers` as GridBatch::moves_by_handle.
-  MoveFinder(absl::Span<const GridMove> moves, absl::Span<const uint32_t> numbers) : moves_(moves), numbers_(numbers) {}
+  explicit MoveFinder(const GridMoves& moves) : moves_(moves.moves), numbers_(moves.by_handle) {}
 
   // Of any handle; it may be the number of another one's move.
   uint32_t number_of(uint32_t handle) const {
     const uint32_t number = handle < numbers_.size() ? numbers_[handle] : 0;
     return number < moves_.size() ? number : 0;
   }
-  const GridMove& operator[](uint32_t number) const { return moves_[number]; }
+  const GridMove& operator[](uint32_t number) const { return moves_.data()[number]; }
 
  private:
-  absl::Span<const GridMove> moves_;  // not empty
+  absl::Span<const GridMove> moves_;
   absl::Span<const uint32_t> numbers_;
 };
 
@@ -80,8 +89,8 @@ BrickSource* gather_block(const BrickPlace& place, const GridBlock& block, uint3
         continue;
       }
       ++moved;
-      if (place.holds(move.position)) {
-        *to++ = {slot | flag, number, static_cast<uint32_t>(place.cell_of(move.position))};
+      if (const int cell = place.cell_if_here(move.position); cell >= 0) {
+        *to++ = {slot | flag, number, static_cast<uint32_t>(cell)};
       } else {
         leave(block, slot, move);
       }

@@ -113,22 +113,23 @@ void HashGrid::insert(const GridItem& item) {
 }
 
 // To another brick.
-void HashGrid::move_away(const GridMove& move) {
+void HashGrid::move_away(const GridMove& move, const GridMoves& moves) {
   Level& level = *known_[slots_[move.handle].brick].level;
   const GridItem item = at(move.handle).item();
   if (!planted(PlantedBug::kGhostAfterMove)) remove(move.handle);
-  arrive_from(item, move, level);
+  arrive_from(item, move, moves, level);
 }
 
 // `before`: what it was.
-void HashGrid::arrive_from(const GridItem& before, const GridMove& move, Level& level) {
+void HashGrid::arrive_from(const GridItem& before, const GridMove& move, const GridMoves& moves, Level& level) {
   GridItem item = before;
   item.entry.position = move.position;
-  if (move.turns) item.form.rotation = move.rotation;
+  if (move.rotation != GridMove::kKeeps) item.form.rotation = moves.rotations[move.rotation];
   arrive(item, level, internal::brick_of(internal::cell_of(move.position, level.cells_per_unit)));
 }
 
-void HashGrid::move_all(absl::Span<const GridMove> moves) {
+void HashGrid::move_all(const GridMoves& batch) {
+  const absl::Span<const GridMove> moves = batch.moves;
   const size_t before = changes_.size();
   changes_.resize(before + moves.size());
   size_t changes = before;
@@ -145,7 +146,7 @@ void HashGrid::move_all(absl::Span<const GridMove> moves) {
     changes_[changes++] = {touched, {slot.slot, static_cast<uint32_t>(i)}};
   }
   changes_.resize(changes);
-  for (const uint32_t i : away_) move_away(moves[i]);
+  for (const uint32_t i : away_) move_away(moves[i], batch);
 }
 
 void HashGrid::group_changes() {
@@ -162,9 +163,8 @@ void HashGrid::drop_brick(uint32_t brick) {
   free_bricks_.push_back(brick);
 }
 
-void HashGrid::rebuild_bricks(absl::Span<const GridMove> moves) {
-  const bool turns = std::any_of(moves.begin(), moves.end(), [](const GridMove& move) { return move.turns; });
-  builder_.begin({moves, arrivals_, turns}, slots_);
+void HashGrid::rebuild_bricks(const GridMoves& moves) {
+  builder_.begin({moves, arrivals_}, slots_);
   for (size_t i = 0; i < touched_.size(); ++i) {
     prefetch_changes(i);
     const uint32_t brick = touched_[i];
@@ -223,7 +223,7 @@ void HashGrid::apply_to_bricks(const GridBatch& batch) {
     remove(handle);
   }
   if (moves_nearly_all(batch)) {
-    gather_all(batch);
+    gather_all(batch.moves);
   } else {
     move_all(batch.moves);
   }
@@ -244,14 +244,15 @@ void HashGrid::clear_batch() {
 }
 
 bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
-  return !batch.moves_by_handle.empty() && batch.removed.empty() && batch.inserted.empty() && !batch.moves.empty() &&
-         batch.moves.size() >= size_ / 2;
+  const size_t moves = batch.moves.moves.size();
+  return !batch.moves.by_handle.empty() && batch.removed.empty() && batch.inserted.empty() && moves != 0 &&
+         moves >= size_ / 2;
 }
 
 // Instead of move_all(): goes from brick to brick, and looks up the move of each value. Values lie together there, in
 // the order of cells that most of them stay in, so that nothing needs to be found or sorted by brick.
-void HashGrid::gather_all(const GridBatch& batch) {
-  const internal::MoveFinder moves(batch.moves, batch.moves_by_handle);
+void HashGrid::gather_all(const GridMoves& moves) {
+  const internal::MoveFinder finder(moves);
   const auto bricks = static_cast<uint32_t>(known_.size());  // others are new, and hold arrivals only
   sources_.resize(size_);
   internal::BrickSource* to = sources_.data();
@@ -262,10 +263,10 @@ void HashGrid::gather_all(const GridBatch& batch) {
     const auto leave = [&](const internal::GridBlock& block, uint32_t slot, const GridMove& move) {
       --level.size;
       --size_;
-      arrive_from(block.item(slot), move, level);
+      arrive_from(block.item(slot), move, moves, level);
     };
     size_t moved = 0;
-    internal::BrickSource* const end = internal::gather_brick(*brick, moves, to, moved, leave);
+    internal::BrickSource* const end = internal::gather_brick(*brick, finder, to, moved, leave);
     if (moved == 0) continue;
     const uint32_t touched = touch(number);
     if (remains_.size() <= touched) remains_.resize(touched + 1);
@@ -285,7 +286,7 @@ size_t HashGrid::apply(const GridBatch& batch) {
     changes_since_choice_ = 0;
   }
   apply_to_bricks(batch);
-  changes_since_choice_ += batch.removed.size() + batch.moves.size() + batch.inserted.size();
+  changes_since_choice_ += batch.removed.size() + batch.moves.moves.size() + batch.inserted.size();
   if (choice_is_stale()) choose_cell_size();
   return replaced_bytes_;
 }

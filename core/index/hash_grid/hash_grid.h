@@ -34,11 +34,8 @@ struct HashGridOptions {
 // may be removed and inserted again under its handle.
 struct GridBatch {
   absl::Span<const uint32_t> removed;
-  absl::Span<const GridMove> moves;
+  GridMoves moves;
   absl::Span<const GridItem> inserted;
-  // By handle the number of its move in `moves`; means nothing for a handle that moves[number] is not of. May be empty,
-  // and is not borrowed beyond the call: with it, moves of nearly all values cost less.
-  absl::Span<const uint32_t> moves_by_handle = {};
 };
 
 class HashGrid {
@@ -88,8 +85,8 @@ class HashGrid {
   };
 
   void remove(uint32_t handle);
-  void move_away(const GridMove& move);
-  void arrive_from(const GridItem& item, const GridMove& move, Level& level);
+  void move_away(const GridMove& move, const GridMoves& moves);
+  void arrive_from(const GridItem& before, const GridMove& move, const GridMoves& moves, Level& level);
   void insert(const GridItem& item);
   void arrive(const GridItem& item, Level& level, const internal::GridKey& key);
   Level& level_for(float reach);
@@ -99,15 +96,15 @@ class HashGrid {
   void group_changes();
   absl::Span<const internal::BrickChange> changes_of(size_t touched) const;
   void prefetch_changes(size_t touched) const;
-  void rebuild_bricks(absl::Span<const GridMove> moves);
+  void rebuild_bricks(const GridMoves& moves);
   void clear_batch();
   void replace_brick(uint32_t brick, internal::BrickPtr next);
   void drop_brick(uint32_t brick);
   internal::BrickTable& writable_table(Level& level);
-  void move_all(absl::Span<const GridMove> moves);
+  void move_all(const GridMoves& moves);
   void apply_to_bricks(const GridBatch& batch);
   bool moves_nearly_all(const GridBatch& batch) const;
-  void gather_all(const GridBatch& batch);
+  void gather_all(const GridMoves& moves);
   bool choice_is_stale() const;
   void choose_cell_size();
   void rebuild(int base_exponent);

@@ -76,15 +76,19 @@ TEST(ObjectStoreTest, MovesOfFewAmongManyLeaveTheOthersWhereTheyAre) {
   store.apply({}, objects);
   for (int batch = 0; batch < 400; ++batch) {
     std::vector<GridMove> moves;
+    std::vector<Quaternion> rotations;
     for (const Id id : {Id(batch * 7 % 3'000 + 1), Id(batch * 13 % 3'000 + 1)}) {
       if (!moves.empty() && moves[0].handle == store.handle(id)) continue;
       const bool turns = random.chance(0.1);
       Shape& shape = model[id].shape;
       shape.position = random.vector(random.chance(0.2) ? 500 : 10);
       if (turns) shape.rotation = {1, 0, 0, 0};
-      moves.push_back({store.handle(id), turns, shape.rotation, shape.position});
+      moves.push_back({shape.position, store.handle(id)});
+      if (!turns) continue;
+      moves.back().rotation = static_cast<uint32_t>(rotations.size());
+      rotations.push_back(shape.rotation);
     }
-    store.move(moves);
+    store.move({moves, rotations});
     if (batch % 100 == 0) expect_holds(store.snapshot(), model);
   }
   expect_holds(store.snapshot(), model);

@@ -24,8 +24,8 @@ class TickMovesTest : public ::testing::Test {
   }
   void move(uint32_t handle, Vec3d to) {
     moves_.moved(grid_.at(handle), to);
-    const GridMove move{handle, false, {}, to};
-    grid_.apply({{}, {&move, 1}, {}});
+    const GridMove move{to, handle};
+    grid_.apply({{}, {{&move, 1}}, {}});
   }
   size_t fast_count() {
     const auto& fast = moves_.displacement().fast;

@@ -41,18 +41,21 @@ class Crowd {
   // Of about that share of the objects, each at most once.
   void move(double share, bool with_numbers) {
     std::vector<GridMove> moves;
+    std::vector<Quaternion> rotations;
     std::vector<uint32_t> by_handle(with_numbers ? store_.handle_count() : 0, 12345);
     for (Object& object : objects_) {
       if (!random_.chance(share)) continue;
       Shape& shape = object.shape;
       shape.position = random_.chance(0.1) ? random_.vector(kHalf) : shape.position + random_.vector(1);
-      const bool turns = turns_ && random_.chance(0.3);
-      if (turns) shape.rotation = random_.rotation();
       const uint32_t handle = store_.handle(object.id);
       if (with_numbers) by_handle[handle] = static_cast<uint32_t>(moves.size());
-      moves.push_back({handle, turns, shape.rotation, shape.position});
+      moves.push_back({shape.position, handle});
+      if (!turns_ || random_.chance(0.7)) continue;
+      shape.rotation = random_.rotation();
+      moves.back().rotation = static_cast<uint32_t>(rotations.size());
+      rotations.push_back(shape.rotation);
     }
-    store_.move(moves, by_handle);
+    store_.move({moves, rotations, by_handle});
   }
   // One goes, and comes back elsewhere.
   void replace_one() {
