@@ -14,9 +14,11 @@ class ObjectGrid {
   ObjectGrid() : ObjectGrid(HashGridOptions()) {}
   explicit ObjectGrid(const HashGridOptions& options) : store_(options), set_(store_.snapshot()) {}
 
-  void apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
-    store_.apply(removed, inserted);
+  // Returns as ObjectStore::apply().
+  size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
+    const size_t replaced = store_.apply(removed, inserted);
     set_ = store_.snapshot();
+    return replaced;
   }
   void insert(const Object& object) { apply({}, {&object, 1}); }
   bool remove(const Object& object) {

@@ -13,7 +13,8 @@
 namespace locus {
 namespace {
 
-constexpr size_t kChangesPerLook = 64;  // of each value, before the cell size is looked at again
+constexpr size_t kChangesPerLook = 64;   // of each value, before the cell size is looked at again
+constexpr size_t kRefiledAtOnce = 8192;  // values that change cells of one size for those of another with a batch
 
 }  // namespace
 
@@ -38,8 +39,13 @@ GridRef HashGrid::at(uint32_t handle) const {
 
 void HashGrid::prefetch_value(uint32_t handle) const { __builtin_prefetch(&at(handle).entry()); }
 
+// Of the level for values of that reach.
+int HashGrid::exponent_for(float reach) const {
+  return internal::exponent_covering(2.0 * double{reach}, base_exponent_, internal::kMaxCellExponent);
+}
+
 HashGrid::Level& HashGrid::level_for(float reach) {
-  const int exponent = internal::exponent_covering(2.0 * double{reach}, base_exponent_, internal::kMaxCellExponent);
+  const int exponent = exponent_for(reach);
   auto at = levels_.begin();
   while (at != levels_.end() && (*at)->exponent > exponent) ++at;
   if (at == levels_.end() || (*at)->exponent != exponent) at = levels_.insert(at, std::make_unique<Level>(exponent));
@@ -95,8 +101,11 @@ void HashGrid::remove(uint32_t handle) {
   change(slot.brick, {slot.slot, BrickChange::kLeaves});
 }
 
-void HashGrid::arrive(const GridItem& item, Level& level, const GridKey& key) {
-  const uint32_t brick = brick_for(level, key);
+void HashGrid::insert(const GridItem& item) {
+  LOCUS_DCHECK(max_component(abs(item.entry.position)) <= limits::kMaxCoordinate);
+  Level& level = level_for(item.reach);
+  const uint32_t brick =
+      brick_for(level, internal::brick_of(internal::cell_of(item.entry.position, level.cells_per_unit)));
   level.reach = std::max(level.reach, double{item.reach});
   ++level.size;
   ++size_;
@@ -106,26 +115,19 @@ void HashGrid::arrive(const GridItem& item, Level& level, const GridKey& key) {
   arrivals_.push_back(item);
 }
 
-void HashGrid::insert(const GridItem& item) {
-  LOCUS_DCHECK(max_component(abs(item.entry.position)) <= limits::kMaxCoordinate);
-  Level& level = level_for(item.reach);
-  arrive(item, level, internal::brick_of(internal::cell_of(item.entry.position, level.cells_per_unit)));
-}
-
 // To another brick.
 void HashGrid::move_away(const GridMove& move, const GridMoves& moves) {
-  Level& level = *known_[slots_[move.handle].brick].level;
   const GridItem item = at(move.handle).item();
   if (!planted(PlantedBug::kGhostAfterMove)) remove(move.handle);
-  arrive_from(item, move, moves, level);
+  insert_moved(item, move, moves);
 }
 
 // `before`: what it was.
-void HashGrid::arrive_from(const GridItem& before, const GridMove& move, const GridMoves& moves, Level& level) {
+void HashGrid::insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves) {
   GridItem item = before;
   item.entry.position = move.position;
   if (move.rotation != GridMove::kKeeps) item.form.rotation = moves.rotations[move.rotation];
-  arrive(item, level, internal::brick_of(internal::cell_of(move.position, level.cells_per_unit)));
+  insert(item);
 }
 
 void HashGrid::move_all(const GridMoves& batch) {
@@ -263,7 +265,7 @@ void HashGrid::gather_all(const GridMoves& moves) {
     const auto leave = [&](const internal::GridBlock& block, uint32_t slot, const GridMove& move) {
       --level.size;
       --size_;
-      arrive_from(block.item(slot), move, moves, level);
+      insert_moved(block.item(slot), move, moves);
     };
     size_t moved = 0;
     internal::BrickSource* const end = internal::gather_brick(*brick, finder, to, moved, leave);
@@ -286,8 +288,10 @@ size_t HashGrid::apply(const GridBatch& batch) {
     changes_since_choice_ = 0;
   }
   apply_to_bricks(batch);
-  changes_since_choice_ += batch.removed.size() + batch.moves.moves.size() + batch.inserted.size();
-  if (choice_is_stale()) choose_cell_size();
+  const size_t changes = batch.removed.size() + batch.moves.moves.size() + batch.inserted.size();
+  changes_since_choice_ += changes;
+  if (stale_.empty() && choice_is_stale()) choose_cell_size();
+  if (!stale_.empty()) refile(std::max(changes, kRefiledAtOnce));
   return replaced_bytes_;
 }
 
@@ -307,27 +311,40 @@ void HashGrid::choose_cell_size() {
   if (same_number && internal::cell_exponent_serves(sample.values(), size_, base_exponent_)) return;
   size_at_choice_ = size_;
   const int exponent = internal::choose_cell_exponent(sample.values(), size_);
-  if (exponent != base_exponent_) rebuild(exponent);
+  if (exponent != base_exponent_) start_refiling(exponent);
 }
 
-void HashGrid::rebuild(int base_exponent) {
-  std::vector<GridItem> all;
-  all.reserve(size_);
-  for_each([&all](const GridRef& value) {
-    all.push_back(value.item());
-    return true;
-  });
+// Bricks that lie together in order, from the last to the first: they go to the same new ones.
+void HashGrid::start_refiling(int base_exponent) {
   base_exponent_ = base_exponent;
-  levels_.clear();
-  for (size_t brick = 0; brick < known_.size(); ++brick) {
-    if (bricks_[brick] != nullptr) replaced_bytes_ += bricks_[brick]->bytes();
-    bricks_.set(brick, nullptr);
+  for (uint32_t brick = 0; brick < known_.size(); ++brick)
+    if (bricks_[brick] != nullptr) stale_.push_back(brick);
+  const auto order = [this](uint32_t brick) {
+    const GridKey& key = known_[brick].place.key;
+    constexpr int kTogether = 2;  // bits of each axis
+    return std::pair(GridKey{key.x >> kTogether, key.y >> kTogether, key.z >> kTogether}, key);
+  };
+  std::sort(stale_.begin(), stale_.end(), [&](uint32_t a, uint32_t b) { return order(b) < order(a); });
+}
+
+void HashGrid::refile(size_t values) {
+  std::vector<uint32_t> leaving;
+  std::vector<GridItem> items;
+  while (!stale_.empty() && items.size() < values) {
+    const uint32_t number = stale_.back();
+    stale_.pop_back();
+    const internal::Brick* const brick = bricks_[number].get();
+    if (brick == nullptr) continue;
+    const int exponent = brick->place.exponent;
+    internal::for_each_value(*brick, [&](const GridRef& value) {
+      if (exponent_for(value.reach()) == exponent) return true;
+      leaving.push_back(value.handle());
+      items.push_back(value.item());
+      return true;
+    });
   }
-  known_.clear();
-  touch_numbers_.clear();
-  free_bricks_.clear();
-  size_ = 0;
-  apply_to_bricks({{}, {}, all});
+  if (stale_.empty()) std::vector<uint32_t>().swap(stale_);
+  if (!items.empty()) apply_to_bricks({leaving, {}, items});
 }
 
 GridSnapshot HashGrid::snapshot() {

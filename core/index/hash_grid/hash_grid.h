@@ -6,9 +6,10 @@
 // Values are known by handles, small numbers that the caller gives out; a handle names one value at a time.
 //
 // Answers never depend on cell sizes: they only cull. The base cell is chosen anew from a sample of the values when
-// their number has doubled since or fallen to an eighth, and looked at when all have moved some dozen times.
-// Invariants: every value lies in the brick of its position on the level of its reach; no brick is empty; slots_ says
-// where each value is. |position| <= limits::kMaxCoordinate on each axis.
+// their number has doubled since or fallen to an eighth, and looked at when all have moved some dozen times. Values are
+// filed anew a few thousand with each batch, so that none takes long: meanwhile there are levels of both.
+// Invariants: every value lies in the brick of its position on a level at least as wide as it; no brick is empty;
+// slots_ says where each value is. |position| <= limits::kMaxCoordinate on each axis.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
 
@@ -86,9 +87,9 @@ class HashGrid {
 
   void remove(uint32_t handle);
   void move_away(const GridMove& move, const GridMoves& moves);
-  void arrive_from(const GridItem& before, const GridMove& move, const GridMoves& moves, Level& level);
+  void insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves);
   void insert(const GridItem& item);
-  void arrive(const GridItem& item, Level& level, const internal::GridKey& key);
+  int exponent_for(float reach) const;
   Level& level_for(float reach);
   uint32_t brick_for(Level& level, const internal::GridKey& key);
   uint32_t touch(uint32_t brick);
@@ -107,7 +108,8 @@ class HashGrid {
   void gather_all(const GridMoves& moves);
   bool choice_is_stale() const;
   void choose_cell_size();
-  void rebuild(int base_exponent);
+  void start_refiling(int base_exponent);
+  void refile(size_t values);
 
   int base_exponent_;
   size_t first_choice_;
@@ -118,6 +120,7 @@ class HashGrid {
   std::vector<std::unique_ptr<Level>> levels_;  // coarse to fine
   std::vector<Known> known_;                    // by brick
   std::vector<uint32_t> free_bricks_;
+  std::vector<uint32_t> stale_;          // bricks that may hold values of cells chosen before
   std::vector<uint32_t> touch_numbers_;  // by brick: its number among the touched, if the list there says so
   internal::BrickArray bricks_;
   std::vector<internal::GridSlot> slots_;  // by handle

@@ -195,6 +195,36 @@ TEST(HashGridTest, CellSizeFollowsTheValuesAndChangesNoAnswer) {
   EXPECT_EQ(first_difference(grid, scene), "");
 }
 
+// So that no batch takes long: what is replaced with each is a part of the whole.
+TEST(HashGridTest, ValuesAreFiledAnewAFewWithEachBatchAndEveryAnswerStays) {
+  Random random(9);
+  std::vector<Object> objects = crowd(40'000, 1000, 0.01f, 9);
+  ObjectGrid grid;
+  grid.apply({}, objects);
+  const double first_size = grid.statistics().cell_size;
+  const auto crowd_the_middle = [&] {
+    const size_t before = objects.size();
+    for (int i = 0; i < 500; ++i) objects.push_back(ball(objects.size() + 1, random.vector(5), 0.01f));
+    return grid.apply({}, absl::MakeConstSpan(objects).subspan(before));
+  };
+  while (grid.statistics().cell_size == first_size) {
+    crowd_the_middle();
+    ASSERT_LT(objects.size(), 100'000u) << "no other cells were chosen";
+  }
+  int batches = 1;
+  for (; grid.statistics().levels > 1; ++batches) {
+    const double radius = random.chance(0.5) ? 1 : 200;
+    const Balld asked{random.vector(3), radius};
+    size_t expected = 0;
+    for (const Object& object : objects) expected += ball_overlaps(asked, object.shape) ? 1 : 0;
+    EXPECT_EQ(ids_near(grid, asked.center, radius).size(), expected);
+    EXPECT_LT(crowd_the_middle(), grid.statistics().bytes / 2);
+    ASSERT_LT(batches, 100) << "it does not end";
+  }
+  EXPECT_GT(batches, 3);
+  EXPECT_EQ(ids_near(grid, {}, 1e6).size(), objects.size());
+}
+
 TEST(HashGridTest, OptionsRoundTheCellSizeUpToAPowerOfTwoWithinBounds) {
   const auto cell_size = [](double asked) {
     HashGridOptions options;
