@@ -18,6 +18,18 @@ double median_diameter(absl::Span<const SampledValue> sample) {
   return *middle;
 }
 
+// Wider cells would tell nothing apart, and their float columns would say nothing either.
+int exponent_of_all(absl::Span<const SampledValue> sample) {
+  Vec3d low = sample[0].position, high = low;
+  for (const SampledValue& value : sample) {
+    low = min(low, value.position);
+    high = max(high, value.position);
+  }
+  const double width = max_component(high - low), magnitude = max_component(max(abs(low), abs(high)));
+  // Where all are in one place, that is no reason for cells that they leave with every move.
+  return exponent_covering(std::max(4 * width, 0x1p-16 * magnitude), kMinCellExponent, kMaxBaseExponent);
+}
+
 // Expected number of other values in the cell of a random value. A pair of the sample stands for the pairs of the
 // population, so the estimate is not biased by the sample's size.
 double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
@@ -42,7 +54,8 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
   int exponent = exponent_covering(median_diameter(sample), kMinCellExponent, kMaxBaseExponent);
   const double allowed =
       std::max(kMaxMeanPerCell, mean_others_per_cell(sample, population, exponent) + kMeanPerCellMargin);
-  while (exponent < kMaxBaseExponent && mean_others_per_cell(sample, population, exponent + 1) <= allowed) ++exponent;
+  const int widest = exponent_of_all(sample);
+  while (exponent < widest && mean_others_per_cell(sample, population, exponent + 1) <= allowed) ++exponent;
   return exponent;
 }
 

@@ -25,8 +25,8 @@ struct SampledValue {
 
 // The exponent of the largest cell edge, at least the median diameter, at which a random value shares its cell with at
 // most kMaxMeanPerCell others on average, estimated for `population` values of which `sample` is an even selection.
-// Values that no cell size separates do not count against larger cells. `sample` is not empty. Cost: at most about
-// fifty sorts of the sample. Pure.
+// Values that no cell size separates do not count against larger cells; but for the diameter, no cell is much wider
+// than all values together. `sample` is not empty. Cost: at most about fifty sorts of the sample. Pure.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
 // Whether cells of that exponent still do: a random value shares its cell with neither too few others nor too many. For

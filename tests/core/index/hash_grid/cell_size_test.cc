@@ -20,13 +20,20 @@ std::vector<SampledValue> spread(size_t count, double half, double diameter) {
 TEST(CellSizeTest, CoincidentValuesOfAnySizeEndAtASaneChoice) {
   for (const double diameter : {0.0, 1e-9, 1.0, 1e9, 1e12}) {
     const std::vector<SampledValue> values(4096, {{5, 5, 5}, diameter});
-    EXPECT_EQ(choose_cell_exponent(values, 1'000'000), kMaxBaseExponent) << diameter;
+    const int exponent = choose_cell_exponent(values, 1'000'000);
+    EXPECT_EQ(exponent, exponent_covering(std::max(diameter, 5 * 0x1p-16), kMinCellExponent, kMaxBaseExponent))
+        << diameter;
   }
 }
 
 TEST(CellSizeTest, OneValueIsEnough) {
   const std::vector<SampledValue> values(1, {{1, 2, 3}, 0.5});
-  EXPECT_EQ(choose_cell_exponent(values, 1), kMaxBaseExponent);
+  EXPECT_EQ(choose_cell_exponent(values, 1), -1);
+}
+
+TEST(CellSizeTest, CellsOfAFewValuesAreNotMuchWiderThanAllOfThem) {
+  EXPECT_EQ(choose_cell_exponent(spread(20, 0.9, 0.01), 20), 3);
+  EXPECT_LE(choose_cell_exponent(spread(2000, 1, 0.25), 2000), 3);
 }
 
 TEST(CellSizeTest, EvenlySpreadValuesGetUpToAboutTwentyFourCompanions) {
