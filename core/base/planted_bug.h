@@ -28,6 +28,7 @@ enum class PlantedBug {
   kKernelLimit,             // a hit exactly at the limit is lost
   kKernelTie,               // of equal hits the highest number wins
   kKernelPruneEqual,        // boxes that start exactly at the best hit are left out
+  kKernelRowTie,            // of hits as far as the last row kept the lowest number does not push it out
   kKernelHitAfterGivingUp,  // what a packet meets last answers a ray that it left undecided
   // The region kernels:
   kRegionReach,       // boxes of nodes are held against the ball without a pad

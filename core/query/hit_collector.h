@@ -35,15 +35,22 @@ class HitCollector {
       answer_.hits.pop_back();
     }
     answer_.hits.push_back(hit);
-    std::push_heap(answer_.hits.begin(), answer_.hits.end(), nearer);  // farthest first
-    if (answer_.hits.size() == capacity_) limit_ = answer_.hits.front().t;
+    if (answer_.hits.size() == capacity_) {
+      // The farthest first: what comes next may push it out.
+      if (is_heap_)
+        std::push_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
+      else
+        std::make_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
+      is_heap_ = true;
+      limit_ = answer_.hits.front().t;
+    }
     return mode_ != RayMode::kAny;
   }
 
   bool done() const { return mode_ == RayMode::kAny && !answer_.hits.empty(); }
 
   RayAnswer finish() {
-    std::sort_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
+    std::sort(answer_.hits.begin(), answer_.hits.end(), nearer);
     answer_.truncated = mode_ == RayMode::kAll && answer_.hits.size() == capacity_;
     if (answer_.truncated) answer_.hits.pop_back();
     return std::move(answer_);
@@ -53,6 +60,7 @@ class HitCollector {
   const RayMode mode_;
   const size_t capacity_;
   float limit_;
+  bool is_heap_ = false;  // once there are as many hits as kept at most
   RayAnswer answer_;
 };
 

@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "core/query/instance_rays.h"
 
 namespace locus {
 namespace {
+
+// Rows of kAll that a ray gets of one mesh by the kernels; a ray that may have more goes triangle by triangle. Bounds
+// memory.
+constexpr uint32_t kMostRows = 128;
 
 // An instance that a ray has come to.
 struct Stop {
@@ -26,6 +31,9 @@ class Round {
     for (const AskedRay& ray : rays)
       walks_.emplace_back(instances, SlabRay<double>(Rayd{ray.request.origin, ray.request.direction}, kInstancePad));
     stops_.reserve(rays.size());
+    if (mode() != RayMode::kAll) return;
+    most_ = std::min(kMostRows, rays.front().request.max_results + 1);  // one more tells whether there are more
+    rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * most_);
   }
 
   void run() {
@@ -40,6 +48,8 @@ class Round {
   }
 
  private:
+  RayMode mode() const { return rays_.front().request.mode; }
+
   // To the next instance that the ray's filter accepts and its limit reaches, if there is one.
   void walk_on(uint32_t number) {
     AskedRay& ray = rays_[number];
@@ -87,8 +97,10 @@ class Round {
     if (asked_.empty()) return;
     hits_.resize(asked_.size());
     const RayKernels& kernels = *task_.ray_kernels();
-    const bool any = rays_.front().request.mode == RayMode::kAny;
-    (any ? kernels.any : kernels.first)(tree, kernel_rays_.data(), hits_.data(), hits_.size());
+    if (mode() == RayMode::kAll)
+      kernels.all(tree, kernel_rays_.data(), hits_.data(), hits_.size(), rows_.get(), most_);
+    else
+      (mode() == RayMode::kAny ? kernels.any : kernels.first)(tree, kernel_rays_.data(), hits_.data(), hits_.size());
     uint64_t tests = 0;
     for (size_t i = 0; i < asked_.size(); ++i) {
       task_.work().nodes += hits_[i].nodes;
@@ -96,7 +108,12 @@ class Round {
     }
     task_.work().tests += tests;
     task_.count_tests(tests);
-    for (size_t i = 0; i < asked_.size(); ++i) take(now_[asked_[i]], hits_[i]);
+    for (size_t i = 0; i < asked_.size(); ++i) {
+      if (mode() == RayMode::kAll)
+        take_all(now_[asked_[i]], hits_[i], rows_.get() + i * most_);
+      else
+        take(now_[asked_[i]], hits_[i]);
+    }
   }
 
   void take(const Stop& stop, const KernelHit& found) {
@@ -105,6 +122,21 @@ class Round {
     Hit hit = hit_on(*stop.instance, found.t);
     hit.triangle = found.number;
     rays_[stop.ray].collector.offer(hit);
+  }
+
+  void take_all(const Stop& stop, const KernelHit& found, const KernelRow* rows) {
+    if (found.verdict == KernelVerdict::kMiss) return;
+    AskedRay& ray = rays_[stop.ray];
+    const bool may_be_more = found.number == most_ && most_ <= ray.request.max_results;
+    const KernelRow* const end = rows + found.number;
+    const auto before = [&](const KernelRow& row) { return row.t < stop.nearest; };
+    if (found.verdict == KernelVerdict::kUndecided || may_be_more || std::any_of(rows, end, before))
+      return ask_triangles(stop);
+    for (; rows != end; ++rows) {
+      Hit hit = hit_on(*stop.instance, rows->t);
+      hit.triangle = rows->number;
+      ray.collector.offer(hit);
+    }
   }
 
   void ask_triangles(const Stop& stop) {
@@ -134,6 +166,8 @@ class Round {
   std::vector<KernelRay> kernel_rays_;
   std::vector<size_t> asked_;  // which stop each of kernel_rays_ is
   std::vector<KernelHit> hits_;
+  uint32_t most_ = 0;  // kAll: rows of each of kernel_rays_
+  std::unique_ptr<KernelRow[]> rows_;
 };
 
 }  // namespace

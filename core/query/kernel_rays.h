@@ -1,6 +1,6 @@
 // Rays of one piece of a batch against the scene's meshes, by the vector kernels, which want many rays at once. Every
 // ray walks the tree over instances near to far; in each round the kernels take all rays that have come to an instance,
-// mesh by mesh, and what they find shortens the rays. Rays of kFirst and kAny, exact.
+// mesh by mesh, and what they find shortens the rays. Rays of any mode, exact.
 //
 // Threads: one at a time.
 #ifndef LOCUS_CORE_QUERY_KERNEL_RAYS_H_

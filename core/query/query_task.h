@@ -82,7 +82,7 @@ class QueryTask {
   bool check();
   bool ended() const { return ended_; }
 
-  // Kernels for first and any hits in meshes; null where there are none, or where all values are to be tested.
+  // Kernels for exact hits of rays in meshes; null where there are none, or where all values are to be tested.
   const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
 
   // Whether ball and box queries may ask the kernels.

@@ -76,9 +76,8 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-bool asks_kernels(const QueryTask& task, const QueryBlock& block, RayMode mode) {
-  return mode != RayMode::kAll && block.precision == Precision::kExact && block.source != Source::kDynamic &&
-         task.ray_kernels() != nullptr;
+bool asks_kernels(const QueryTask& task, const QueryBlock& block) {
+  return block.precision == Precision::kExact && block.source != Source::kDynamic && task.ray_kernels() != nullptr;
 }
 
 Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
@@ -109,7 +108,7 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
   std::vector<AskedRay> rays;
   rays.reserve(end - begin);
   for (size_t i = begin; i < end; ++i) rays.emplace_back(ray_request(block, columns, winding, i), Filter(block, i));
-  const bool by_kernels = asks_kernels(task, block, columns.mode);
+  const bool by_kernels = asks_kernels(task, block);
   if (by_kernels) ask_meshes(task, rays);
   RayAnswers answers;
   answers.reserve(rays.size());

@@ -84,6 +84,7 @@ constexpr Trial kTrials[] = {
     {"KernelThatLosesAHitAtTheLimit", PlantedBug::kKernelLimit, compare_kernels_with_list},
     {"KernelWithTiesTheWrongWayRound", PlantedBug::kKernelTie, compare_kernels_with_list},
     {"KernelThatPrunesEqualHits", PlantedBug::kKernelPruneEqual, compare_kernels_with_list},
+    {"KernelThatKeepsTheWrongOfEqualRows", PlantedBug::kKernelRowTie, compare_kernels_with_list},
     {"KernelThatAnswersWhatItGaveUp", PlantedBug::kKernelHitAfterGivingUp, compare_kernels_with_list},
     {"RegionKernelWithoutNodePad", PlantedBug::kRegionReach, compare_region_kernels_with_list},
     {"RegionKernelWithoutInnerPad", PlantedBug::kRegionInside, compare_region_kernels_with_list},

@@ -3,14 +3,17 @@
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/types/span.h"
 #include "core/base/check.h"
 #include "core/geometry/ray_triangle.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
@@ -26,24 +29,25 @@ struct KernelQuestion {
   Cull cull = Cull::kNone;
 };
 
-struct KernelAnswer {
-  float t;
-  uint32_t number;
-};
+// Of all hits, the lowest first.
+using KernelAnswer = std::vector<KernelRow>;
 
-inline std::optional<KernelAnswer> answer_of_list(const std::vector<Triangle>& triangles,
-                                                  const KernelQuestion& question) {
+inline void sort_rows(absl::Span<KernelRow> rows) {
+  std::sort(rows.begin(), rows.end(),
+            [](const KernelRow& a, const KernelRow& b) { return std::tie(a.t, a.number) < std::tie(b.t, b.number); });
+}
+
+inline KernelAnswer answer_of_list(const std::vector<Triangle>& triangles, const KernelQuestion& question) {
   const TriangleRay ray(question.origin, question.direction, question.cull);
-  std::optional<KernelAnswer> best;
+  KernelAnswer answer;
   for (const Triangle& triangle : triangles) {
     const std::optional<TriangleHit> found = ray.hit(triangle);
     if (!found) continue;
     const float t = ray.from_scaled(found->t);
-    if (!(t <= question.limit)) continue;
-    if (!best || t < best->t || (t == best->t && triangle.number < best->number))
-      best = KernelAnswer{t, triangle.number};
+    if (t <= question.limit) answer.push_back({t, triangle.number});
   }
-  return best;
+  sort_rows(absl::MakeSpan(answer));
+  return answer;
 }
 
 inline KernelRay kernel_ray(const KernelQuestion& question) {
@@ -56,22 +60,21 @@ inline KernelRay kernel_ray(const KernelQuestion& question) {
 }
 
 // A mesh and questions to it with their answers; each that has a hit is asked again with a limit at, just behind and
-// just before the hit. Immutable.
+// just before the nearest. Immutable.
 class KernelTrial {
  public:
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions)
       : name_(std::move(name)), tree_(*TriangleBvh::build(triangles)) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     for (KernelQuestion question : questions) {
-      const std::optional<KernelAnswer> answer = answer_of_list(triangles, question);
+      const KernelAnswer answer = answer_of_list(triangles, question);
       add(question, answer);
-      if (!answer) continue;
-      question.limit = answer->t;
-      add(question, answer);
-      question.limit = std::nextafter(answer->t, kInfinity);
-      add(question, answer);
-      question.limit = std::nextafter(answer->t, -kInfinity);
-      if (question.limit >= 0) add(question, std::nullopt);
+      if (answer.empty()) continue;
+      const float nearest = answer.front().t;
+      for (const float limit : {nearest, std::nextafter(nearest, kInfinity), std::nextafter(nearest, -kInfinity)}) {
+        question.limit = limit;
+        if (limit >= 0) add(question, answer);
+      }
     }
   }
 
@@ -88,6 +91,8 @@ class KernelTrial {
            {wrong_any(any[i], i), wrong_any(any_alone, i), wrong_first(first[i], i), wrong_first(first_alone, i)})
         if (!what.empty()) return absl::StrCat(name_, ", question ", i, ", ", what);
     }
+    for (const uint32_t most : {1u, 3u, 100u})
+      if (const std::string what = difference_of_all(kernels, most); !what.empty()) return what;
     return "";
   }
 
@@ -95,21 +100,22 @@ class KernelTrial {
   double undecided_share(const RayKernels& kernels) const {
     size_t undecided = 0;
     for (const KernelRay& ray : rays_) {
-      KernelHit first{}, any{};
+      KernelHit first{}, any{}, all{};
+      KernelRow row{};
       kernels.first(tree_.tree(), &ray, &first, 1);
       kernels.any(tree_.tree(), &ray, &any, 1);
-      undecided += first.verdict == KernelVerdict::kUndecided;
-      undecided += any.verdict == KernelVerdict::kUndecided;
+      kernels.all(tree_.tree(), &ray, &all, 1, &row, 1);
+      for (const KernelHit& hit : {first, any, all}) undecided += hit.verdict == KernelVerdict::kUndecided;
     }
-    return static_cast<double>(undecided) / static_cast<double>(2 * rays_.size());
+    return static_cast<double>(undecided) / static_cast<double>(3 * rays_.size());
   }
 
  private:
   // What is wrong with the answer to question `i`; empty for nothing.
   std::string wrong_verdict(const KernelHit& hit, size_t i) const {
     if (hit.verdict == KernelVerdict::kUndecided) return "";
-    if ((hit.verdict == KernelVerdict::kHit) == answers_[i].has_value()) return "";
-    return answers_[i] ? "the hit is missed" : "nothing is hit";
+    if ((hit.verdict == KernelVerdict::kHit) == !answers_[i].empty()) return "";
+    return answers_[i].empty() ? "nothing is hit" : "the hit is missed";
   }
   std::string wrong_any(const KernelHit& hit, size_t i) const {
     const std::string what = wrong_verdict(hit, i);
@@ -118,20 +124,51 @@ class KernelTrial {
   std::string wrong_first(const KernelHit& hit, size_t i) const {
     if (const std::string what = wrong_verdict(hit, i); !what.empty()) return absl::StrCat("first: ", what);
     if (hit.verdict != KernelVerdict::kHit) return "";
-    const KernelAnswer expected = *answers_[i];
+    const KernelRow expected = answers_[i].front();
     if (hit.t != expected.t || std::signbit(hit.t)) return absl::StrCat("first: t is ", hit.t, ", not ", expected.t);
     return hit.number == expected.number ? "" : absl::StrCat("first: ", hit.number, " is hit, not ", expected.number);
   }
 
-  void add(const KernelQuestion& question, std::optional<KernelAnswer> answer) {
+  // The same of all hits, up to `most` a question.
+  std::string difference_of_all(const RayKernels& kernels, uint32_t most) const {
+    std::vector<KernelHit> hits(rays_.size());
+    std::vector<KernelRow> rows(rays_.size() * most), rows_alone(most);
+    kernels.all(tree_.tree(), rays_.data(), hits.data(), rays_.size(), rows.data(), most);
+    for (size_t i = 0; i < rays_.size(); ++i) {
+      KernelHit alone{};
+      kernels.all(tree_.tree(), &rays_[i], &alone, 1, rows_alone.data(), most);
+      for (const std::string& what : {wrong_all(hits[i], absl::MakeSpan(rows).subspan(i * most, most), i),
+                                      wrong_all(alone, absl::MakeSpan(rows_alone), i)})
+        if (!what.empty()) return absl::StrCat(name_, ", question ", i, ", at most ", most, ", ", what);
+    }
+    return "";
+  }
+  std::string wrong_all(const KernelHit& hit, absl::Span<KernelRow> rows, size_t i) const {
+    if (const std::string what = wrong_verdict(hit, i); !what.empty()) return absl::StrCat("all: ", what);
+    if (hit.verdict == KernelVerdict::kUndecided) return "";
+    const size_t expected = std::min(answers_[i].size(), rows.size());
+    if (hit.number != expected) return absl::StrCat("all: ", hit.number, " rows, not ", expected);
+    sort_rows(rows.first(expected));
+    for (size_t row = 0; row < expected; ++row) {
+      const KernelRow &is = rows[row], &should = answers_[i][row];
+      if (is.t != should.t || std::signbit(is.t) || is.number != should.number)
+        return absl::StrCat("all: row ", row, " is ", is.number, " at ", is.t, ", not ", should.number, " at ",
+                            should.t);
+    }
+    return "";
+  }
+
+  // `answer`: with the question's own limit or without.
+  void add(const KernelQuestion& question, KernelAnswer answer) {
+    while (!answer.empty() && answer.back().t > question.limit) answer.pop_back();
     rays_.push_back(kernel_ray(question));
-    answers_.push_back(answer);
+    answers_.push_back(std::move(answer));
   }
 
   std::string name_;
   TriangleBvh tree_;
   std::vector<KernelRay> rays_;
-  std::vector<std::optional<KernelAnswer>> answers_;
+  std::vector<KernelAnswer> answers_;
 };
 
 }  // namespace locus::test

@@ -1,7 +1,7 @@
 // Rays that go to the kernels piece by piece, against every triangle of every instance.
 #include "core/query/kernel_rays.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <string>
@@ -69,6 +69,31 @@ TEST_P(KernelRaysTest, FindWhetherThereIsAHitAsEveryTriangleDoes) {
   RunOptions every_triangle;
   every_triangle.brute_force = true;
   EXPECT_EQ(run_block(*snapshot, rays).hits, run_block(*snapshot, rays, every_triangle).hits);
+}
+
+TEST_P(KernelRaysTest, FindAllHitsOrTheLowestOfThemAsEveryTriangleDoes) {
+  const SnapshotPtr snapshot = snapshot_of(crowd());
+  RunOptions every_triangle;
+  every_triangle.brute_force = true;
+  for (const uint32_t most : {1u, 4u, limits::kDefaultMaxResults}) {
+    OwnedBlock rays = rays_through(RayMode::kAll);
+    rays.settings.max_results = most;
+    EXPECT_EQ(difference(run_block(*snapshot, rays), run_block(*snapshot, rays, every_triangle)), "") << most;
+  }
+}
+
+// More of one mesh than the kernels keep.
+TEST_P(KernelRaysTest, FindAllHitsOfARayThroughManyTrianglesOfOneMesh) {
+  constexpr uint32_t kWalls = 500;
+  std::vector<Triangle> walls;
+  for (uint32_t i = 0; i < kWalls; ++i) walls.push_back(wall_triangle(static_cast<float>(i)));
+  number_in_order(walls);
+  QueryWorld world;
+  world.instances = {placed(1, mesh_of(walls))};
+  const BlockResult result = run_block(*snapshot_of(world), one_ray(RayMode::kAll, {-1, 0, 0}, {1, 0, 0}));
+  EXPECT_THAT(result.truncated, ::testing::IsEmpty());
+  ASSERT_EQ(result.triangles.size(), kWalls);
+  for (uint32_t i = 0; i < kWalls; ++i) EXPECT_EQ(result.triangles[i], i);
 }
 
 TEST_P(KernelRaysTest, ABudgetThatEndsListsTheRaysThatWereLeft) {

@@ -1,5 +1,5 @@
-// What single rays and packets of rays have in common: the rows of a node by the way a ray goes, and which of two hits
-// is the answer.
+// What single rays and packets of rays have in common: the rows of a node by the way a ray goes, and which hits are the
+// answer.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 
@@ -37,6 +37,36 @@ static inline bool is_better(float t, uint32_t number, float limit, bool found, 
   if (t > limit || (planted(PlantedBug::kKernelLimit) && !found && t == limit)) return false;
   return !found || t < limit || (number >= best) == planted(PlantedBug::kKernelTie);
 }
+
+// The lowest hits of one ray so far.
+struct KeptRows {
+  KernelRow* rows;  // where they are as many as wanted, the farthest stands first
+  uint32_t most;
+
+  static inline bool is_lower(const KernelRow& a, const KernelRow& b) {
+    if (planted(PlantedBug::kKernelRowTie)) return a.t < b.t;
+    return a.t < b.t || (a.t == b.t && a.number < b.number);
+  }
+
+  // `count`: how many there are. Lowers the limit once there are as many as wanted.
+  inline void offer(const KernelRow& row, uint32_t& count, float& limit) const {
+    if (row.t > limit) return;
+    if (count < most)
+      rows[count++] = row;
+    else if (is_lower(row, rows[0]))
+      rows[0] = row;
+    else
+      return;
+    if (count < most) return;
+    for (uint32_t i = 1; i < most; ++i) {
+      if (!is_lower(rows[0], rows[i])) continue;
+      const KernelRow farther = rows[i];
+      rows[i] = rows[0];
+      rows[0] = farther;
+    }
+    limit = rows[0].t;
+  }
+};
 
 }  // namespace
 }  // namespace locus

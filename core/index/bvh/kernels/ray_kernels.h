@@ -39,10 +39,16 @@ enum class KernelVerdict : uint8_t { kMiss, kHit, kUndecided };
 
 struct KernelHit {
   float t;          // in lengths of the direction; FIRST only
-  uint32_t number;  // of the triangle, the lowest of those at t; FIRST only
+  uint32_t number;  // FIRST: of the triangle, the lowest of those at t; ALL: how many rows stand
   KernelVerdict verdict;
   uint32_t nodes;  // opened
   uint32_t tests;  // triangles met
+};
+
+// One hit of many.
+struct KernelRow {
+  float t;  // in lengths of the direction
+  uint32_t number;
 };
 
 struct RayKernels {
@@ -52,6 +58,10 @@ struct RayKernels {
   void (*first)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
   // Whether there is a hit at all.
   void (*any)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
+  // The hits of each ray, or the lowest `most` of them, in order of t, then number, where there are that many or more;
+  // `most` >= 1. Those of ray i stand from rows[i * most] on, in no order. What an undecided ray leaves there is void.
+  void (*all)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count, KernelRow* rows,
+              uint32_t most);
 };
 
 // The exported symbol of each instruction set's object. Only to be called on a processor that has it.

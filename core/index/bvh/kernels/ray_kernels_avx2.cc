@@ -4,7 +4,7 @@
 namespace locus {
 
 const RayKernels& ray_kernels_avx2() {
-  static constexpr RayKernels kKernels = {"avx2", trace<false>, trace<true>};
+  static constexpr RayKernels kKernels = {"avx2", trace_first, trace_any, trace_all};
   return kKernels;
 }
 

@@ -29,7 +29,7 @@ struct alignas(64) Flight {
   uint32_t now;  // where it is: a node, a block, or kNoChild at its end
   uint32_t top;
   float limit;
-  uint32_t number;  // of the best hit so far
+  uint32_t number;  // of the best hit so far; kAll: of hits kept
   uint32_t nodes, tests;
   bool found, undecided;
   alignas(64) uint32_t waiting[kTreeStack];
@@ -49,16 +49,19 @@ struct Agenda {
   inline bool empty() const { return counts[kNode] + counts[kBlock] + counts[kEnd] == 0; }
 };
 
+enum class Wanted : uint8_t { kFirst, kAny, kAll };
+
 // Up to kPreparedRays rays through one tree: those whose numbers are given.
-template <bool kAny>
+template <Wanted kWanted>
 class Voyage {
  public:
   inline Voyage(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared, KernelHit* hits,
-                const uint8_t* numbers, uint32_t count, Flight* flights)
+                KeptRows kept, const uint8_t* numbers, uint32_t count, Flight* flights)
       : tree_(tree),
         rays_(rays),
         prepared_(prepared),
         hits_(hits),
+        kept_(kept),
         numbers_(numbers),
         count_(count),
         flights_(flights) {}
@@ -82,6 +85,8 @@ class Voyage {
   }
 
  private:
+  static constexpr bool kAny = kWanted == Wanted::kAny, kAll = kWanted == Wanted::kAll;
+
   struct Met {
     BlockMet block;
     uint32_t number;  // of the block
@@ -95,7 +100,7 @@ class Voyage {
     flight.now = 0;
     flight.top = 1;
     flight.limit = flight.ray.number(kLimit);
-    flight.number = kNoNumber;
+    flight.number = kAll ? 0 : kNoNumber;
     flight.nodes = flight.tests = 0;
     flight.found = flight.undecided = false;
     flight.waiting[0] = kNoChild;
@@ -179,10 +184,18 @@ class Voyage {
       const Verdict verdict = decide(block, place, rays_[flight.index], flight.ray);
       if (verdict.what == KernelVerdict::kUndecided) flight.undecided = true;
       if (verdict.what != KernelVerdict::kHit) continue;
-      const uint32_t number = number_of(tree_, block, place);
-      if (!is_better(verdict.t, number, flight.limit, flight.found, flight.number)) continue;
-      flight.limit = verdict.t;
-      flight.number = number;
+      take(flight, {verdict.t, number_of(tree_, block, place)});
+    }
+  }
+
+  inline void take(Flight& flight, KernelRow hit) const {
+    if constexpr (kAll) {
+      const KeptRows kept = {kept_.rows + uint64_t{flight.index} * kept_.most, kept_.most};
+      kept.offer(hit, flight.number, flight.limit);
+      flight.found = flight.number != 0;
+    } else if (is_better(hit.t, hit.number, flight.limit, flight.found, flight.number)) {
+      flight.limit = hit.t;
+      flight.number = hit.number;
       flight.found = true;
     }
   }
@@ -222,6 +235,7 @@ class Voyage {
   const KernelRay* const rays_;
   const PreparedRays* const prepared_;
   KernelHit* const hits_;
+  const KeptRows kept_;  // kAll: of the first ray
   const uint8_t* const numbers_;
   const uint32_t count_;
   Flight* const flights_;
@@ -270,20 +284,38 @@ static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, c
   return left;
 }
 
-template <bool kAny>
-static void trace(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count) {
+template <Wanted kWanted>
+static inline void trace(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count,
+                         KeptRows kept) {
   PreparedRays prepared[kPreparedRays / kTreeWidth];
   uint8_t rest[kPreparedRays];
   Flight flights[kMostFlights];
   while (count != 0) {
     const auto now = static_cast<uint32_t>(count < kPreparedRays ? count : kPreparedRays);
     for (uint32_t i = 0; i < now; i += kTreeWidth) prepare(rays + i, now - i, tree.magnitude, prepared[i / kTreeWidth]);
-    const uint32_t left = trace_packets<kAny>(tree, rays, prepared, hits, now, rest);
-    Voyage<kAny>(tree, rays, prepared, hits, rest, left, flights).run();
+    uint32_t left = 0;
+    if constexpr (kWanted == Wanted::kAll) {
+      for (; left < now; ++left) rest[left] = static_cast<uint8_t>(left);
+    } else {
+      left = trace_packets<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, rest);
+    }
+    Voyage<kWanted>(tree, rays, prepared, hits, kept, rest, left, flights).run();
     rays += now;
     hits += now;
     count -= now;
+    if (kWanted == Wanted::kAll) kept.rows += uint64_t{now} * kept.most;
   }
+}
+
+static void trace_first(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count) {
+  trace<Wanted::kFirst>(tree, rays, hits, count, {});
+}
+static void trace_any(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count) {
+  trace<Wanted::kAny>(tree, rays, hits, count, {});
+}
+static void trace_all(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count, KernelRow* rows,
+                      uint32_t most) {
+  trace<Wanted::kAll>(tree, rays, hits, count, {rows, most});
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 namespace locus {
 
 const RayKernels& ray_kernels_sse4() {
-  static constexpr RayKernels kKernels = {"sse4", trace<false>, trace<true>};
+  static constexpr RayKernels kKernels = {"sse4", trace_first, trace_any, trace_all};
   return kKernels;
 }
 

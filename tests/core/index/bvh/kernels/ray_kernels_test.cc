@@ -15,6 +15,8 @@
 namespace locus::test {
 namespace {
 
+Triangle wall_at(float x, uint32_t number) { return {{x, -1, -1}, {x, 1, -1}, {x, -1, 1}, number}; }
+
 class RayKernelsTest : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
@@ -103,21 +105,35 @@ TEST_P(RayKernelsTest, DecideSliversAndTrianglesWithoutAreaAsAllTrianglesDo) {
 
 TEST_P(RayKernelsTest, OfEqualHitsTheLowestNumberWins) { EXPECT_EQ(copies_trial().difference(*kernels_), ""); }
 
+// Where few of many are wanted, what lies behind them is not looked at.
+TEST_P(RayKernelsTest, RowsThatAreFullShortenTheRay) {
+  std::vector<Triangle> walls;
+  for (uint32_t i = 0; i < 1'000; ++i) walls.push_back(wall_at(static_cast<float>(i), i));
+  const TriangleBvh tree = *TriangleBvh::build(walls);
+  const KernelRay ray = kernel_ray({{-1, -0.5, -0.5}, {1, 0, 0}});
+  KernelHit hit{};
+  std::vector<KernelRow> rows(20);
+  kernels_->all(tree.tree(), &ray, &hit, 1, rows.data(), 20);
+  EXPECT_EQ(hit.number, 20u);
+  EXPECT_LT(hit.tests, 60u);
+}
+
 // The bound of a call: a pile of triangles that all lie on the ray's way and are all missed.
 TEST_P(RayKernelsTest, ARayThatMeetsTooManyTrianglesIsLeftUndecided) {
   std::vector<Triangle> pile;
-  for (uint32_t i = 0; i < 3 * kMaxKernelTests; ++i) {
-    const float x = static_cast<float>(i);
-    pile.push_back({{x, -1, -1}, {x, 1, -1}, {x, -1, 1}, i});
-  }
+  for (uint32_t i = 0; i < 3 * kMaxKernelTests; ++i) pile.push_back(wall_at(static_cast<float>(i), i));
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(pile);
   ASSERT_TRUE(tree.ok());
   const KernelRay ray = kernel_ray({{-1, 0.9, 0.9}, {1, 0, 0}});
-  KernelHit hit{};
-  active_ray_kernels()->first(tree->tree(), &ray, &hit, 1);
-  EXPECT_EQ(hit.verdict, KernelVerdict::kUndecided);
-  EXPECT_GT(hit.tests, kMaxKernelTests);
-  EXPECT_LT(hit.tests, kMaxKernelTests + 9);
+  KernelHit first{}, all{};
+  KernelRow row{};
+  kernels_->first(tree->tree(), &ray, &first, 1);
+  kernels_->all(tree->tree(), &ray, &all, 1, &row, 1);
+  for (const KernelHit& hit : {first, all}) {
+    EXPECT_EQ(hit.verdict, KernelVerdict::kUndecided);
+    EXPECT_GT(hit.tests, kMaxKernelTests);
+    EXPECT_LT(hit.tests, kMaxKernelTests + 9);
+  }
 }
 
 std::vector<std::string> with_kernels() {
