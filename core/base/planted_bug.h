@@ -15,6 +15,7 @@ enum class PlantedBug {
   kRewindReach,        // between two ticks objects are looked for only where they were at the first
   kUnpaddedNear,       // the near side of the slab test of tree nodes goes without its pad
   kEdgeOnInDouble,     // triangles nearly edge-on are decided in double, like all others
+  kGridBallMargin,     // float culls what balls reach without its error bound
   kNearestLimit,       // boxes as far as the farthest thing found near a point are left out
   kNearestTreePad,     // float decides distances to the boxes of triangles without its pad
   // The ray kernels:

@@ -1,5 +1,7 @@
 #include "core/query/overlap_query.h"
 
+#include <optional>
+
 #include "core/index/regions.h"
 #include "core/query/placed_triangle.h"
 #include "core/query/triangle_search.h"
@@ -40,6 +42,7 @@ struct BallShape {
   }
   static double size(const Ballf& ball) { return ball.radius; }
   static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
+  static std::optional<Balld> as_ball(const Balld& ball) { return ball; }
   static bool overlaps_bounds(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
   static bool overlaps_object(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
   static Verdict verdict(const Balld& ball, const LooselyPlaced& object) {
@@ -63,6 +66,7 @@ struct BoxShape {
   }
   static double size(const Obbf& box) { return max_component(box.half); }
   static double reach(const Obbd& box) { return max_component(abs(box.center)) + max_component(box.half) * 2; }
+  static std::optional<Balld> as_ball(const Obbd&) { return std::nullopt; }
   static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
   static Verdict verdict(const Obbd& box, const LooselyPlaced& object) {
@@ -82,6 +86,10 @@ class ObjectRows {
       : task_(task), moment_(moment), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
 
   Aabbd bounds() const { return region_.bounds(); }
+  // What wanted objects themselves, not only their bounds, reach into; nothing where that is not a ball.
+  std::optional<Balld> ball() const {
+    return options_.precision == Precision::kExact ? Kind::as_ball(shape_) : std::nullopt;
+  }
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <functional>
+#include <optional>
 
 #include "absl/status/status.h"
 #include "core/base/column.h"
@@ -133,10 +134,13 @@ class QueryTask {
   template <class Visitor>
   void visit_objects_in_region(const Moment& moment, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
+    const Aabbd bounds = std::as_const(visitor).bounds();
     if (brute_force_)
       moment.objects().grid().for_each(visit);
+    else if (const std::optional<Balld> ball = std::as_const(visitor).ball())
+      moment.visit_ball(*ball, bounds, work_, visit);
     else
-      moment.visit_region(std::as_const(visitor).bounds(), work_, visit);
+      moment.visit_region(bounds, work_, visit);
   }
 
  private:

@@ -48,6 +48,8 @@ class Moment {
   // As GridSnapshot's, of objects() where they are at this moment.
   template <class Visit>
   void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
+  template <class Visit>
+  void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
   template <class Limit, class Visit>
@@ -96,6 +98,12 @@ void Moment::visit_region(const Aabbd& region, Work& work, const Visit& visit) c
   if (!visit_fast([&region](const Aabbd& bounds) { return overlaps(bounds, region); }, work, visit)) return;
   at_->grid().visit_region(near, work,
                            [&](const GridRef& object) { return is_fast(object.handle()) || visit(object); });
+}
+
+template <class Visit>
+void Moment::visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const {
+  if (next_ == nullptr) return at_->grid().visit_ball(ball, bounds, work, visit);
+  visit_region(bounds, work, visit);
 }
 
 template <class Limit, class Visit>

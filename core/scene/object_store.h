@@ -45,7 +45,7 @@ class ObjectStore {
   size_t handle_count() const { return next_handle_; }
   GridRef at(uint32_t handle) const { return grid_.at(handle); }
   // Asks for the memory of at(), some time before it is needed.
-  void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
+  [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
 
   // Removes the objects of one span, as they are, and inserts those of the other: a changed object is in both, under
   // its id, and lives on unless it is among the `reborn`. All removed ones must be here, no inserted one may remain

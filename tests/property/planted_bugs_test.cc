@@ -30,6 +30,10 @@ std::string compare_grids_with_list() {
   return search_grid_scenes(scaled_count(400), any_adversarial_scene, grid_difference);
 }
 
+std::string compare_balls_of_grids_with_list() {
+  return search_grid_scenes(scaled_count(400), any_adversarial_scene, grid_ball_difference);
+}
+
 std::string compare_moving_grids_with_list() {
   return search_grid_scenes(scaled_count(40), any_adversarial_scene, moving_grid_difference);
 }
@@ -68,6 +72,7 @@ constexpr Trial kTrials[] = {
     {"TreeThatLeavesOutWhatIsAsFar", PlantedBug::kNearestLimit, compare_trees_with_list},
     {"TreeWithUnpaddedDistances", PlantedBug::kNearestTreePad, compare_triangle_trees_with_list},
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
+    {"GridThatTrustsFloatWithBalls", PlantedBug::kGridBallMargin, compare_balls_of_grids_with_list},
     {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},
     {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},

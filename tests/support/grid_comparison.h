@@ -35,6 +35,30 @@ inline std::string grid_difference(const ObjectScene& scene, Random& random) {
   return "";
 }
 
+// Balls of a scene, and such as just touch some of its values, asked as balls and not by their bounds.
+inline std::string grid_ball_difference(const ObjectScene& scene, Random& random) {
+  ObjectGrid grid(random_grid_options(random));
+  grid.apply({}, scene.values);
+  std::vector<Balld> balls = scene.balls;
+  for (int i = 0; i < 20 && !scene.values.empty(); ++i) {
+    const Shape& shape = random.pick(scene.values).shape;
+    const Vec3d toward = random.unit_vector();
+    const double away = random.magnitude(-10, 20), reach = shape.kind == ShapeKind::kBall ? double{shape.radius} : 0;
+    balls.push_back({shape.position + toward * (away + reach), away});
+  }
+  for (const Balld& ball : balls) {
+    size_t expected = 0, found = 0;
+    for (const Object& object : scene.values) expected += ball_overlaps(ball, object.shape) ? 1 : 0;
+    Work work;
+    grid.snapshot().grid().visit_ball(ball, bounds_of(ball), work, [&](const GridRef& value) {
+      found += ball_overlaps(ball, shape_of(value)) ? 1 : 0;
+      return true;
+    });
+    if (found != expected) return "a ball finds " + std::to_string(found) + " instead of " + std::to_string(expected);
+  }
+  return "";
+}
+
 // Puts each object where another one is, so that it fits the queries of the scene, or a little beside.
 inline Object moved(const Object& object, const std::vector<Object>& objects, Random& random) {
   Object result = object;

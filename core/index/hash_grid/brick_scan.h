@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/base/planted_bug.h"
+#include "core/geometry/ball.h"
 #include "core/geometry/ray.h"
 #include "core/index/hash_grid/brick.h"
 #include "core/index/hash_grid/kernels/grid_dispatch.h"
@@ -73,6 +74,19 @@ inline GridBox cull_box_of(const Brick& brick, const Aabbd& region) {
   return box;
 }
 
+inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
+  const Vec3d center = ball.center - brick.place.center;
+  const double magnitude = max_component(abs(center)) + brick.place.edge + ball.radius + brick.largest_reach;
+  GridBall cull;
+  for (int axis = 0; axis < 3; ++axis) cull.center[axis] = static_cast<float>(center[axis]);
+  if (planted(PlantedBug::kGridBallMargin))
+    return {{cull.center[0], cull.center[1], cull.center[2]}, static_cast<float>(ball.radius)};
+  // The differences, squares and their sum below are off by less than four 2^-24 of the distance.
+  cull.radius = static_cast<float>((ball.radius + cull_margin(brick) + 4 * double{kCullSlack} * magnitude) *
+                                   (1 + 2 * double{kCullSlack}));
+  return cull;
+}
+
 // The ray's line as seen from the brick, by its point nearest to the centre, so that the numbers are small.
 inline GridLine cull_line_of(const Brick& brick, const SlabRay<double>& ray, double ray_margin) {
   const Vec3d direction = ray.direction() * (1 / max_component(abs(ray.direction())));
@@ -121,7 +135,7 @@ class RowScan {
     work_.cells += rows_.count;
     rows_.count = 0;
     values_ = 0;
-    for (uint32_t i = 0; i < kept; ++i) __builtin_prefetch(&block_.entry(slots_[i]));
+    for (uint32_t i = 0; i < kept; ++i) block_.prefetch_entry(slots_[i]);
     for (uint32_t i = 0; i < kept; ++i) {
       ++work_.tests;
       if (!visit_(GridRef(block_, slots_[i], brick_))) return false;

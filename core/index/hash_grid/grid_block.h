@@ -77,15 +77,18 @@ class GridBlock {
   std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }
   const std::array<uint32_t, kBrickCells + 1>& offsets() const { return offsets_; }
 
-  // Asks for the memory of a value that is to be read or put() soon.
-  void prefetch_value(uint32_t slot) const {
+  // Asks for the memory of a value that is to be read or put() soon: an entry lies in two lines more often than in one.
+  [[gnu::always_inline]] void prefetch_entry(uint32_t slot) const {
     const char* const entry = reinterpret_cast<const char*>(&entries_[slot]);
     __builtin_prefetch(entry);
     __builtin_prefetch(entry + sizeof(GridEntry) - 1);
+  }
+  [[gnu::always_inline]] void prefetch_value(uint32_t slot) const {
+    prefetch_entry(slot);
     __builtin_prefetch(&handles_[slot]);
     __builtin_prefetch(&column(3)[slot]);
   }
-  void prefetch_place(uint32_t slot) const {
+  [[gnu::always_inline]] void prefetch_place(uint32_t slot) const {
     for (int number = 0; number < 3; ++number) __builtin_prefetch(&column(number)[slot], 1);
     prefetch_value(slot);
   }

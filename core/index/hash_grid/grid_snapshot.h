@@ -61,6 +61,10 @@ class GridSnapshot {
   // visit(GridRef) for every value whose bounds overlap `region`, and for others near it; false ends the visit.
   template <class Visit>
   void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
+  // The same for a ball with those bounds: visit(GridRef) for every value of which a part lies in the ball, and for
+  // others near it. Fewer than by the bounds alone, but not all whose own bounds overlap them.
+  template <class Visit>
+  void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
 
   // visit(GridRef) for every value whose own interval on the ray has near <= far, far >= 0 and near <= limit(), and for
   // others near the ray; roughly near to far on each level. limit() may fall meanwhile; false ends the visit. For
@@ -99,6 +103,9 @@ class GridSnapshot {
   template <class Fn>
   bool for_each_brick(const internal::GridLevel& level, const internal::KeyRange& bricks, Work& work,
                       const Fn& fn) const;
+  // cull_of(brick) says which values of the brick are visited: as RowScan's Cull.
+  template <class CullOf, class Visit>
+  void visit_cells(const Aabbd& region, Work& work, const CullOf& cull_of, const Visit& visit) const;
   template <class Limit, class Visit>
   bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, const SlabRay<double>& ray,
              const Limit& limit, Work& work, const Visit& visit) const;
@@ -152,12 +159,30 @@ bool GridSnapshot::for_each_brick(const internal::GridLevel& level, const intern
 
 template <class Visit>
 void GridSnapshot::visit_region(const Aabbd& region, Work& work, const Visit& visit) const {
-  const GridKernels& kernels = active_grid_kernels();
+  const auto cull_of = [&region, &kernels = active_grid_kernels()](const internal::Brick& brick) {
+    return [&kernels, box = internal::cull_box_of(brick, region)](const GridRows& rows, uint32_t* slots) {
+      return kernels.cull_box(rows, box, slots);
+    };
+  };
+  visit_cells(region, work, cull_of, visit);
+}
+
+template <class Visit>
+void GridSnapshot::visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const {
+  const auto cull_of = [&ball, &kernels = active_grid_kernels()](const internal::Brick& brick) {
+    return [&kernels, seen = internal::cull_ball_of(brick, ball)](const GridRows& rows, uint32_t* slots) {
+      return kernels.cull_ball(rows, seen, slots);
+    };
+  };
+  visit_cells(bounds, work, cull_of, visit);
+}
+
+template <class CullOf, class Visit>
+void GridSnapshot::visit_cells(const Aabbd& region, Work& work, const CullOf& cull_of, const Visit& visit) const {
   for (const internal::GridLevel& level : levels_) {
     const internal::KeyRange cells = internal::cells_near(level, region);
     const bool go_on = for_each_brick(level, internal::bricks_of(cells), work, [&](const internal::Brick& brick) {
-      const GridBox box = internal::cull_box_of(brick, region);
-      const auto cull = [&](const GridRows& rows, uint32_t* slots) { return kernels.cull_box(rows, box, slots); };
+      const auto cull = cull_of(brick);
       return internal::scan_cells(brick, internal::within_brick(cells, brick.place.key), work, cull, visit) &&
              internal::scan_recent(brick, work, cull, visit);
     });

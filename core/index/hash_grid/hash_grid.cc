@@ -37,8 +37,6 @@ GridRef HashGrid::at(uint32_t handle) const {
   return {recent ? *brick.recent : *brick.sorted, slot.slot & ~GridSlot::kRecent, slot.brick};
 }
 
-void HashGrid::prefetch_value(uint32_t handle) const { __builtin_prefetch(&at(handle).entry()); }
-
 // Of the level for values of that reach.
 int HashGrid::exponent_for(float reach) const {
   return internal::exponent_covering(2.0 * double{reach}, base_exponent_, internal::kMaxCellExponent);

@@ -48,8 +48,7 @@ class HashGrid {
   // The value of `handle`, which is in the grid.
   GridRef at(uint32_t handle) const;
   // Asks for the memory of at(), some time before it is needed.
-  void prefetch_slot(uint32_t handle) const { __builtin_prefetch(&slots_[handle]); }
-  void prefetch_value(uint32_t handle) const;
+  [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { __builtin_prefetch(&slots_[handle]); }
   // Returns the bytes of what the snapshots so far hold and later ones will not. O(n) and the bricks that are touched.
   size_t apply(const GridBatch& batch);
 

@@ -10,14 +10,13 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// Ids of what a region meets; `meets` decides by the shape.
-template <class Region, class Meets>
-void collect(const SceneSnapshot& snapshot, const Region& region, const Meets& meets, std::vector<uint64_t>& ids) {
-  Work work;
-  snapshot.objects.grid().visit_region(region.bounds(), work, [&](const GridRef& object) {
+// What GridSnapshot's visits take: puts ids of what meets() says so of into `ids`.
+template <class Meets>
+auto collector(const Meets& meets, std::vector<uint64_t>& ids) {
+  return [&meets, &ids](const GridRef& object) {
     if (meets(shape_of(object))) ids.push_back(object.entry().id);
     return true;
-  });
+  };
 }
 
 // Up to kRayLength; the lower id wins a tie.
@@ -194,8 +193,9 @@ void Ours::insert(const Objects& objects) {
 void Ours::balls(absl::Span<const Vec3f> centers, Answers& answers) {
   each_region(centers, answers, [&](Vec3f center, std::vector<uint64_t>& ids) {
     const Balld ball = {to_double(center), kReach};
-    collect(
-        *snapshot_, BallRegion<double>(ball), [&](const Shape& shape) { return ball_overlaps(ball, shape); }, ids);
+    Work work;
+    const auto meets = [&](const Shape& shape) { return ball_overlaps(ball, shape); };
+    snapshot_->objects.grid().visit_ball(ball, BallRegion<double>(ball).bounds(), work, collector(meets, ids));
   });
 }
 
@@ -204,8 +204,9 @@ void Ours::boxes(absl::Span<const Vec3f> centers, Answers& answers) {
     Obbd box;
     box.center = to_double(center);
     box.half = {kReach, kReach, kReach};
-    collect(
-        *snapshot_, BoxRegion<double>(box), [&](const Shape& shape) { return box_overlaps(box, shape); }, ids);
+    Work work;
+    const auto meets = [&](const Shape& shape) { return box_overlaps(box, shape); };
+    snapshot_->objects.grid().visit_region(BoxRegion<double>(box).bounds(), work, collector(meets, ids));
   });
 }
 

@@ -21,6 +21,10 @@ TEST(HashGridEqualsListTest, OnScenesMadeToBreakGrids) {
   EXPECT_EQ(search_grid_scenes(scaled_count(2'000), grid_scene, grid_difference), "");
 }
 
+TEST(HashGridEqualsListTest, OnBallsThatAreNotAskedByTheirBounds) {
+  EXPECT_EQ(search_grid_scenes(scaled_count(1'000), any_adversarial_scene, grid_ball_difference), "");
+}
+
 TEST(HashGridEqualsListTest, ThroughRandomInsertsMovesAndRemoves) {
   EXPECT_EQ(search_grid_scenes(scaled_count(300), any_adversarial_scene, moving_grid_difference), "");
 }

@@ -93,6 +93,13 @@ void expect_finds(const ObjectSet& set, const std::vector<Object>& objects, Rand
     size_t expected = 0;
     for (const Object& object : objects) expected += ball_overlaps(ball, object.shape) ? 1 : 0;
     EXPECT_EQ(found.size(), expected);
+    size_t by_ball = 0;
+    Work work;
+    set.grid().visit_ball(ball, bounds_of(ball), work, [&](const GridRef& value) {
+      by_ball += ball_overlaps(ball, shape_of(value)) ? 1 : 0;
+      return true;
+    });
+    EXPECT_EQ(by_ball, expected);
     for (const Object& object : found) EXPECT_EQ(object, objects[object.id - 1]);
   }
 }
