@@ -28,7 +28,7 @@ class Cgal : public Peer {
     tree_.insert(surface_.cbegin(), surface_.cend());
     tree_.build();
   }
-  bool does(Task task) const override { return task != Task::kBall; }
+  bool does(Task task) const override { return task != Task::kBall && task != Task::kAll; }
   bool slow() const override { return true; }
   std::string known_fault(Task) const override { return "CGAL decides and constructs in float here, without a filter"; }
 

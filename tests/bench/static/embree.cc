@@ -223,6 +223,39 @@ class RayPackets : public Peer {
   std::shared_ptr<const Scene> scene_;
 };
 
+// rtcOccluded1 with a filter that takes down each hit and goes on as if there were none.
+class AllHits : public Peer {
+ public:
+  explicit AllHits(std::shared_ptr<const Scene> scene) : Peer("embree_robust"), scene_(std::move(scene)) {}
+  bool does(Task task) const override { return task == Task::kAll; }
+  void ray_ids(absl::Span<const RayQuery> rays, absl::Span<uint32_t> ids, uint32_t* counts) override {
+    Found found{context_of(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT), ids.data(), 0};
+    found.context.filter = take_down;
+    RTCRay asked;
+    for (const RayQuery& ray : rays) {
+      set(asked, ray);
+      found.count = 0;
+      rtcOccluded1(scene_->get(), &found.context, &asked);
+      *counts++ = found.count;
+    }
+  }
+
+ private:
+  struct Found {
+    RTCIntersectContext context;  // first: Embree knows this much of it
+    uint32_t* ids;
+    uint32_t count;
+  };
+
+  static void take_down(const RTCFilterFunctionNArguments* arguments) {
+    auto& found = *reinterpret_cast<Found*>(arguments->context);
+    found.ids[found.count++] = RTCHitN_primID(arguments->hit, arguments->N, 0);
+    arguments->valid[0] = 0;
+  }
+
+  std::shared_ptr<const Scene> scene_;
+};
+
 // rtcPointQuery; each triangle it hands over is decided by a float test. Boxes go by the ball around them.
 class PointQuery : public Peer {
  public:
@@ -306,7 +339,10 @@ void add_embree_peers(const BenchMesh& mesh, Needs needs, Peers& peers) {
     peers.push_back(std::make_unique<RayPackets<RTCRayHit8, 8>>("embree_intersect8", usual));
     peers.push_back(std::make_unique<RayPackets<RTCRayHit16, 16>>("embree_intersect16", usual));
   }
-  if (needs.regions) peers.push_back(std::make_unique<PointQuery>(mesh, usual));
+  if (!needs.regions) return;
+  peers.push_back(std::make_unique<PointQuery>(mesh, usual));
+  const auto filtered = committed(mesh, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+  peers.push_back(std::make_unique<AllHits>(filtered));
 }
 
 std::unique_ptr<Builder> embree_builder(const BenchMesh& mesh) { return std::make_unique<EmbreeBuilder>(mesh); }

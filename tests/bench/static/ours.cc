@@ -18,6 +18,8 @@ namespace {
 
 constexpr size_t kBatch = 1024;      // rays given to the kernels at once
 constexpr size_t kRegionBatch = 16;  // balls or boxes given at once
+constexpr size_t kAllBatch = 256;    // rays of which all hits are asked, and how many of each
+constexpr uint32_t kMostRows = 128;
 
 using AskKernel = void (*)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
 
@@ -79,6 +81,33 @@ void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQue
   }
 }
 
+// All hits of one ray, from the start of `ids`.
+uint32_t all_by_triangles(const TriangleBvh& tree, const RayQuery& ray, uint32_t* ids) {
+  std::vector<RayHit<Triangle>> found;
+  all_rays(tree, triangle_ray(ray), just_beyond(ray.t_max), tree.size(), found);
+  for (const RayHit<Triangle>& hit : found) *ids++ = hit.value.number;
+  return static_cast<uint32_t>(found.size());
+}
+
+// The same by the kernels, where they hold; of up to kAllBatch rays. Starts again where `ids` might not do.
+void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<const RayQuery> rays,
+              absl::Span<uint32_t> ids, uint32_t* counts, KernelRow* rows) {
+  std::array<KernelRay, kAllBatch> batch;
+  std::array<KernelHit, kAllBatch> hits;
+  std::transform(rays.begin(), rays.end(), batch.begin(), kernel_ray);
+  kernels.all(tree.tree(), batch.data(), hits.data(), rays.size(), rows, kMostRows);
+  size_t used = 0;
+  for (size_t i = 0; i < rays.size(); ++i, rows += kMostRows) {
+    if (used > kSpareIds) used = 0;
+    const bool settled = hits[i].verdict != KernelVerdict::kUndecided && hits[i].number < kMostRows &&
+                         kernels_hold(rays[i], tree.tree().magnitude);
+    if (settled)
+      std::transform(rows, rows + hits[i].number, ids.begin() + used, [](const KernelRow& row) { return row.number; });
+    counts[i] = settled ? hits[i].number : all_by_triangles(tree, rays[i], ids.data() + used);
+    used += counts[i];
+  }
+}
+
 // Each batch from the start of `ids` again; what does not fit behind the others is asked once more.
 template <class Shape>
 void find_in_batches(const TriangleBvh& tree, absl::Span<const Shape> shapes, absl::Span<uint32_t> ids,
@@ -136,6 +165,18 @@ void Ours::any(absl::Span<const RayQuery> rays, uint8_t* answers) {
   }
   const auto settled = [&](size_t i, const KernelHit& hit) { answers[i] = hit.verdict == KernelVerdict::kHit ? 1 : 0; };
   ask_kernels(tree, kernels->any, rays, settled, by_triangles);
+}
+
+void Ours::ray_ids(absl::Span<const RayQuery> rays, absl::Span<uint32_t> ids, uint32_t* counts) {
+  const TriangleBvh& tree = mesh_->tree();
+  const RayKernels* const kernels = active_ray_kernels();
+  if (kernels == nullptr) {
+    for (const RayQuery& ray : rays) *counts++ = all_by_triangles(tree, ray, ids.data());
+    return;
+  }
+  const auto rows = std::make_unique_for_overwrite<KernelRow[]>(std::min(rays.size(), kAllBatch) * kMostRows);
+  for (size_t begin = 0; begin < rays.size(); begin += kAllBatch)
+    find_all(tree, *kernels, rays.subspan(begin, kAllBatch), ids, counts + begin, rows.get());
 }
 
 void Ours::ball_ids(absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) {

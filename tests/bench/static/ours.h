@@ -18,6 +18,7 @@ class Ours : public Peer {
   bool does(Task) const override { return true; }
   void first(absl::Span<const RayQuery> rays, RayAnswer* answers) override;
   void any(absl::Span<const RayQuery> rays, uint8_t* answers) override;
+  void ray_ids(absl::Span<const RayQuery> rays, absl::Span<uint32_t> ids, uint32_t* counts) override;
   void ball_ids(absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) override;
   void box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) override;
 

@@ -24,7 +24,7 @@ struct RayAnswer {
 };
 
 // What a case asks.
-enum class Task : uint8_t { kFirst, kFirstOfCamera, kAny, kBall, kBox };
+enum class Task : uint8_t { kFirst, kFirstOfCamera, kAny, kAll, kBall, kBox };
 
 class Peer {
  public:
@@ -43,9 +43,10 @@ class Peer {
   // `answers` holds one for each ray. Only what does() says is called.
   virtual void first(absl::Span<const RayQuery>, RayAnswer*) {}
   virtual void any(absl::Span<const RayQuery>, uint8_t*) {}
-  // The numbers of all triangles that each ball or box reaches, in any order, written to `ids` from its start again
-  // where that is full or the peer works query by query; it has room for all triangles of the mesh and kSpareIds more.
-  // A call with one query leaves that query's numbers at the start. `counts`: how many, query by query.
+  // The numbers of all triangles that each ray, ball or box reaches, in any order, written to `ids` from its start
+  // again where that is full or the peer works query by query; it has room for all triangles of the mesh and kSpareIds
+  // more. A call with one query leaves that query's numbers at the start. `counts`: how many, query by query.
+  virtual void ray_ids(absl::Span<const RayQuery>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void ball_ids(absl::Span<const Ballf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void box_ids(absl::Span<const Obbf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
 
@@ -55,7 +56,7 @@ class Peer {
 
 using Peers = std::vector<std::unique_ptr<Peer>>;
 
-// Whether rays, or balls and boxes, are asked at all: what is not is not built.
+// Whether hits of rays, or all triangles of a ray, ball or box, are asked at all: what is not is not built.
 struct Needs {
   bool rays = false;
   bool regions = false;

@@ -1,5 +1,8 @@
 #include "tests/bench/static/region_cases.h"
 
+#include <optional>
+
+#include "core/geometry/ray_triangle.h"
 #include "core/geometry/triangle_overlap.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/results_hash.h"
@@ -11,13 +14,14 @@ namespace {
 struct RegionCase {
   const char* name;
   Task task;
-  float fraction;  // of the diagonal
+  float fraction;  // of the diagonal; rays end nowhere
   uint64_t seed;
   size_t count;  // a tenth for meshes of more than a million triangles
   size_t quick_count;
   size_t chunk;
 };
-constexpr RegionCase kCases[] = {{"ball/0.5", Task::kBall, 0.005f, 301, 50'000, 640, 5'000},
+constexpr RegionCase kCases[] = {{"ray/incoherent/all", Task::kAll, 0, 101, 100'000, 640, 10'000},
+                                 {"ball/0.5", Task::kBall, 0.005f, 301, 50'000, 640, 5'000},
                                  {"ball/2", Task::kBall, 0.02f, 302, 20'000, 384, 2'000},
                                  {"ball/10", Task::kBall, 0.10f, 303, 4'000, 256, 500},
                                  {"box/0.5", Task::kBox, 0.005f, 401, 50'000, 640, 5'000},
@@ -30,11 +34,19 @@ size_t query_count(const RegionCase& region_case, const MeshRun& run) {
   return run.mesh.triangles.size() > kManyTriangles ? region_case.count / 10 : region_case.count;
 }
 
+void ask(Peer& peer, absl::Span<const RayQuery> rays, absl::Span<uint32_t> ids, uint32_t* counts) {
+  peer.ray_ids(rays, ids, counts);
+}
 void ask(Peer& peer, absl::Span<const Ballf> balls, absl::Span<uint32_t> ids, uint32_t* counts) {
   peer.ball_ids(balls, ids, counts);
 }
 void ask(Peer& peer, absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) {
   peer.box_ids(boxes, ids, counts);
+}
+bool overlaps(const RayQuery& query, const Triangle& triangle) {
+  const TriangleRay ray(to_double(query.origin), to_double(query.direction));
+  const std::optional<TriangleHit> hit = ray.hit(triangle);
+  return hit && ray.from_scaled(hit->t) <= query.t_max;
 }
 bool overlaps(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
 bool overlaps(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
@@ -59,7 +71,7 @@ SetOfIds set_of(absl::Span<const uint32_t> ids) {
   return set;
 }
 
-// One case of one kind of region, from its queries to its cells.
+// One case of one kind of query, from its queries to its cells.
 template <class Query>
 class RegionRace {
  public:
@@ -164,7 +176,9 @@ class RegionRace {
 
 void run_case(const MeshRun& run, const RegionCase& region_case) {
   const size_t count = query_count(region_case, run);
-  if (region_case.task == Task::kBall)
+  if (region_case.task == Task::kAll)
+    RegionRace(run, region_case, random_rays(run.mesh, count, region_case.seed, kEndless)).run();
+  else if (region_case.task == Task::kBall)
     RegionRace(run, region_case, balls(run.mesh, count, region_case.seed, region_case.fraction)).run();
   else
     RegionRace(run, region_case, boxes(run.mesh, count, region_case.seed, region_case.fraction)).run();
