@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/base/planted_bug.h"
 #include "core/geometry/ball.h"
@@ -87,24 +88,47 @@ inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
   return cull;
 }
 
-// The ray's line as seen from the brick, by its point nearest to the centre, so that the numbers are small.
-inline GridLine cull_line_of(const Brick& brick, const SlabRay<double>& ray, double ray_margin) {
-  const Vec3d direction = ray.direction() * (1 / max_component(abs(ray.direction())));
-  const Vec3d toward = direction * (1 / std::sqrt(squared_length(direction)));
-  const Vec3d to_origin = ray.origin() - brick.place.center;
-  const Vec3d point = to_origin - toward * dot(to_origin, toward);
-  const double far = max_component(abs(to_origin));
-  GridLine line;
-  for (int axis = 0; axis < 3; ++axis) {
-    line.point[axis] = static_cast<float>(point[axis]);
-    line.direction[axis] = static_cast<float>(toward[axis]);
+// The ray as seen from the brick: its line by the point nearest to the centre, so that the numbers are small.
+class CullRay {
+ public:
+  // `ray_margin`: how far values may be beside where they are filed, and the pad of the ray's slabs.
+  CullRay(const Brick& brick, const SlabRay<double>& ray, double ray_margin) {
+    const double longest = max_component(abs(ray.direction()));
+    const Vec3d direction = ray.direction() * (1 / longest);
+    const double length = std::sqrt(squared_length(direction));
+    const Vec3d toward = direction * (1 / length);
+    const Vec3d to_origin = ray.origin() - brick.place.center;
+    start_ = dot(to_origin, toward);
+    speed_ = longest * length;
+    const Vec3d point = to_origin - toward * start_;
+    const double far = max_component(abs(to_origin));
+    for (int axis = 0; axis < 3; ++axis) {
+      line_.point[axis] = static_cast<float>(point[axis]);
+      line_.direction[axis] = static_cast<float>(toward[axis]);
+    }
+    // Along the brick the line's direction and its point are off by a few 2^-24 of the lengths, and by 2^-50 of the
+    // way.
+    line_.margin = static_cast<float>((cull_margin(brick) + ray_margin + 0x1p-46 * far +
+                                       4 * double{kCullSlack} * (max_component(abs(point)) + 2 * brick.place.edge)) *
+                                      (1 + 2 * double{kCullSlack}));
+    line_.from = static_cast<float>(start_ - kEndSlack * std::abs(start_));
+    end_at(std::numeric_limits<double>::infinity());
   }
-  // Along the brick the line's direction and its point are off by a few 2^-24 of the lengths, and by 2^-50 of the way.
-  line.margin = static_cast<float>((cull_margin(brick) + ray_margin + 0x1p-46 * far +
-                                    4 * double{kCullSlack} * (max_component(abs(point)) + 2 * brick.place.edge)) *
-                                   (1 + 2 * double{kCullSlack}));
-  return line;
-}
+
+  // Nothing beyond `limit`, in lengths of the direction, is asked for any more.
+  void end_at(double limit) {
+    const double end = start_ + limit * speed_;
+    line_.to = static_cast<float>(std::clamp(end + kEndSlack * std::abs(end), -kFar, kFar));
+  }
+  const GridLine& line() const { return line_; }
+
+ private:
+  static constexpr double kEndSlack = 2 * double{kCullSlack};
+  static constexpr double kFar = 0x1p120;
+
+  GridLine line_;
+  double start_, speed_;  // where it starts, by its distance from the point, and how far one of its lengths is
+};
 
 // Fills GridRows with rows of one block, runs cull(rows, slots) when they are full, and hands on what it keeps.
 template <class Cull, class Visit>

@@ -107,8 +107,8 @@ class GridSnapshot {
   template <class CullOf, class Visit>
   void visit_cells(const Aabbd& region, Work& work, const CullOf& cull_of, const Visit& visit) const;
   template <class Limit, class Visit>
-  bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, const SlabRay<double>& ray,
-             const Limit& limit, Work& work, const Visit& visit) const;
+  bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double margin,
+             const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
   // About how many values share a cell there.
   double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
   // For shells that would name more bricks than there are, from the present one on.
@@ -117,7 +117,7 @@ class GridSnapshot {
                             const Limit& limit, Work& work, const Visit& visit) const;
   // For rays that would name more bricks than there are.
   template <class Limit, class Visit>
-  bool visit_by_distance(const internal::GridLevel& level, double margin, const SlabRay<double>& ray,
+  bool visit_by_distance(const internal::GridLevel& level, double reach, double margin, const SlabRay<double>& ray,
                          const Limit& limit, Work& work, const Visit& visit) const;
 
   std::vector<internal::GridLevel> levels_;  // coarse to fine
@@ -200,21 +200,22 @@ void GridSnapshot::visit_ray(const SlabRay<double>& ray, const Limit& limit, Wor
       extent.bounds = grown(extent.bounds, astray);
     }
     const internal::SlabMarch slabs(ray, extent, limit());
+    const double margin = astray + 2 * ray.margin(magnitude(extent.bounds));
     const bool go_on = slabs.bricks() > static_cast<double>(level.table->size())
-                           ? visit_by_distance(level, extent.reach, ray, limit, work, visit)
-                           : march(level, slabs, ray, limit, work, visit);
+                           ? visit_by_distance(level, extent.reach, margin, ray, limit, work, visit)
+                           : march(level, slabs, margin, ray, limit, work, visit);
     if (!go_on) return;
   }
 }
 
 template <class Limit, class Visit>
-bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabMarch& slabs, const SlabRay<double>& ray,
-                         const Limit& limit, Work& work, const Visit& visit) const {
+bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double margin,
+                         const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const {
   constexpr int kLayers = 1 << internal::kBrickBits;
   const GridKernels& kernels = active_grid_kernels();
   struct Met {
     const internal::Brick* brick;
-    GridLine line;
+    internal::CullRay ray;
   };
   absl::InlinedVector<Met, 16> met;
   for (int64_t n = 0; n < slabs.slabs(); ++n) {
@@ -222,21 +223,25 @@ bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabM
     if (slab.near > limit()) return true;
     met.clear();
     for_each_brick(level, slab.bricks, work, [&](const internal::Brick& brick) {
-      met.push_back({&brick, internal::cull_line_of(brick, ray, slabs.margin())});
+      met.push_back({&brick, internal::CullRay(brick, ray, margin)});
       return true;
     });
-    for (const Met& one : met) {
-      const auto cull = [&](const GridRows& rows, uint32_t* slots) { return kernels.cull_line(rows, one.line, slots); };
+    for (Met& one : met) {
+      one.ray.end_at(limit());
+      const auto cull = [&](const GridRows& rows, uint32_t* slots) {
+        return kernels.cull_line(rows, one.ray.line(), slots);
+      };
       if (!internal::scan_recent(*one.brick, work, cull, visit)) return false;
     }
     for (int number = 0; number < kLayers && !met.empty(); ++number) {
       const internal::SlabMarch::Layer layer = slabs.layer(n, number, limit());
       if (layer.near > limit()) return true;
-      for (const Met& one : met) {
+      for (Met& one : met) {
         const internal::KeyRange cells = internal::within_brick(layer.cells, one.brick->place.key);
         if (cells.empty()) continue;
+        one.ray.end_at(limit());
         const auto cull = [&](const GridRows& rows, uint32_t* slots) {
-          return kernels.cull_line(rows, one.line, slots);
+          return kernels.cull_line(rows, one.ray.line(), slots);
         };
         if (!internal::scan_cells(*one.brick, cells, work, cull, visit)) return false;
       }
@@ -246,8 +251,9 @@ bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabM
 }
 
 template <class Limit, class Visit>
-bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double margin, const SlabRay<double>& ray,
-                                     const Limit& limit, Work& work, const Visit& visit) const {
+bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double reach, double margin,
+                                     const SlabRay<double>& ray, const Limit& limit, Work& work,
+                                     const Visit& visit) const {
   struct Candidate {
     double near;
     const internal::Brick* brick;
@@ -257,7 +263,7 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double ma
   level.table->for_each([&](uint32_t number) {
     ++work.cells;
     const internal::Brick& brick = *bricks_[number];
-    const Vec3d half = Vec3d{1, 1, 1} * (brick.place.edge / 2 + margin);
+    const Vec3d half = Vec3d{1, 1, 1} * (brick.place.edge / 2 + reach);
     const Interval<double> part = ray.interval({brick.place.center - half, brick.place.center + half});
     if (part.near <= part.far && part.far >= 0 && part.near <= limit()) candidates.push_back({part.near, &brick});
     return true;
@@ -266,8 +272,11 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double ma
             [](const Candidate& a, const Candidate& b) { return a.near < b.near; });
   for (const Candidate& candidate : candidates) {
     if (candidate.near > limit()) break;
-    const GridLine line = internal::cull_line_of(*candidate.brick, ray, margin);
-    const auto cull = [&](const GridRows& rows, uint32_t* slots) { return kernels.cull_line(rows, line, slots); };
+    internal::CullRay cull_ray(*candidate.brick, ray, margin);
+    cull_ray.end_at(limit());
+    const auto cull = [&](const GridRows& rows, uint32_t* slots) {
+      return kernels.cull_line(rows, cull_ray.line(), slots);
+    };
     if (!internal::scan_cells(*candidate.brick, internal::kAllCells, work, cull, visit) ||
         !internal::scan_recent(*candidate.brick, work, cull, visit))
       return false;

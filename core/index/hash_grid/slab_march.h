@@ -45,9 +45,6 @@ class SlabMarch {
   };
   Layer layer(int64_t n, int number, double limit) const;
 
-  // How far from the ray the positions of values that it can meet may lie, on any axis.
-  double margin() const { return margin_; }
-
  private:
   // The positions of values between two planes across the ray, which `index` times `edge` and one edge more name, that
   // the ray can meet up to `limit`; near as in Slab.

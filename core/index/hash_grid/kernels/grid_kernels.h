@@ -13,6 +13,7 @@
 namespace locus {
 
 inline constexpr float kCullSlack = 0x1p-20f;
+inline constexpr float kDiagonal = 1.73206f;  // the corners of a value's bounds, in reaches: the root of 3, and more
 inline constexpr uint32_t kMostSorted = 64;
 
 // Some rows of consecutive values of one block.
@@ -36,7 +37,8 @@ struct GridBox {
 
 struct GridLine {
   float point[3], direction[3];  // the direction has length 1
-  float margin;                  // added to every reach
+  float margin;                  // added to every reach times kDiagonal
+  float from, to;                // the part that is asked for, by its distance from `point`
 };
 
 struct GridBall {

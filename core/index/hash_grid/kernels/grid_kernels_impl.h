@@ -92,14 +92,15 @@ uint32_t cull_ball(const GridRows& rows, const GridBall& ball, uint32_t* slots) 
 uint32_t cull_line(const GridRows& rows, const GridLine& line, uint32_t* slots) {
   const Floats point_x = all(line.point[0]), point_y = all(line.point[1]), point_z = all(line.point[2]);
   const Floats toward_x = all(line.direction[0]), toward_y = all(line.direction[1]), toward_z = all(line.direction[2]);
-  const Floats margin = all(line.margin);
+  const Floats margin = all(line.margin), from = all(line.from), to = all(line.to);
   return collect(rows, slots, [&](uint32_t slot) {
     const Floats x = load(rows.x + slot) - point_x, y = load(rows.y + slot) - point_y;
     const Floats z = load(rows.z + slot) - point_z;
     const Floats along = x * toward_x + y * toward_y + z * toward_z;
     const Floats off_x = x - along * toward_x, off_y = y - along * toward_y, off_z = z - along * toward_z;
-    const Floats reach = load(rows.reach + slot) + margin;
-    return bits_of(off_x * off_x + off_y * off_y + off_z * off_z <= reach * reach);
+    const Floats reach = load(rows.reach + slot) * kDiagonal + margin;
+    const Lanes near = off_x * off_x + off_y * off_y + off_z * off_z <= reach * reach;
+    return bits_of(near & (along + reach >= from) & (along - reach <= to));
   });
 }
 

@@ -110,19 +110,23 @@ TEST_P(GridKernelsTest, KeepValuesThatReachABall) {
       [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_ball(rows, ball, slots); }, keep);
 }
 
-TEST_P(GridKernelsTest, KeepValuesThatReachALine) {
+TEST_P(GridKernelsTest, KeepValuesThatReachAPartOfALine) {
   Random random(3);
   Columns4 columns = random_columns(300, random);
-  const GridLine line{{1, 2, 0}, {0.6f, 0, 0.8f}, 0.5f};
-  const auto keep = [&](uint32_t slot) {
-    const double x = columns.x[slot] - 1.0, y = columns.y[slot] - 2.0, z = columns.z[slot];
-    const double along = x * 0.6 + z * 0.8;
-    const double off_x = x - along * 0.6, off_z = z - along * 0.8;
-    return verdict(std::sqrt(off_x * off_x + y * y + off_z * off_z), 0.5 + columns.reach[slot]);
-  };
-  expect_kept(
-      columns, random,
-      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_line(rows, line, slots); }, keep);
+  for (const auto& [from, to] : {std::pair(-1e30f, 1e30f), std::pair(-2.0f, 1e30f), std::pair(-2.0f, 1.5f)}) {
+    const GridLine line{{1, 2, 0}, {0.6f, 0, 0.8f}, 0.5f, from, to};
+    const auto keep = [&](uint32_t slot) {
+      const double x = columns.x[slot] - 1.0, y = columns.y[slot] - 2.0, z = columns.z[slot];
+      const double along = x * 0.6 + z * 0.8, reach = 0.5 + double{kDiagonal} * columns.reach[slot];
+      const double off_x = x - along * 0.6, off_z = z - along * 0.8;
+      return std::min({verdict(std::sqrt(off_x * off_x + y * y + off_z * off_z), reach),
+                       verdict(line.from, along + reach), verdict(along - reach, line.to)});
+    };
+    expect_kept(
+        columns, random,
+        [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_line(rows, line, slots); },
+        keep);
+  }
 }
 
 TEST_P(GridKernelsTest, CollectValuesByTheSquaredDistanceOfTheirBoundsAndSayIt) {
