@@ -28,7 +28,9 @@ double values_per_cell(const LevelExtent& level, size_t values);
 class NearestShells {
  public:
   // `per_cell`: about how many values there are in a cell near the point; decides cost only.
+  // Borrows the level.
   NearestShells(const Vec3d& point, const LevelExtent& level, double per_cell);
+  NearestShells(const Vec3d& point, const LevelExtent&& level, double per_cell) = delete;
 
   // Goes on to the next shell; false where nothing remains within `limit`.
   bool next(double limit);

@@ -62,7 +62,8 @@ TEST(NearestWalkTest, ShellsFollowEachOtherUntilAllIsInTheLast) {
 }
 
 TEST(NearestWalkTest, ShellsEndAtTheLimit) {
-  NearestShells shells({}, world_of(1000), 12);
+  const LevelExtent world = world_of(1000);
+  NearestShells shells({}, world, 12);
   EXPECT_TRUE(shells.next(4));
   EXPECT_EQ(shells.upto(), key_limit(4));
   EXPECT_FALSE(shells.next(4));
@@ -70,7 +71,8 @@ TEST(NearestWalkTest, ShellsEndAtTheLimit) {
 }
 
 TEST(NearestWalkTest, TheFirstShellIsNarrowerWhereThereIsMore) {
-  NearestShells few({}, world_of(1000), 1), many({}, world_of(1000), 1000);
+  const LevelExtent world = world_of(1000);
+  NearestShells few({}, world, 1), many({}, world, 1000);
   ASSERT_TRUE(few.next(kInfinity) && many.next(kInfinity));
   EXPECT_LT(many.upto(), few.upto() / 10);
 }
