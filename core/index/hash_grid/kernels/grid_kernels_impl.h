@@ -189,6 +189,7 @@ uint32_t collect_near(const GridRows& rows, const GridNear& near, uint32_t* slot
 }
 
 void sort_few(int32_t* numbers, uint32_t count) {
+  if (count == 0) return;
   int32_t given[kMostSorted + kLanes];
   std::memcpy(given, numbers, count * sizeof(int32_t));
   for (uint32_t i = 0; i < kLanes; ++i) given[count + i] = INT32_MAX;
