@@ -12,7 +12,7 @@ sets:
   build      what configuring and building locusd and locus needs
   python     what building and using the Python package needs
   test       what tests/run.sh needs on top of build
-  bench      the libraries that build/release/bin/locus-bench compares with
+  bench      the libraries and servers that build/release/bin/locus-bench compares with
   lint       what tests/run.sh --long needs on top of these
   container  what tests/container.sh needs to build and run the image without a registry or a daemon
   runtime    what locusd and locus need to run once they are built; the image has nothing else
@@ -24,17 +24,21 @@ TEXT
 
 # The compiler and what find_package and pkg-config look for.
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev"
+  libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev
+  prometheus-cpp-dev libcivetweb-dev libcurl4-openssl-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
-# binutils gives nm to the house test; zsh and fish run the completions; groff and mandoc read the manual.
-test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy zsh fish mandoc
-  groff-base"
-bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev libnanoflann-dev"
+# binutils gives nm to the house test; prometheus-client and yaml read what is made for Prometheus; zsh and fish run the
+# completions; groff and mandoc read the manual.
+test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy
+  python3-prometheus-client python3-yaml zsh fish mandoc groff-base"
+# redis-tools holds the server too, without the service that redis-server would start.
+bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev libnanoflann-dev redis-tools"
 lint_packages="clang-tidy mypy"
 # systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
 # The libraries that the programs name themselves; these bring their own.
-runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6"
+runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6
+  libprometheus-cpp-core1.0 libcivetweb1 libcurl4"
 
 action=install
 packages=

@@ -3,6 +3,7 @@
 #include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -33,6 +34,14 @@ void keep_freed_memory(uint64_t memory_limit) {
   mallopt(M_TOP_PAD, 16 << 20);
 }
 
+// A connection is a file: as many as the system lets this process have.
+void allow_many_files() {
+  rlimit limit;
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 sigset_t ending_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -48,19 +57,25 @@ int wait_for_signal(const sigset_t& signals) {
   return signal;
 }
 
-// Whole or not at all: a reader never sees half a number.
+// Whole or not at all: a reader never sees half a number. Nothing where there is no path; says itself why it failed.
 bool write_port_file(const std::string& path, uint16_t port) {
+  if (path.empty()) return true;
   const std::string temporary = absl::StrCat(path, ".tmp");
   std::FILE* file = std::fopen(temporary.c_str(), "w");
-  if (file == nullptr) return false;
-  const bool written = std::fprintf(file, "%u\n", static_cast<unsigned>(port)) > 0;
-  const bool closed = std::fclose(file) == 0;
-  return written && closed && std::rename(temporary.c_str(), path.c_str()) == 0;
+  bool written = file != nullptr;
+  if (written) {
+    written = std::fprintf(file, "%u\n", static_cast<unsigned>(port)) > 0;
+    written = std::fclose(file) == 0 && written;
+    written = written && std::rename(temporary.c_str(), path.c_str()) == 0;
+  }
+  if (!written) log(LogLevel::kError, "cannot write the port file", {{"path", path}});
+  return written;
 }
 
 void log_start(const Server& server, const ServerConfig& config) {
   log(LogLevel::kInfo, "serving",
       {{"addresses", absl::StrJoin(server.addresses(), ",")},
+       {"http_port", absl::StrCat(server.http_port())},
        {"version", kVersion},
        {"threads", absl::StrCat(config.threads)},
        {"instruction_set", std::string(instruction_set())},
@@ -87,10 +102,9 @@ int run(const ServerConfig& config) {
     log(LogLevel::kError, server.status().message());
     return EXIT_FAILURE;
   }
-  if (!config.port_file.empty() && !write_port_file(config.port_file, (*server)->port())) {
-    log(LogLevel::kError, "cannot write the port file", {{"path", config.port_file}});
+  if (!write_port_file(config.http_port_file, (*server)->http_port()) ||
+      !write_port_file(config.port_file, (*server)->port()))
     return EXIT_FAILURE;
-  }
   capture_library_logs(LogLevel::kWarning);
   log_start(**server, config);
   const int signal = wait_for_signal(signals);
@@ -112,6 +126,7 @@ int main(int argc, char** argv) {
       locus::server::read_invocation({argv + 1, argv + argc}, locus::server::process_environment);
   if (invocation.config) {
     locus::server::keep_freed_memory(invocation.config->memory_limit);
+    locus::server::allow_many_files();
     return locus::server::run(*invocation.config);
   }
   std::fputs(invocation.text.c_str(), invocation.exit_code == 0 ? stdout : stderr);

@@ -130,7 +130,7 @@ client() {
   podman run --rm --interactive --network host --env LOCUS_ADDRESS="$(podman port "$id" 7575/tcp)" --entrypoint locus "$image" "$@"
 }
 compose() {
-  LOCUS_PORT=$compose_port podman-compose --project-name "$(basename "$work" | tr -d .)" --file deploy/compose.yaml "$@"
+  LOCUS_PORT=$compose_port LOCUS_HTTP_PORT=$compose_http_port podman-compose --project-name "$(basename "$work" | tr -d .)" --file deploy/compose.yaml "$@"
 }
 
 free_port() { /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
@@ -176,6 +176,11 @@ ends_in_order() {
   podman stop --time 20 "$id" && [ "$(podman inspect --format '{{.State.ExitCode}}' "$id")" = 0 ] \
     && podman logs "$id" 2>&1 | grep " ended"
 }
+http_ready() {
+  /usr/bin/python3 -c 'import sys, urllib.request as r; print(r.urlopen(sys.argv[1], timeout=10).read().decode())' \
+    "http://127.0.0.1:$compose_http_port/readyz" | grep -q ready
+}
+
 compose_starts() {
   compose up --detach || return
   for _ in $(seq 100); do
@@ -236,6 +241,8 @@ need "image" build_image
 check_image
 check_container
 compose_port=$(free_port)
+compose_http_port=$(free_port)
 composed=yes
 check "compose starts it on this machine's loopback" compose_starts
+check "its HTTP port says that it is ready" http_ready
 finish

@@ -26,6 +26,8 @@ constexpr char kExamples[] = R"(Examples:
   generator | locus move arena --from-ndjson -
   locus export arena arena.glb
   locus -a unix:/run/locus.sock health
+  locus top
+  locus config show --origin
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
 LOCUS_SCENE names the scene of commands that are given none.
@@ -132,7 +134,9 @@ void build_cli(CLI::App& app, Context& context) {
   add_dump_command(app, context);
   add_export_command(app, context);
   add_demo_command(app, context);
+  add_top_command(app, context);
   add_limits_command(app, context);
+  add_config_command(app, context);
   add_health_command(app, context);
   add_version_command(app, context);
   add_completion_command(app, context);

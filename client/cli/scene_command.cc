@@ -24,6 +24,7 @@ struct CreateOptions {
   std::string static_from;
   uint32_t history_ticks = 0;
   uint64_t history_bytes = 0;
+  v1::OverloadPolicy overload = v1::OVERLOAD_POLICY_UNSPECIFIED;
   bool if_absent = false;
 };
 
@@ -80,6 +81,10 @@ Report description_of(const v1::Scene& scene) {
                               {"recorded_ticks", scene.recorded_ticks()},
                               {"used_bytes", scene.history_bytes()}};
   }
+  if (scene.spec().overload() == v1::OVERLOAD_POLICY_LATEST_WINS) {
+    report.head["overload"] = "latest-wins";
+    report.head["joined_updates"] = scene.joined_updates();
+  }
   report.head["pending_changes"] = scene.pending_changes();
   if (!scene.last_build_error().empty()) report.head["last_build_error"] = scene.last_build_error();
   Json labels = Json::object();
@@ -99,6 +104,7 @@ absl::Status create(const CreateOptions& options, Context& context) {
   request.mutable_spec()->set_static_from(options.static_from);
   request.mutable_spec()->set_history_ticks(options.history_ticks);
   request.mutable_spec()->set_history_bytes(options.history_bytes);
+  request.mutable_spec()->set_overload(options.overload);
   request.mutable_spec()->mutable_labels()->insert(labels->begin(), labels->end());
   const absl::StatusOr<client::Client*> client = context.connect();
   if (!client.ok()) return client.status();
@@ -156,7 +162,7 @@ void add_create(CLI::App& parent, Context& context) {
   command.footer(R"(Examples:
   locus scene create arena
   locus scene create arena --if-absent --label map=delta --label mode=ctf
-  locus scene create arena --history-ticks 64
+  locus scene create arena --history-ticks 64 --overload latest-wins
   locus scene create arena-copy --static-from arena)");
   command.add_option("NAME", options->name, "Lower case letters, digits and dashes, at most 63")->required();
   command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
@@ -171,6 +177,13 @@ void add_create(CLI::App& parent, Context& context) {
       ->type_name("TICKS");
   command.add_option("--history-bytes", options->history_bytes, "Memory the past may take [256 MiB]")
       ->type_name("BYTES");
+  const NamedValues<v1::OverloadPolicy> policies = {{"every-batch", v1::OVERLOAD_POLICY_EVERY_BATCH},
+                                                    {"latest-wins", v1::OVERLOAD_POLICY_LATEST_WINS}};
+  command
+      .add_option("--overload", options->overload,
+                  "Moves that come too fast: a revision for every-batch, or one for all, latest-wins [every-batch]")
+      ->type_name("POLICY")
+      ->transform(choices(policies));
   run_when_chosen(command, options, context, create);
 }
 

@@ -55,12 +55,15 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
 struct Client::Connection {
   std::string address;
   ClientOptions options;
-  std::shared_ptr<grpc::Channel> channel;
+  std::shared_ptr<grpc::Channel> channel;  // for single calls
+  std::shared_ptr<grpc::Channel> bulk;
   std::unique_ptr<v1::ServerService::StubInterface> servers;
   std::unique_ptr<v1::SceneService::StubInterface> scenes;
   std::unique_ptr<v1::UpdateService::StubInterface> updates;
   std::unique_ptr<v1::QueryService::StubInterface> queries;
+  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // uploads, downloads, dumps
 
+  const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
   CallPlan once(absl::string_view scene = {}) const { return {options.deadline, options.retry, Repeat::kNever, scene}; }
   CallPlan repeatable(absl::string_view scene = {}) const {
     return {options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
@@ -76,9 +79,10 @@ absl::StatusOr<std::unique_ptr<Client>> Client::connect(absl::string_view addres
   std::shared_ptr<grpc::Channel> channel = open_channel(*target, options);
   const absl::Status connected = await_connection(*channel, *target, options);
   if (!connected.ok()) return connected;
-  auto connection = std::make_unique<Connection>(
-      Connection{*target, options, channel, v1::ServerService::NewStub(channel), v1::SceneService::NewStub(channel),
-                 v1::UpdateService::NewStub(channel), v1::QueryService::NewStub(channel)});
+  std::shared_ptr<grpc::Channel> bulk = open_channel(*target, options);
+  auto connection = std::make_unique<Connection>(Connection{
+      *target, options, channel, bulk, v1::ServerService::NewStub(channel), v1::SceneService::NewStub(channel),
+      v1::UpdateService::NewStub(channel), v1::QueryService::NewStub(channel), v1::SceneService::NewStub(bulk)});
   return std::unique_ptr<Client>(new Client(std::move(connection)));
 }
 
@@ -137,7 +141,7 @@ absl::Status Client::delete_scene(const v1::DeleteSceneRequest& request) const {
 
 absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& mesh,
                                                            const UploadProgress& progress) const {
-  return locus::client::upload_mesh(*connection_->scenes, mesh, absl::Now() + connection_->options.long_deadline,
+  return locus::client::upload_mesh(*connection_->transfers, mesh, absl::Now() + connection_->options.long_deadline,
                                     progress);
 }
 
@@ -145,7 +149,7 @@ absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, con
   const absl::Time deadline = absl::Now() + connection_->options.long_deadline;
   absl::StatusOr<DownloadedMesh> mesh = absl::UnknownError("not asked yet");
   with_retries(connection_->options.retry, deadline, [&] {
-    mesh = locus::client::download_mesh(*connection_->scenes, name, deadline, progress);
+    mesh = locus::client::download_mesh(*connection_->transfers, name, deadline, progress);
     return mesh.status();
   }).IgnoreError();
   return mesh;
@@ -182,7 +186,7 @@ absl::Status Client::dump(const v1::DumpSceneRequest& request,
   grpc::ClientContext context;
   context.set_deadline(absl::ToChronoTime(absl::Now() + connection_->options.long_deadline));
   add_scene(context, request.scene());
-  const auto reader = connection_->scenes->DumpScene(&context, request);
+  const auto reader = connection_->transfers->DumpScene(&context, request);
   v1::DumpSceneResponse response;
   absl::Status taken;
   while (taken.ok() && reader->Read(&response)) taken = piece(response);
@@ -214,11 +218,11 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
 }
 
 std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {
-  return std::make_unique<UpdateStream>(connection_->channel, std::string(scene), options);
+  return std::make_unique<UpdateStream>(connection_->channel_of(options.lane), std::string(scene), options);
 }
 
 std::unique_ptr<QueryStream> Client::query_stream(absl::string_view scene, const QueryStreamOptions& options) const {
-  return std::make_unique<QueryStream>(connection_->channel, std::string(scene), options);
+  return std::make_unique<QueryStream>(connection_->channel_of(options.lane), std::string(scene), options);
 }
 
 }  // namespace locus::client

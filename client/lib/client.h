@@ -48,7 +48,8 @@ using UploadProgress = std::function<void(uint64_t sent, uint64_t total)>;
 using DownloadProgress = std::function<void(uint64_t received, uint64_t total)>;
 
 // Thread promise: every method may be called from any number of threads at once. Streams hold what they need of the
-// connection and may outlive the client. Each client has a connection of its own.
+// connections and may outlive the client. Each client has two connections of its own, so that small calls do not wait
+// behind large messages (Lane); the second is made when it is first needed. Both come back by themselves.
 class Client {
  public:
   // `address` is host:port (the port may be left out: 7575) or unix:/path. Blocks until the connection stands;

@@ -19,7 +19,7 @@ namespace locus::client {
 // What gRPC is to connect to: `address` with the default port where it names none. INVALID_ARGUMENT if it is empty.
 absl::StatusOr<std::string> target_of(absl::string_view address);
 
-// A channel of its own connection to `target`. Does not connect.
+// A channel of its own connection to `target`, shared with no other channel of this process. Does not connect.
 std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options);
 
 // Waits until the channel is connected. UNAVAILABLE naming `target` if it is refused (unless `wait_for_server`) or the

@@ -17,6 +17,13 @@ struct RetryPolicy {
   absl::Duration max_backoff = absl::Seconds(2);
 };
 
+// Which of a client's two connections carries something. One connection is one socket: what is small waits there behind
+// what is large.
+enum class Lane {
+  kLatency,  // small and soon: single calls, and streams of small batches
+  kBulk,     // much at once: streams by default, uploads, downloads, dumps
+};
+
 struct ClientOptions {
   // How long connect() may take in all.
   absl::Duration connect_timeout = absl::Seconds(10);

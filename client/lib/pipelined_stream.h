@@ -1,6 +1,6 @@
 // The machinery under UpdateStream and QueryStream: a bidirectional call whose requests are answered under their
 // sequence numbers, with a bounded number under way, that comes back after a broken connection and sends again what was
-// not answered. Internal to the library.
+// not answered; a connection on which nothing is answered for too long counts as broken. Internal to the library.
 //
 // Threads: one of its own per stream, the supervisor, which opens call after call and waits for each to be over;
 // messages move on gRPC's callback threads. send(), flush() and close() may be called from any thread. Answers are
@@ -66,12 +66,19 @@ class PipelinedStream {
     virtual absl::Status answered(const absl::StatusOr<Result>& outcome, Items& items, size_t position) = 0;
   };
 
+  struct Options {
+    int max_in_flight;
+    RetryPolicy reconnect;
+    absl::Duration patience;  // with a server that answers nothing
+  };
+
   // `kind` outlives the stream.
-  PipelinedStream(Kind& kind, std::string scene, int max_in_flight, const RetryPolicy& reconnect)
+  PipelinedStream(Kind& kind, std::string scene, const Options& options)
       : kind_(kind),
         scene_(std::move(scene)),
-        max_in_flight_(static_cast<size_t>(std::max(1, max_in_flight))),
-        backoff_(reconnect),
+        max_in_flight_(static_cast<size_t>(std::max(1, options.max_in_flight))),
+        patience_(absl::ToChronoNanoseconds(options.patience)),
+        backoff_(options.reconnect),
         supervisor_([this] { supervise(); }) {}
 
   ~PipelinedStream() {
@@ -91,6 +98,7 @@ class PipelinedStream {
     if (ended_ || closing_) return why_ended();
     shared->set_scene(scene_);
     kind_.number(*shared);
+    if (items_.empty()) last_sign_ = Clock::now();
     items_.push_back({std::move(shared), std::move(done)});
     pump();
     changed_.notify_all();
@@ -117,8 +125,12 @@ class PipelinedStream {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   // How long a server may take to end a stream that was closed.
   static constexpr std::chrono::seconds kFarewell{5};
+  // Of a clock's wait, which must not overflow.
+  static constexpr std::chrono::hours kLongestWait{1};
 
   // One call. Its hold keeps gRPC from finishing it while other threads may still start writes; the hold ends with the
   // last read. Members are guarded by the stream's lock, `response_` by the order of reactions.
@@ -202,6 +214,7 @@ class PipelinedStream {
     Callback done = std::move(item->done);
     items_.erase(item);
     backoff_.reset();
+    last_sign_ = Clock::now();
     absl::StatusOr<Result> outcome = kind_.outcome_of(response);
     fatal_.Update(kind_.answered(outcome, items_, position));
     if (fatal_.ok()) {
@@ -243,15 +256,32 @@ class PipelinedStream {
     for (Item& item : items_) item.written = false;
     attempt_ = std::make_unique<Attempt>(*this, scene_);
     attempt_->start();
+    last_sign_ = Clock::now();
     pump();
-    changed_.wait(lock, [this] { return attempt_->end().has_value(); });
+    const bool silent = !wait_for_end(lock);
     absl::Status end = *attempt_->end();
     attempt_.reset();
     if (!fatal_.ok()) return fatal_;
     if (broken_off_) return absl::CancelledError("the stream was broken off");
     if (closing_ && items_.empty()) return absl::OkStatus();
+    if (silent) return absl::UnavailableError("the server answered nothing for as long as the stream is patient");
     if (end.ok()) return absl::UnavailableError("the server ended the stream before it had answered everything");
     return end;
+  }
+
+  // False: it was ended here, because the server left everything unanswered for too long.
+  bool wait_for_end(std::unique_lock<std::mutex>& lock) {
+    const auto ended = [this] { return attempt_->end().has_value(); };
+    while (!ended()) {
+      const Clock::duration quiet = items_.empty() ? Clock::duration::zero() : Clock::now() - last_sign_;
+      if (quiet >= patience_) {
+        attempt_->cancel();
+        changed_.wait(lock, ended);
+        return false;
+      }
+      changed_.wait_for(lock, std::min<Clock::duration>(patience_ - quiet, kLongestWait), ended);
+    }
+    return true;
   }
 
   // Nothing: the stream has ended with `end`. An idle stream may lose its connection as often as it likes.
@@ -276,11 +306,13 @@ class PipelinedStream {
   Kind& kind_;
   const std::string scene_;
   const size_t max_in_flight_;
+  const Clock::duration patience_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
   Backoff backoff_;
   Items items_;
+  Clock::time_point last_sign_;       // of the server, or since when it is waited for
   std::unique_ptr<Attempt> attempt_;  // the call in progress
   int handing_over_ = 0;              // callbacks running
   bool closing_ = false;

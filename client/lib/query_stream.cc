@@ -17,7 +17,7 @@ class QueryStream::Impl final : public Stream::Kind {
  public:
   Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const QueryStreamOptions& options)
       : stub_(v1::QueryService::NewStub(std::move(channel))),
-        stream_(*this, std::move(scene), options.max_in_flight, options.reconnect) {}
+        stream_(*this, std::move(scene), {options.max_in_flight, options.reconnect, options.patience}) {}
 
   Stream& stream() { return stream_; }
 

@@ -25,7 +25,12 @@ struct QueryStreamOptions {
   // a local server busy.
   int max_in_flight = 8;
   // For new connections after a break. An answer starts the count anew.
-  RetryPolicy reconnect;
+  RetryPolicy reconnect = {};
+  // So long may the server answer nothing while it is asked; then the connection counts as broken. Longer than the
+  // largest batch takes.
+  absl::Duration patience = absl::Seconds(10);
+  // kLatency where batches are small and wanted at once.
+  Lane lane = Lane::kBulk;
 };
 
 // Thread promise: every method may be called from any thread. Callbacks come one at a time, in the order of the

@@ -35,7 +35,7 @@ class UpdateStream::Impl final : public Stream::Kind {
       : stub_(v1::UpdateService::NewStub(std::move(channel))),
         writer_(options.writer != 0 ? options.writer : random_writer()),
         next_batch_(options.next_batch),
-        stream_(*this, std::move(scene), options.max_in_flight, options.reconnect) {}
+        stream_(*this, std::move(scene), {options.max_in_flight, options.reconnect, options.patience}) {}
 
   Stream& stream() { return stream_; }
   uint64_t writer() const { return writer_; }

@@ -41,6 +41,10 @@ struct UpdateStreamOptions {
   uint64_t next_batch = 1;
   // For new connections after a break. An ack starts the count anew.
   RetryPolicy reconnect = {.max_attempts = 10};
+  // So long may the server ack nothing while batches are under way; then the connection counts as broken.
+  absl::Duration patience = absl::Seconds(10);
+  // kLatency where batches are small and acks wanted at once.
+  Lane lane = Lane::kBulk;
 };
 
 // Thread promise: every method may be called from any thread; batches of several threads are numbered in the order in

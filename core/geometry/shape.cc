@@ -109,10 +109,14 @@ std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape) {
 }
 
 bool ball_overlaps(const Balld& ball, const Shape& shape) {
-  if (!reaches(ball, bounds_of(shape))) return false;
   const double reach = ball.radius + core_radius(shape);
   const double distance = squared_distance_to_core(ball.center, shape);
-  return planted(PlantedBug::kStrictTie) ? distance < reach * reach : distance <= reach * reach;
+  const bool meets = planted(PlantedBug::kStrictTie) ? distance < reach * reach : distance <= reach * reach;
+  if (!meets) return false;
+  // A ball's bounds are never farther than it is, but for rounding.
+  const bool is_round = shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kPoint;
+  if (is_round && distance < reach * reach * (1 - 0x1p-38) && reach > 0x1p-256) return true;
+  return reaches(ball, bounds_of(shape));
 }
 
 bool box_overlaps(const Obbd& box, const Shape& shape) {

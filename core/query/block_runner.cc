@@ -5,64 +5,97 @@
 
 #include "core/query/lookup_query.h"
 #include "core/query/ray_query.h"
+#include "core/query/rows.h"
 
 namespace locus {
 namespace {
 
-// Rays that the kernels get at once. Fewer would leave them waiting at the end of each call; more would leave the
-// caches.
-constexpr size_t kRaysAtOnce = 256;
+// Work of a piece: about a tenth of a millisecond.
+constexpr uint64_t kPieceWork = 16'384;
+// Work of a call of the kernels, which nothing can stop.
+constexpr uint64_t kCallWork = 65'536;
+// Rays of a call. The most are for rays that turn out dear behind cheap ones: at 4,096 triangles each they take 3 ms,
+// and those that keep many hits twice that. Twice as many would not be answered measurably faster.
+constexpr uint64_t kLeastRaysAtOnce = 8, kMostRaysAtOnce = 128, kMostRaysOfManyHits = 64;
 
 }  // namespace
 
-BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryMoments& moments, uint64_t max_bytes)
+BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryMoments& moments, BlockPlace& place,
+                         uint64_t max_bytes)
     : task_(task),
       block_(block),
       moments_(moments),
+      place_(place),
       columns_(returned_columns(block)),
       max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {}
 
-BlockResult BlockRunner::run(size_t begin, size_t end) {
+size_t BlockRunner::run(size_t begin, size_t end) {
   task_.check();
-  std::visit([&](const auto& kind) { run_queries(kind, begin, end); }, block_.kind);
+  const size_t reached = std::visit([&](const auto& kind) { return run_queries(kind, begin, end); }, block_.kind);
   task_.check();  // books what is not booked yet: many small pieces use up a budget like a large one
-  result_.work = task_.work();
-  return std::move(result_);
+  return reached;
+}
+
+uint64_t BlockRunner::work_done() const {
+  const Work& work = task_.work();
+  return work.nodes + work.cells + work.tests + rows_;
+}
+
+bool BlockRunner::enough() const { return work_done() >= kPieceWork && groups_.empty(); }
+
+template <class Columns, class RegionOf>
+void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {
+  if (block_.source == Source::kStatic || !RegionWalk::pays(task_.snapshot().objects.grid())) return;
+  const OverlapOptions options = overlap_options(block_, columns.detail);
+  task_.walk_regions(begin, end, [&region_of, options](size_t i) { return region_of(i, options); });
 }
 
 template <class Columns>
-void BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end) {
+size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end) {
+  if constexpr (std::is_same_v<Columns, BallColumns>)
+    walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
+      return ball_region(moments_.of(i), ball_of(block_, columns, i), options);
+    });
+  if constexpr (std::is_same_v<Columns, BoxColumns>)
+    walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
+      return box_region(moments_.of(i), box_of(block_, columns, i), options);
+    });
   for (size_t i = begin; i < end; ++i) {
+    if (i != begin && enough()) return i;
     run_query(columns, i);
     if (!task_.ended()) continue;
     const auto query = static_cast<uint32_t>(i);
     if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
   }
+  return end;
 }
 
 void BlockRunner::append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest& request) {
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
   const Winding winding = task_.snapshot().winding;
-  for (const Hit& row : rows.subspan(0, kept)) {
-    append_row(row, columns_, result_);
-    append_surface(request, block_.frame, row, winding, columns_, result_);
+  const RowSpans to = add_rows(result_, columns_, kept);
+  for (size_t row = 0; row < kept; ++row) {
+    write_row(rows[row], to, row);
+    write_surface(request, block_.frame, rows[row], winding, to, row);
   }
   count_rows(kept, truncated || kept < rows.size(), i);
 }
 
 void BlockRunner::append_runs(const OverlapAnswer& answer, size_t i) {
-  size_t kept = 0;
-  bool cut = answer.truncated;
+  size_t all = 0;
+  for (const RowRun& run : answer.runs) all += run.rows();
+  const size_t kept = std::min<uint64_t>(all, max_rows_ - rows_);
+  const RowSpans to = add_rows(result_, columns_, kept);
+  size_t row = 0;
   for (const RowRun& run : answer.runs) {
-    const size_t rows = std::min<uint64_t>(run.rows(), max_rows_ - rows_ - kept);
+    const size_t rows = std::min(run.rows(), kept - row);
     if (run.triangle_count != 0)
-      append_triangle_rows(run.row, answer.triangles_of(run).subspan(0, rows), columns_, result_);
+      write_triangle_rows(run.row, answer.triangles_of(run).subspan(0, rows), to, row);
     else if (rows != 0)
-      append_row(run.row, columns_, result_);
-    cut = cut || rows < run.rows();
-    kept += rows;
+      write_row(run.row, to, row);
+    row += rows;
   }
-  count_rows(kept, cut, i);
+  count_rows(kept, answer.truncated || kept < all, i);
 }
 
 void BlockRunner::count_rows(size_t rows, bool cut, size_t i) {
@@ -71,26 +104,39 @@ void BlockRunner::count_rows(size_t rows, bool cut, size_t i) {
   if (cut) result_.truncated.push_back(static_cast<uint32_t>(i));
 }
 
-void BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) {
+size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) {
   const Winding winding = task_.snapshot().winding;
-  for (size_t first = begin; first < end; first += kRaysAtOnce) {
-    const size_t last = std::min(end, first + kRaysAtOnce);
+  for (size_t first = begin; first < end;) {
+    if (first != begin && enough()) return first;
+    const size_t last = std::min<size_t>(end, first + place_.rays_at_once.load(std::memory_order_relaxed));
+    const uint64_t before = work_done();
     const RayAnswers answers = run_rays(task_, block_, rays, moments_, winding, first, last);
-    for (size_t i = first; i < last; ++i)
-      append_ray(rays, answers[i - first], ray_request(block_, rays, winding, i), i);
+    for (size_t i = first; i < last; ++i) take_ray(rays, answers[i - first], ray_request(block_, rays, winding, i), i);
+    pace_rays(last - first, work_done() - before);
+    first = last;
   }
+  return end;
 }
 
-void BlockRunner::append_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i) {
+// As many rays in the next call as should be little work, if they are like these.
+void BlockRunner::pace_rays(size_t rays, uint64_t work) {
+  const bool many_hits = std::get<RayColumns>(block_.kind).mode == RayMode::kAll;
+  const uint64_t most = many_hits ? kMostRaysOfManyHits : kMostRaysAtOnce;
+  const uint64_t fit = kCallWork * rays / std::max<uint64_t>(work, 1);
+  const uint64_t next = std::clamp<uint64_t>(std::min<uint64_t>(fit, 4 * rays), kLeastRaysAtOnce, most);
+  place_.rays_at_once.store(static_cast<uint32_t>(next), std::memory_order_relaxed);
+}
+
+void BlockRunner::take_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i) {
   if (rays.mode == RayMode::kAll) return append_counted(answer.hits, answer.truncated, i, request);
   if (answer.truncated) result_.truncated.push_back(static_cast<uint32_t>(i));
   if (rays.mode == RayMode::kAny) {
-    result_.hits.push_back(answer.hits.empty() ? '\0' : '\1');
+    place_.hits[i] = answer.hits.empty() ? '\0' : '\1';
     return;
   }
   const Hit hit = answer.hits.empty() ? Hit{} : answer.hits.front();
-  append_row(hit, columns_, result_);
-  append_surface(request, block_.frame, hit, task_.snapshot().winding, columns_, result_);
+  write_row(hit, place_.rows, i);
+  write_surface(request, block_.frame, hit, task_.snapshot().winding, place_.rows, i);
 }
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {
@@ -114,9 +160,10 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   std::vector<Hit> rows;
   if (!task_.ended()) rows = run_nearest(task_, moments_.of(i), request, Filter(block_, i));
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
-  for (const Hit& row : absl::MakeConstSpan(rows).subspan(0, kept)) {
-    append_row(row, columns_, result_);
-    append_nearest_point(request, block_.frame, row, columns_, result_);
+  const RowSpans to = add_rows(result_, columns_, kept);
+  for (size_t row = 0; row < kept; ++row) {
+    write_row(rows[row], to, row);
+    write_nearest_point(request, block_.frame, rows[row], to, row);
   }
   count_rows(kept, kept < rows.size(), i);
 }
@@ -130,8 +177,7 @@ void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
 }
 
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
-  if (lookup.groups.empty())
-    return append_row(look_up(task_.snapshot(), moments_.of(i), lookup.ids[i]), columns_, result_);
+  if (lookup.groups.empty()) return write_row(look_up(task_.snapshot(), moments_.of(i), lookup.ids[i]), place_.rows, i);
   look_up_groups_at(lookup, i);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];
   append_runs(answer, i);

@@ -79,17 +79,21 @@ struct BoxShape {
 };
 
 template <class Kind>
+GridRegion region_asked(const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options) {
+  const typename Kind::WorldRegion region(shape);
+  // Objects themselves, not only their bounds, are to reach into a ball.
+  return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
+}
+
+template <class Kind>
 class ObjectRows {
  public:
   ObjectRows(QueryTask& task, const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options,
              const Filter& filter, LowestRows& rows)
-      : task_(task), moment_(moment), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
+      : task_(task), moment_(moment), shape_(shape), options_(options), filter_(filter), rows_(rows) {}
 
-  Aabbd bounds() const { return region_.bounds(); }
-  // What wanted objects themselves, not only their bounds, reach into; nothing where that is not a ball.
-  std::optional<Balld> ball() const {
-    return options_.precision == Precision::kExact ? Kind::as_ball(shape_) : std::nullopt;
-  }
+  Aabbd bounds() const { return typename Kind::WorldRegion(shape_).bounds(); }
+  GridRegion region() const { return region_asked<Kind>(moment_, shape_, options_); }
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;
@@ -111,7 +115,6 @@ class ObjectRows {
   QueryTask& task_;
   const Moment& moment_;
   const typename Kind::World& shape_;
-  typename Kind::WorldRegion region_;
   const OverlapOptions& options_;
   const Filter& filter_;
   LowestRows& rows_;
@@ -285,6 +288,14 @@ OverlapAnswer run_ball(QueryTask& task, const Moment& moment, const Balld& ball,
 OverlapAnswer run_box(QueryTask& task, const Moment& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter) {
   return run_overlap<BoxShape>(task, moment, box, options, filter);
+}
+
+GridRegion ball_region(const Moment& moment, const Balld& ball, const OverlapOptions& options) {
+  return region_asked<BallShape>(moment, ball, options);
+}
+
+GridRegion box_region(const Moment& moment, const Obbd& box, const OverlapOptions& options) {
+  return region_asked<BoxShape>(moment, box, options);
 }
 
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {

@@ -26,6 +26,10 @@ OverlapAnswer run_ball(QueryTask& task, const Moment& moment, const Balld& ball,
 OverlapAnswer run_box(QueryTask& task, const Moment& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter);
 
+// What such a query asks of the grid of objects.
+GridRegion ball_region(const Moment& moment, const Balld& ball, const OverlapOptions& options);
+GridRegion box_region(const Moment& moment, const Obbd& box, const OverlapOptions& options);
+
 // The ball or box of query `i` of a block, in world axes.
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i);
 Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i);

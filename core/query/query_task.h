@@ -134,13 +134,20 @@ class QueryTask {
   template <class Visitor>
   void visit_objects_in_region(const Moment& moment, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
-    const Aabbd bounds = std::as_const(visitor).bounds();
-    if (brute_force_)
+    if (brute_force_) {
       moment.objects().grid().for_each(visit);
-    else if (const std::optional<Balld> ball = std::as_const(visitor).ball())
-      moment.visit_ball(*ball, bounds, work_, visit);
-    else
-      moment.visit_region(bounds, work_, visit);
+      return;
+    }
+    const Aabbd bounds = std::as_const(visitor).bounds();
+    const auto ask = [&](const auto& visit_one) {
+      if (walk_) return walk_->visit(work_, visit_one);
+      std::as_const(visitor).region().visit(work_, visit_one);
+    };
+    moment.visit_asked(bounds, work_, ask, visit);
+  }
+  // The regions of the visits above are those of the walk from here on, one after the other.
+  void walk_regions(size_t begin, size_t end, const std::function<GridRegion(size_t)>& region_of) {
+    walk_.emplace(begin, end, region_of);
   }
 
  private:
@@ -159,6 +166,7 @@ class QueryTask {
   BatchControl& control_;
   const bool brute_force_;
   Work work_;
+  std::optional<RegionWalk> walk_;
   uint64_t tests_ = 0;
   uint64_t booked_ = 0;
   bool ended_ = false;

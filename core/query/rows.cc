@@ -1,5 +1,6 @@
 #include "core/query/rows.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
@@ -90,15 +91,27 @@ Labels labels_of(const Hit& hit) {
   return {};
 }
 
-template <class Values, class V>
-void append_point(Values& values, V x, V y, V z) {
-  values.insert(values.end(), {x, y, z});
+template <class T, class V>
+void write_point(T* column, size_t row, V x, V y, V z) {
+  column += 3 * row;
+  column[0] = x;
+  column[1] = y;
+  column[2] = z;
 }
 
-template <class Values>
-void append_slice(const Values& from, size_t first, size_t count, size_t width, Values& to) {
-  const auto begin = from.begin() + static_cast<std::ptrdiff_t>(first * width);
-  to.insert(to.end(), begin, begin + static_cast<std::ptrdiff_t>(count * width));
+void write_labels(const Hit& hit, const RowSpans& to, size_t row) {
+  const Labels labels = labels_of(hit);
+  if (to.groups != nullptr) to.groups[row] = labels.group;
+  if (to.tags != nullptr) to.tags[row] = labels.tag;
+  if (to.layers != nullptr) to.layers[row] = labels.layers;
+  if (to.positions == nullptr) return;
+  write_point(to.positions, row, labels.position.x, labels.position.y, labels.position.z);
+  const Quaternion& turned = labels.rotation;
+  std::copy_n(std::array{turned.x, turned.y, turned.z, turned.w}.begin(), 4, to.rotations + 4 * row);
+}
+
+bool has_labels(const RowSpans& to) {
+  return to.groups != nullptr || to.tags != nullptr || to.layers != nullptr || to.positions != nullptr;
 }
 
 }  // namespace
@@ -144,68 +157,38 @@ absl::Status check_reply_size(const QueryBatch& batch) {
                       static_cast<double>(bytes));
 }
 
-void append_row(const Hit& hit, ColumnSet columns, BlockResult& result) {
-  if (columns.has(Column::kT)) result.t.push_back(hit.t);
-  if (columns.has(Column::kId)) result.ids.push_back(hit.id);
-  if (columns.has(Column::kTriangle)) result.triangles.push_back(hit.triangle);
-  if (!columns.has(Column::kGroup) && !columns.has(Column::kTag) && !columns.has(Column::kLayers) &&
-      !columns.has(Column::kPose))
-    return;
-  const Labels labels = labels_of(hit);
-  if (columns.has(Column::kGroup)) result.groups.push_back(labels.group);
-  if (columns.has(Column::kTag)) result.tags.push_back(labels.tag);
-  if (columns.has(Column::kLayers)) result.layers.push_back(labels.layers);
-  if (!columns.has(Column::kPose)) return;
-  append_point(result.positions, labels.position.x, labels.position.y, labels.position.z);
-  append_point(result.rotations, labels.rotation.x, labels.rotation.y, labels.rotation.z);
-  result.rotations.push_back(labels.rotation.w);
+void write_row(const Hit& hit, const RowSpans& to, size_t row) {
+  if (to.t != nullptr) to.t[row] = hit.t;
+  if (to.ids != nullptr) to.ids[row] = hit.id;
+  if (to.triangles != nullptr) to.triangles[row] = hit.triangle;
+  if (has_labels(to)) write_labels(hit, to, row);
 }
 
-void append_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, ColumnSet columns,
-                          BlockResult& result) {
-  if (columns.has(Column::kId)) result.ids.insert(result.ids.end(), triangles.size(), hit.id);
-  if (columns.has(Column::kTriangle))
-    result.triangles.insert(result.triangles.end(), triangles.begin(), triangles.end());
-  ColumnSet labels;
-  for (const Column column : {Column::kGroup, Column::kTag, Column::kLayers, Column::kPose})
-    if (columns.has(column)) labels.add(column);
-  if (labels.empty()) return;
-  for (size_t row = 0; row < triangles.size(); ++row) append_row(hit, labels, result);
+void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row) {
+  if (to.ids != nullptr) std::fill_n(to.ids + row, triangles.size(), hit.id);
+  if (to.triangles != nullptr) std::copy(triangles.begin(), triangles.end(), to.triangles + row);
+  if (!has_labels(to)) return;
+  for (size_t i = 0; i < triangles.size(); ++i) write_labels(hit, to, row + i);
 }
 
-void append_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, ColumnSet columns,
-                    BlockResult& result) {
-  if (columns.has(Column::kUv) || columns.has(Column::kNormal)) {
+void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
+                   size_t row) {
+  if (to.uvs != nullptr || to.normals != nullptr) {
     const Surface surface = surface_at(request, hit, winding);
-    if (columns.has(Column::kUv)) result.uvs.insert(result.uvs.end(), {surface.u, surface.v});
+    if (to.uvs != nullptr) std::copy_n(std::array{surface.u, surface.v}.begin(), 2, to.uvs + 2 * row);
     const Vec3f normal = to_float(surface.normal);
-    if (columns.has(Column::kNormal)) append_point(result.normals, normal.x, normal.y, normal.z);
+    if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
   }
-  if (!columns.has(Column::kPoint)) return;
+  if (to.points == nullptr) return;
   Vec3f point;
   if (hit.id != kNoId) point = to_float(request.origin - frame + request.direction * double{hit.t});
-  append_point(result.points, point.x, point.y, point.z);
+  write_point(to.points, row, point.x, point.y, point.z);
 }
 
-void append_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& row, ColumnSet columns,
-                          BlockResult& result) {
-  if (!columns.has(Column::kPoint)) return;
-  const Vec3f point = to_float(request.point - frame + nearest_offset(request, row));
-  append_point(result.points, point.x, point.y, point.z);
-}
-
-void append_rows(const BlockResult& from, size_t first, size_t rows, ColumnSet columns, BlockResult& to) {
-  if (columns.has(Column::kT)) append_slice(from.t, first, rows, 1, to.t);
-  if (columns.has(Column::kId)) append_slice(from.ids, first, rows, 1, to.ids);
-  if (columns.has(Column::kTriangle)) append_slice(from.triangles, first, rows, 1, to.triangles);
-  if (columns.has(Column::kUv)) append_slice(from.uvs, first, rows, 2, to.uvs);
-  if (columns.has(Column::kNormal)) append_slice(from.normals, first, rows, 3, to.normals);
-  if (columns.has(Column::kPoint)) append_slice(from.points, first, rows, 3, to.points);
-  if (columns.has(Column::kGroup)) append_slice(from.groups, first, rows, 1, to.groups);
-  if (columns.has(Column::kTag)) append_slice(from.tags, first, rows, 1, to.tags);
-  if (columns.has(Column::kLayers)) append_slice(from.layers, first, rows, 1, to.layers);
-  if (columns.has(Column::kPose)) append_slice(from.positions, first, rows, 3, to.positions);
-  if (columns.has(Column::kPose)) append_slice(from.rotations, first, rows, 4, to.rotations);
+void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {
+  if (to.points == nullptr) return;
+  const Vec3f point = to_float(request.point - frame + nearest_offset(request, hit));
+  write_point(to.points, row, point.x, point.y, point.z);
 }
 
 }  // namespace locus

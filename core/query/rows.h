@@ -3,11 +3,11 @@
 #define LOCUS_CORE_QUERY_ROWS_H_
 
 #include "absl/strings/string_view.h"
+#include "core/query/answer_sink.h"
 #include "core/query/hit.h"
 #include "core/query/nearest_query.h"
 #include "core/query/query_batch.h"
 #include "core/query/ray_query.h"
-#include "core/query/run_batch.h"
 
 namespace locus {
 
@@ -34,20 +34,16 @@ uint64_t reply_limit(const QueryBatch& batch);
 // INVALID_ARGUMENT LIMIT where fixed_reply_bytes() alone is over the batch's limit.
 absl::Status check_reply_size(const QueryBatch& batch);
 
-// Writes the columns of a row that every kind has; a miss where `hit` names nothing.
-void append_row(const Hit& hit, ColumnSet columns, BlockResult& result);
-// Writes a row like `hit` for each of some triangles.
-void append_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, ColumnSet columns, BlockResult& result);
+// Writes the columns of row `row` that every kind has; a miss where `hit` names nothing.
+void write_row(const Hit& hit, const RowSpans& to, size_t row);
+// Writes a row like `hit` for each of some triangles, from row `row` on.
+void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);
 // Writes what only hits of rays have: uv, normal and point, the latter relative to the frame.
-void append_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, ColumnSet columns,
-                    BlockResult& result);
+void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
+                   size_t row);
 
 // Writes the point of a row of what is nearest, relative to the frame, where it is wanted.
-void append_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& row, ColumnSet columns,
-                          BlockResult& result);
-
-// Appends the first `rows` rows of `from`; both have the columns `columns`.
-void append_rows(const BlockResult& from, size_t first_row, size_t rows, ColumnSet columns, BlockResult& to);
+void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
 
 }  // namespace locus
 

@@ -21,6 +21,14 @@ Moment::Moment(const ObjectSet& at, const ObjectSet& next, double weight, const 
       reach_(displacement.reach * weight * kRelativeSlack + kPlaceSlack),
       fast_(displacement.fast.get()) {}
 
+GridRegion Moment::region(const Aabbd& bounds, const std::optional<Balld>& ball) const {
+  if (next_ == nullptr) return {&at_->grid(), bounds, ball};
+  const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
+  std::optional<Balld> near = ball;
+  if (near) near->radius += reach;
+  return {&at_->grid(), grown(bounds, reach), near};
+}
+
 Shape Moment::shape_between(const GridRef& object) const {
   Shape shape = shape_of(object);
   const GridRef later = next_->grid().find_like(object);

@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "core/base/planted_bug.h"
+#include "core/index/hash_grid/region_walk.h"
 #include "core/scene/scene_snapshot.h"
 
 namespace locus {
@@ -45,11 +46,14 @@ class Moment {
     return reach_;
   }
 
+  // What a query that asks for the objects in a box or, where there is one, in a ball with those bounds, asks of the
+  // grid of objects().
+  GridRegion region(const Aabbd& bounds, const std::optional<Balld>& ball) const;
+  // visit(GridRef) for the objects in such a box or ball: those of which ask(visit) gives what region() names, and
+  // others that moved far.
+  template <class Ask, class Visit>
+  void visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const;
   // As GridSnapshot's, of objects() where they are at this moment.
-  template <class Visit>
-  void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
-  template <class Visit>
-  void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
   template <class Limit, class Visit>
@@ -90,20 +94,11 @@ bool Moment::visit_fast(const MightMeet& might_meet, Work& work, const Visit& vi
   return true;
 }
 
-template <class Visit>
-void Moment::visit_region(const Aabbd& region, Work& work, const Visit& visit) const {
-  if (next_ == nullptr) return at_->grid().visit_region(region, work, visit);
-  const Aabbd near = grown(region, planted(PlantedBug::kRewindReach) ? 0 : reach_);
-  if (fast_ == nullptr) return at_->grid().visit_region(near, work, visit);
-  if (!visit_fast([&region](const Aabbd& bounds) { return overlaps(bounds, region); }, work, visit)) return;
-  at_->grid().visit_region(near, work,
-                           [&](const GridRef& object) { return is_fast(object.handle()) || visit(object); });
-}
-
-template <class Visit>
-void Moment::visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const {
-  if (next_ == nullptr) return at_->grid().visit_ball(ball, bounds, work, visit);
-  visit_region(bounds, work, visit);
+template <class Ask, class Visit>
+void Moment::visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const {
+  if (fast_ == nullptr) return ask(visit);
+  if (!visit_fast([&bounds](const Aabbd& way) { return overlaps(way, bounds); }, work, visit)) return;
+  ask([&](const GridRef& object) { return is_fast(object.handle()) || visit(object); });
 }
 
 template <class Limit, class Visit>

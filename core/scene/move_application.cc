@@ -18,14 +18,19 @@ bool MoveApplication::serves(const UpdateBatch& batch) {
          batch.inserts.empty() && batch.relabels.empty() && !batch.moves.empty();
 }
 
-void MoveApplication::run(const ObjectStore& objects, const UpdateBatch& batch) {
+void MoveApplication::begin(const ObjectStore& objects) {
   moves_.clear();
   rotations_.clear();
-  changes_ = false;
+  last_move_.resize(std::max(last_move_.size(), objects.handle_count()));
+}
+
+void MoveApplication::add(const ObjectStore& objects, const UpdateBatch& batch) {
   applied_ = refused_ = 0;
   errors_.clear();
-  last_move_.resize(std::max(last_move_.size(), objects.handle_count()));
   for (size_t list = 0; list < batch.moves.size(); ++list) run(objects, batch.frame, batch.moves[list], list);
+}
+
+void MoveApplication::finish(const ObjectStore& objects) {
   changes_ = std::any_of(moves_.begin(), moves_.end(), [&](const GridMove& move) {
     const GridRef now = objects.at(move.handle);
     return !(move.position == now.entry().position) ||

@@ -20,7 +20,15 @@ class MoveApplication {
   static bool serves(const UpdateBatch& batch);
 
   // `batch` has passed check_form(), and serves() is true of it. O(items).
-  void run(const ObjectStore& objects, const UpdateBatch& batch);
+  void run(const ObjectStore& objects, const UpdateBatch& batch) {
+    begin(objects);
+    add(objects, batch);
+    finish(objects);
+  }
+  // The same of several batches, one after another, between a begin() and a finish().
+  void begin(const ObjectStore& objects);
+  void add(const ObjectStore& objects, const UpdateBatch& batch);
+  void finish(const ObjectStore& objects);
 
   // Forgets what the last run() came to.
   void clear() {
@@ -32,6 +40,7 @@ class MoveApplication {
   GridMoves moves() const { return {moves_, rotations_, last_move_}; }
   // Whether any of them changes anything.
   bool changes() const { return changes_; }
+  // Of the last batch.
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
   std::vector<ItemError>& errors() { return errors_; }

@@ -1,5 +1,7 @@
 #include "core/scene/scene.h"
 
+#include <algorithm>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -105,6 +107,33 @@ absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until)
   }
 }
 
+absl::StatusOr<std::vector<absl::StatusOr<UpdateAck>>> Scene::apply_joined(absl::Span<const UpdateBatch* const> batches,
+                                                                           Deadline until) {
+  std::vector<absl::StatusOr<UpdateAck>> acks;
+  std::vector<const UpdateBatch*> good;
+  for (const UpdateBatch* batch : batches) {
+    absl::Status form = check_form(*batch);
+    if (form.ok()) good.push_back(batch);
+    acks.push_back(form.ok() ? absl::StatusOr<UpdateAck>(UpdateAck()) : std::move(form));
+  }
+  while (true) {
+    if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
+    const MutexLock lock(writer_mutex_);
+    if (absl::Status status = check_open(); !status.ok()) return status;
+    if (pins_->over()) continue;
+    SceneWriter::Joined joined = writer_.apply_joined(good);
+    if (joined.snapshot != nullptr) publish(joined.snapshot);
+    auto next = joined.acks.begin();
+    for (absl::StatusOr<UpdateAck>& ack : acks)
+      if (ack.ok()) ack = std::move(*next++);
+    const auto applied = std::count_if(
+        acks.begin(), acks.end(), [](const absl::StatusOr<UpdateAck>& ack) { return ack.ok() && !ack->duplicate; });
+    const MutexLock counting(mutex_);
+    joined_updates_ += static_cast<uint64_t>(std::max<std::ptrdiff_t>(applied, 1) - 1);
+    return acks;
+  }
+}
+
 absl::Status Scene::admit_change() {
   const MutexLock lock(mutex_);
   if (closed_) return closed_status();
@@ -160,8 +189,33 @@ void Scene::publish(const SnapshotPtr& snapshot) {
       recent_.pop_front();
     }
     published_.notify_all();
+    tell_watches(snapshot->revision);
   }
   pins_->judge(*snapshot);
+}
+
+void Scene::tell_watches(uint64_t revision) {
+  while (!watches_.empty() && watches_.begin()->first <= revision) {
+    Watch& watch = *watches_.begin()->second;
+    watches_.erase(watches_.begin());
+    watch.told_ = true;
+    watch.tell_();
+  }
+}
+
+Scene::Watch::Watch(const Scene& scene, uint64_t revision, std::function<void()> tell)
+    : scene_(scene), tell_(std::move(tell)) {
+  const MutexLock lock(scene_.mutex_);
+  told_ = scene_.closed_ || scene_.latest_->revision >= revision;
+  if (told_)
+    tell_();
+  else
+    place_ = scene_.watches_.emplace(revision, this);
+}
+
+Scene::Watch::~Watch() {
+  const MutexLock lock(scene_.mutex_);
+  if (!told_) scene_.watches_.erase(place_);
 }
 
 SnapshotPtr Scene::latest() const {
@@ -207,6 +261,7 @@ void Scene::close() {
   closed_ = true;
   pins_->close();
   published_.notify_all();
+  tell_watches(std::numeric_limits<uint64_t>::max());
 }
 
 SceneStatus Scene::status() const {
@@ -215,6 +270,7 @@ SceneStatus Scene::status() const {
   {
     const MutexLock lock(mutex_);
     status.pending_changes = pending_changes_;
+    status.joined_updates = joined_updates_;
     status.last_build_error = last_build_error_;
     snapshot = latest_;
   }

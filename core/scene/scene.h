@@ -9,6 +9,7 @@
 
 #include <chrono>
 #include <deque>
+#include <functional>
 #include <map>
 #include <string>
 
@@ -20,11 +21,18 @@
 
 namespace locus {
 
+// What becomes of update batches that come faster than they can be applied.
+enum class OverloadPolicy : uint8_t {
+  kEveryBatch,  // each is a revision of its own; who sends waits
+  kLatestWins,  // batches that only move objects at one tick and wait together become one revision
+};
+
 struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
   HistoryOptions history = {};
   uint64_t pinned_bytes = 0;  // as PinLedger takes it
+  OverloadPolicy overload = OverloadPolicy::kEveryBatch;
 };
 
 // Which revision a caller wants. Epoch 0 is not checked.
@@ -48,6 +56,7 @@ struct SceneStatus {
   uint64_t pinned_bytes = 0;      // that older revisions hold because they are still read ...
   uint64_t max_pinned_bytes = 0;  // ... and the most that may be
   uint32_t pending_changes = 0;
+  uint64_t joined_updates = 0;   // batches that became visible only together with a later one
   std::string last_build_error;  // of the latest change that failed, whatever came after it
 };
 
@@ -65,6 +74,12 @@ class Scene {
   // Refuses by check_form(), by writer and batch numbers (BATCH_GAP), by `all_or_nothing`, DEADLINE_EXCEEDED where it
   // waited until `until`, or NOT_FOUND once the scene is closed; then nothing has changed.
   absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = PinLedger::kNever)
+      LOCUS_EXCLUDES(writer_mutex_, mutex_);
+
+  // Several batches that may_join(), one after another, as one revision, which their acks share: an entry a batch, with
+  // what apply() says of it. An error of all is as of apply(), and then nothing has changed.
+  absl::StatusOr<std::vector<absl::StatusOr<UpdateAck>>> apply_joined(absl::Span<const UpdateBatch* const> batches,
+                                                                      Deadline until = PinLedger::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Removes and places instances as one revision; builds outside the writer's lock, one change at a time. Waits
@@ -85,6 +100,26 @@ class Scene {
   // For whoever has waited too long: PinLedger::cut_off().
   void cut_off_readers() { pins_->cut_off(); }
 
+  // Tells once that the scene reached a revision or was closed: for whoever may not block in view(). `tell` is called
+  // from any thread, at the latest when that revision is published, and under the scene's lock: it must be quick, take
+  // no lock that is held while a Watch comes or goes, and leave the scene alone. Never after the Watch is gone, which
+  // waits for a call in work. The scene outlives it.
+  class Watch {
+   public:
+    Watch(const Scene& scene, uint64_t revision, std::function<void()> tell);
+    ~Watch();
+    Watch(const Watch&) = delete;
+    Watch& operator=(const Watch&) = delete;
+
+   private:
+    friend class Scene;
+    const Scene& scene_;
+    const std::function<void()> tell_;
+    // Both guarded by the scene's mutex_; the place is of no meaning once told.
+    std::multimap<uint64_t, Watch*>::iterator place_;
+    bool told_ = false;
+  };
+
   // Keeps no revision but the latest for `exactly` views, until more come: gives memory back when it is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
 
@@ -95,6 +130,8 @@ class Scene {
 
  private:
   void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
+  // Those who wait for `revision` or an earlier one.
+  void tell_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);
   absl::Status closed_status() const;
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
   absl::Status admit_change() LOCUS_EXCLUDES(mutex_);
@@ -110,9 +147,11 @@ class Scene {
   mutable Mutex mutex_;
   mutable ConditionVariable published_;
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
-  std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);  // oldest first, latest_ last
+  std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);                   // oldest first, latest_ last
+  mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);  // not yet told, by revision
   uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
+  uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
   const std::shared_ptr<PinLedger> pins_;  // pins may outlive the scene
 };

@@ -100,14 +100,7 @@ UpdateAck SceneWriter::ack_now() const {
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch) {
   absl::StatusOr<std::optional<UpdateAck>> known = writers_.admit(batch.writer, batch.batch);
   if (!known.ok()) return known.status();
-  if (*known) {
-    UpdateAck ack = **known;
-    if (ack.epoch == 0) {
-      ack = ack_now();
-      ack.duplicate = true;
-    }
-    return Applied{std::move(ack), nullptr};
-  }
+  if (*known) return Applied{old_ack(batch), nullptr};
   const bool jumps = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
                                                    [](const MoveColumns& move) { return move.teleport; });
   absl::StatusOr<Applied> result = MoveApplication::serves(batch) && !jumps ? apply_moves(batch) : apply_changes(batch);
@@ -131,10 +124,11 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   Applied result;
   moves_.run(objects_, batch);
   if (absl::Status status = book(batch, moves_, result); !status.ok()) return status;
-  start_tick(batch);
-  if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves());
-  commit(batch, moves_.changes(), result);
-  moves_.clear();
+  result.snapshot = commit_moves(batch);
+  UpdateAck reached = ack_now();
+  result.ack.epoch = reached.epoch;
+  result.ack.revision = reached.revision;
+  result.ack.tick = reached.tick;
   return result;
 }
 
@@ -152,6 +146,58 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
   replaced_bytes_ += objects_.apply(difference.gone, difference.come, difference.reborn);
   commit(batch, !difference.empty() || forgets_now, result);
   return result;
+}
+
+SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* const> batches) {
+  Joined joined;
+  std::vector<bool> is_new;
+  const UpdateBatch* any_new = nullptr;
+  moves_.begin(objects_);
+  for (const UpdateBatch* batch : batches) {
+    const absl::StatusOr<std::optional<UpdateAck>> known = writers_.admit(batch->writer, batch->batch);
+    is_new.push_back(known.ok() && !*known);
+    joined.acks.push_back(known.ok() ? absl::StatusOr<UpdateAck>(UpdateAck()) : known.status());
+    if (!is_new.back()) continue;
+    any_new = batch;
+    moves_.add(objects_, *batch);
+    UpdateAck& ack = *joined.acks.back();
+    ack.applied = moves_.applied();
+    ack.refused = moves_.refused();
+    ack.errors = std::move(moves_.errors());
+    // The next of the same writer may be among them, or the same once more.
+    writers_.record(batch->writer, batch->batch, ack);
+  }
+  moves_.finish(objects_);
+  if (any_new != nullptr) joined.snapshot = commit_moves(*any_new);
+  for (size_t i = 0; i < batches.size(); ++i)
+    if (is_new[i]) settle(*batches[i], *joined.acks[i]);
+  for (size_t i = 0; i < batches.size(); ++i)
+    if (!is_new[i] && joined.acks[i].ok()) joined.acks[i] = old_ack(*batches[i]);
+  return joined;
+}
+
+SnapshotPtr SceneWriter::commit_moves(const UpdateBatch& batch) {
+  Applied all;
+  start_tick(batch);
+  if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves());
+  commit(batch, moves_.changes(), all);
+  moves_.clear();
+  return std::move(all.snapshot);
+}
+
+void SceneWriter::settle(const UpdateBatch& batch, UpdateAck& ack) {
+  ack.epoch = epoch_;
+  ack.revision = revision_;
+  ack.tick = tick_;
+  writers_.record(batch.writer, batch.batch, ack);
+}
+
+UpdateAck SceneWriter::old_ack(const UpdateBatch& batch) const {
+  UpdateAck ack = **writers_.admit(batch.writer, batch.batch);
+  if (ack.epoch != 0) return ack;
+  ack = ack_now();
+  ack.duplicate = true;
+  return ack;
 }
 
 uint64_t SceneWriter::tick_of(const UpdateBatch& batch) const {

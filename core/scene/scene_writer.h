@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
@@ -58,6 +59,13 @@ class SceneWriter {
   // does one object too many, with RESOURCE_EXHAUSTED.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
 
+  struct Joined {
+    std::vector<absl::StatusOr<UpdateAck>> acks;  // one a batch
+    SnapshotPtr snapshot;                         // null when nothing changed
+  };
+  // Applies batches that may_join() and have passed check_form(), one after another, as one revision.
+  Joined apply_joined(absl::Span<const UpdateBatch* const> batches);
+
   // The next revision with other statics.
   SnapshotPtr replace_statics(std::shared_ptr<const StaticSet> statics);
 
@@ -75,6 +83,12 @@ class SceneWriter {
   template <class Application>
   static absl::Status book(const UpdateBatch& batch, Application& application, Applied& result);
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
+  // What the moves at hand come to, at the tick of `batch`; null when that is nothing.
+  SnapshotPtr commit_moves(const UpdateBatch& batch);
+  // Where an applied batch became visible, into its ack, which is remembered.
+  void settle(const UpdateBatch& batch, UpdateAck& ack);
+  // Of a batch that was applied before.
+  UpdateAck old_ack(const UpdateBatch& batch) const;
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
   // Whether the batch drops anything of the past.
   bool forgets(const UpdateBatch& batch) const { return batch.restart_ticks && recorder_.history() != nullptr; }

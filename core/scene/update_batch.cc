@@ -1,5 +1,7 @@
 #include "core/scene/update_batch.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
@@ -76,7 +78,18 @@ absl::Status check_numbers(const UpdateBatch& batch) {
   return absl::OkStatus();
 }
 
+bool moves_alone(const UpdateBatch& batch) {
+  if (batch.clear || batch.restart_ticks || batch.all_or_nothing || batch.moves.empty()) return false;
+  if (!batch.remove_ids.empty() || !batch.remove_groups.empty() || !batch.inserts.empty() || !batch.relabels.empty())
+    return false;
+  return std::none_of(batch.moves.begin(), batch.moves.end(), [](const MoveColumns& move) { return move.teleport; });
+}
+
 }  // namespace
+
+bool may_join(const UpdateBatch& first, const UpdateBatch& second) {
+  return first.tick == second.tick && moves_alone(first) && moves_alone(second);
+}
 
 absl::Status check_form(const UpdateBatch& batch) {
   if (absl::Status status = check_numbers(batch); !status.ok()) return status;

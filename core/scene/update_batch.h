@@ -76,6 +76,10 @@ struct UpdateAck {
   bool duplicate = false;
 };
 
+// Whether both only move objects, at one tick and item by item, so that they may become one revision: what the second
+// moves is where the second says, and all else where the first says.
+bool may_join(const UpdateBatch& first, const UpdateBatch& second);
+
 // The form of a batch: column lengths, frame and limits. INVALID_ARGUMENT naming the field.
 absl::Status check_form(const UpdateBatch& batch);
 

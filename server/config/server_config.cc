@@ -12,6 +12,7 @@
 #include "absl/strings/str_replace.h"
 #include "server/config/listen_address.h"
 #include "server/config/machine.h"
+#include "server/config/observability_limits.h"
 #include "server/config/server_parser.h"
 #include "server/config/version.h"
 
@@ -33,9 +34,18 @@ Examples:
   locusd --listen 127.0.0.1:0 --port-file p   take a free port and write it to the file p
   locusd --config /etc/locus/locusd.conf --log-format json
 
-Try it: locus health; locus limits; locus scene create demo
+Try it: locus health; locus limits; locus scene create demo; locus top
+/metrics, /healthz and /readyz are served on 127.0.0.1:7576. What it would run with
+and why: locus config show --origin
 It ends on SIGTERM or SIGINT once calls in work are done, with exit code 0; a
 second signal ends it at once.)";
+
+template <class T>
+std::string name_of(const std::map<std::string, T>& names, T value) {
+  for (const auto& [name, named] : names)
+    if (named == value) return name;
+  return "";
+}
 
 // CLI11 has made a plain number of the size by now.
 bool is_size(const std::string& text, uint64_t least, uint64_t most) {
@@ -60,23 +70,40 @@ void add_options(CLI::App& app, ServerConfig& config) {
       ->expected(1, static_cast<int>(limits::kMaxListenAddresses))
       ->take_all()
       ->capture_default_str();
-  app.add_option("--port-file", config.port_file, "File to write the first TCP port to once the daemon answers");
+  app.add_option("--port-file", config.port_file, "File to write the first TCP port to once the daemon answers")
+      ->capture_default_str();
+  app.add_option("--http-listen", config.http_listen,
+                 "Address of the HTTP port with /metrics, /healthz and /readyz; empty = none")
+      ->capture_default_str();
+  app.add_option("--http-port-file", config.http_port_file, "File to write the HTTP port to once it answers")
+      ->capture_default_str();
   app.add_option("--threads", config.threads, "Threads that may work on one batch; 0 = the cores it may use")
       ->check(CLI::Range(0u, limits::kMaxThreads))
       ->capture_default_str();
+  const std::map<std::string, BatchPriority> priorities = {{"nice", BatchPriority::kNice},
+                                                           {"idle", BatchPriority::kIdle}};
+  app.add_option("--batch-priority", config.batch_priority,
+                 "Of threads on large batches: nice, 10 below all others, or idle, only on idle cores")
+      ->transform(CLI::CheckedTransformer(priorities).description(""))
+      ->default_str(name_of(priorities, config.batch_priority));
   app.add_option("--instruction-set", config.instruction_set,
-                 "Vector instructions of queries: avx2, sse4 or portable [the widest there are]");
+                 "Vector instructions of queries: avx2, sse4 or portable [the widest there are]")
+      ->capture_default_str();
   const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
                                                   {"info", LogLevel::kInfo},
                                                   {"warning", LogLevel::kWarning},
                                                   {"error", LogLevel::kError}};
   app.add_option("--log-level", config.log_level, "debug, info, warning or error")
       ->transform(CLI::CheckedTransformer(levels).description(""))
-      ->default_str("info");
+      ->default_str(name_of(levels, config.log_level));
   const std::map<std::string, LogFormat> formats = {{"text", LogFormat::kText}, {"json", LogFormat::kJson}};
   app.add_option("--log-format", config.log_format, "text, or json: one object a line")
       ->transform(CLI::CheckedTransformer(formats).description(""))
-      ->default_str("text");
+      ->default_str(name_of(formats, config.log_format));
+  app.add_option("--slow-query-ms", config.slow_query_ms,
+                 "Log query batches that take longer, in milliseconds; 0 = none")
+      ->check(CLI::Range(0u, kMaxSlowQueryMs))
+      ->capture_default_str();
   const auto add_limit = [&app](const char* name, uint32_t& value, const char* what) {
     app.add_option(name, value, what)->check(CLI::Range(1u, value))->capture_default_str();
   };
@@ -130,7 +157,9 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
     if (option->count() > 0 || option->get_lnames().empty() || !option->get_configurable()) continue;
     const std::string& name = option->get_lnames().front();
     const std::optional<std::string> value = environment(environment_variable(name));
-    if (value && !value->empty()) all.push_back(absl::StrCat("--", name, "=", *value));
+    if (!value) continue;
+    if (!value->empty()) all.push_back(absl::StrCat("--", name, "=", *value));
+    if (value->empty() && may_be_empty(name)) all.insert(all.end(), {absl::StrCat("--", name), ""});
   }
   return all;
 }
@@ -150,6 +179,19 @@ absl::Status reachable_from_outside(absl::string_view address) {
       "  1. Where only trusted machines reach it, such as a container whose port is published on its host's 127.0.0.1 ",
       "only, say so with LOCUS_INSECURE=1 or --insecure.\n",
       "  2. Otherwise listen on 127.0.0.1, [::1] or a unix socket, and put a proxy in front that ends TLS."));
+}
+
+absl::Status check_http(const ServerConfig& config) {
+  if (config.http_listen.empty()) {
+    if (config.http_port_file.empty()) return absl::OkStatus();
+    return absl::InvalidArgumentError("--http-port-file needs an HTTP port; give --http-listen an address");
+  }
+  const absl::StatusOr<ListenAddress> address = parse_listen_address(config.http_listen);
+  if (!address.ok()) return address.status();
+  if (address->kind != ListenAddress::Kind::kTcp)
+    return absl::InvalidArgumentError("--http-listen takes host:port or [v6]:port, for scrapers speak TCP");
+  if (!address->local && !config.insecure) return reachable_from_outside(config.http_listen);
+  return absl::OkStatus();
 }
 
 Invocation mistake(absl::string_view message) {
@@ -193,6 +235,8 @@ std::string environment_variable(const std::string& option) {
   return absl::StrCat("LOCUS_", absl::AsciiStrToUpper(absl::StrReplaceAll(option, {{"-", "_"}})));
 }
 
+bool may_be_empty(const std::string& option) { return option == "http-listen"; }
+
 std::optional<std::string> process_environment(const std::string& name) {
   const char* value = std::getenv(name.c_str());
   if (value == nullptr) return std::nullopt;
@@ -226,7 +270,7 @@ absl::Status check_config(const ServerConfig& config) {
   }
   if (!config.port_file.empty() && !tcp)
     return absl::InvalidArgumentError("--port-file needs a TCP address among --listen; a unix socket has no port");
-  return absl::OkStatus();
+  return check_http(config);
 }
 
 }  // namespace locus::server

@@ -17,6 +17,9 @@ namespace locus::server {
 
 enum class LogLevel : uint8_t { kDebug, kInfo, kWarning, kError };
 enum class LogFormat : uint8_t { kText, kJson };
+enum class BatchPriority : uint8_t { kNice, kIdle };
+
+inline constexpr const char* kDefaultHttpListen = "127.0.0.1:7576";
 
 struct ServerConfig {
   // Where to listen; more than one address is fine. `host:port`, `[v6]:port` or `unix:/path`; port 0 takes a free one.
@@ -27,9 +30,23 @@ struct ServerConfig {
   // scripts that start the daemon on port 0.
   std::string port_file;
 
+  // Where metrics and health pages are served by HTTP: /metrics for Prometheus, /healthz, /readyz. `host:port` or
+  // `[v6]:port`; port 0 takes a free one; empty = nowhere. Where the default is taken, the daemon warns and goes on
+  // without; any other address it must get. Change it to let a scraper on another machine in, which also needs
+  // `insecure`: whoever reads the pages learns the names of scenes and how they are used.
+  std::string http_listen = kDefaultHttpListen;
+
+  // Written with the HTTP port as `port_file` is; empty = not written.
+  std::string http_port_file;
+
   // Threads that may work on one query batch, the caller's own included; 0 = the cores this process may use, by its
   // affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
   uint32_t threads = 0;
+
+  // How threads that work on large query batches stand beside those that talk to clients and apply updates: `nice` 10
+  // steps below, or `idle`, which runs only when nobody else wants a core. Idle halves the wait of small calls beside
+  // large ones, but starves where other processes fill the machine.
+  BatchPriority batch_priority = BatchPriority::kNice;
 
   // The vector instructions that queries use: a name that `locusd` logs at its start, or portable for none; empty = the
   // widest that the processor has. Answers do not depend on it. Change it to compare, or to rule out a processor's
@@ -42,12 +59,16 @@ struct ServerConfig {
   // `json` writes one object a line, for collectors.
   LogFormat log_format = LogFormat::kText;
 
+  // A batch of queries that takes longer, in milliseconds from its turn to its answer, is logged as a warning, a few a
+  // second at most; 0 = none. Lower it to find out what makes a server slow.
+  uint32_t slow_query_ms = 1000;
+
   // Limits that may be lowered, never raised; a refusal names them. Lower them where memory is short or callers are
   // many.
   uint32_t max_receive_bytes = limits::kReceiveBytes;  // one message
   uint32_t max_scenes = limits::kMaxScenes;
   uint32_t max_meshes = limits::kMaxMeshes;
-  uint32_t max_streams = limits::kMaxStreams;  // open update and query streams; each costs a thread
+  uint32_t max_streams = limits::kMaxStreams;  // open update and query streams
   uint32_t max_calls = limits::kMaxCalls;      // calls in work at once, streams apart
 
   // Bytes of memory that the process may hold before uploads, inserts and placements are refused; 0 = three quarters of

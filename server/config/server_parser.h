@@ -14,6 +14,9 @@ namespace locus::server {
 // is no matter of the parser: see environment_variable().
 void build_parser(CLI::App& app, ServerConfig& config);
 
+// Whether an empty variable sets the option, to nothing, rather than being as good as none.
+bool may_be_empty(const std::string& option);
+
 // The variable that sets an option: "drain-grace-s" is set by LOCUS_DRAIN_GRACE_S.
 std::string environment_variable(const std::string& option);
 

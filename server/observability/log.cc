@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 
@@ -15,6 +17,8 @@ namespace {
 constexpr size_t kMaxValue = 1024;
 
 std::atomic<LogFormat> log_format{LogFormat::kText};
+
+thread_local const TraceContext* current_trace = nullptr;
 
 spdlog::level::level_enum to_spdlog(LogLevel level) {
   switch (level) {
@@ -54,7 +58,7 @@ void append_escaped(std::string& out, absl::string_view text) {
   }
 }
 
-std::string json_line(absl::string_view message, std::initializer_list<LogField> fields) {
+std::string json_line(absl::string_view message, const std::vector<LogField>& fields) {
   std::string line = "\"message\":\"";
   append_escaped(line, message);
   line += '"';
@@ -66,7 +70,7 @@ std::string json_line(absl::string_view message, std::initializer_list<LogField>
   return line;
 }
 
-std::string text_line(absl::string_view message, std::initializer_list<LogField> fields) {
+std::string text_line(absl::string_view message, const std::vector<LogField>& fields) {
   std::string line;
   append_escaped(line, message);
   for (const LogField& field : fields) {
@@ -92,8 +96,19 @@ bool logs(LogLevel level) { return logger().should_log(to_spdlog(level)); }
 
 void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields) {
   if (!logs(level)) return;
-  const std::string line = log_format == LogFormat::kJson ? json_line(message, fields) : text_line(message, fields);
+  std::vector<LogField> all = fields;
+  if (current_trace != nullptr) {
+    all.push_back({"request_id", current_trace->request_id});
+    if (!current_trace->traceparent.empty()) all.push_back({"traceparent", current_trace->traceparent});
+  }
+  const std::string line = log_format == LogFormat::kJson ? json_line(message, all) : text_line(message, all);
   logger().log(to_spdlog(level), spdlog::string_view_t(line.data(), line.size()));
 }
+
+LogScope::LogScope(TraceContext trace) : trace_(std::move(trace)), outer_(current_trace) { current_trace = &trace_; }
+
+LogScope::~LogScope() { current_trace = outer_; }
+
+TraceContext LogScope::current() { return current_trace == nullptr ? TraceContext() : *current_trace; }
 
 }  // namespace locus::server

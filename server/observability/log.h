@@ -10,6 +10,7 @@
 
 #include "absl/strings/string_view.h"
 #include "server/config/server_config.h"
+#include "server/observability/trace_context.h"
 
 namespace locus::server {
 
@@ -27,6 +28,23 @@ bool logs(LogLevel level);
 // `message` says what happened and is the same for every event of a kind; `fields` say to what. Control characters,
 // which may come from callers, are escaped.
 void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields = {});
+
+// Names the call that this thread works on: while it lives, every line the thread logs has the fields request_id and,
+// where there is one, traceparent. Scopes may be nested; the innermost counts.
+class LogScope {
+ public:
+  explicit LogScope(TraceContext trace);
+  ~LogScope();
+  LogScope(const LogScope&) = delete;
+  LogScope& operator=(const LogScope&) = delete;
+
+  // Of the innermost scope of this thread; empty without one. For work that another thread goes on with.
+  static TraceContext current();
+
+ private:
+  const TraceContext trace_;
+  const TraceContext* const outer_;
+};
 
 }  // namespace locus::server
 

@@ -29,13 +29,31 @@ SteadyTime to_steady(system_clock::time_point deadline) {
 
 }  // namespace
 
-Caller::Caller(const Host& host, const grpc::ServerContextBase& context)
-    : host_(host), context_(context), deadline_(to_steady(context.deadline())) {}
+uint64_t nanoseconds_since(SteadyTime moment) {
+  return static_cast<uint64_t>(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - moment).count());
+}
+
+Caller::Caller(const Host& host, const grpc::ServerContextBase& context, const std::atomic<bool>* gone)
+    : host_(host), context_(context), gone_(gone), deadline_(to_steady(context.deadline())) {}
+
+TraceContext Caller::trace() const {
+  const auto& metadata = context_.client_metadata();
+  const auto checked = [&metadata](const char* name, bool (*good)(absl::string_view)) {
+    const auto entry = metadata.find(name);
+    if (entry == metadata.end()) return std::string();
+    std::string value(entry->second.data(), entry->second.size());
+    return good(value) ? value : std::string();
+  };
+  TraceContext trace{checked(kRequestIdMetadata, is_request_id), checked("traceparent", is_traceparent)};
+  if (trace.request_id.empty()) trace.request_id = request_id_of(number_);
+  return trace;
+}
 
 absl::Status Caller::stop() const {
   if (host_.drain.ended()) return draining();
   if (steady_clock::now() >= deadline_) return absl::DeadlineExceededError("the call's deadline passed");
-  if (context_.IsCancelled()) return absl::CancelledError("the caller gave up");
+  if (gone_ != nullptr ? gone_->load() : context_.IsCancelled()) return absl::CancelledError("the caller gave up");
   return absl::OkStatus();
 }
 
@@ -84,8 +102,12 @@ absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>&
   }
 }
 
-grpc::Status serve(Host& host, const grpc::ServerContextBase& context, absl::string_view rpc,
+grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
                    const std::function<absl::Status(const Caller&)>& body, WhileDraining while_draining) {
+  const SteadyTime arrived = steady_clock::now();
+  const Caller caller(host, context);
+  const LogScope scope(caller.trace());
+  context.AddTrailingMetadata(kRequestIdMetadata, LogScope::current().request_id);
   const Gate::Pass pass = host.calls.enter();
   absl::Status status;
   if (!pass) {
@@ -93,16 +115,26 @@ grpc::Status serve(Host& host, const grpc::ServerContextBase& context, absl::str
   } else if (host.drain.draining() && while_draining == WhileDraining::kRefuse) {
     status = draining();
   } else {
-    status = body(Caller(host, context));
+    status = body(caller);
   }
-  if (!status.ok()) log_refusal(rpc, status);
+  record_answer(host.metrics, caller, rpc, status, arrived);
   return to_grpc(status);
 }
 
-void log_refusal(absl::string_view rpc, const absl::Status& status) {
+bool ends_stream(const Caller& caller, const absl::Status& status) {
+  if (status.code() == absl::StatusCode::kCancelled || status.code() == absl::StatusCode::kUnavailable) return true;
+  return status.code() == absl::StatusCode::kDeadlineExceeded && !caller.stop().ok();
+}
+
+void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status,
+                   SteadyTime arrived) {
+  metrics.record_call(rpc, status.code(), nanoseconds_since(arrived));
+  if (status.ok()) return;
+  metrics.record_refusal(status);
   if (!logs(LogLevel::kDebug)) return;
+  const LogScope scope(caller.trace());
   log(LogLevel::kDebug, "refused",
-      {{"rpc", std::string(rpc)},
+      {{"rpc", std::string(rpc_name(rpc))},
        {"code", absl::StatusCodeToString(status.code())},
        {"text", std::string(status.message())}});
 }

@@ -7,21 +7,27 @@
 
 #include <grpcpp/server_context.h>
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <string>
 
 #include "absl/status/statusor.h"
 #include "core/scene/scene.h"
+#include "server/observability/trace_context.h"
 #include "server/service/host.h"
 
 namespace locus::server {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
+// Of the steady clock, up to now.
+uint64_t nanoseconds_since(SteadyTime moment);
+
 class Caller {
  public:
-  Caller(const Host& host, const grpc::ServerContextBase& context);
+  // `gone`, where given, says whether the caller gave up; of calls on completion queues, `context` does not.
+  Caller(const Host& host, const grpc::ServerContextBase& context, const std::atomic<bool>* gone = nullptr);
 
   // OK while the call should go on; else CANCELLED, DEADLINE_EXCEEDED, or DRAINING once the grace is used up.
   absl::Status stop() const;
@@ -38,13 +44,22 @@ class Caller {
   // Ends the call at once, CANCELLED, whatever it waits for.
   void cut_off() const { context_.TryCancel(); }
 
+  // How logs call this call: by the caller's metadata x-request-id and traceparent where they are of their form, or by
+  // an id of its own. Unlike the rest on the call's own thread only.
+  TraceContext trace() const;
+
   const Host& host() const { return host_; }
 
  private:
   const Host& host_;
   const grpc::ServerContextBase& context_;
+  const std::atomic<bool>* const gone_;
   SteadyTime deadline_;
+  const uint64_t number_ = next_request_number();
 };
+
+// The metadata that brings a request id and takes it back to whoever called.
+inline constexpr const char* kRequestIdMetadata = "x-request-id";
 
 // The name and x-scene checks of a call about one scene, and the scene.
 absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field);
@@ -59,13 +74,18 @@ absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>&
 
 enum class WhileDraining { kRefuse, kServe };
 
-// Runs `body` and turns what it returns into the call's status.
-grpc::Status serve(Host& host, const grpc::ServerContextBase& context, absl::string_view rpc,
+// Runs `body`, turns what it returns into the call's status, and counts the call. Its lines in the log have its request
+// id, which also goes back to the caller at the end.
+grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
                    const std::function<absl::Status(const Caller&)>& body,
                    WhileDraining while_draining = WhileDraining::kRefuse);
 
-// A line at debug for a refused call or message.
-void log_refusal(absl::string_view rpc, const absl::Status& status);
+// Which refusals of a message are the stream's own end: the caller's end of the call, and the server's.
+bool ends_stream(const Caller& caller, const absl::Status& status);
+
+// Counts a call or a message of a stream that was answered with `status`, and logs a line at debug where that is a
+// refusal.
+void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived);
 
 }  // namespace locus::server
 

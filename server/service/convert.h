@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "absl/status/statusor.h"
+#include "core/index/work.h"
 #include "core/query/query_batch.h"
-#include "core/query/run_batch.h"
 #include "core/scene/registry.h"
 #include "core/scene/scene.h"
 #include "core/scene/update_batch.h"
@@ -37,8 +37,6 @@ absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch);
 v1::UpdateAck to_proto(const UpdateAck& ack);
 
 absl::StatusOr<QueryBatch> to_queries(const v1::QueryBatch& batch);
-// Columns are moved or copied once into the message.
-void to_proto(const BlockResult& block, v1::BlockResult* out);
 v1::Work to_proto(const Work& work, uint64_t nanoseconds);
 
 // Without `static_from`, which the registry looks up.

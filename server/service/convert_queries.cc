@@ -137,11 +137,6 @@ absl::Status read_block(const v1::QueryBlock& block, const std::string& field, Q
   return read_columns(block, field, &out->columns);
 }
 
-template <class T, class Repeated>
-void copy_column(const std::vector<T>& from, Repeated* to) {
-  to->Add(from.begin(), from.end());
-}
-
 }  // namespace
 
 absl::StatusOr<QueryBatch> to_queries(const v1::QueryBatch& batch) {
@@ -157,26 +152,6 @@ absl::StatusOr<QueryBatch> to_queries(const v1::QueryBatch& batch) {
         !status.ok())
       return status;
   return out;
-}
-
-void to_proto(const BlockResult& block, v1::BlockResult* out) {
-  copy_column(block.counts, out->mutable_counts());
-  copy_column(block.truncated, out->mutable_truncated());
-  out->set_hits(block.hits);
-  copy_column(block.t, out->mutable_t());
-  copy_column(block.ids, out->mutable_ids());
-  copy_column(block.triangles, out->mutable_triangles());
-  copy_column(block.uvs, out->mutable_uvs());
-  copy_column(block.normals, out->mutable_normals());
-  copy_column(block.points, out->mutable_points());
-  copy_column(block.groups, out->mutable_groups());
-  copy_column(block.tags, out->mutable_tags());
-  copy_column(block.layers, out->mutable_layers());
-  copy_column(block.positions, out->mutable_positions());
-  copy_column(block.rotations, out->mutable_rotations());
-  copy_column(block.resolved_ticks, out->mutable_resolved_ticks());
-  copy_column(block.resolved_fractions, out->mutable_resolved_fractions());
-  copy_column(block.clamped, out->mutable_clamped());
 }
 
 v1::Work to_proto(const Work& work, uint64_t nanoseconds) {

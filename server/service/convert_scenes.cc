@@ -20,6 +20,8 @@ v1::SceneSpec to_proto(const SceneSpec& spec) {
   out.set_history_bytes(spec.history.bytes);
   out.set_durability(v1::DURABILITY_MEMORY);
   out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
+  out.set_overload(spec.overload == OverloadPolicy::kLatestWins ? v1::OVERLOAD_POLICY_LATEST_WINS
+                                                                : v1::OVERLOAD_POLICY_EVERY_BATCH);
   return out;
 }
 
@@ -28,6 +30,7 @@ absl::Status check_served(const v1::SceneSpec& spec) {
   if (spec.durability() == v1::DURABILITY_LOCAL) return not_served("spec.durability");
   if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
   if (!v1::Winding_IsValid(spec.winding())) return unknown_enum("spec.winding", spec.winding());
+  if (!v1::OverloadPolicy_IsValid(spec.overload())) return unknown_enum("spec.overload", spec.overload());
   return absl::OkStatus();
 }
 
@@ -91,6 +94,7 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   out.history = *history;
   out.labels.insert(spec.labels().begin(), spec.labels().end());
   out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
+  if (spec.overload() == v1::OVERLOAD_POLICY_LATEST_WINS) out.overload = OverloadPolicy::kLatestWins;
   return out;
 }
 
@@ -114,6 +118,7 @@ v1::Scene to_proto(const Scene& scene) {
   out.set_triangles(snapshot->statics->triangle_count());
   out.set_memory_bytes(status.memory_bytes);
   out.set_pending_changes(status.pending_changes);
+  out.set_joined_updates(status.joined_updates);
   out.set_last_build_error(status.last_build_error);
   const Aabbd bounds = bounds_of_all(*snapshot);
   if (!bounds.empty()) {

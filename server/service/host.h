@@ -5,11 +5,16 @@
 
 #include "core/scene/registry.h"
 #include "server/config/server_config.h"
+#include "server/observability/metrics.h"
+#include "server/observability/slow_queries.h"
 #include "server/scheduling/change_queue.h"
+#include "server/scheduling/cost_estimates.h"
 #include "server/scheduling/drain.h"
 #include "server/scheduling/gate.h"
 #include "server/scheduling/memory_budget.h"
-#include "server/scheduling/thread_group.h"
+#include "server/scheduling/query_scheduler.h"
+#include "server/scheduling/thread_clock.h"
+#include "server/scheduling/update_pump.h"
 #include "server/scheduling/worker_pool.h"
 #include "server/service/memory_use.h"
 
@@ -18,20 +23,41 @@ namespace locus::server {
 struct Host {
   explicit Host(const ServerConfig& with)
       : config(with),
+        slow_queries(with.slow_query_ms),
         memory(with.memory_limit, process_memory(registry)),
         pool(with.threads),
+        scheduler(scheduler_options(with)),
+        updates(pump_options(with)),
         calls(with.max_calls),
         streams(with.max_streams) {}
 
   static constexpr uint32_t kChangeThreads = 2;
 
+  static SchedulerOptions scheduler_options(const ServerConfig& config) {
+    SchedulerOptions options;
+    options.threads = config.threads;
+    options.priority = config.batch_priority;
+    options.clock = &thread_nanoseconds;
+    return options;
+  }
+  static UpdatePumpOptions pump_options(const ServerConfig& config) {
+    UpdatePumpOptions options;
+    options.threads = config.threads;
+    return options;
+  }
+
   const ServerConfig config;
+  CallMetrics metrics;
+  SlowQueries slow_queries;
   Registry registry;
   MemoryBudget memory;
   WorkerPool pool;
+  CostEstimates costs;
+  QueryScheduler scheduler;
+  UpdatePump updates;
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
-  Gate calls;           // in work, streams apart
-  ThreadGroup streams;  // one thread each
+  Gate calls;    // in work, streams apart
+  Gate streams;  // open
   Drain drain;
 };
 

@@ -135,10 +135,13 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   const auto outcome = std::make_shared<Outcome>();
   const uint64_t epoch = (*scene)->latest()->epoch;
   const absl::StatusOr<uint64_t> number =
-      host.changes.submit(epoch, [scene = *scene, owned = *owned, outcome, room = *room](uint64_t change_number) {
+      host.changes.submit(epoch, [&host, arrived = SteadyTime::clock::now(), scene = *scene, owned = *owned, outcome,
+                                  room = *room, trace = LogScope::current()](uint64_t change_number) {
+        const LogScope scope(trace);
         // Whoever asked may be gone by now; readers end in any case.
         (void)wait_for_readers(*scene, [] { return absl::OkStatus(); });
         absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
+        if (change.ok()) host.metrics.record_instance_change(nanoseconds_since(arrived));
         log_change(*scene, change_number, change);
         outcome->set(std::move(change));
       });

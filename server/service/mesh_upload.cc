@@ -112,6 +112,18 @@ absl::StatusOr<bool> answer_early(Host& host, const MeshUpload& upload, v1::Uplo
   return false;
 }
 
+absl::StatusOr<MeshPtr> build(Host& host, const std::string& name, MeshUpload::Complete complete) {
+  const SteadyTime start = SteadyTime::clock::now();
+  BvhOptions options;
+  options.cancel = host.drain.ended_flag();
+  options.parallel_for = [&host](size_t n, const std::function<void(size_t)>& work) {
+    host.pool.parallel_for(n, work);
+  };
+  absl::StatusOr<MeshPtr> built = StaticMesh::build(name, complete.sha256, std::move(complete.mesh), options);
+  if (built.ok()) host.metrics.record_mesh_build(nanoseconds_since(start));
+  return built;
+}
+
 }  // namespace
 
 Sha256 mesh_hash(absl::Span<const float> vertices, absl::Span<const uint32_t> indices) {
@@ -197,13 +209,7 @@ absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1
   if (!complete.ok()) return complete.status();
   if (MeshPtr known = host.registry.find_content(complete->sha256); known != nullptr)
     return reuse(host, upload->name(), std::move(known), response);
-  BvhOptions options;
-  options.cancel = host.drain.ended_flag();
-  options.parallel_for = [&host](size_t n, const std::function<void(size_t)>& work) {
-    host.pool.parallel_for(n, work);
-  };
-  absl::StatusOr<MeshPtr> built =
-      StaticMesh::build(upload->name(), complete->sha256, std::move(complete->mesh), options);
+  absl::StatusOr<MeshPtr> built = build(host, upload->name(), *std::move(complete));
   if (!built.ok()) return built.status();
   absl::StatusOr<MeshPtr> added = host.registry.add_mesh(upload->name(), *std::move(built));
   if (!added.ok()) return added.status();

@@ -1,38 +1,69 @@
 #include "server/service/query_service.h"
 
-#include "server/service/answer_queries.h"
-#include "server/service/call.h"
-#include "server/service/stream_loop.h"
+#include <list>
+#include <string>
+
+#include "server/service/hot_call.h"
+#include "server/service/query_work.h"
 
 namespace locus::server {
 namespace {
 
-using Stream = BlockingStream<v1::StreamQueriesRequest, v1::StreamQueriesResponse>;
+struct QueryMethod {
+  using Request = v1::QueryRequest;
+  using Response = v1::QueryResponse;
+  using Work = QueryWork;
+  static constexpr Rpc kRpc = Rpc::kQuery;
+  static constexpr bool kStream = false;
+  static constexpr bool kInOrder = false;
+
+  void listen(grpc::ServerContext* context, grpc::ByteBuffer* request,
+              grpc::ServerAsyncResponseWriter<grpc::ByteBuffer>* wire, grpc::ServerCompletionQueue* queue,
+              void* tag) const {
+    service->RequestQuery(context, request, wire, queue, queue, tag);
+  }
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_result());
+  }
+
+  QueryService* service;
+};
+
+// Answers as they come.
+struct StreamQueriesMethod {
+  using Request = v1::StreamQueriesRequest;
+  using Response = v1::StreamQueriesResponse;
+  using Work = QueryWork;
+  static constexpr Rpc kRpc = Rpc::kStreamQueries;
+  static constexpr bool kStream = true;
+  static constexpr bool kInOrder = false;
+
+  void listen(grpc::ServerContext* context, grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer>* wire,
+              grpc::ServerCompletionQueue* queue, void* tag) const {
+    service->RequestStreamQueries(context, wire, queue, queue, tag);
+  }
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_result());
+  }
+
+  QueryService* service;
+};
 
 }  // namespace
 
-grpc::Status QueryService::Query(grpc::ServerContext* context, const v1::QueryRequest* request,
-                                 v1::QueryResponse* response) {
-  return serve(host_, *context, "Query", [&](const Caller& caller) {
-    return answer_queries(host_, caller, request->scene(), request->batch(), caller.wait_until(false),
-                          response->mutable_result());
-  });
-}
+struct QueryService::Listeners {
+  std::list<Listener<QueryMethod>> query;
+  std::list<Listener<StreamQueriesMethod>> stream;
+};
 
-RawReactor* QueryService::StreamQueries(grpc::CallbackServerContext* context) {
-  return Stream::open(host_, [this, context](Stream& stream) {
-    const Caller caller(host_, *context);
-    const auto answer = [&](const std::string& scene, const v1::QueryBatch& batch,
-                            v1::StreamQueriesResponse* response) {
-      const absl::Status status =
-          answer_queries(host_, caller, scene, batch, caller.wait_until(true), response->mutable_result());
-      // The revision will not come any more: nobody may write. What was read is answered even so.
-      if (status.code() == absl::StatusCode::kUnavailable && !host_.drain.ended())
-        return absl::DeadlineExceededError("the server is shutting down before the scene reached the revision");
-      return status;
-    };
-    return answer_all(stream, caller, "StreamQueries", answer);
-  });
+QueryService::QueryService(Host& host) : host_(host), listeners_(std::make_unique<Listeners>()) {}
+QueryService::~QueryService() = default;
+
+void QueryService::listen(IoThreads& threads) {
+  for (size_t i = 0; i < threads.size(); ++i) {
+    listeners_->query.emplace_back(host_, QueryMethod{this}, threads[i]).listen();
+    listeners_->stream.emplace_back(host_, StreamQueriesMethod{this}, threads[i]).listen();
+  }
 }
 
 }  // namespace locus::server

@@ -1,26 +1,29 @@
-// QueryService over the scenes of a host: one batch a call, or a stream of them. A batch is answered on the caller's
-// thread with the help of the host's pool.
+// QueryService over the scenes of a host: one batch a call, or a stream of them. Both live on IO threads.
 #ifndef LOCUS_SERVER_SERVICE_QUERY_SERVICE_H_
 #define LOCUS_SERVER_SERVICE_QUERY_SERVICE_H_
 
+#include <memory>
+
 #include "locus/v1/query_service.grpc.pb.h"
-#include "server/service/blocking_stream.h"
 #include "server/service/host.h"
+#include "server/service/io_threads.h"
 
 namespace locus::server {
 
-class QueryService final : public v1::QueryService::WithRawCallbackMethod_StreamQueries<v1::QueryService::Service> {
+class QueryService final : public v1::QueryService::WithRawMethod_Query<
+                               v1::QueryService::WithRawMethod_StreamQueries<v1::QueryService::Service>> {
  public:
-  explicit QueryService(Host& host) : host_(host) {}
+  explicit QueryService(Host& host);
+  ~QueryService() override;
 
-  grpc::Status Query(grpc::ServerContext* context, const v1::QueryRequest* request,
-                     v1::QueryResponse* response) override;
-
-  using WithRawCallbackMethod_StreamQueries::StreamQueries;
-  RawReactor* StreamQueries(grpc::CallbackServerContext* context) override;
+  // Once, after the server started and before the IO threads do. They end before the service.
+  void listen(IoThreads& threads);
 
  private:
+  struct Listeners;
+
   Host& host_;
+  std::unique_ptr<Listeners> listeners_;
 };
 
 }  // namespace locus::server

@@ -115,13 +115,13 @@ absl::Status SceneService::create(const Caller& caller, const v1::CreateSceneReq
 
 grpc::Status SceneService::CreateScene(grpc::ServerContext* context, const v1::CreateSceneRequest* request,
                                        v1::CreateSceneResponse* response) {
-  return serve(host_, *context, "CreateScene",
+  return serve(host_, *context, Rpc::kCreateScene,
                [&](const Caller& caller) { return create(caller, *request, response); });
 }
 
 grpc::Status SceneService::GetScene(grpc::ServerContext* context, const v1::GetSceneRequest* request,
                                     v1::GetSceneResponse* response) {
-  return serve(host_, *context, "GetScene", [&](const Caller& caller) {
+  return serve(host_, *context, Rpc::kGetScene, [&](const Caller& caller) {
     const absl::StatusOr<ScenePtr> scene = find_scene(caller, request->name(), "name");
     if (scene.ok()) *response->mutable_scene() = describe(host_, **scene);
     return scene.status();
@@ -130,29 +130,31 @@ grpc::Status SceneService::GetScene(grpc::ServerContext* context, const v1::GetS
 
 grpc::Status SceneService::ListScenes(grpc::ServerContext* context, const v1::ListScenesRequest* request,
                                       v1::ListScenesResponse* response) {
-  return serve(host_, *context, "ListScenes", [&](const Caller&) { return list_scenes(host_, *request, response); });
+  return serve(host_, *context, Rpc::kListScenes,
+               [&](const Caller&) { return list_scenes(host_, *request, response); });
 }
 
 grpc::Status SceneService::DeleteScene(grpc::ServerContext* context, const v1::DeleteSceneRequest* request,
                                        v1::DeleteSceneResponse*) {
-  return serve(host_, *context, "DeleteScene",
+  return serve(host_, *context, Rpc::kDeleteScene,
                [&](const Caller& caller) { return delete_scene(caller, host_, *request); });
 }
 
 grpc::Status SceneService::UploadMesh(grpc::ServerContext* context, grpc::ServerReader<v1::UploadMeshRequest>* reader,
                                       v1::UploadMeshResponse* response) {
-  return serve(host_, *context, "UploadMesh",
+  return serve(host_, *context, Rpc::kUploadMesh,
                [&](const Caller& caller) { return upload_mesh(host_, caller, *reader, response); });
 }
 
 grpc::Status SceneService::ListMeshes(grpc::ServerContext* context, const v1::ListMeshesRequest* request,
                                       v1::ListMeshesResponse* response) {
-  return serve(host_, *context, "ListMeshes", [&](const Caller&) { return list_meshes(host_, *request, response); });
+  return serve(host_, *context, Rpc::kListMeshes,
+               [&](const Caller&) { return list_meshes(host_, *request, response); });
 }
 
 grpc::Status SceneService::DeleteMesh(grpc::ServerContext* context, const v1::DeleteMeshRequest* request,
                                       v1::DeleteMeshResponse*) {
-  return serve(host_, *context, "DeleteMesh", [&](const Caller&) -> absl::Status {
+  return serve(host_, *context, Rpc::kDeleteMesh, [&](const Caller&) -> absl::Status {
     if (absl::Status status = check_mesh_name(request->mesh(), "mesh"); !status.ok()) return status;
     if (absl::Status status = host_.registry.delete_mesh(request->mesh()); !status.ok()) return status;
     log(LogLevel::kInfo, "mesh deleted", {{"mesh", request->mesh()}});
@@ -162,19 +164,19 @@ grpc::Status SceneService::DeleteMesh(grpc::ServerContext* context, const v1::De
 
 grpc::Status SceneService::DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
                                         grpc::ServerWriter<v1::DownloadMeshResponse>* writer) {
-  return serve(host_, *context, "DownloadMesh",
+  return serve(host_, *context, Rpc::kDownloadMesh,
                [&](const Caller& caller) { return download_mesh(host_, caller, *request, *writer); });
 }
 
 grpc::Status SceneService::ChangeInstances(grpc::ServerContext* context, const v1::ChangeInstancesRequest* request,
                                            v1::ChangeInstancesResponse* response) {
-  return serve(host_, *context, "ChangeInstances",
+  return serve(host_, *context, Rpc::kChangeInstances,
                [&](const Caller& caller) { return change_instances(host_, caller, *request, response); });
 }
 
 grpc::Status SceneService::DumpScene(grpc::ServerContext* context, const v1::DumpSceneRequest* request,
                                      grpc::ServerWriter<v1::DumpSceneResponse>* writer) {
-  return serve(host_, *context, "DumpScene",
+  return serve(host_, *context, Rpc::kDumpScene,
                [&](const Caller& caller) { return dump_scene(host_, caller, *request, *writer); });
 }
 

@@ -11,10 +11,14 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/config/listen_address.h"
+#include "server/observability/http_server.h"
+#include "server/observability/log.h"
 #include "server/service/host.h"
+#include "server/service/io_threads.h"
 #include "server/service/listening.h"
 #include "server/service/query_service.h"
 #include "server/service/scene_service.h"
+#include "server/service/scrape.h"
 #include "server/service/server_service.h"
 #include "server/service/update_service.h"
 
@@ -45,6 +49,20 @@ absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& co
     addresses.push_back(*std::move(address));
   }
   return addresses;
+}
+
+// Null where there is to be none, or the default address is taken.
+absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, Scrape& scrape) {
+  if (config.http_listen.empty()) return nullptr;
+  const absl::StatusOr<ListenAddress> address = parse_listen_address(config.http_listen);
+  if (!address.ok()) return address.status();
+  absl::StatusOr<std::unique_ptr<HttpServer>> http = HttpServer::start(*address, scrape.pages());
+  if (http.ok()) return http;
+  const std::string text =
+      absl::StrCat("cannot listen on ", config.http_listen, " for metrics and health pages: ", why_not(*address));
+  if (config.http_listen != kDefaultHttpListen) return absl::UnavailableError(text);
+  log(LogLevel::kWarning, text, {{"hint", "choose another address with --http-listen, or none by leaving it empty"}});
+  return nullptr;
 }
 
 // Before the first ServerBuilder of the process, once.
@@ -78,16 +96,25 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
 
 struct Server::Parts {
   explicit Parts(const ServerConfig& config)
-      : host(config), server_service(host), scene_service(host), update_service(host), query_service(host) {}
+      : host(config),
+        scrape(host),
+        server_service(host),
+        scene_service(host),
+        update_service(host),
+        query_service(host) {}
 
   std::vector<grpc::Service*> services() { return {&server_service, &scene_service, &update_service, &query_service}; }
 
   Host host;
+  Scrape scrape;
   ServerService server_service;
   SceneService scene_service;
   UpdateService update_service;
   QueryService query_service;
+  // Ended before the services they serve, and after the server.
+  std::unique_ptr<IoThreads> io;
   std::unique_ptr<grpc::Server> grpc;
+  std::unique_ptr<HttpServer> http;  // from before calls are served until none are
   bool ended = false;
 };
 
@@ -102,12 +129,16 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
   if (!addresses.ok()) return addresses.status();
   enable_extras();
   auto parts = std::make_unique<Parts>(config);
+  absl::StatusOr<std::unique_ptr<HttpServer>> http = start_http(config, parts->scrape);
+  if (!http.ok()) return http.status();
+  parts->http = *std::move(http);
   grpc::ServerBuilder builder;
   set_limits(config, builder);
   std::vector<int> ports(addresses->size(), 0);
   for (size_t i = 0; i < addresses->size(); ++i)
     builder.AddListeningPort(config.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
   for (grpc::Service* service : parts->services()) builder.RegisterService(service);
+  parts->io = std::make_unique<IoThreads>(builder, IoThreads::count_for(config.threads));
   parts->grpc = builder.BuildAndStart();
   if (parts->grpc == nullptr) {
     parts->ended = true;
@@ -116,6 +147,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
     return absl::UnavailableError(
         absl::StrCat("cannot listen on ", config.listen[failed], ": ", why_not((*addresses)[failed])));
   }
+  parts->update_service.listen(*parts->io);
+  parts->query_service.listen(*parts->io);
+  parts->io->start();
   std::unique_ptr<Server> server(new Server(std::move(parts)));
   for (size_t i = 0; i < addresses->size(); ++i) {
     const auto port = static_cast<uint16_t>(ports[i]);
@@ -127,19 +161,24 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
   for (const char* name :
        {"locus.v1.ServerService", "locus.v1.SceneService", "locus.v1.UpdateService", "locus.v1.QueryService"})
     health->SetServingStatus(name, true);
+  server->parts_->scrape.serving(server->addresses_);
   return server;
 }
+
+uint16_t Server::http_port() const { return parts_->http == nullptr ? 0 : parts_->http->port(); }
 
 void Server::drain(milliseconds grace) {
   const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
   parts_->grpc->GetHealthCheckService()->SetServingStatus(false);
   host.drain.begin();
-  const bool idle = host.streams.wait_until_idle(deadline) && host.calls.wait_until_empty(deadline);
+  parts_->io->drain();
+  const bool idle = host.streams.wait_until_empty(deadline) && host.calls.wait_until_empty(deadline);
   host.drain.end();
   parts_->grpc->Shutdown(system_clock::now() + (idle ? kLastWords : milliseconds(0)));
-  host.streams.join_all();
   parts_->grpc->Wait();
+  parts_->io->stop();
+  parts_->http.reset();
   parts_->ended = true;
 }
 

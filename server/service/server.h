@@ -30,6 +30,8 @@ class Server {
   const std::vector<std::string>& addresses() const { return addresses_; }
   // Of the first TCP address; 0 without one.
   uint16_t port() const { return port_; }
+  // Of the HTTP port; 0 without one.
+  uint16_t http_port() const;
 
   // Says NOT_SERVING, ends streams and new calls with REASON_DRAINING, lets calls in work finish within `grace`, cuts
   // off the rest, and returns when nothing runs any more.

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/base/limits.h"
+#include "server/config/observability_limits.h"
 #include "server/config/version.h"
 #include "server/service/call.h"
 
@@ -16,6 +17,31 @@ struct NamedLimit {
   double used = 0;
 };
 
+// Batches that wait or are in work, and the work that they should be for all threads together.
+void add_queue(const char* jobs_name, const char* work_name, const QueueLimit& limit, uint32_t threads, uint64_t jobs,
+               uint64_t nanoseconds, std::vector<NamedLimit>& all) {
+  constexpr double kNanosecondsAMs = 1e6;
+  all.push_back({jobs_name, static_cast<double>(limit.jobs), static_cast<double>(jobs)});
+  all.push_back({work_name, static_cast<double>(limit.nanoseconds) * threads / kNanosecondsAMs,
+                 static_cast<double>(nanoseconds) / kNanosecondsAMs});
+}
+
+void add_queues(const Host& host, std::vector<NamedLimit>& all) {
+  const SchedulerOptions& options = host.scheduler.options();
+  const SchedulerStats now = host.scheduler.stats();
+  const uint32_t threads = options.threads;
+  add_queue("small_batches", "small_batch_work_ms", options.limits[0], threads, now.jobs[0], now.nanoseconds[0], all);
+  add_queue("large_batches", "large_batch_work_ms", options.limits[1], threads, now.jobs[1], now.nanoseconds[1], all);
+  add_queue("batches", "batch_work_ms", options.limit, threads, now.jobs[0] + now.jobs[1],
+            now.nanoseconds[0] + now.nanoseconds[1], all);
+  // Of each scene; used by all together.
+  const UpdatePumpStats updates = host.updates.stats();
+  all.push_back({"waiting_updates", static_cast<double>(host.updates.options().max_updates),
+                 static_cast<double>(updates.updates)});
+  all.push_back({"waiting_update_items", static_cast<double>(host.updates.options().max_items),
+                 static_cast<double>(updates.items)});
+}
+
 // Every limit under the name that refusals use.
 std::vector<NamedLimit> limits_of(const Host& host) {
   std::vector<NamedLimit> all = {
@@ -24,9 +50,12 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"coordinate", limits::kMaxCoordinate},
       {"history_bytes", static_cast<double>(limits::kMaxHistoryBytes)},
       {"history_ticks", limits::kMaxHistoryTicks},
+      {"http_connections", kHttpThreads + kMaxHttpWaiting},
+      {"http_request_bytes", kMaxHttpRequestBytes},
       {"ignored_ids", limits::kMaxIgnoredIds},
       {"instances", limits::kMaxInstances},
       {"label_length", limits::kMaxLabelLength},
+      {"labelled_scenes", kMaxLabelledScenes},
       {"labels", limits::kMaxLabels},
       {"listed_item_errors", limits::kMaxListedItemErrors},
       {"reply_bytes", limits::kMaxReplyBytes},
@@ -46,14 +75,17 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"queries", limits::kMaxQueries},
       {"receive_bytes", static_cast<double>(host.config.max_receive_bytes)},
       {"recent_revisions", limits::kRecentRevisions},
+      {"request_id_length", kMaxRequestIdLength},
       {"scenes", static_cast<double>(host.config.max_scenes), static_cast<double>(host.registry.scene_count())},
-      {"streams", static_cast<double>(host.streams.max()), static_cast<double>(host.streams.running())},
+      {"slow_query_lines", kMaxSlowQueryLines},
+      {"streams", static_cast<double>(host.streams.max()), static_cast<double>(host.streams.used())},
       {"threads", static_cast<double>(host.pool.threads())},
       {"update_items", limits::kMaxUpdateItems},
       {"update_lists", limits::kMaxUpdateLists},
       {"wait_ms", limits::kDefaultWaitMs},
       {"writers", limits::kMaxWriters},
   };
+  add_queues(host, all);
   std::sort(all.begin(), all.end(),
             [](const NamedLimit& a, const NamedLimit& b) { return absl::string_view(a.name) < b.name; });
   return all;
@@ -66,8 +98,8 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
   const auto body = [&](const Caller&) {
     response->set_version(kVersion);
     response->set_instruction_set("portable");
-    for (const char* feature :
-         {"as_of", "balls", "boxes", "download_mesh", "history", "lookup", "nearest", "rays", "static_from"})
+    for (const char* feature : {"as_of", "balls", "boxes", "download_mesh", "history", "latest_wins", "lookup",
+                                "nearest", "rays", "static_from"})
       response->add_features(feature);
     for (const NamedLimit& limit : limits_of(host_)) {
       v1::Limit* out = response->add_limits();
@@ -77,7 +109,7 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
     }
     return absl::OkStatus();
   };
-  return serve(host_, *context, "GetServer", body, WhileDraining::kServe);
+  return serve(host_, *context, Rpc::kGetServer, body, WhileDraining::kServe);
 }
 
 }  // namespace locus::server

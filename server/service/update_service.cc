@@ -1,63 +1,69 @@
 #include "server/service/update_service.h"
 
-#include "server/service/call.h"
-#include "server/service/convert.h"
-#include "server/service/stream_loop.h"
+#include <list>
+#include <string>
+
+#include "server/service/hot_call.h"
+#include "server/service/update_work.h"
 
 namespace locus::server {
 namespace {
 
-using Stream = BlockingStream<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse>;
+struct ApplyUpdatesMethod {
+  using Request = v1::ApplyUpdatesRequest;
+  using Response = v1::ApplyUpdatesResponse;
+  using Work = UpdateWork;
+  static constexpr Rpc kRpc = Rpc::kApplyUpdates;
+  static constexpr bool kStream = false;
+  static constexpr bool kInOrder = true;
 
-// Room for what the batch needs while it is applied. A batch that inserts may be refused; others only change what is
-// there, or make room themselves.
-absl::StatusOr<MemoryBudget::Claim> make_room(Host& host, const UpdateBatch& batch) {
-  const UpdateCost cost = cost_of(batch);
-  if (cost.inserts) return host.memory.claim("inserts", cost.bytes);
-  return host.memory.claim_anyway(cost.bytes);
-}
-
-absl::StatusOr<UpdateAck> apply_in_time(const Caller& caller, Scene& scene, const UpdateBatch& batch) {
-  while (true) {
-    if (absl::Status status = wait_for_readers(scene, [&caller] { return caller.stop(); }); !status.ok()) return status;
-    absl::StatusOr<UpdateAck> ack = scene.apply(batch, SteadyTime::min());
-    // Another batch was faster, and now there is something to wait for again.
-    if (ack.status().code() != absl::StatusCode::kDeadlineExceeded) return ack;
+  void listen(grpc::ServerContext* context, grpc::ByteBuffer* request,
+              grpc::ServerAsyncResponseWriter<grpc::ByteBuffer>* wire, grpc::ServerCompletionQueue* queue,
+              void* tag) const {
+    service->RequestApplyUpdates(context, request, wire, queue, queue, tag);
   }
-}
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_ack());
+  }
 
-absl::Status apply(Host& host, const Caller& caller, const std::string& name, const v1::UpdateBatch& batch,
-                   v1::UpdateAck* out) {
-  const absl::StatusOr<ScenePtr> scene = find_scene(caller, name, "scene");
-  if (!scene.ok()) return scene.status();
-  const absl::StatusOr<UpdateBatch> updates = to_updates(batch);
-  if (!updates.ok()) return updates.status();
-  const absl::StatusOr<MemoryBudget::Claim> room = make_room(host, *updates);
-  if (!room.ok()) return room.status();
-  const absl::StatusOr<UpdateAck> ack = apply_in_time(caller, **scene, *updates);
-  if (!ack.ok()) return ack.status();
-  *out = to_proto(*ack);
-  return absl::OkStatus();
-}
+  UpdateService* service;
+};
+
+// Answers in the order of the messages, as they are applied.
+struct StreamUpdatesMethod {
+  using Request = v1::StreamUpdatesRequest;
+  using Response = v1::StreamUpdatesResponse;
+  using Work = UpdateWork;
+  static constexpr Rpc kRpc = Rpc::kStreamUpdates;
+  static constexpr bool kStream = true;
+  static constexpr bool kInOrder = true;
+
+  void listen(grpc::ServerContext* context, grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer>* wire,
+              grpc::ServerCompletionQueue* queue, void* tag) const {
+    service->RequestStreamUpdates(context, wire, queue, queue, tag);
+  }
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_ack());
+  }
+
+  UpdateService* service;
+};
 
 }  // namespace
 
-grpc::Status UpdateService::ApplyUpdates(grpc::ServerContext* context, const v1::ApplyUpdatesRequest* request,
-                                         v1::ApplyUpdatesResponse* response) {
-  return serve(host_, *context, "ApplyUpdates", [&](const Caller& caller) {
-    return apply(host_, caller, request->scene(), request->batch(), response->mutable_ack());
-  });
-}
+struct UpdateService::Listeners {
+  std::list<Listener<ApplyUpdatesMethod>> apply;
+  std::list<Listener<StreamUpdatesMethod>> stream;
+};
 
-RawReactor* UpdateService::StreamUpdates(grpc::CallbackServerContext* context) {
-  return Stream::open(host_, [this, context](Stream& stream) {
-    const Caller caller(host_, *context);
-    return answer_all(
-        stream, caller, "StreamUpdates",
-        [this, &caller](const std::string& scene, const v1::UpdateBatch& batch, v1::StreamUpdatesResponse* response) {
-          return apply(host_, caller, scene, batch, response->mutable_ack());
-        });
-  });
+UpdateService::UpdateService(Host& host) : host_(host), listeners_(std::make_unique<Listeners>()) {}
+UpdateService::~UpdateService() = default;
+
+void UpdateService::listen(IoThreads& threads) {
+  for (size_t i = 0; i < threads.size(); ++i) {
+    listeners_->apply.emplace_back(host_, ApplyUpdatesMethod{this}, threads[i]).listen();
+    listeners_->stream.emplace_back(host_, StreamUpdatesMethod{this}, threads[i]).listen();
+  }
 }
 
 }  // namespace locus::server

@@ -1,25 +1,29 @@
-// UpdateService over the scenes of a host: one batch a call, or a stream of them.
+// UpdateService over the scenes of a host: one batch a call, or a stream of them. Both live on IO threads.
 #ifndef LOCUS_SERVER_SERVICE_UPDATE_SERVICE_H_
 #define LOCUS_SERVER_SERVICE_UPDATE_SERVICE_H_
 
+#include <memory>
+
 #include "locus/v1/update_service.grpc.pb.h"
-#include "server/service/blocking_stream.h"
 #include "server/service/host.h"
+#include "server/service/io_threads.h"
 
 namespace locus::server {
 
-class UpdateService final : public v1::UpdateService::WithRawCallbackMethod_StreamUpdates<v1::UpdateService::Service> {
+class UpdateService final : public v1::UpdateService::WithRawMethod_ApplyUpdates<
+                                v1::UpdateService::WithRawMethod_StreamUpdates<v1::UpdateService::Service>> {
  public:
-  explicit UpdateService(Host& host) : host_(host) {}
+  explicit UpdateService(Host& host);
+  ~UpdateService() override;
 
-  grpc::Status ApplyUpdates(grpc::ServerContext* context, const v1::ApplyUpdatesRequest* request,
-                            v1::ApplyUpdatesResponse* response) override;
-
-  using WithRawCallbackMethod_StreamUpdates::StreamUpdates;
-  RawReactor* StreamUpdates(grpc::CallbackServerContext* context) override;
+  // Once, after the server started and before the IO threads do. They end before the service.
+  void listen(IoThreads& threads);
 
  private:
+  struct Listeners;
+
   Host& host_;
+  std::unique_ptr<Listeners> listeners_;
 };
 
 }  // namespace locus::server

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -31,6 +32,17 @@ NOT_ASKED = {"box": {"nanoflann"}, "ray": {"nanoflann", "boost_rtree"}, "nearest
              "reinsert": {"nanoflann", "sorted_rebuild"}}
 KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed")
 
+# The suite serving.
+SERVING = {(f"rays/{cost}/{size}", "in_process") for cost in ("90ns", "270ns") for size in (1024, 8192)}
+SERVING |= {(f"one_stream/{size}", "two_streams") for size in (1024, 8192)}
+SERVING |= {(f"echo/{size}", "raw_tcp") for size in (1024, 8192)}
+SERVING |= {(f"{case}/{size}", peer) for size in (256, 4096)
+            for case, peer in (("moves", "raw_tcp"), ("moves_applied", "in_process"))}
+SERVING |= {("mixed_p50/16", "idle"), ("mixed_p99/16", "idle"), ("overload/10x", "peak"),
+            ("deadline/1ms", "whole_job"), ("cancel/1000", "whole_job")}
+REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
+HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
+
 
 def run(*arguments):
     return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600)
@@ -47,7 +59,8 @@ def expected_cells():
 
 def expected_dynamic_cells():
     peers = set().union(*(DYNAMIC_PEERS[library] for library in (PEERS | {"ours"}) & set(DYNAMIC_PEERS)))
-    cells = {("growth/ball", "10k"), ("concurrent_moves/3readers/10k", "paced")}
+    cells = {("growth/ball", "10k"), ("concurrent_moves/3readers/10k", "paced"),
+             ("concurrent_moves/3readers_below/10k", "paced")}
     cells |= {(f"concurrent_{share}/1reader/10k", peer) for share in ("p50", "p99", "p999")
               for peer in ("no_writer", "spinning")}
     cells |= {("unpaced/1reader/10k" + batch, "no_reader") for batch in ("", "/batch100", "/batch10000")}
@@ -159,6 +172,39 @@ class DynamicTest(unittest.TestCase):
     def test_missing_peers_are_said(self):
         said = self.answer.stdout.count("a peer is missing")
         self.assertEqual(said, 3 - len(PEERS & {"bullet", "boost", "nanoflann"}))
+
+
+class ServingTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "serving.json")
+            cls.answer = run("serving", "--quick", "--json", path)
+            with open(path, encoding="utf-8") as file:
+                cls.cells = json.load(file)
+
+    def test_the_server_answers_as_this_process_does(self):
+        self.assertEqual(self.answer.returncode, 0, self.answer.stdout + self.answer.stderr)
+        self.assertNotIn("DISAGREEMENT", self.answer.stdout)
+
+    def test_every_expected_cell_is_there_once(self):
+        found = [(cell["case"], cell["peer_name"]) for cell in self.cells]
+        self.assertEqual(len(found), len(set(found)))
+        self.assertEqual(set(found), SERVING | (REDIS if HAS_REDIS else set()))
+
+    def test_cells_have_every_field_and_figures_above_zero(self):
+        for cell in self.cells:
+            self.assertEqual({name: type(value) for name, value in cell.items()}, FIELDS)
+            self.assertEqual(cell["suite"], "serving")
+            for field in ("ours", "peer", "ratio"):
+                self.assertTrue(math.isfinite(cell[field]) and cell[field] > 0, cell)
+            self.assertRegex(cell["results_hash"], "^[0-9a-f]{16}$")
+
+    def test_a_missing_redis_is_said(self):
+        self.assertEqual("a peer is missing: redis" in self.answer.stdout, not HAS_REDIS)
+
+    def test_what_has_to_be_shown_is_said_beside_what_was_found(self):
+        self.assertRegex(self.answer.stdout, r"note: rays/90ns/1024 beside in_process: .* to be shown .*c/\(c\+45\)")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
 // The program `locus-bench`: one suite of benchmarks against its peers, as a table and as JSON.
+#include <malloc.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
@@ -12,6 +14,7 @@
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/report.h"
 #include "tests/bench/frame/suite.h"
+#include "tests/bench/serving/serving_suite.h"
 #include "tests/bench/static/static_suite.h"
 
 namespace locus::bench {
@@ -23,6 +26,8 @@ std::vector<Suite> suites() {
       {"static", "rays, balls, boxes, builds and memory of one level, beside Embree and others", run_static_suite},
       {"dynamic", "moving objects: moves, queries, memory and readers beside a writer, beside Bullet and others",
        dynamic::run_dynamic_suite},
+      {"serving", "a server and its client on the loopback, beside the same work in process, plain sockets and Redis",
+       serving::run_serving_suite},
   };
 }
 
@@ -33,6 +38,7 @@ constexpr char kExamples[] = R"(Examples:
   locus-bench static --mesh city:200000:9 --mesh build/levels/pak1-maps.pk3#maps/delta.bsp
   locus-bench static --filter '^(build|memory)/' --rounds 9
   locus-bench dynamic --filter '^(move|ball)/(uniform|far)/100k'
+  locus-bench serving --filter '^rays/' --rounds 9
 
 A MESH is a file that `locus import` reads (FILE, or FILE#ENTRY for a level in a .pk3), or a made-up one: KIND:TRIANGLES
 or KIND:TRIANGLES:SEED, where KIND is city, terrain or blob. Levels of Debian packages: tests/bench/fetch_levels.sh.
@@ -90,11 +96,19 @@ int run(const Options& options) {
   return exit_status(report);
 }
 
+// As the daemon does, for whatever is measured: what is freed is used again, and not given back to the kernel.
+void keep_freed_memory() {
+  mallopt(M_MMAP_THRESHOLD, 64 << 20);
+  mallopt(M_TRIM_THRESHOLD, 512 << 20);
+  mallopt(M_TOP_PAD, 16 << 20);
+}
+
 }  // namespace
 }  // namespace locus::bench
 
 int main(int argc, char** argv) {
   using locus::bench::CaseFilter;
+  locus::bench::keep_freed_memory();
   CLI::App app;
   app.name("locus-bench");
   locus::bench::Options options;

@@ -113,6 +113,9 @@ TEST_F(SceneRpcTest, UnknownEnumNumbersAndLongLabelsOfTheSpecAreRefused) {
   spec.set_durability(static_cast<v1::Durability>(-1));
   expect_refused(create("arena", spec), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "spec.durability"});
   spec.Clear();
+  spec.set_overload(static_cast<v1::OverloadPolicy>(3));
+  expect_refused(create("arena", spec), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "spec.overload"});
+  spec.Clear();
   for (uint32_t i = 0; i <= limits::kMaxLabels; ++i) (*spec.mutable_labels())[std::to_string(i)] = "";
   const v1::Error error = error_of(create("arena", spec));
   expect_error(error, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "spec.labels"});
@@ -122,6 +125,17 @@ TEST_F(SceneRpcTest, UnknownEnumNumbersAndLongLabelsOfTheSpecAreRefused) {
   spec.Clear();
   (*spec.mutable_labels())["key"] = std::string(limits::kMaxLabelLength + 1, 'x');
   EXPECT_EQ(error_of(create("arena", spec)).limit(), "label_length");
+}
+
+TEST_F(SceneRpcTest, TheOverloadPolicyIsWhatTheSceneWasCreatedWith) {
+  v1::Scene scene;
+  ASSERT_TRUE(create("usual", {}, &scene).ok());
+  EXPECT_EQ(scene.spec().overload(), v1::OVERLOAD_POLICY_EVERY_BATCH);
+  v1::SceneSpec spec;
+  spec.set_overload(v1::OVERLOAD_POLICY_LATEST_WINS);
+  ASSERT_TRUE(create("crowded", spec, &scene).ok());
+  EXPECT_EQ(scene.spec().overload(), v1::OVERLOAD_POLICY_LATEST_WINS);
+  EXPECT_EQ(scene.joined_updates(), 0u);
 }
 
 TEST_F(SceneRpcTest, StaticsCanComeFromAnotherSceneAndThenPartWays) {

@@ -28,8 +28,8 @@ TEST_F(ServerRpcTest, TheServerSaysWhatItIsAndServes) {
   const v1::GetServerResponse server = get_server(stubs());
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_FALSE(server.instruction_set().empty());
-  EXPECT_THAT(server.features(), ::testing::ElementsAre("as_of", "balls", "boxes", "download_mesh", "history", "lookup",
-                                                        "nearest", "rays", "static_from"));
+  EXPECT_THAT(server.features(), ::testing::ElementsAre("as_of", "balls", "boxes", "download_mesh", "history",
+                                                        "latest_wins", "lookup", "nearest", "rays", "static_from"));
 }
 
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithWhatIsUsed) {

@@ -28,7 +28,8 @@ class TemporaryFolder {
     path_ = path;
   }
   ~TemporaryFolder() {
-    for (const char* name : {"port", "port.tmp", "locus.sock", "log"}) unlink((path_ + "/" + name).c_str());
+    for (const char* name : {"port", "port.tmp", "http", "locus.sock", "log", "refused", "second"})
+      unlink((path_ + "/" + name).c_str());
     rmdir(path_.c_str());
   }
   TemporaryFolder(const TemporaryFolder&) = delete;

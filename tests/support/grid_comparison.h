@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "core/index/hash_grid/region_walk.h"
 #include "tests/support/grid_scenes.h"
 #include "tests/support/index_judge.h"
 #include "tests/support/object_grid.h"
@@ -46,15 +48,28 @@ inline std::string grid_ball_difference(const ObjectScene& scene, Random& random
     const double away = random.magnitude(-10, 20), reach = shape.kind == ShapeKind::kBall ? double{shape.radius} : 0;
     balls.push_back({shape.position + toward * (away + reach), away});
   }
+  const GridSnapshot snapshot = grid.snapshot().grid();
+  RegionWalk walk(0, balls.size(), [&](size_t i) { return GridRegion{&snapshot, bounds_of(balls[i]), balls[i]}; });
+  RegionWalk wide_walk(0, balls.size(), [&](size_t i) { return GridRegion{&snapshot, bounds_of(balls[i]), {}}; });
   for (const Balld& ball : balls) {
-    size_t expected = 0, found = 0;
+    size_t expected = 0;
     for (const Object& object : scene.values) expected += ball_overlaps(ball, object.shape) ? 1 : 0;
-    Work work;
-    grid.snapshot().grid().visit_ball(ball, bounds_of(ball), work, [&](const GridRef& value) {
-      found += ball_overlaps(ball, shape_of(value)) ? 1 : 0;
-      return true;
-    });
-    if (found != expected) return "a ball finds " + std::to_string(found) + " instead of " + std::to_string(expected);
+    const auto found_by = [&ball](const auto& visit_all) {
+      size_t found = 0;
+      Work work;
+      visit_all(work, [&](const GridRef& value) {
+        found += ball_overlaps(ball, shape_of(value)) ? 1 : 0;
+        return true;
+      });
+      return found;
+    };
+    const size_t alone =
+        found_by([&](Work& work, const auto& visit) { snapshot.visit_ball(ball, bounds_of(ball), work, visit); });
+    const size_t walked = found_by([&](Work& work, const auto& visit) { walk.visit(work, visit); });
+    const size_t wide = found_by([&](Work& work, const auto& visit) { wide_walk.visit(work, visit); });
+    if (alone != expected || walked != expected || wide != expected)
+      return absl::StrCat("a ball finds ", alone, ", in a walk ", walked, ", by its bounds ", wide, " instead of ",
+                          expected);
   }
   return "";
 }

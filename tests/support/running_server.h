@@ -50,10 +50,11 @@ struct Stubs {
   std::unique_ptr<v1::QueryService::Stub> queries;
 };
 
-// Options for a server of a test: two threads, a free port.
+// Options for a server of a test: two threads, a free port, no HTTP port.
 inline server::ServerConfig test_config() {
   server::ServerConfig config;
   config.listen = {"127.0.0.1:0"};
+  config.http_listen = "";
   config.threads = 2;
   config.memory_limit = limits::kMostMemory;
   config.log_level = server::LogLevel::kError;

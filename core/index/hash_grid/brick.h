@@ -22,10 +22,11 @@ namespace locus::internal {
 // Where the brick lies: fixed from its first version to its last.
 struct BrickPlace {
   GridKey key;
-  int exponent = 0;  // of the cell edge
+  Vec3d center;  // exact, as low and high
+  double edge = 0;
+  Vec3d low, high;
   double cells_per_unit = 1;
-  Vec3d low, center, high;  // exact
-  double edge = 0;          // of the brick
+  int exponent = 0;  // of the cell edge
 
   static BrickPlace of(const GridKey& key, int exponent);
   // The cell within the brick of a position in it.
@@ -58,7 +59,7 @@ struct BrickPlace {
 struct Brick {
   static constexpr uint32_t kMostRecent = 128;
 
-  BrickPlace place;
+  // What every query reads comes first.
   uint32_t number = 0;                      // in the list of bricks, from its first version to its last
   float largest_reach = 0;                  // no value here has a larger one
   std::shared_ptr<const GridBlock> sorted;  // never null
@@ -66,6 +67,7 @@ struct Brick {
   uint32_t gone_count = 0;
   uint32_t recent_count = 0;  // this version's share of the log
   uint32_t recent_gone_count = 0;
+  BrickPlace place;
   std::array<uint64_t, kMostRecent / 64 + 1> recent_gone{};
   static constexpr size_t kGoneInPlace = 20;
   absl::InlinedVector<uint64_t, kGoneInPlace> gone;
@@ -84,6 +86,11 @@ struct Brick {
   [[gnu::always_inline]] void prefetch() const {
     for (size_t line = 0; line < sizeof(Brick); line += 64)
       __builtin_prefetch(reinterpret_cast<const char*>(this) + line);
+  }
+  [[gnu::always_inline]] void prefetch_head() const {
+    __builtin_prefetch(this);
+    __builtin_prefetch(&place.center);
+    __builtin_prefetch(&place.edge);
   }
   [[gnu::always_inline]] void prefetch_blocks() const {
     __builtin_prefetch(sorted.get());

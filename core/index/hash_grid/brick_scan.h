@@ -130,75 +130,103 @@ class CullRay {
   double start_, speed_;  // where it starts, by its distance from the point, and how far one of its lengths is
 };
 
-// Fills GridRows with rows of one block, runs cull(rows, slots) when they are full, and hands on what it keeps.
-template <class Cull, class Visit>
-class RowScan {
+// What culls the values of a brick for a box, and for a ball.
+class BoxCull {
  public:
-  RowScan(const GridBlock& block, const uint64_t* gone, uint32_t brick, const Cull& cull, const Visit& visit,
-          Work& work)
-      : block_(block), brick_(brick), cull_(cull), visit_(visit), work_(work) {
-    rows_ = {block.column(0), block.column(1), block.column(2), block.column(3), gone, 0, {}, {}};
-  }
-
-  // False once visit() was.
-  bool add(uint32_t begin, uint32_t end) {
-    while (begin < end) {
-      const uint32_t taken = std::min(end - begin, GridRows::kMostValues - values_);
-      rows_.begin[rows_.count] = begin;
-      rows_.end[rows_.count++] = begin + taken;
-      begin += taken;
-      values_ += taken;
-      if ((values_ == GridRows::kMostValues || rows_.count == GridRows::kMost) && !flush()) return false;
-    }
-    return true;
-  }
-
-  bool flush() {
-    if (rows_.count == 0) return true;
-    const uint32_t kept = cull_(rows_, slots_);
-    work_.cells += rows_.count;
-    rows_.count = 0;
-    values_ = 0;
-    for (uint32_t i = 0; i < kept; ++i) block_.prefetch_entry(slots_[i]);
-    for (uint32_t i = 0; i < kept; ++i) {
-      ++work_.tests;
-      if (!visit_(GridRef(block_, slots_[i], brick_))) return false;
-    }
-    return true;
+  explicit BoxCull(const Aabbd& region) : region_(&region) {}
+  auto operator()(const Brick& brick) const {
+    return [&kernels = active_grid_kernels(), box = cull_box_of(brick, *region_)](
+               const GridRows& rows, uint32_t* slots) { return kernels.cull_box(rows, box, slots); };
   }
 
  private:
-  const GridBlock& block_;
-  const uint32_t brick_;
-  const Cull& cull_;
-  const Visit& visit_;
-  Work& work_;
-  GridRows rows_;
-  uint32_t values_ = 0;
-  uint32_t slots_[GridRows::kMostValues + GridBlock::kLanes];
+  const Aabbd* region_;
 };
+class BallCull {
+ public:
+  explicit BallCull(const Balld& ball) : ball_(&ball) {}
+  auto operator()(const Brick& brick) const {
+    return [&kernels = active_grid_kernels(), ball = cull_ball_of(brick, *ball_)](
+               const GridRows& rows, uint32_t* slots) { return kernels.cull_ball(rows, ball, slots); };
+  }
+
+ private:
+  const Balld* ball_;
+};
+
+// The rows of cells, numbered within the brick, of its sorted block: those that hold values, and rows that follow on
+// each other as one.
+inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
+  static_assert(GridRows::kMost == 1 << (2 * kBrickBits));
+  const GridBlock& sorted = *brick.sorted;
+  GridRows rows;
+  rows.x = sorted.column(0), rows.y = sorted.column(1), rows.z = sorted.column(2), rows.reach = sorted.column(3);
+  rows.gone = brick.gone_count == 0 ? nullptr : brick.gone.data();
+  rows.count = 0;
+  if (cells.empty()) return rows;
+  constexpr uint32_t kRow = 1 << kBrickBits, kLayer = kRow << kBrickBits;
+  const GridKey& lo = cells.lo;
+  const auto x_cells = static_cast<uint32_t>(cells.hi.x - lo.x + 1),
+             y_rows = static_cast<uint32_t>(cells.hi.y - lo.y + 1);
+  const auto layers = static_cast<uint32_t>(cells.hi.z - lo.z + 1);
+  const bool whole_rows = x_cells == kRow, whole_layers = whole_rows && y_rows == kRow;
+  const uint32_t runs_a_layer = whole_rows ? 1 : y_rows, runs = whole_layers ? 1 : runs_a_layer * layers;
+  const uint32_t run_cells = whole_layers ? layers * kLayer : whole_rows ? y_rows * kRow : x_cells;
+  auto cell = static_cast<uint32_t>(lo.z << (2 * kBrickBits) | lo.y << kBrickBits | lo.x);
+  uint32_t left = runs_a_layer;
+  for (uint32_t run = 0; run < runs; ++run) {
+    const uint32_t begin = sorted.offsets()[cell], end = sorted.offsets()[cell + run_cells];
+    rows.begin[rows.count] = begin;
+    rows.end[rows.count] = end;
+    rows.count += begin != end ? 1 : 0;
+    cell += kRow;
+    if (--left == 0) {
+      left = runs_a_layer;
+      cell += kLayer - runs_a_layer * kRow;
+    }
+  }
+  if (planted(PlantedBug::kDropCell)) rows.end[0] = rows.begin[0];
+  return rows;
+}
+
+// fn(rows) for these, or parts of them of at most kMostValues; false once fn() was.
+template <class Fn>
+bool for_each_part(const GridRows& rows, const Fn& fn) {
+  uint32_t values = 0;
+  for (uint32_t row = 0; row < rows.count; ++row) values += rows.end[row] - rows.begin[row];
+  if (values <= GridRows::kMostValues) return values == 0 || fn(rows);
+  GridRows part = rows;
+  part.count = 1;
+  for (uint32_t row = 0; row < rows.count; ++row) {
+    for (part.begin[0] = rows.begin[row]; part.begin[0] < rows.end[row]; part.begin[0] = part.end[0]) {
+      part.end[0] = std::min(rows.end[row], part.begin[0] + GridRows::kMostValues);
+      if (!fn(part)) return false;
+    }
+  }
+  return true;
+}
+
+// Those values of the rows that cull(rows, slots) keeps; false once visit() was.
+template <class Cull, class Visit>
+bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work& work, const Cull& cull,
+               const Visit& visit) {
+  return for_each_part(all, [&](const GridRows& rows) {
+    uint32_t slots[GridRows::kMostValues + GridBlock::kLanes];
+    const uint32_t kept = cull(rows, slots);
+    work.cells += rows.count;
+    for (uint32_t i = 0; i < kept; ++i) block.prefetch_entry(slots[i]);
+    for (uint32_t i = 0; i < kept; ++i) {
+      ++work.tests;
+      if (!visit(GridRef(block, slots[i], brick))) return false;
+    }
+    return true;
+  });
+}
 
 // Those values of `cells`, which are numbered within the brick, that cull(rows, slots) keeps; false once visit() was.
 template <class Cull, class Visit>
 bool scan_cells(const Brick& brick, const KeyRange& cells, Work& work, const Cull& cull, const Visit& visit) {
-  const GridBlock& sorted = *brick.sorted;
-  RowScan<Cull, Visit> scan(sorted, brick.gone.empty() ? nullptr : brick.gone.data(), brick.number, cull, visit, work);
-  uint32_t begin = 0, end = 0;
-  bool first = true;
-  for (int64_t z = cells.lo.z; z <= cells.hi.z; ++z) {
-    for (int64_t y = cells.lo.y; y <= cells.hi.y; ++y) {
-      const auto row = static_cast<size_t>(z << (2 * kBrickBits) | y << kBrickBits);
-      const uint32_t row_begin = sorted.offsets()[row + static_cast<size_t>(cells.lo.x)];
-      const uint32_t row_end = sorted.offsets()[row + static_cast<size_t>(cells.hi.x) + 1];
-      if (row_begin == row_end || (planted(PlantedBug::kDropCell) && std::exchange(first, false))) continue;
-      if (row_begin != end) {
-        if (!scan.add(begin, end)) return false;
-        begin = row_begin;
-      }
-      end = row_end;
-    }
-  }
-  return scan.add(begin, end) && scan.flush();
+  return scan_rows(*brick.sorted, brick.number, rows_of(brick, cells), work, cull, visit);
 }
 
 // The same for the values that came or moved lately, wherever in the brick they are.
@@ -207,8 +235,10 @@ bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& 
   if (brick.recent_count == 0) return true;
   const GridBlock& recent = *brick.recent;
   const uint32_t whole = brick.recent_count / GridBlock::kLanes * GridBlock::kLanes;
-  RowScan<Cull, Visit> scan(recent, brick.recent_gone.data(), brick.number, cull, visit, work);
-  if (!scan.add(0, whole) || !scan.flush()) return false;
+  const GridRows vectors = {
+      recent.column(0), recent.column(1), recent.column(2), recent.column(3), brick.recent_gone.data(), 1, {0},
+      {whole}};
+  if (!scan_rows(recent, brick.number, vectors, work, cull, visit)) return false;
   if (whole == brick.recent_count) return true;
   // Copied: the rest of their vector belongs to the writer.
   const uint32_t rest = brick.recent_count - whole;

@@ -8,12 +8,13 @@ namespace locus {
 namespace internal {
 
 KeyRange cells_near(const GridLevel& level, const Aabbd& region) {
+  // Positions lie within the extent, so that cells of what is cut to it have numbers; its reach covers the rounding.
   const Aabbd& bounds = level.extent.bounds;
-  if (!overlaps(region, bounds)) return {{0, 0, 0}, {-1, -1, -1}};
-  // Positions lie within the extent, so that the figures below are finite; the growth covers their rounding.
-  const Aabbd inside{max(region.min, bounds.min), min(region.max, bounds.max)};
-  const Aabbd near = grown(inside, level.extent.reach);
-  return cells_within({max(near.min, bounds.min), min(near.max, bounds.max)}, level.extent.cells_per_unit);
+  const Aabbd near = grown(region, level.extent.reach);
+  const Aabbd inside{max(near.min, bounds.min), min(near.max, bounds.max)};
+  if (inside.min.x > inside.max.x || inside.min.y > inside.max.y || inside.min.z > inside.max.z)
+    return {{0, 0, 0}, {-1, -1, -1}};
+  return cells_within(inside, level.extent.cells_per_unit);
 }
 
 KeyRange within_brick(const KeyRange& range, const GridKey& brick) {

@@ -65,6 +65,10 @@ class GridSnapshot {
   // others near it. Fewer than by the bounds alone, but not all whose own bounds overlap them.
   template <class Visit>
   void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
+  // fn(brick, cells) for each brick, and its own cells, where such a visit looks; false, after some of them, if they
+  // are more than `most`.
+  template <class Fn>
+  bool for_few_bricks(const Aabbd& region, size_t most, Work& work, const Fn& fn) const;
 
   // visit(GridRef) for every value whose own interval on the ray has near <= far, far >= 0 and near <= limit(), and for
   // others near the ray; roughly near to far on each level. limit() may fall meanwhile; false ends the visit. For
@@ -159,22 +163,29 @@ bool GridSnapshot::for_each_brick(const internal::GridLevel& level, const intern
 
 template <class Visit>
 void GridSnapshot::visit_region(const Aabbd& region, Work& work, const Visit& visit) const {
-  const auto cull_of = [&region, &kernels = active_grid_kernels()](const internal::Brick& brick) {
-    return [&kernels, box = internal::cull_box_of(brick, region)](const GridRows& rows, uint32_t* slots) {
-      return kernels.cull_box(rows, box, slots);
-    };
-  };
-  visit_cells(region, work, cull_of, visit);
+  visit_cells(region, work, internal::BoxCull(region), visit);
 }
 
 template <class Visit>
 void GridSnapshot::visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const {
-  const auto cull_of = [&ball, &kernels = active_grid_kernels()](const internal::Brick& brick) {
-    return [&kernels, seen = internal::cull_ball_of(brick, ball)](const GridRows& rows, uint32_t* slots) {
-      return kernels.cull_ball(rows, seen, slots);
-    };
-  };
-  visit_cells(bounds, work, cull_of, visit);
+  visit_cells(bounds, work, internal::BallCull(ball), visit);
+}
+
+template <class Fn>
+bool GridSnapshot::for_few_bricks(const Aabbd& region, size_t most, Work& work, const Fn& fn) const {
+  size_t left = most;
+  for (const internal::GridLevel& level : levels_) {
+    const internal::KeyRange cells = internal::cells_near(level, region);
+    const internal::KeyRange bricks = internal::bricks_of(cells);
+    if (bricks.empty()) continue;
+    if (bricks.count() > static_cast<double>(left)) return false;
+    for_each_brick(level, bricks, work, [&](const internal::Brick& brick) {
+      fn(brick, internal::within_brick(cells, brick.place.key));
+      --left;
+      return true;
+    });
+  }
+  return true;
 }
 
 template <class CullOf, class Visit>

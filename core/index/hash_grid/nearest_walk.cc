@@ -20,22 +20,6 @@ GridNear near_of(const Brick& brick, const Vec3d& point, float above, float upto
   return near;
 }
 
-// The rows of cells, numbered within the brick, of its sorted block.
-GridRows rows_of(const Brick& brick, const KeyRange& cells) {
-  const GridBlock& sorted = *brick.sorted;
-  const uint64_t* gone = brick.gone.empty() ? nullptr : brick.gone.data();
-  GridRows rows = {sorted.column(0), sorted.column(1), sorted.column(2), sorted.column(3), gone, 0, {}, {}};
-  if (cells.empty()) return rows;
-  for (int64_t z = cells.lo.z; z <= cells.hi.z; ++z) {
-    for (int64_t y = cells.lo.y; y <= cells.hi.y; ++y) {
-      const auto row = static_cast<size_t>(z << (2 * kBrickBits) | y << kBrickBits);
-      rows.begin[rows.count] = sorted.offsets()[row + static_cast<size_t>(cells.lo.x)];
-      rows.end[rows.count++] = sorted.offsets()[row + static_cast<size_t>(cells.hi.x) + 1];
-    }
-  }
-  return rows;
-}
-
 // How far off the sides of a region may be that holds all keys of a shell: more than twice what near_of() adds, and the
 // rounding of the sides.
 double slack_of(const Vec3d& point, const LevelExtent& level) {
@@ -138,17 +122,10 @@ void NearCandidates::collect_rows(const GridBlock& block, uint32_t brick, const 
   sources_.push_back({&block, brick});
   uint32_t slots[GridRows::kMostValues + GridBlock::kLanes];
   float keys[GridRows::kMostValues + GridBlock::kLanes];
-  uint32_t values = 0;
-  for (uint32_t row = 0; row < rows.count; ++row) values += rows.end[row] - rows.begin[row];
-  if (values <= GridRows::kMostValues) return add(slots, keys, kernels.collect_near(rows, near, slots, keys));
-  GridRows part = rows;
-  part.count = 1;
-  for (uint32_t row = 0; row < rows.count; ++row) {
-    for (part.begin[0] = rows.begin[row]; part.begin[0] < rows.end[row]; part.begin[0] = part.end[0]) {
-      part.end[0] = std::min(rows.end[row], part.begin[0] + GridRows::kMostValues);
-      add(slots, keys, kernels.collect_near(part, near, slots, keys));
-    }
-  }
+  for_each_part(rows, [&](const GridRows& part) {
+    add(slots, keys, kernels.collect_near(part, near, slots, keys));
+    return true;
+  });
 }
 
 void NearCandidates::add(const uint32_t* slots, const float* keys, uint32_t count) {
@@ -157,7 +134,7 @@ void NearCandidates::add(const uint32_t* slots, const float* keys, uint32_t coun
   candidates_.resize(before + count);
   for (uint32_t i = 0; i < count; ++i) {
     candidates_[before + i] = {keys[i], slots[i], source};
-    __builtin_prefetch(&sources_[source].block->entry(slots[i]));
+    sources_[source].block->prefetch_entry(slots[i]);
   }
 }
 

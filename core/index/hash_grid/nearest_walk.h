@@ -27,8 +27,7 @@ double values_per_cell(const LevelExtent& level, size_t values);
 // The shells around a point on one level.
 class NearestShells {
  public:
-  // `per_cell`: about how many values there are in a cell near the point; decides cost only.
-  // Borrows the level.
+  // `per_cell`: about how many values there are in a cell near the point; decides cost only. Borrows the level.
   NearestShells(const Vec3d& point, const LevelExtent& level, double per_cell);
   NearestShells(const Vec3d& point, const LevelExtent&& level, double per_cell) = delete;
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "server/scheduling/batch_priority.h"
 #include "tests/bench/frame/race.h"
 
 namespace locus::bench::dynamic {
@@ -68,7 +69,12 @@ Seen Arena::run(const Window& window) {
   Seen all;
   std::vector<Seen> seen(window.readers);
   std::vector<std::thread> threads;
-  for (size_t i = 0; i < seen.size(); ++i) threads.emplace_back([&, i] { read(i * kBatchesApart, seen[i]); });
+  for (size_t i = 0; i < seen.size(); ++i) {
+    threads.emplace_back([&, i] {
+      if (window.stand == Readers::kBelow) server::take_priority(server::BatchPriority::kNice);
+      read(i * kBatchesApart, seen[i]);
+    });
+  }
   if (window.beside == Beside::kWriter) threads.emplace_back([&] { write(window, all); });
   if (window.beside == Beside::kSpinning) threads.emplace_back([&] { spin(stop_); });
   sleep_for(window.seconds);

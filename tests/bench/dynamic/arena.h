@@ -16,6 +16,9 @@ namespace locus::bench::dynamic {
 // writer.
 enum class Beside : uint8_t { kNothing, kSpinning, kWriter };
 
+// How readers stand beside the writer: as equals, or as the daemon's threads for large batches do.
+enum class Readers : uint8_t { kEqual, kBelow };
+
 inline constexpr double kUnpaced = 0;
 
 struct Window {
@@ -24,6 +27,7 @@ struct Window {
   Beside beside = Beside::kNothing;
   size_t batch = 1000;     // moves a revision
   double rate = kUnpaced;  // moves a second, or as many as there can be
+  Readers stand = Readers::kEqual;
 };
 
 struct Seen {

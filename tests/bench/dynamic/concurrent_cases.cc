@@ -26,7 +26,8 @@ class Rounds {
 
   void run() {
     if (wants_latencies()) run_latencies();
-    if (options_.filter.wants(name_of_case("concurrent_moves/3readers"))) run_kept_pace();
+    run_kept_pace("concurrent_moves/3readers", Readers::kEqual);
+    run_kept_pace("concurrent_moves/3readers_below", Readers::kBelow);
     for (const size_t batch : {100, 1000, 10'000})
       if (options_.filter.wants(unpaced_name(batch))) run_unpaced(batch);
   }
@@ -86,12 +87,13 @@ class Rounds {
                                          batches_, " lost their core to other programs and are left out"));
   }
 
-  void run_kept_pace() {
-    const std::string name = name_of_case("concurrent_moves/3readers");
+  void run_kept_pace(const std::string& what, Readers stand) {
+    const std::string name = name_of_case(what);
+    if (!options_.filter.wants(name)) return;
     progress_(name);
     std::vector<double> rates;
     for (int round = 0; round < options_.rounds; ++round)
-      rates.push_back(run({1, 3, Beside::kWriter, 1000, kPace}).moves_a_second);
+      rates.push_back(run({1, 3, Beside::kWriter, 1000, kPace, stand}).moves_a_second);
     add_rates(name, rates, "paced", std::vector<double>(rates.size(), kPace));
   }
 

@@ -4,6 +4,7 @@
 
 #include "core/base/check.h"
 #include "core/geometry/point_shape.h"
+#include "core/index/hash_grid/region_walk.h"
 #include "core/index/regions.h"
 #include "core/query/run_batch.h"
 
@@ -13,7 +14,7 @@ namespace {
 // What GridSnapshot's visits take: puts ids of what meets() says so of into `ids`.
 template <class Meets>
 auto collector(const Meets& meets, std::vector<uint64_t>& ids) {
-  return [&meets, &ids](const GridRef& object) {
+  return [meets, &ids](const GridRef& object) {
     if (meets(shape_of(object))) ids.push_back(object.entry().id);
     return true;
   };
@@ -190,23 +191,41 @@ void Ours::insert(const Objects& objects) {
   apply(batch, objects.ids.size());
 }
 
+// As the query engine does: one region after the other, or in a walk where that pays. `region_of(center)` is the
+// region of a query; `meets_of(center)` what meets().
+template <class RegionOf, class MeetsOf>
+void Ours::ask_regions(absl::Span<const Vec3f> centers, Answers& answers, const RegionOf& region_of,
+                       const MeetsOf& meets_of) {
+  Work work;
+  if (!RegionWalk::pays(snapshot_->objects.grid())) {
+    each_region(centers, answers, [&](Vec3f center, std::vector<uint64_t>& ids) {
+      region_of(center).visit(work, collector(meets_of(center), ids));
+    });
+    return;
+  }
+  RegionWalk walk(0, centers.size(), [&](size_t i) { return region_of(centers[i]); });
+  each_region(centers, answers,
+              [&](Vec3f center, std::vector<uint64_t>& ids) { walk.visit(work, collector(meets_of(center), ids)); });
+}
+
 void Ours::balls(absl::Span<const Vec3f> centers, Answers& answers) {
-  each_region(centers, answers, [&](Vec3f center, std::vector<uint64_t>& ids) {
-    const Balld ball = {to_double(center), kReach};
-    Work work;
-    const auto meets = [&](const Shape& shape) { return ball_overlaps(ball, shape); };
-    snapshot_->objects.grid().visit_ball(ball, BallRegion<double>(ball).bounds(), work, collector(meets, ids));
+  const auto ball_at = [](Vec3f center) { return Balld{to_double(center), kReach}; };
+  const auto region_of = [&](Vec3f center) {
+    const Balld ball = ball_at(center);
+    return GridRegion{&snapshot_->objects.grid(), BallRegion<double>(ball).bounds(), ball};
+  };
+  ask_regions(centers, answers, region_of, [&](Vec3f center) {
+    return [ball = ball_at(center)](const Shape& shape) { return ball_overlaps(ball, shape); };
   });
 }
 
 void Ours::boxes(absl::Span<const Vec3f> centers, Answers& answers) {
-  each_region(centers, answers, [&](Vec3f center, std::vector<uint64_t>& ids) {
-    Obbd box;
-    box.center = to_double(center);
-    box.half = {kReach, kReach, kReach};
-    Work work;
-    const auto meets = [&](const Shape& shape) { return box_overlaps(box, shape); };
-    snapshot_->objects.grid().visit_region(BoxRegion<double>(box).bounds(), work, collector(meets, ids));
+  const auto box_at = [](Vec3f center) { return Obbd{to_double(center), {kReach, kReach, kReach}, {}}; };
+  const auto region_of = [&](Vec3f center) {
+    return GridRegion{&snapshot_->objects.grid(), BoxRegion<double>(box_at(center)).bounds(), {}};
+  };
+  ask_regions(centers, answers, region_of, [&](Vec3f center) {
+    return [box = box_at(center)](const Shape& shape) { return box_overlaps(box, shape); };
   });
 }
 

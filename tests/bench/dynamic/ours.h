@@ -35,6 +35,9 @@ class Ours : public Contender {
 
  private:
   void apply(const UpdateBatch& batch, size_t items);
+  template <class RegionOf, class MeetsOf>
+  void ask_regions(absl::Span<const Vec3f> centers, Answers& answers, const RegionOf& region_of,
+                   const MeetsOf& meets_of);
 
   Scene scene_;
   SnapshotPtr snapshot_;  // the latest

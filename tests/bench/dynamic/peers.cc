@@ -4,16 +4,16 @@ namespace locus::bench::dynamic {
 
 std::vector<Maker> peer_makers() {
   return {
-#ifdef LOCUS_BENCH_BULLET
-      {"bullet", false, bullet},
+#if LOCUS_BENCH_BULLET
+    {"bullet", false, bullet},
 #endif
-#ifdef LOCUS_BENCH_BOOST
-      {"boost_rtree", true, boost_rtree},
+#if LOCUS_BENCH_BOOST
+        {"boost_rtree", true, boost_rtree},
 #endif
-#ifdef LOCUS_BENCH_NANOFLANN
-      {"nanoflann", true, nanoflann_tree},
+#if LOCUS_BENCH_NANOFLANN
+        {"nanoflann", true, nanoflann_tree},
 #endif
-      {"flat_hash_map", true, naive_grid}, {"sorted_rebuild", false, sorted_rebuild},
+        {"flat_hash_map", true, naive_grid}, {"sorted_rebuild", false, sorted_rebuild},
   };
 }
 

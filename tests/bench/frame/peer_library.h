@@ -16,31 +16,11 @@ struct PeerLibrary {
   bool is_here;
 };
 
-#ifdef LOCUS_BENCH_EMBREE
-inline constexpr PeerLibrary kEmbree = {"libembree-dev", true};
-#else
-inline constexpr PeerLibrary kEmbree = {"libembree-dev", false};
-#endif
-#ifdef LOCUS_BENCH_BULLET
-inline constexpr PeerLibrary kBullet = {"libbullet-dev", true};
-#else
-inline constexpr PeerLibrary kBullet = {"libbullet-dev", false};
-#endif
-#ifdef LOCUS_BENCH_BOOST
-inline constexpr PeerLibrary kBoost = {"libboost-dev", true};
-#else
-inline constexpr PeerLibrary kBoost = {"libboost-dev", false};
-#endif
-#ifdef LOCUS_BENCH_CGAL
-inline constexpr PeerLibrary kCgal = {"libcgal-dev", true};
-#else
-inline constexpr PeerLibrary kCgal = {"libcgal-dev", false};
-#endif
-#ifdef LOCUS_BENCH_NANOFLANN
-inline constexpr PeerLibrary kNanoflann = {"libnanoflann-dev", true};
-#else
-inline constexpr PeerLibrary kNanoflann = {"libnanoflann-dev", false};
-#endif
+inline constexpr PeerLibrary kEmbree = {"libembree-dev", LOCUS_BENCH_EMBREE != 0};
+inline constexpr PeerLibrary kBullet = {"libbullet-dev", LOCUS_BENCH_BULLET != 0};
+inline constexpr PeerLibrary kBoost = {"libboost-dev", LOCUS_BENCH_BOOST != 0};
+inline constexpr PeerLibrary kCgal = {"libcgal-dev", LOCUS_BENCH_CGAL != 0};
+inline constexpr PeerLibrary kNanoflann = {"libnanoflann-dev", LOCUS_BENCH_NANOFLANN != 0};
 
 // One sentence for each that was not there when this program was configured.
 inline std::vector<std::string> missing_peers(absl::Span<const PeerLibrary> libraries) {

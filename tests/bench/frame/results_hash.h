@@ -13,6 +13,7 @@ namespace locus::bench {
 class ResultsHash {
  public:
   void add(uint64_t value) { state_ = (state_ ^ value) * 0x100000001B3u; }
+  uint64_t value() const { return state_; }
   // Sixteen hexadecimal digits.
   std::string text() const { return absl::StrCat(absl::Hex(state_, absl::kZeroPad16)); }
 

@@ -1,16 +1,16 @@
 #include "tests/bench/static/peers.h"
 
-#ifdef LOCUS_BENCH_EMBREE
+#if LOCUS_BENCH_EMBREE
 #include "tests/bench/static/embree.h"
 #include "tests/bench/static/embree_collide.h"
 #endif
-#ifdef LOCUS_BENCH_BULLET
+#if LOCUS_BENCH_BULLET
 #include "tests/bench/static/bullet.h"
 #endif
-#ifdef LOCUS_BENCH_BOOST
+#if LOCUS_BENCH_BOOST
 #include "tests/bench/static/boost_rtree.h"
 #endif
-#ifdef LOCUS_BENCH_CGAL
+#if LOCUS_BENCH_CGAL
 #include "tests/bench/static/cgal.h"
 #endif
 
@@ -19,17 +19,17 @@ namespace locus::bench {
 Peers all_peers([[maybe_unused]] const BenchMesh& mesh, [[maybe_unused]] Needs needs,
                 [[maybe_unused]] std::vector<std::string>& notes) {
   Peers peers;
-#ifdef LOCUS_BENCH_EMBREE
+#if LOCUS_BENCH_EMBREE
   add_embree_peers(mesh, needs, peers);
   add_embree_collide_peer(mesh, needs, peers);
 #endif
-#ifdef LOCUS_BENCH_BULLET
+#if LOCUS_BENCH_BULLET
   add_bullet_peer(mesh, needs, peers, notes);
 #endif
-#ifdef LOCUS_BENCH_BOOST
+#if LOCUS_BENCH_BOOST
   add_boost_peer(mesh, needs, peers);
 #endif
-#ifdef LOCUS_BENCH_CGAL
+#if LOCUS_BENCH_CGAL
   add_cgal_peer(mesh, needs, peers);
 #endif
   return peers;
@@ -37,7 +37,7 @@ Peers all_peers([[maybe_unused]] const BenchMesh& mesh, [[maybe_unused]] Needs n
 
 std::vector<std::unique_ptr<Builder>> all_builders([[maybe_unused]] const BenchMesh& mesh) {
   std::vector<std::unique_ptr<Builder>> builders;
-#ifdef LOCUS_BENCH_EMBREE
+#if LOCUS_BENCH_EMBREE
   builders.push_back(embree_builder(mesh));
 #endif
   return builders;

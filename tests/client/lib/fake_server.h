@@ -174,13 +174,16 @@ class FakeQueries final : public v1::QueryService::Service {
     return answer(*request, *response->mutable_result());
   }
 
-  // Holds back the answers of each pair of messages until both are there, then sends them in the wrong order.
+  // Holds back the answers of each pair of messages until both are there, then sends them in the wrong order. With a
+  // `stream_answer` each message is answered by it at once.
   grpc::Status StreamQueries(
       grpc::ServerContext*,
       grpc::ServerReaderWriter<v1::StreamQueriesResponse, v1::StreamQueriesRequest>* stream) override {
     v1::StreamQueriesRequest request;
     std::vector<v1::StreamQueriesResponse> held;
     while (stream->Read(&request)) {
+      v1::StreamQueriesResponse response;
+      response.set_sequence(request.sequence());
       {
         std::lock_guard lock(mutex_);
         ++calls;
@@ -188,9 +191,16 @@ class FakeQueries final : public v1::QueryService::Service {
           --failing_calls;
           return failure;
         }
+        if (silent_messages > 0) {
+          --silent_messages;
+          continue;
+        }
+        if (stream_answer) *response.mutable_result() = stream_answer(request.batch());
       }
-      v1::StreamQueriesResponse response;
-      response.set_sequence(request.sequence());
+      if (response.has_result()) {
+        stream->Write(response);
+        continue;
+      }
       if (request.batch().max_work() == kRefusedWork) {
         response.mutable_error()->set_code(grpc::StatusCode::INVALID_ARGUMENT);
         response.mutable_error()->set_reason(v1::REASON_NOT_FINITE);
@@ -214,6 +224,8 @@ class FakeQueries final : public v1::QueryService::Service {
     result.set_revision(1);
     return grpc::Status::OK;
   };
+  std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
+  int silent_messages = 0;  // of streams, that are never answered
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;

@@ -17,8 +17,15 @@ class QueryStreamTest : public ::testing::Test {
   void SetUp() override {
     absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address());
     ASSERT_TRUE(client.ok()) << client.status();
-    stream_ = (*client)->query_stream("arena", {.reconnect = {.first_backoff = absl::Milliseconds(1)}});
+    client_ = *std::move(client);
+    open({.reconnect = kPatient});
   }
+
+  // For as long as a test's server may be away.
+  static constexpr RetryPolicy kPatient = {
+      .max_attempts = 1000, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(20)};
+
+  void open(const QueryStreamOptions& options) { stream_ = client_->query_stream("arena", options); }
 
   // The fake answers with the work budget as the revision, so an answer shows whose it is.
   std::future<absl::StatusOr<v1::QueryResult>> ask(uint64_t number) {
@@ -28,6 +35,7 @@ class QueryStreamTest : public ::testing::Test {
   }
 
   FakeServer server_;
+  std::unique_ptr<Client> client_;
   std::unique_ptr<QueryStream> stream_;
 };
 
@@ -66,6 +74,55 @@ TEST_F(QueryStreamTest, AnEndThatARetryCannotMendReachesEveryQuestion) {
   auto second = ask(2);
   EXPECT_TRUE(absl::IsPermissionDenied(first.get().status()));
   EXPECT_TRUE(absl::IsPermissionDenied(second.get().status()));
+}
+
+TEST_F(QueryStreamTest, AServerThatRestartsOnItsPortIsAskedTheRest) {
+  server_.queries.stream_answer = [](const v1::QueryBatch& batch) {
+    v1::QueryResult result;
+    result.set_revision(batch.max_work());
+    return result;
+  };
+  EXPECT_EQ(ask(1).get()->revision(), 1u);
+  server_.stop();
+  std::vector<std::future<absl::StatusOr<v1::QueryResult>>> answers;
+  for (uint64_t number = 2; number <= 6; ++number) answers.push_back(ask(number));
+  server_.restart();
+  for (uint64_t number = 2; number <= 6; ++number) {
+    const absl::StatusOr<v1::QueryResult> answer = answers[number - 2].get();
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    EXPECT_EQ(answer->revision(), number);
+  }
+}
+
+TEST_F(QueryStreamTest, AServerThatAnswersNothingIsAskedAgainOnANewConnection) {
+  server_.queries.stream_answer = [](const v1::QueryBatch&) {
+    v1::QueryResult result;
+    result.set_revision(5);
+    return result;
+  };
+  server_.queries.silent_messages = 1;
+  open({.reconnect = kPatient, .patience = absl::Milliseconds(20)});
+  EXPECT_EQ(ask(1).get()->revision(), 5u);
+}
+
+TEST_F(QueryStreamTest, AServerThatNeverAnswersIsUnavailableInTheEnd) {
+  server_.queries.silent_messages = 1000;
+  open({.reconnect = {.max_attempts = 3, .first_backoff = absl::Milliseconds(1)}, .patience = absl::Milliseconds(20)});
+  auto answer = ask(1);
+  EXPECT_TRUE(absl::IsUnavailable(answer.get().status()));
+  EXPECT_TRUE(absl::IsUnavailable(stream_->close()));
+}
+
+TEST_F(QueryStreamTest, EitherLaneReachesTheServer) {
+  server_.queries.stream_answer = [](const v1::QueryBatch&) {
+    v1::QueryResult result;
+    result.set_revision(3);
+    return result;
+  };
+  for (const Lane lane : {Lane::kLatency, Lane::kBulk}) {
+    open({.lane = lane});
+    EXPECT_EQ(ask(1).get()->revision(), 3u);
+  }
 }
 
 }  // namespace

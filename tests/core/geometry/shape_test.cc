@@ -162,6 +162,29 @@ TEST_P(ShapeOverlapTest, BoundsContainTheSolid) {
 
 INSTANTIATE_TEST_SUITE_P(EveryKind, ShapeOverlapTest, testing::ValuesIn(kKinds));
 
+// Most verdicts on balls are told by the distance alone; these lie where it might tell otherwise than the bounds.
+TEST(ShapeTest, TheShortWayToAVerdictOnBallsAndPointsIsTheLongOne) {
+  Random random(11);
+  int met = 0;
+  for (int i = 0; i < 200'000; ++i) {
+    Shape shape;
+    shape.kind = random.chance(0.8) ? ShapeKind::kBall : ShapeKind::kPoint;
+    shape.position = random.vector(random.magnitude(-20, 30));
+    shape.radius = static_cast<float>(random.magnitude(-40, 20));
+    const double radius = random.magnitude(-40, 20);
+    const double reach = radius + (shape.kind == ShapeKind::kBall ? double{shape.radius} : 0);
+    const double near = 1 + random.between(-1, 1) * random.magnitude(-54, -30);
+    const Vec3d toward = random.chance(0.5) ? random.unit_vector() : Vec3d{random.chance(0.5) ? 1.0 : -1.0, 0, 0};
+    const Balld ball = {shape.position + toward * (reach * near), radius};
+    const bool long_way =
+        reaches(ball, bounds_of(shape)) && squared_length(ball.center - shape.position) <= reach * reach;
+    ASSERT_EQ(ball_overlaps(ball, shape), long_way) << "case " << i;
+    met += long_way ? 1 : 0;
+  }
+  EXPECT_GT(met, 50'000);
+  EXPECT_LT(met, 150'000);
+}
+
 TEST(ShapeTest, ThreeFourFiveTouchesAndTheNextRadiusBelowDoesNot) {
   const Shape box{ShapeKind::kBox, {0, 0, 0}, {}, {1, 1, 1}, 0};
   const Vec3d beside_edge = {4, 5, 0};  // the edge x = 1, y = 1 is 3 and 4 away

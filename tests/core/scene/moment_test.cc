@@ -44,7 +44,9 @@ class MomentTest : public SceneFixture {
     const Moment moment = find_moment(*snapshot, {tick, fraction}).value();
     std::vector<Id> found;
     Work work;
-    moment.visit_region({place, place}, work, [&](const GridRef& object) {
+    const Aabbd bounds = {place, place};
+    const auto ask = [&](const auto& visit) { moment.region(bounds, std::nullopt).visit(work, visit); };
+    moment.visit_asked(bounds, work, ask, [&](const GridRef& object) {
       if (moment.shape(object).position == place) found.push_back(object.entry().id);
       return true;
     });

@@ -47,7 +47,9 @@ void expect_past(const SceneSnapshot& snapshot, Random& random) {
   size_t found = 0;
   Work work;
   const Vec3d place{x, static_cast<double>(id), 0};
-  moment.visit_region({place, place}, work, [&](const GridRef& object) {
+  const Aabbd bounds = {place, place};
+  const auto ask = [&](const auto& visit) { moment.region(bounds, std::nullopt).visit(work, visit); };
+  moment.visit_asked(bounds, work, ask, [&](const GridRef& object) {
     if (moment.shape(object).position == place) ++found;
     return true;
   });

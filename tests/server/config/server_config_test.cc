@@ -55,6 +55,14 @@ TEST_F(ServerConfigTest, AFlagWinsOverTheEnvironmentWhichWinsOverTheFile) {
   EXPECT_EQ(invocation.config->log_format, LogFormat::kJson);
 }
 
+TEST_F(ServerConfigTest, LargeBatchesGiveWayByNicenessOrOnIdleCoresOnly) {
+  EXPECT_EQ(read({}).config->batch_priority, BatchPriority::kNice);
+  EXPECT_EQ(read({"--batch-priority", "idle"}).config->batch_priority, BatchPriority::kIdle);
+  const Invocation wrong = read({"--batch-priority", "high"});
+  EXPECT_FALSE(wrong.config.has_value());
+  EXPECT_THAT(wrong.text, HasSubstr("batch-priority"));
+}
+
 TEST_F(ServerConfigTest, ListenFlagsReplaceThoseOfTheEnvironment) {
   environment_ = {{"LOCUS_LISTEN", "127.0.0.1:1,unix:/tmp/a.sock"}};
   EXPECT_THAT(read({}).config->listen, ElementsAre("127.0.0.1:1", "unix:/tmp/a.sock"));
@@ -104,6 +112,22 @@ TEST_F(ServerConfigTest, ListeningBeyondTheMachineNeedsASecondWord) {
   EXPECT_TRUE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
   environment_ = {{"LOCUS_INSECURE", "0"}};
   EXPECT_FALSE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
+}
+
+TEST_F(ServerConfigTest, TheHttpPortFollowsTheSameRuleAndCanBeTurnedOff) {
+  EXPECT_EQ(read({}).config->http_listen, "127.0.0.1:7576");
+  EXPECT_EQ(read({"--http-listen", ""}).config->http_listen, "");
+  EXPECT_EQ(read({"--http-listen", "[::1]:1"}).config->http_listen, "[::1]:1");
+  EXPECT_THAT(read({"--http-listen", "0.0.0.0:7576"}).text, HasSubstr("two ways out"));
+  EXPECT_TRUE(read({"--http-listen", "0.0.0.0:7576", "--insecure"}).config.has_value());
+  EXPECT_THAT(read({"--http-listen", "unix:/tmp/a.sock"}).text, HasSubstr("speak TCP"));
+  EXPECT_THAT(read({"--http-listen", "nowhere"}).text, HasSubstr("nowhere"));
+  EXPECT_THAT(read({"--http-listen", "", "--http-port-file", "p"}).text, HasSubstr("needs an HTTP port"));
+  environment_ = {{"LOCUS_HTTP_LISTEN", ""}};
+  EXPECT_EQ(read({}).config->http_listen, "");
+  write_file("http-listen = \"\"\n");
+  environment_ = {};
+  EXPECT_EQ(read({"--config", file_}).config->http_listen, "");
 }
 
 TEST_F(ServerConfigTest, ThreadsAndMemoryFollowTheMachineUnlessGiven) {

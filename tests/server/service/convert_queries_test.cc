@@ -78,46 +78,6 @@ TEST(ConvertQueriesTest, EveryFieldOfNearestArrives) {
   EXPECT_EQ(columns.detail, StaticDetail::kInstances);
 }
 
-TEST(ConvertQueriesTest, EveryColumnOfAResultArrives) {
-  BlockResult block;
-  block.counts = {2};
-  block.truncated = {0};
-  block.hits = std::string("\1\0", 2);
-  block.t = {1, 2};
-  block.ids = {3, 4};
-  block.triangles = {5, 6};
-  block.uvs = {0.25f, 0.5f};
-  block.normals = {1, 0, 0};
-  block.points = {7, 8, 9};
-  block.groups = {10};
-  block.tags = {11};
-  block.layers = {12};
-  block.positions = {13, 14, 15};
-  block.rotations = {0, 0, 0, 1};
-  block.resolved_ticks = {16};
-  block.resolved_fractions = {0.75f};
-  block.clamped = {17};
-  v1::BlockResult out;
-  to_proto(block, &out);
-  EXPECT_THAT(out.counts(), ElementsAre(2u));
-  EXPECT_THAT(out.truncated(), ElementsAre(0u));
-  EXPECT_EQ(out.hits(), block.hits);
-  EXPECT_THAT(out.t(), ElementsAre(1.f, 2.f));
-  EXPECT_THAT(out.ids(), ElementsAre(3u, 4u));
-  EXPECT_THAT(out.triangles(), ElementsAre(5u, 6u));
-  EXPECT_THAT(out.uvs(), ElementsAre(0.25f, 0.5f));
-  EXPECT_THAT(out.normals(), ElementsAre(1.f, 0.f, 0.f));
-  EXPECT_THAT(out.points(), ElementsAre(7.f, 8.f, 9.f));
-  EXPECT_THAT(out.groups(), ElementsAre(10u));
-  EXPECT_THAT(out.tags(), ElementsAre(11u));
-  EXPECT_THAT(out.layers(), ElementsAre(12u));
-  EXPECT_THAT(out.positions(), ElementsAre(13., 14., 15.));
-  EXPECT_THAT(out.rotations(), ElementsAre(0.f, 0.f, 0.f, 1.f));
-  EXPECT_THAT(out.resolved_ticks(), ElementsAre(16u));
-  EXPECT_THAT(out.resolved_fractions(), ElementsAre(0.75f));
-  EXPECT_THAT(out.clamped(), ElementsAre(17u));
-}
-
 TEST(ConvertQueriesTest, ViewsSayWhichRevision) {
   v1::View view;
   EXPECT_EQ(to_view(view).kind, View::Kind::kLatest);

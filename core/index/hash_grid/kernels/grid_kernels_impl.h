@@ -49,20 +49,89 @@ inline uint32_t gone_bits(const uint64_t* gone, uint32_t slot) {
   return (uint32_t{bits} >> (slot % 8)) & 0xFF;
 }
 
+#ifdef __AVX2__
+// For each set of lanes, their numbers in order, a byte each.
+struct LanesOfSets {
+  constexpr LanesOfSets() {
+    for (uint32_t set = 0; set < 256; ++set) {
+      uint32_t next = 0;
+      for (uint64_t lane = 0; lane < kLanes; ++lane)
+        if ((set >> lane & 1) != 0) lanes[set] |= lane << (8 * next++);
+    }
+  }
+  uint64_t lanes[256] = {};
+};
+constexpr LanesOfSets kLanesOfSets;
+#endif
+
+// Writes the slots of the lanes of `kept`, one after the other, and whatever behind them.
+inline void write_slots(uint32_t kept, uint32_t slot, uint32_t* slots) {
+#ifdef __AVX2__
+  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfSets.lanes[kept])));
+  const __m256i places = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
+  std::memcpy(slots, &places, sizeof(places));
+#else
+  for (; kept != 0; kept &= kept - 1) *slots++ = slot + static_cast<uint32_t>(__builtin_ctz(kept));
+#endif
+}
+
+// The same, and their keys.
+inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slots, float* keys) {
+#ifdef __AVX2__
+  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfSets.lanes[kept])));
+  const __m256 first = _mm256_permutevar8x32_ps(reinterpret_cast<__m256>(key), lanes);
+  std::memcpy(keys, &first, sizeof(first));
+  const __m256i places = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
+  std::memcpy(slots, &places, sizeof(places));
+#else
+  float all_keys[kLanes];
+  std::memcpy(all_keys, &key, sizeof(all_keys));
+  for (; kept != 0; kept &= kept - 1) {
+    const auto lane = static_cast<uint32_t>(__builtin_ctz(kept));
+    *keys++ = all_keys[lane];
+    *slots++ = slot + lane;
+  }
+#endif
+}
+
+// The vectors of all rows, one after the other: few loops of unknown length are more than one.
+struct RowVectors {
+  static constexpr uint32_t kUsual = 4;  // of a row
+  static constexpr uint32_t kMost = GridRows::kMostValues / kLanes + GridRows::kMost + kUsual;
+
+  explicit RowVectors(const GridRows& rows) {
+    for (uint32_t row = 0; row < rows.count; ++row) {
+      const uint32_t begin = rows.begin[row], values = rows.end[row] - begin;
+      const uint32_t vectors = (values + kLanes - 1) / kLanes;
+      for (uint32_t i = 0; i < kUsual; ++i) slot[count + i] = begin + i * kLanes;
+      for (uint32_t i = kUsual; i < vectors; ++i) slot[count + i] = begin + i * kLanes;
+      for (uint32_t i = 0; i < kUsual; ++i) lanes[count + i] = 0xFF;
+      for (uint32_t i = kUsual; i < vectors; ++i) lanes[count + i] = 0xFF;
+      count += vectors;
+      if (vectors != 0) lanes[count - 1] = 0xFFu >> (vectors * kLanes - values);
+    }
+  }
+
+  uint32_t count = 0;
+  uint32_t slot[kMost];
+  uint32_t lanes[kMost];
+};
+
 // Writes the slots of all values of the rows that keep(slot) has a bit for.
 template <class Keep>
 inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep) {
-  uint32_t* out = slots;
+  uint32_t count = 0;
   for (uint32_t row = 0; row < rows.count; ++row) {
     const uint32_t end = rows.end[row];
     for (uint32_t slot = rows.begin[row]; slot < end; slot += kLanes) {
       uint32_t kept = keep(slot);
       if (end - slot < kLanes) kept &= (1u << (end - slot)) - 1;
       if (rows.gone != nullptr) kept &= ~gone_bits(rows.gone, slot);
-      for (; kept != 0; kept &= kept - 1) *out++ = slot + static_cast<uint32_t>(__builtin_ctz(kept));
+      write_slots(kept, slot, slots + count);
+      count += static_cast<uint32_t>(__builtin_popcount(kept));
     }
   }
-  return static_cast<uint32_t>(out - slots);
+  return count;
 }
 
 uint32_t cull_box(const GridRows& rows, const GridBox& box, uint32_t* slots) {
@@ -110,63 +179,6 @@ inline Floats gap_of(Floats along, Floats reach) {
   const Floats gap = away - reach;
   return gap > 0 ? gap : Floats{};
 }
-
-#ifdef __AVX2__
-// For each set of lanes, their numbers in order, a byte each.
-struct LanesOfSets {
-  constexpr LanesOfSets() {
-    for (uint32_t set = 0; set < 256; ++set) {
-      uint32_t next = 0;
-      for (uint64_t lane = 0; lane < kLanes; ++lane)
-        if ((set >> lane & 1) != 0) lanes[set] |= lane << (8 * next++);
-    }
-  }
-  uint64_t lanes[256] = {};
-};
-constexpr LanesOfSets kLanesOfSets;
-#endif
-
-// Writes the lanes of `kept`, one after the other, and whatever behind them.
-inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slots, float* keys) {
-#ifdef __AVX2__
-  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfSets.lanes[kept])));
-  const __m256 first = _mm256_permutevar8x32_ps(reinterpret_cast<__m256>(key), lanes);
-  std::memcpy(keys, &first, sizeof(first));
-  const __m256i places = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
-  std::memcpy(slots, &places, sizeof(places));
-#else
-  float all_keys[kLanes];
-  std::memcpy(all_keys, &key, sizeof(all_keys));
-  for (; kept != 0; kept &= kept - 1) {
-    const auto lane = static_cast<uint32_t>(__builtin_ctz(kept));
-    *keys++ = all_keys[lane];
-    *slots++ = slot + lane;
-  }
-#endif
-}
-
-// The vectors of all rows, one after the other: few loops of unknown length are more than one.
-struct RowVectors {
-  static constexpr uint32_t kUsual = 4;  // of a row
-  static constexpr uint32_t kMost = GridRows::kMostValues / kLanes + GridRows::kMost + kUsual;
-
-  explicit RowVectors(const GridRows& rows) {
-    for (uint32_t row = 0; row < rows.count; ++row) {
-      const uint32_t begin = rows.begin[row], values = rows.end[row] - begin;
-      const uint32_t vectors = (values + kLanes - 1) / kLanes;
-      for (uint32_t i = 0; i < kUsual; ++i) slot[count + i] = begin + i * kLanes;
-      for (uint32_t i = kUsual; i < vectors; ++i) slot[count + i] = begin + i * kLanes;
-      for (uint32_t i = 0; i < kUsual; ++i) lanes[count + i] = 0xFF;
-      for (uint32_t i = kUsual; i < vectors; ++i) lanes[count + i] = 0xFF;
-      count += vectors;
-      if (vectors != 0) lanes[count - 1] = 0xFFu >> (vectors * kLanes - values);
-    }
-  }
-
-  uint32_t count = 0;
-  uint32_t slot[kMost];
-  uint32_t lanes[kMost];
-};
 
 uint32_t collect_near(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys) {
   const Floats point_x = all(near.point[0]), point_y = all(near.point[1]), point_z = all(near.point[2]);

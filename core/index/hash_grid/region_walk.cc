@@ -1,0 +1,114 @@
+#include "core/index/hash_grid/region_walk.h"
+
+namespace locus {
+namespace internal {
+namespace {
+
+constexpr size_t kLine = 64;
+
+void prefetch(const void* from, size_t bytes) {
+  for (size_t at = 0; at < bytes; at += kLine) __builtin_prefetch(static_cast<const char*>(from) + at);
+}
+
+void prefetch_rows(const GridRows& rows) {
+  for (const float* column : {rows.x, rows.y, rows.z, rows.reach})
+    for (uint32_t row = 0; row < rows.count; ++row)
+      prefetch(column + rows.begin[row], (rows.end[row] - rows.begin[row]) * sizeof(float));
+}
+
+}  // namespace
+
+void RegionSteps::find_bricks(const GridRegion& region) {
+  region_ = region;
+  piece_count_ = value_count_ = 0;
+  Work work;
+  is_small_ =
+      region.grid->for_few_bricks(region.bounds, kMostBricks, work, [&](const Brick& brick, const KeyRange& cells) {
+        brick.prefetch_head();
+        pieces_[piece_count_].brick = &brick;
+        pieces_[piece_count_++].cells = cells;
+      });
+  cells_ = work.cells;
+}
+
+void RegionSteps::find_blocks() {
+  if (!is_small_) return;
+  for (size_t i = 0; i < piece_count_; ++i) {
+    const Piece& piece = pieces_[i];
+    const GridBlock& sorted = *piece.brick->sorted;
+    __builtin_prefetch(&sorted);
+    for (int64_t z = piece.cells.lo.z; z <= piece.cells.hi.z; ++z) {
+      const auto layer = static_cast<size_t>(z) << (2 * kBrickBits);
+      __builtin_prefetch(&sorted.offsets()[layer]);
+      __builtin_prefetch(&sorted.offsets()[layer + (1 << (2 * kBrickBits))]);
+    }
+    if (piece.brick->recent_count != 0) __builtin_prefetch(piece.brick->recent.get());
+  }
+}
+
+void RegionSteps::find_rows() {
+  if (!is_small_) return;
+  for (size_t i = 0; i < piece_count_; ++i) {
+    Piece& piece = pieces_[i];
+    piece.rows = rows_of(*piece.brick, piece.cells);
+    prefetch_rows(piece.rows);
+    if (piece.brick->recent_count == 0) continue;
+    for (int number = 0; number < 4; ++number)
+      prefetch(piece.brick->recent->column(number), piece.brick->recent_count * sizeof(float));
+  }
+}
+
+void RegionSteps::find_values() {
+  if (!is_small_) return;
+  if (region_.ball)
+    cull(BallCull(*region_.ball));
+  else
+    cull(BoxCull(region_.bounds));
+}
+
+template <class CullOf>
+void RegionSteps::cull(const CullOf& cull_of) {
+  Work work;
+  const auto keep = [this](const GridRef& value) {
+    if (value_count_ == kMostValues) return false;
+    values_[value_count_++] = value;
+    return true;
+  };
+  for (size_t i = 0; is_small_ && i < piece_count_; ++i) {
+    const Brick& brick = *pieces_[i].brick;
+    const auto cull = cull_of(brick);
+    is_small_ = scan_rows(*brick.sorted, brick.number, pieces_[i].rows, work, cull, keep) &&
+                scan_recent(brick, work, cull, keep);
+  }
+  cells_ += work.cells;
+}
+
+}  // namespace internal
+
+RegionWalk::RegionWalk(size_t begin, size_t end, std::function<GridRegion(size_t)> region_of)
+    : region_of_(std::move(region_of)), next_(begin), end_(end) {
+  for (size_t ahead = 0; ahead < kAhead; ++ahead) {
+    for (size_t step = 0; step <= ahead; ++step) take_step(begin + ahead - step, step);
+  }
+}
+
+void RegionWalk::take_steps() {
+  for (size_t step = 0; step < kAhead; ++step) take_step(next_ + kAhead - step, step);
+}
+
+void RegionWalk::take_step(size_t region, size_t step) {
+  if (region >= end_) return;
+  internal::RegionSteps& steps = steps_[region % steps_.size()];
+  switch (step) {
+    case 0:
+      return steps.find_bricks(region_of_(region));
+    case 1:
+      return steps.find_blocks();
+    case 2:
+      return steps.find_rows();
+    default:
+      return steps.find_values();
+  }
+}
+
+}  // namespace locus

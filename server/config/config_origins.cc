@@ -1,0 +1,118 @@
+#include "server/config/config_origins.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fstream>
+#include <optional>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
+#include "server/config/server_parser.h"
+
+namespace locus::server {
+namespace {
+
+// The lines of the file that set the option, as 3 or 3,7; empty where none does.
+std::string lines_that_set(const std::string& path, const std::string& name) {
+  std::ifstream file(path);
+  std::string lines;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    const absl::string_view key = absl::string_view(line).substr(0, line.find('='));
+    if (absl::StripAsciiWhitespace(key) == name) absl::StrAppend(&lines, lines.empty() ? "" : ",", number);
+  }
+  return lines;
+}
+
+// A parser over the options in use shows them as if they were its defaults.
+std::string value_of(const CLI::Option& option, const ServerConfig& config) {
+  if (option.get_expected_max() == 0) return config.insecure ? "true" : "false";  // the only flag without a value
+  const std::string text = option.get_default_str();
+  absl::string_view list = text;  // several values stand in brackets
+  if (absl::ConsumePrefix(&list, "[") && absl::ConsumeSuffix(&list, "]")) return std::string(list);
+  return text;
+}
+
+// What flags alone set, and the file that they or the environment name.
+struct Given {
+  std::vector<std::string> flags;
+  std::string file;
+};
+
+// `arguments` have been read without a mistake.
+Given read_flags(const std::vector<std::string>& arguments, const Environment& environment) {
+  ServerConfig ignored;
+  Given given;
+  CLI::App app;
+  build_parser(app, ignored);
+  app.set_config();  // the file is no matter of flags
+  app.add_option("--config", given.file);
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  app.parse(std::move(reversed));
+  for (const CLI::Option* option : static_cast<const CLI::App&>(app).get_options()) {
+    if (option->get_lnames().empty() || !option->get_configurable()) continue;
+    const std::string& name = option->get_lnames().front();
+    if (option->count() > 0) given.flags.push_back(name);
+  }
+  if (given.file.empty()) given.file = environment(environment_variable("config")).value_or("");
+  return given;
+}
+
+void find_origin(const Given& given, const Environment& environment, ConfigValue* value) {
+  if (std::find(given.flags.begin(), given.flags.end(), value->name) != given.flags.end()) {
+    value->origin = Origin::kFlag;
+    value->place = absl::StrCat("--", value->name);
+    return;
+  }
+  const std::string variable = environment_variable(value->name);
+  const std::optional<std::string> set = environment(variable);
+  if (set && (!set->empty() || may_be_empty(value->name))) {
+    value->origin = Origin::kEnvironment;
+    value->place = variable;
+    return;
+  }
+  const std::string lines = given.file.empty() ? "" : lines_that_set(given.file, value->name);
+  if (lines.empty()) return;
+  value->origin = Origin::kFile;
+  value->place = absl::StrCat(given.file, ":", lines);
+}
+
+}  // namespace
+
+const char* origin_name(Origin origin) {
+  switch (origin) {
+    case Origin::kFlag:
+      return "flag";
+    case Origin::kEnvironment:
+      return "environment";
+    case Origin::kFile:
+      return "file";
+    case Origin::kDefault:
+      return "default";
+  }
+  return "";
+}
+
+absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::string>& arguments,
+                                                        const Environment& environment) {
+  const Invocation invocation = read_invocation(arguments, environment);
+  if (!invocation.config) return absl::InvalidArgumentError(absl::StripTrailingAsciiWhitespace(invocation.text));
+  const Given given = read_flags(arguments, environment);
+  ServerConfig used = *invocation.config;
+  CLI::App app;
+  build_parser(app, used);
+  std::vector<ConfigValue> values;
+  for (const CLI::Option* option : static_cast<const CLI::App&>(app).get_options()) {
+    if (option->get_lnames().empty() || !option->get_configurable()) continue;
+    ConfigValue value;
+    value.name = option->get_lnames().front();
+    value.value = value_of(*option, used);
+    find_origin(given, environment, &value);
+    values.push_back(std::move(value));
+  }
+  return values;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,16 @@
+// What was counted about calls, as metrics. Functions without state.
+#ifndef LOCUS_SERVER_OBSERVABILITY_CALL_FIGURES_H_
+#define LOCUS_SERVER_OBSERVABILITY_CALL_FIGURES_H_
+
+#include "server/observability/metric_page.h"
+#include "server/observability/metrics.h"
+
+namespace locus::server {
+
+// Each name once. An rpc that was never called has its count of OK, 0, and nothing else, so that rates start at 0 and a
+// page stays short.
+void add_call_figures(const MetricCounts& counts, MetricPage& page);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_OBSERVABILITY_CALL_FIGURES_H_

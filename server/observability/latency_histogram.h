@@ -1,0 +1,69 @@
+// How many of many durations fell into which range: two ranges for each power of two nanoseconds, from a microsecond to
+// 17 seconds, so that a quantile read from them is off by less than half of itself.
+//
+// Threads: record() from any thread, at the cost of two relaxed additions, without a lock or an allocation; add_to()
+// from any thread at any time.
+#ifndef LOCUS_SERVER_OBSERVABILITY_LATENCY_HISTOGRAM_H_
+#define LOCUS_SERVER_OBSERVABILITY_LATENCY_HISTOGRAM_H_
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+namespace locus::server {
+
+inline constexpr uint32_t kLowestOctave = 10;   // 2^10 ns, a microsecond
+inline constexpr uint32_t kHighestOctave = 34;  // 2^34 ns, 17 s
+// Ranges with an upper bound, and one without.
+inline constexpr size_t kLatencyBounds = 2 * (kHighestOctave - kLowestOctave) + 1;
+
+// The highest duration of a range, in nanoseconds: 2^k, 1.5 * 2^k, 2^(k+1) ... `range` < kLatencyBounds.
+constexpr uint64_t latency_bound(size_t range) {
+  const uint64_t octave = uint64_t{1} << (kLowestOctave + range / 2);
+  return range % 2 == 0 ? octave : octave + octave / 2;
+}
+
+// The range of a duration: latency_bound() of it is the lowest that is not below; kLatencyBounds beyond the highest.
+constexpr size_t latency_range(uint64_t nanoseconds) {
+  if (nanoseconds <= latency_bound(0)) return 0;
+  const uint64_t below = nanoseconds - 1;  // since a bound belongs to the range below it
+  const auto octave = static_cast<uint32_t>(std::bit_width(below)) - 1;
+  const size_t half = below >> (octave - 1) & 1;
+  return std::min<size_t>(kLatencyBounds, 2 * (octave - kLowestOctave) + half + 1);
+}
+
+// Durations summed up, at one moment.
+struct LatencyCounts {
+  std::array<uint64_t, kLatencyBounds + 1> ranges{};
+  uint64_t nanoseconds = 0;
+
+  uint64_t count() const {
+    uint64_t sum = 0;
+    for (const uint64_t range : ranges) sum += range;
+    return sum;
+  }
+};
+
+class LatencyHistogram {
+ public:
+  void record(uint64_t nanoseconds) {
+    nanoseconds_.fetch_add(nanoseconds, std::memory_order_relaxed);
+    ranges_[latency_range(nanoseconds)].fetch_add(1, std::memory_order_relaxed);
+  }
+
+  void add_to(LatencyCounts& counts) const {
+    for (size_t i = 0; i < ranges_.size(); ++i) counts.ranges[i] += ranges_[i].load(std::memory_order_relaxed);
+    counts.nanoseconds += nanoseconds_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  std::array<std::atomic<uint64_t>, kLatencyBounds + 1> ranges_{};
+  std::atomic<uint64_t> nanoseconds_{0};
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_OBSERVABILITY_LATENCY_HISTOGRAM_H_

@@ -1,0 +1,32 @@
+// What the system says about this process, for /metrics: the figures that Prometheus's client libraries have in common.
+// Read when asked; functions without state, for any thread.
+#ifndef LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
+#define LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/observability/metric_page.h"
+
+namespace locus::server {
+
+struct ProcessFigures {
+  double cpu_seconds = 0;  // user and system
+  uint64_t resident_bytes = 0;
+  uint64_t threads = 0;
+  uint64_t open_files = 0;
+  uint64_t max_files = 0;
+  uint64_t connections = 0;  // that others opened to the addresses asked about
+  double start_seconds = 0;  // since 1970
+};
+
+// `addresses` as parse_listen_address() reads them; others are passed over. What cannot be read is 0. O(open files),
+// two system calls each.
+ProcessFigures read_process(const std::vector<std::string>& addresses);
+
+void add_process_figures(const ProcessFigures& process, MetricPage& page);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_

@@ -1,0 +1,75 @@
+#include "server/observability/scene_figures.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace locus::server {
+namespace {
+
+void add_up(const SceneFigures& scene, SceneFigures& sum) {
+  sum.revision += scene.revision;
+  sum.objects += scene.objects;
+  sum.instances += scene.instances;
+  sum.triangles += scene.triangles;
+  sum.memory_bytes += scene.memory_bytes;
+  sum.history_bytes += scene.history_bytes;
+  sum.history_ticks += scene.history_ticks;
+  sum.pinned_bytes += scene.pinned_bytes;
+  sum.pending_changes += scene.pending_changes;
+}
+
+struct Figure {
+  const char* name;
+  const char* help;
+  uint64_t SceneFigures::*value;
+};
+
+constexpr Figure kFigures[] = {
+    {"locus_scene_revision", "The scene's revision, one more for each change that was published.",
+     &SceneFigures::revision},
+    {"locus_scene_objects", "Objects in the scene.", &SceneFigures::objects},
+    {"locus_scene_instances", "Placed meshes in the scene.", &SceneFigures::instances},
+    {"locus_scene_triangles", "Triangles of the scene's placed meshes.", &SceneFigures::triangles},
+    {"locus_scene_memory_bytes", "Memory of the scene's latest revision without meshes, in bytes.",
+     &SceneFigures::memory_bytes},
+    {"locus_scene_history_bytes", "Memory of the scene's past beyond its latest revision, in bytes.",
+     &SceneFigures::history_bytes},
+    {"locus_scene_history_ticks", "Ticks of the past that queries may ask about.", &SceneFigures::history_ticks},
+    {"locus_scene_pinned_bytes", "Memory of older revisions of the scene that are still being read, in bytes.",
+     &SceneFigures::pinned_bytes},
+    {"locus_scene_pending_changes", "Changes of the scene's instances that are being built or wait.",
+     &SceneFigures::pending_changes},
+};
+
+}  // namespace
+
+std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& scenes) {
+  std::set<std::string> present;
+  for (const SceneFigures& scene : scenes)
+    if (labelled_.contains(scene.name)) present.insert(scene.name);
+  labelled_ = std::move(present);
+  for (const SceneFigures& scene : scenes)
+    if (labelled_.size() < most_) labelled_.insert(scene.name);
+  std::vector<SceneFigures> shown;
+  SceneFigures other;
+  for (const SceneFigures& scene : scenes) {
+    if (labelled_.contains(scene.name)) {
+      shown.push_back(scene);
+    } else {
+      other.name = kOther;
+      add_up(scene, other);
+    }
+  }
+  if (!other.name.empty()) shown.push_back(other);
+  return shown;
+}
+
+void add_scene_figures(const std::vector<SceneFigures>& scenes, MetricPage& page) {
+  for (const Figure& figure : kFigures) {
+    page.begin(figure.name, figure.help, MetricKind::kGauge);
+    for (const SceneFigures& scene : scenes)
+      page.add({{"scene", scene.name}}, static_cast<double>(scene.*figure.value));
+  }
+}
+
+}  // namespace locus::server

@@ -1,0 +1,92 @@
+#include "server/scheduling/cost_estimates.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace locus::server {
+namespace {
+
+// Of a block, whatever it asks.
+constexpr double kBlockNanoseconds = 500;
+// Before anything is known: what scenes of 100,000 triangles and 10,000 objects take. In the order of CostKind.
+constexpr std::array<double, 8> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000};
+constexpr double kLeast = 1, kMost = 1e12;
+constexpr size_t kProbes = 8;
+// So many queries weigh as much as all that was learned before.
+constexpr double kForgetQueries = 2048;
+constexpr double kLeastWeight = 1.0 / 64, kMostWeight = 0.5;
+
+uint64_t mixed(uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+struct KindOf {
+  CostKind operator()(const RayColumns& rays) const {
+    if (rays.mode == RayMode::kAll) return CostKind::kRayAll;
+    return rays.mode == RayMode::kAny ? CostKind::kRayAny : CostKind::kRayFirst;
+  }
+  CostKind operator()(const BallColumns&) const { return CostKind::kBall; }
+  CostKind operator()(const BoxColumns&) const { return CostKind::kBox; }
+  CostKind operator()(const NearestColumns&) const { return CostKind::kNearest; }
+  CostKind operator()(const LookupColumns& lookup) const {
+    return lookup.groups.empty() ? CostKind::kLookup : CostKind::kLookupGroups;
+  }
+};
+
+uint64_t packed(uint32_t tag, double nanoseconds) {
+  return uint64_t{tag} << 32 | std::bit_cast<uint32_t>(static_cast<float>(nanoseconds));
+}
+uint32_t tag_of(uint64_t entry) { return static_cast<uint32_t>(entry >> 32); }
+double nanoseconds_of(uint64_t entry) { return std::bit_cast<float>(static_cast<uint32_t>(entry)); }
+
+}  // namespace
+
+CostKind cost_kind(const QueryBlock& block) { return std::visit(KindOf(), block.kind); }
+
+CostEstimates::Place CostEstimates::place_of(uint64_t scene, const QueryBlock& block) {
+  const uint64_t kind = static_cast<uint64_t>(cost_kind(block)) * 4 + static_cast<uint64_t>(block.source);
+  const uint64_t hash = mixed(mixed(scene) + kind);
+  return {hash % kEntries, static_cast<uint32_t>(hash >> 32) | 1u};
+}
+
+size_t CostEstimates::find(const Place& place) const {
+  size_t empty = place.first;
+  for (size_t i = kProbes; i-- > 0;) {
+    const size_t number = (place.first + i) % kEntries;
+    const uint64_t entry = entries_[number].load(std::memory_order_relaxed);
+    if (tag_of(entry) == place.tag) return number;
+    if (entry == 0) empty = number;
+  }
+  return empty;
+}
+
+double CostEstimates::nanoseconds_a_query(uint64_t scene, const QueryBlock& block) const {
+  const Place place = place_of(scene, block);
+  const uint64_t entry = entries_[find(place)].load(std::memory_order_relaxed);
+  return tag_of(entry) == place.tag ? nanoseconds_of(entry) : kFirstGuess[static_cast<size_t>(cost_kind(block))];
+}
+
+uint64_t CostEstimates::nanoseconds(uint64_t scene, const QueryBatch& batch) const {
+  double sum = 0;
+  for (const QueryBlock& block : batch.blocks)
+    sum += kBlockNanoseconds + static_cast<double>(query_count(block)) * nanoseconds_a_query(scene, block);
+  return static_cast<uint64_t>(std::min(sum, kMost));
+}
+
+void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds) {
+  const auto queries = static_cast<double>(query_count(block));
+  if (queries == 0) return;
+  const double seen = std::clamp(static_cast<double>(nanoseconds) / queries, kLeast, kMost);
+  const Place place = place_of(scene, block);
+  std::atomic<uint64_t>& at = entries_[find(place)];
+  uint64_t before = at.load(std::memory_order_relaxed);
+  const double weight = std::clamp(queries / kForgetQueries, kLeastWeight, kMostWeight);
+  const double known = nanoseconds_of(before);
+  const double now = tag_of(before) == place.tag ? known + (seen - known) * weight : seen;
+  at.compare_exchange_strong(before, packed(place.tag, now), std::memory_order_relaxed);
+}
+
+}  // namespace locus::server

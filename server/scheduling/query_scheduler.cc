@@ -1,0 +1,301 @@
+#include "server/scheduling/query_scheduler.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/base/limits.h"
+#include "core/base/refusal.h"
+#include "server/scheduling/batch_priority.h"
+
+namespace locus::server {
+namespace {
+
+constexpr double kNanosecondsAMs = 1e6;
+constexpr uint32_t kLongestRetryMs = 10'000;
+// Of the work done while both classes wait, large jobs get a part in so many.
+constexpr uint64_t kLargeShare = 5;
+// Withdrawn tickets that may stay in line until their turn comes.
+constexpr uint32_t kMostTombstones = 256;
+
+constexpr const char* kJobLimits[kJobClasses] = {"small_batches", "large_batches"};
+constexpr const char* kWorkLimits[kJobClasses] = {"small_batch_work_ms", "large_batch_work_ms"};
+constexpr const char* kAllJobsLimit = "batches";
+constexpr const char* kAllWorkLimit = "batch_work_ms";
+
+uint64_t steady_nanoseconds() {
+  const auto since = std::chrono::steady_clock::now().time_since_epoch();
+  return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since).count());
+}
+
+SchedulerOptions filled_in(SchedulerOptions options) {
+  if (!options.clock) options.clock = &steady_nanoseconds;
+  return options;
+}
+
+}  // namespace
+
+class QueryScheduler::Ticket {
+ public:
+  Ticket(QueryJob& of, uint64_t whose, uint64_t estimated, JobClass as)
+      : job(of), client(whose), nanoseconds(estimated), admitted_as(as), job_class(as) {}
+
+  // False once it was withdrawn. `state_` counts the threads at work; the two bits close it.
+  bool begin_work() {
+    uint32_t state = state_.load(std::memory_order_relaxed);
+    while ((state & kWithdrawn) == 0)
+      if (state_.compare_exchange_weak(state, state + 1, std::memory_order_acq_rel)) return true;
+    return false;
+  }
+  void finish() { state_.fetch_or(kFinished, std::memory_order_relaxed); }
+  // True to the last thread of a finished job.
+  bool end_work() { return state_.fetch_sub(1, std::memory_order_acq_rel) - 1 == kFinished; }
+  bool alone() const { return (state_.load(std::memory_order_relaxed) & kWorkers) == 1; }
+  bool finished() const { return (state_.load(std::memory_order_relaxed) & kFinished) != 0; }
+  bool withdrawn() const { return (state_.load(std::memory_order_acquire) & kWithdrawn) != 0; }
+  bool withdraw() {
+    uint32_t waiting = 0;
+    return state_.compare_exchange_strong(waiting, kWithdrawn, std::memory_order_acq_rel);
+  }
+
+  QueryJob& job;
+  const uint64_t client;
+  const uint64_t nanoseconds;  // as estimated
+  const JobClass admitted_as;
+  Ticket* next = nullptr;        // in the inbox
+  std::shared_ptr<Ticket> self;  // for as long as the scheduler may look at it
+
+  // Of pool threads, under the scheduler's mutex.
+  JobClass job_class;
+  bool in_line = false;
+  uint64_t spent = 0;
+
+ private:
+  static constexpr uint32_t kWithdrawn = 1u << 31, kFinished = 1u << 30, kWorkers = kFinished - 1;
+
+  std::atomic<uint32_t> state_{0};
+};
+
+QueryScheduler::QueryScheduler(const SchedulerOptions& options) : options_(filled_in(options)) {
+  LOCUS_CHECK_LE(1u, options.threads);
+  LOCUS_CHECK_LE(options.threads, limits::kMaxThreads);
+  for (uint32_t i = 0; i < options.threads; ++i) threads_.emplace_back([this] { run(); });
+}
+
+QueryScheduler::~QueryScheduler() {
+  ended_.store(true);
+  for (size_t i = 0; i < threads_.size(); ++i) wake_.post();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::start(QueryJob& job, uint64_t client, uint64_t nanoseconds) {
+  if (nanoseconds < options_.inline_nanoseconds) {
+    if (job.work(options_.inline_nanoseconds) == Progress::kDone) {
+      inline_done_.fetch_add(1, std::memory_order_relaxed);
+      return TicketPtr();
+    }
+    // It has shown that the estimate was too low.
+    nanoseconds = options_.inline_nanoseconds;
+  }
+  return submit(job, client, nanoseconds);
+}
+
+absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) {
+  const JobClass job_class = nanoseconds <= options_.small_nanoseconds ? JobClass::kSmall : JobClass::kLarge;
+  if (absl::Status status = admit(job_class, nanoseconds); !status.ok()) return status;
+  auto ticket = std::make_shared<Ticket>(job, client, nanoseconds, job_class);
+  ticket->self = ticket;
+  // From here on the job may be done at any moment.
+  Ticket* first = inbox_.load(std::memory_order_relaxed);
+  do ticket->next = first;
+  while (!inbox_.compare_exchange_weak(first, ticket.get(), std::memory_order_release, std::memory_order_relaxed));
+  wake_.post();
+  return ticket;
+}
+
+absl::Status QueryScheduler::admit(JobClass job_class, uint64_t nanoseconds) {
+  const auto number = static_cast<size_t>(job_class);
+  Admitted& admitted = admitted_[number];
+  const Admitted& other = admitted_[1 - number];
+  // Booked first, so that two at once never take the same place.
+  const uint64_t jobs = admitted.jobs.fetch_add(1) + 1;
+  const uint64_t work = admitted.nanoseconds.fetch_add(nanoseconds) + nanoseconds;
+  absl::Status status = check_jobs(kJobLimits[number], options_.limits[number].jobs, jobs);
+  if (status.ok()) status = check_jobs(kAllJobsLimit, options_.limit.jobs, jobs + other.jobs.load());
+  if (!status.ok()) {
+    admitted.refused_jobs.fetch_add(1, std::memory_order_relaxed);
+  } else {
+    status = check_work(kWorkLimits[number], options_.limits[number].nanoseconds, work, nanoseconds);
+    if (status.ok())
+      status = check_work(kAllWorkLimit, options_.limit.nanoseconds, work + other.nanoseconds.load(), nanoseconds);
+    if (!status.ok()) admitted.refused_work.fetch_add(1, std::memory_order_relaxed);
+  }
+  if (status.ok()) return status;
+  admitted.jobs.fetch_sub(1);
+  admitted.nanoseconds.fetch_sub(nanoseconds);
+  return status;
+}
+
+absl::Status QueryScheduler::check_jobs(const char* limit, uint64_t most, uint64_t jobs) const {
+  if (jobs <= most) return absl::OkStatus();
+  return refuse_full("", limit, static_cast<double>(most), static_cast<double>(jobs), retry_after_ms());
+}
+
+absl::Status QueryScheduler::check_work(const char* limit, uint64_t most, uint64_t work, uint64_t of_this) const {
+  most *= options_.threads;
+  if (work <= most || work == of_this) return absl::OkStatus();
+  return refuse_full("", limit, static_cast<double>(most) / kNanosecondsAMs,
+                     static_cast<double>(work) / kNanosecondsAMs, retry_after_ms());
+}
+
+// When half of what is there should be done.
+uint32_t QueryScheduler::retry_after_ms() const {
+  double work = 0;
+  for (const Admitted& admitted : admitted_) work += static_cast<double>(admitted.nanoseconds.load());
+  const double milliseconds = work / 2 / options_.threads / kNanosecondsAMs;
+  return static_cast<uint32_t>(std::clamp(milliseconds, 1.0, static_cast<double>(kLongestRetryMs)));
+}
+
+void QueryScheduler::release(const Ticket& ticket) {
+  Admitted& admitted = admitted_[static_cast<size_t>(ticket.admitted_as)];
+  admitted.jobs.fetch_sub(1);
+  admitted.nanoseconds.fetch_sub(ticket.nanoseconds);
+}
+
+bool QueryScheduler::withdraw(Ticket& ticket) {
+  if (!ticket.withdraw()) return false;
+  release(ticket);
+  admitted_[static_cast<size_t>(ticket.admitted_as)].withdrawn.fetch_add(1, std::memory_order_relaxed);
+  tombstones_.fetch_add(1, std::memory_order_relaxed);
+  return true;
+}
+
+SchedulerStats QueryScheduler::stats() const {
+  SchedulerStats stats;
+  for (size_t i = 0; i < kJobClasses; ++i) {
+    const Admitted& admitted = admitted_[i];
+    stats.jobs[i] = admitted.jobs.load(std::memory_order_relaxed);
+    stats.nanoseconds[i] = admitted.nanoseconds.load(std::memory_order_relaxed);
+    stats.done[i] = admitted.done.load(std::memory_order_relaxed);
+    stats.withdrawn[i] = admitted.withdrawn.load(std::memory_order_relaxed);
+    stats.refused_jobs[i] = admitted.refused_jobs.load(std::memory_order_relaxed);
+    stats.refused_work[i] = admitted.refused_work.load(std::memory_order_relaxed);
+  }
+  stats.inline_done = inline_done_.load(std::memory_order_relaxed);
+  stats.worked_nanoseconds = worked_.load(std::memory_order_relaxed);
+  return stats;
+}
+
+void QueryScheduler::run() {
+  take_priority(options_.priority);
+  while (Ticket* const ticket = next()) {
+    const uint64_t start = options_.clock();
+    const Progress progress = ticket->job.work(options_.turn_nanoseconds);
+    const uint64_t spent = options_.clock() - start;
+    worked_.fetch_add(spent, std::memory_order_relaxed);
+    if (!settle(*ticket, progress, spent)) continue;
+    release(*ticket);
+    admitted_[static_cast<size_t>(ticket->admitted_as)].done.fetch_add(1, std::memory_order_relaxed);
+    const TicketPtr last = std::move(ticket->self);
+    last->job.done();
+  }
+}
+
+QueryScheduler::Ticket* QueryScheduler::next() {
+  while (true) {
+    {
+      MutexLock lock(mutex_);
+      take_in();
+      if (Ticket* const ticket = take_turn()) return ticket;
+      if (ended_.load()) return nullptr;
+      sleepers_.fetch_add(1);
+    }
+    wake_.wait();
+    sleepers_.fetch_sub(1);
+  }
+}
+
+void QueryScheduler::take_in() {
+  Ticket* last_first = inbox_.exchange(nullptr, std::memory_order_acquire);
+  Ticket* first = nullptr;
+  while (last_first != nullptr) first = std::exchange(last_first, std::exchange(last_first->next, first));
+  for (Ticket* ticket = first; ticket != nullptr; ticket = std::exchange(ticket->next, nullptr)) {
+    queue_of(*ticket).push_back(ticket->client, ticket);
+    ticket->in_line = true;
+  }
+  if (tombstones_.load(std::memory_order_relaxed) > kMostTombstones) drop_withdrawn();
+}
+
+void QueryScheduler::drop_withdrawn() {
+  for (FairQueue<Ticket*>& queue : queues_)
+    for (Ticket* const ticket : queue.take_if([](const Ticket* entry) { return entry->withdrawn(); })) drop(*ticket);
+}
+
+void QueryScheduler::drop(Ticket& ticket) {
+  tombstones_.fetch_sub(1, std::memory_order_relaxed);
+  ticket.self.reset();
+}
+
+FairQueue<QueryScheduler::Ticket*>& QueryScheduler::queue_of(const Ticket& ticket) {
+  return queues_[static_cast<size_t>(ticket.job_class)];
+}
+
+FairQueue<QueryScheduler::Ticket*>& QueryScheduler::class_in_turn() {
+  FairQueue<Ticket*>& small = queues_[static_cast<size_t>(JobClass::kSmall)];
+  FairQueue<Ticket*>& large = queues_[static_cast<size_t>(JobClass::kLarge)];
+  if (large.empty()) {
+    small_in_a_row_ = 0;
+    return small;
+  }
+  if (!small.empty() && small_in_a_row_ < (kLargeShare - 1) * options_.turn_nanoseconds) {
+    small_in_a_row_ += options_.turn_nanoseconds;
+    return small;
+  }
+  small_in_a_row_ = 0;
+  return large;
+}
+
+QueryScheduler::Ticket* QueryScheduler::take_turn() {
+  while (true) {
+    FairQueue<Ticket*>& queue = class_in_turn();
+    if (queue.empty()) return nullptr;
+    Ticket* const ticket = queue.turn(options_.turn_nanoseconds);
+    if (ticket->begin_work()) {
+      // It stays in line, and others may help where it is worth waking them.
+      const bool long_enough = ticket->spent > 0 || ticket->nanoseconds > options_.turn_nanoseconds;
+      if (long_enough && sleepers_.load() > 0) wake_.post();
+      return ticket;
+    }
+    queue.correct(ticket->client, -static_cast<int64_t>(options_.turn_nanoseconds));
+    queue.remove(ticket->client, ticket);
+    drop(*ticket);
+  }
+}
+
+bool QueryScheduler::settle(Ticket& ticket, Progress progress, uint64_t spent) {
+  MutexLock lock(mutex_);
+  const auto more = static_cast<int64_t>(spent) - static_cast<int64_t>(options_.turn_nanoseconds);
+  queue_of(ticket).correct(ticket.client, more);
+  ticket.spent += spent;
+  if (progress == Progress::kDone) ticket.finish();
+  put_in_place(ticket, progress);
+  return ticket.end_work();
+}
+
+// A job with nothing to begin leaves the line until one of those at work on it comes back with more. Where this is the
+// last of them, the word was overtaken on its way here, and the job is looked at again.
+void QueryScheduler::put_in_place(Ticket& ticket, Progress progress) {
+  const bool waits = !ticket.finished() && (progress == Progress::kMore || ticket.alone());
+  const bool grown = ticket.job_class == JobClass::kSmall && ticket.spent > 2 * options_.small_nanoseconds;
+  if (ticket.in_line && (!waits || grown)) {
+    queue_of(ticket).remove(ticket.client, &ticket);
+    ticket.in_line = false;
+  }
+  if (grown) ticket.job_class = JobClass::kLarge;
+  if (!waits || ticket.in_line) return;
+  queue_of(ticket).push_front(ticket.client, &ticket);
+  ticket.in_line = true;
+}
+
+}  // namespace locus::server

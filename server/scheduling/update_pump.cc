@@ -1,0 +1,294 @@
+#include "server/scheduling/update_pump.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/base/limits.h"
+#include "core/base/refusal.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+// Applying one item, before anything is known.
+constexpr double kFirstGuess = 100;
+// Of a batch, whatever it holds: its revision.
+constexpr uint64_t kBatchNanoseconds = 5'000;
+constexpr double kForget = 0.1;
+constexpr uint32_t kRetryAfterMs = 5;
+// Between two looks whether a scene's readers have ended, and how long they may take for that.
+constexpr milliseconds kLookAgain{2};
+constexpr milliseconds kReadersMayTake{1000};
+
+uint64_t items_of(const UpdateBatch& batch) {
+  uint64_t items = batch.remove_ids.size() + batch.remove_groups.size();
+  for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
+  for (const MoveColumns& move : batch.moves) items += move.ids.size();
+  for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
+  return items;
+}
+
+using Acks = std::vector<absl::StatusOr<UpdateAck>>;
+
+absl::StatusOr<Acks> apply_all(Scene& scene, absl::Span<const UpdateBatch* const> batches) {
+  const auto at_once = steady_clock::time_point::min();
+  if (batches.size() > 1) return scene.apply_joined(batches, at_once);
+  absl::StatusOr<UpdateAck> ack = scene.apply(*batches.front(), at_once);
+  if (!ack.ok()) return ack.status();
+  Acks acks;
+  acks.push_back(std::move(ack));
+  return acks;
+}
+
+}  // namespace
+
+UpdatePump::UpdatePump(const UpdatePumpOptions& options) : options_(options), nanoseconds_an_item_(kFirstGuess) {
+  LOCUS_CHECK_LE(1u, options.threads);
+  LOCUS_CHECK_LE(options.threads, limits::kMaxThreads);
+  for (uint32_t i = 0; i < options.threads; ++i) threads_.emplace_back([this] { run(); });
+}
+
+UpdatePump::~UpdatePump() {
+  {
+    const MutexLock lock(mutex_);
+    ended_ = true;
+    work_.notify_all();
+  }
+  for (std::thread& thread : threads_) thread.join();
+}
+
+UpdatePump::Mailbox& UpdatePump::mailbox_of(const ScenePtr& scene) {
+  std::unique_ptr<Mailbox>& mailbox = mailboxes_[scene.get()];
+  if (mailbox == nullptr) {
+    mailbox = std::make_unique<Mailbox>();
+    mailbox->scene = scene;
+  }
+  return *mailbox;
+}
+
+bool UpdatePump::full(const Mailbox& mailbox, uint64_t items) const {
+  if (mailbox.waiting.size() >= options_.max_updates) return true;
+  return !mailbox.waiting.empty() && mailbox.items + items > options_.max_items;
+}
+
+absl::Status UpdatePump::refuse(const Mailbox& mailbox, uint64_t items) const {
+  const double nanoseconds = nanoseconds_an_item_.load(std::memory_order_relaxed);
+  const double drain = static_cast<double>(mailbox.items) * nanoseconds / 2 / 1e6;
+  const auto retry = static_cast<uint32_t>(std::clamp(drain, double{kRetryAfterMs}, 1000.0));
+  if (mailbox.waiting.size() >= options_.max_updates)
+    return refuse_full("", "waiting_updates", options_.max_updates, static_cast<double>(mailbox.waiting.size() + 1),
+                       retry);
+  return refuse_full("", "waiting_update_items", static_cast<double>(options_.max_items),
+                     static_cast<double>(mailbox.items + items), retry);
+}
+
+// What looks at every object may take as long as it likes.
+bool UpdatePump::fits_inline(const UpdateBatch& batch, uint64_t items) const {
+  if (batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
+  const double nanoseconds = static_cast<double>(items) * nanoseconds_an_item_.load(std::memory_order_relaxed);
+  return nanoseconds + kBatchNanoseconds < static_cast<double>(options_.inline_nanoseconds);
+}
+
+absl::StatusOr<Posted> UpdatePump::post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) {
+  const uint64_t items = items_of(update.batch());
+  Mailbox* here = nullptr;
+  {
+    const MutexLock lock(mutex_);
+    Mailbox& mailbox = mailbox_of(scene);
+    if (!mailbox.at_work && mailbox.waiting.empty() && fits_inline(update.batch(), items)) {
+      mailbox.at_work = true;
+      here = &mailbox;
+    } else {
+      const bool no_more = full(mailbox, items);
+      if (no_more && when_full == WhenFull::kRefuse) {
+        ++stats_.refused;
+        return refuse(mailbox, items);
+      }
+      if (mailbox.waiting.empty() && !mailbox.at_work) {
+        ready_.push_back(&mailbox);
+        work_.notify_one();
+      }
+      mailbox.waiting.push_back(&update);
+      mailbox.items += items;
+      ++stats_.updates;
+      stats_.items += items;
+      stats_.held += no_more ? 1 : 0;
+      return no_more ? Posted::kFull : Posted::kTaken;
+    }
+  }
+  apply_here(*here, update, items);
+  return Posted::kTaken;
+}
+
+void UpdatePump::apply_here(Mailbox& mailbox, PendingUpdate& update, uint64_t items) {
+  Group group = {&update};
+  const SteadyTime start = steady_clock::now();
+  if (!apply(mailbox, group)) return stall(mailbox, group);
+  learn(items, start);
+  std::unique_ptr<Mailbox> empty;
+  const MutexLock lock(mutex_);
+  ++stats_.applied_inline;
+  empty = leave(mailbox, group.size());
+}
+
+void UpdatePump::run() {
+  while (Mailbox* const mailbox = next()) work_on(*mailbox);
+}
+
+UpdatePump::Mailbox* UpdatePump::next() {
+  const MutexLock lock(mutex_);
+  while (true) {
+    const SteadyTime now = steady_clock::now();
+    const auto due = std::find_if(stalled_.begin(), stalled_.end(),
+                                  [now](const Mailbox* mailbox) { return mailbox->retry_at <= now; });
+    Mailbox* mailbox = nullptr;
+    if (due != stalled_.end()) {
+      mailbox = *due;
+      stalled_.erase(due);
+    } else if (!ready_.empty()) {
+      mailbox = ready_.front();
+      ready_.pop_front();
+    }
+    if (mailbox != nullptr) {
+      mailbox->at_work = true;
+      return mailbox;
+    }
+    if (ended_ && mailboxes_.empty()) return nullptr;
+    if (stalled_.empty())
+      work_.wait(mutex_);
+    else
+      work_.wait_until(mutex_, now + kLookAgain);
+  }
+}
+
+void UpdatePump::work_on(Mailbox& mailbox) {
+  Group group;
+  uint64_t items = 0;
+  {
+    const MutexLock lock(mutex_);
+    const uint64_t before = mailbox.items;
+    group = take_group(mailbox);
+    items = before - mailbox.items;
+  }
+  const SteadyTime start = steady_clock::now();
+  if (!apply(mailbox, group)) return stall(mailbox, group);
+  learn(items, start);
+  std::unique_ptr<Mailbox> empty;
+  const MutexLock lock(mutex_);
+  empty = leave(mailbox, group.size());
+}
+
+UpdatePump::Group UpdatePump::take_group(Mailbox& mailbox) {
+  const bool joins = mailbox.scene->spec().overload == OverloadPolicy::kLatestWins;
+  Group group;
+  uint64_t items = 0;
+  while (!mailbox.waiting.empty()) {
+    PendingUpdate* const update = mailbox.waiting.front();
+    const uint64_t more = items_of(update->batch());
+    if (!group.empty() &&
+        (!joins || items + more > limits::kMaxUpdateItems || !may_join(group.front()->batch(), update->batch())))
+      break;
+    group.push_back(update);
+    items += more;
+    mailbox.waiting.pop_front();
+  }
+  mailbox.items -= items;
+  stats_.items -= items;
+  stats_.updates -= group.size();
+  return group;
+}
+
+// Who no longer wants it is told so first, and what it waited for where that made it too late.
+void UpdatePump::drop_stopped(const Mailbox& mailbox, Group& group) {
+  const auto stopped = [&mailbox](PendingUpdate* update) {
+    absl::Status status = update->stop();
+    if (status.ok()) return false;
+    if (status.code() == mailbox.late.code()) status = mailbox.late;
+    update->done(std::move(status));
+    return true;
+  };
+  group.erase(std::remove_if(group.begin(), group.end(), stopped), group.end());
+}
+
+bool UpdatePump::apply(Mailbox& mailbox, Group& group) {
+  drop_stopped(mailbox, group);
+  mailbox.late = absl::OkStatus();
+  if (group.empty()) return true;
+  std::vector<const UpdateBatch*> batches;
+  for (const PendingUpdate* update : group) batches.push_back(&update->batch());
+  // Without waiting for readers, who may take long.
+  absl::StatusOr<Acks> acks = apply_all(*mailbox.scene, batches);
+  if (acks.status().code() == absl::StatusCode::kDeadlineExceeded) {
+    mailbox.late = acks.status();
+    return false;
+  }
+  for (size_t i = 0; i < group.size(); ++i) group[i]->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
+  return true;
+}
+
+// Readers that were told to end hold too much memory. Their scene waits, other scenes do not.
+void UpdatePump::stall(Mailbox& mailbox, const Group& group) {
+  const SteadyTime now = steady_clock::now();
+  ScenePtr too_slow;  // others may be done with the mailbox before its readers are cut off
+  {
+    const MutexLock lock(mutex_);
+    put_back(mailbox, group);
+    if (mailbox.stalled_at == SteadyTime()) {
+      mailbox.stalled_at = now;
+      ++stats_.stalls;
+    }
+    if (now - mailbox.stalled_at > kReadersMayTake) too_slow = mailbox.scene;
+    mailbox.retry_at = now + kLookAgain;
+    mailbox.at_work = false;
+    stalled_.push_back(&mailbox);
+    work_.notify_one();
+  }
+  if (too_slow != nullptr) too_slow->cut_off_readers();
+}
+
+void UpdatePump::put_back(Mailbox& mailbox, const Group& group) {
+  for (auto update = group.rbegin(); update != group.rend(); ++update) {
+    const uint64_t items = items_of((*update)->batch());
+    mailbox.waiting.push_front(*update);
+    mailbox.items += items;
+    stats_.items += items;
+    ++stats_.updates;
+  }
+}
+
+std::unique_ptr<UpdatePump::Mailbox> UpdatePump::leave(Mailbox& mailbox, size_t updates) {
+  stats_.applied += updates;
+  if (updates > 1) stats_.coalesced += updates - 1;
+  mailbox.at_work = false;
+  mailbox.stalled_at = {};
+  if (!mailbox.waiting.empty()) {
+    ready_.push_back(&mailbox);
+    work_.notify_one();
+    return nullptr;
+  }
+  const auto place = mailboxes_.find(mailbox.scene.get());
+  std::unique_ptr<Mailbox> empty = std::move(place->second);
+  mailboxes_.erase(place);
+  if (ended_) work_.notify_all();
+  return empty;
+}
+
+void UpdatePump::learn(uint64_t items, SteadyTime start) {
+  if (items == 0) return;
+  const auto spent = std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start).count();
+  const double an_item = static_cast<double>(spent) / static_cast<double>(items);
+  const double known = nanoseconds_an_item_.load(std::memory_order_relaxed);
+  // Few items say little: a batch has its own cost.
+  const double weight = items < 64 ? 0 : kForget;
+  nanoseconds_an_item_.store(known + (an_item - known) * weight, std::memory_order_relaxed);
+}
+
+UpdatePumpStats UpdatePump::stats() const {
+  const MutexLock lock(mutex_);
+  return stats_;
+}
+
+}  // namespace locus::server

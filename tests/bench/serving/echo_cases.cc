@@ -1,0 +1,232 @@
+#include "tests/bench/serving/echo_cases.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "tests/bench/dynamic/world.h"
+#include "tests/bench/serving/query_load.h"
+#include "tests/bench/serving/update_load.h"
+
+namespace locus::bench::serving {
+namespace {
+
+constexpr size_t kStreams = 2;
+constexpr size_t kUpdateWindow = 8;
+constexpr uint64_t kWriter = 7;
+constexpr uint32_t kMoving = 100'000;
+
+struct Echo {
+  size_t rays;
+  size_t window;
+};
+constexpr Echo kEchos[] = {{1024, 4}, {8192, 2}};
+
+struct Moves {
+  size_t moves;
+  double bar;  // millions a second
+};
+constexpr Moves kMoves[] = {{256, 30}, {4096, 75}};
+
+std::string echo_name(const Echo& echo) { return absl::StrCat("echo/", echo.rays); }
+std::string parsed_name(const Moves& moves) { return absl::StrCat("moves/", moves.moves); }
+std::string applied_name(const Moves& moves) { return absl::StrCat("moves_applied/", moves.moves); }
+
+// 32 bytes a ray there, 24 back: every column that says what is hit.
+Batches echo_batches(size_t rays, size_t messages, const std::string& scene) {
+  Batches batches;
+  batches.queries = rays * messages;
+  for (size_t i = 0; i < messages; ++i) {
+    v1::StreamQueriesRequest& message = batches.messages.emplace_back();
+    message.set_scene(scene);
+    v1::QueryBlock* const block = message.mutable_batch()->add_blocks();
+    for (const v1::Column column : {v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_TRIANGLE, v1::COLUMN_UV})
+      block->add_columns(column);
+    for (size_t ray = 0; ray < rays; ++ray) {
+      for (const float value : {static_cast<float>(i), static_cast<float>(ray), 1.0f})
+        block->mutable_rays()->add_origins(value);
+      for (const float value : {0.0f, 0.0f, 1.0f}) block->mutable_rays()->add_directions(value);
+      block->mutable_rays()->add_t_max(100);
+      block->add_masks(0xFFFFFFFF);
+    }
+  }
+  batches.borrow();
+  return batches;
+}
+
+class EchoCases {
+ public:
+  EchoCases(const ServingRun& run, const RawTcpServer& plain, TwinScene& scene)
+      : run_(run), plain_(plain), scene_(scene) {}
+
+  absl::Status echo(const Echo& echo) {
+    const std::string name = echo_name(echo);
+    if (!run_.wants(name)) return absl::OkStatus();
+    run_.progress(name);
+    const size_t messages = (run_.options.quick ? 65'536 : 1'048'576) / echo.rays;
+    Batches batches = echo_batches(echo.rays, messages, scene_.name());
+    ServerLoad server(scene_.daemon(), batches, kStreams, echo.window);
+    const LocalLoad process(scene_.here().latest(), batches, kStreams);
+    const std::vector<uint64_t> here = process.hashes();
+    if (server.hashes() != here) run_.disagree(absl::StrCat(name, ": other answers over gRPC"));
+    if (!server.status().ok()) return server.status();
+    const MessageBytes bytes = {static_cast<uint32_t>(batches.messages.front().ByteSizeLong()),
+                                static_cast<uint32_t>(24 * echo.rays)};
+    RawTcpLoad plain(plain_, bytes, kStreams, echo.window);
+    const auto count = static_cast<double>(batches.queries * chunks());
+    const std::vector<Contestant> contestants = {{"grpc", [&](size_t) { server.run(1); }, count, {}},
+                                                 {"raw_tcp", [&](size_t) { plain.run(messages); }, count, {}},
+                                                 {"in_process", [&](size_t) { process.run(1); }, count, {}}};
+    const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
+    add_cell(run_, cell_of(name, "ns/ray", hash_of_number(here.front())), "raw_tcp", times[0], times[1], Better::kLess);
+    constexpr double kBar = 0.8;
+    judge(run_, kBar);
+    run_.note(absl::StrFormat("%s: %.1f M rays/s, plain sockets %.1f; to check and answer them takes %.1f ns a ray",
+                              name, 1e3 / median(times[0]), 1e3 / median(times[1]), kStreams * median(times[2])));
+    absl::Status status = server.status();
+    status.Update(plain.status());
+    return status;
+  }
+
+  // The writer's first batch has been applied: as such every message is read whole and acked, and nothing moves.
+  absl::Status parsed(const Moves& moves) {
+    const std::string name = parsed_name(moves);
+    if (!run_.wants(name)) return absl::OkStatus();
+    run_.progress(name);
+    std::vector<v1::StreamUpdatesRequest> messages = move_messages(moves.moves, 1);
+    for (v1::StreamUpdatesRequest& message : messages) {
+      message.mutable_batch()->set_writer(kWriter);
+      message.mutable_batch()->set_batch(1);
+    }
+    UpdateLoad server(scene_.daemon(), messages, kUpdateWindow, UpdateLoad::Expect::kDuplicate);
+    server.run(1);
+    if (!server.status().ok()) return server.status();
+    const MessageBytes bytes = {static_cast<uint32_t>(messages.front().ByteSizeLong()),
+                                static_cast<uint32_t>(server.ack_bytes())};
+    RawTcpLoad plain(plain_, bytes, 1, kUpdateWindow);
+    const size_t passes = passes_of_a_chunk(run_, [&](size_t) { server.run(1); });
+    const auto count = static_cast<double>(moves.moves * messages.size() * passes * chunks());
+    const std::vector<Contestant> contestants = {
+        {"grpc", [&](size_t) { server.run(passes); }, count, {}},
+        {"raw_tcp", [&](size_t) { plain.run(passes * messages.size()); }, count, {}}};
+    const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
+    add_cells(contestants, times, cell_of(name, "ns/move", hash_of_number(messages.size())), run_.report);
+    const double rate = 1e3 / median(times[0]);
+    run_.note(absl::StrFormat("%s: %.1f M moves/s parsed and acked, to be shown %.0f: %s", name, rate, moves.bar,
+                              rate >= moves.bar ? "shown" : "MISSED"));
+    absl::Status status = server.status();
+    status.Update(plain.status());
+    return status;
+  }
+
+  // Ticks of a world, each object once a tick, there and in this process.
+  absl::Status applied(const Moves& moves) {
+    const std::string name = applied_name(moves);
+    if (!run_.wants(name)) return absl::OkStatus();
+    run_.progress(name);
+    std::vector<v1::StreamUpdatesRequest> messages = move_messages(moves.moves, run_.options.quick ? 1 : 4);
+    std::vector<UpdateBatch> columns;
+    size_t count = 0;
+    for (const v1::StreamUpdatesRequest& message : messages) {
+      columns.push_back(columns_of(message.batch()));
+      count += static_cast<size_t>(message.batch().moves(0).ids_size());
+    }
+    UpdateLoad server(scene_.daemon(), messages, kUpdateWindow, UpdateLoad::Expect::kApplied);
+    const auto here = [&](size_t) {
+      for (const UpdateBatch& batch : columns) refused_ += scene_.here().apply(batch).ok() ? 0 : 1;
+    };
+    const std::vector<Contestant> contestants = {
+        {"grpc", [&](size_t) { server.run(1); }, static_cast<double>(count * chunks()), {}},
+        {"in_process", here, static_cast<double>(count * chunks()), {}}};
+    const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
+    if (refused_ != 0) run_.disagree(absl::StrCat(name, ": ", refused_, " batches were refused in process"));
+    const uint64_t hash = compare_objects(name);
+    add_cells(contestants, times, cell_of(name, "ns/move", hash_of_number(hash)), run_.report);
+    return server.status();
+  }
+
+  absl::Status insert_objects() {
+    v1::UpdateBatch batch;
+    v1::Insert* const insert = batch.add_inserts();
+    const dynamic::Objects objects = world_.objects();
+    insert->mutable_ids()->Add(objects.ids.begin(), objects.ids.end());
+    insert->mutable_positions()->Add(objects.positions.begin(), objects.positions.end());
+    insert->mutable_ball()->mutable_radii()->Add(objects.radii.begin(), objects.radii.end());
+    batch.set_writer(kWriter);
+    batch.set_batch(1);
+    return scene_.apply(batch);
+  }
+
+ private:
+  size_t chunks() const { return run_.options.quick ? 1 : 8; }
+
+  // So many ticks, cut into messages of `size`; the last of a tick may be shorter.
+  std::vector<v1::StreamUpdatesRequest> move_messages(size_t size, size_t ticks) {
+    std::vector<v1::StreamUpdatesRequest> messages;
+    for (size_t tick = 0; tick < ticks; ++tick) {
+      world_.step();
+      const dynamic::Moves moves = world_.moves();
+      for (size_t first = 0; first < moves.ids.size(); first += size) {
+        const auto ids = moves.ids.subspan(first, size);
+        const auto positions = moves.positions.subspan(3 * first, 3 * ids.size());
+        v1::StreamUpdatesRequest& message = messages.emplace_back();
+        message.set_scene(scene_.name());
+        v1::Move* const move = message.mutable_batch()->add_moves();
+        move->mutable_ids()->Add(ids.begin(), ids.end());
+        move->mutable_positions()->Add(positions.begin(), positions.end());
+      }
+    }
+    return messages;
+  }
+
+  // Everything is where it is in process.
+  uint64_t compare_objects(const std::string& name) const {
+    v1::QueryBatch batch;
+    v1::Balls* const balls = batch.add_blocks()->mutable_balls();
+    const auto centers = dynamic::queries_of(world_, 1000).centers;
+    for (const Vec3f& center : centers)
+      for (const float value : {center.x, center.y, center.z}) balls->add_centers(value);
+    balls->add_radii(dynamic::kReach);
+    const auto there = scene_.daemon().client().query(scene_.name(), batch);
+    const uint64_t here = hash_of(answer_here(*scene_.here().latest(), columns_of(batch)));
+    if (!there.ok() || hash_of(*there) != here)
+      run_.disagree(absl::StrCat(name, ": objects are elsewhere than in process"));
+    return here;
+  }
+
+  const ServingRun& run_;
+  const RawTcpServer& plain_;
+  TwinScene& scene_;
+  dynamic::World world_{dynamic::Kind::kUniform, kMoving};
+  size_t refused_ = 0;
+};
+
+bool wants_moves(const ServingRun& run) {
+  return std::any_of(std::begin(kMoves), std::end(kMoves), [&](const Moves& moves) {
+    return run.wants(parsed_name(moves)) || run.wants(applied_name(moves));
+  });
+}
+
+}  // namespace
+
+bool wants_raw_tcp(const ServingRun& run) {
+  return wants_moves(run) || std::any_of(std::begin(kEchos), std::end(kEchos),
+                                         [&](const Echo& echo) { return run.wants(echo_name(echo)); });
+}
+
+absl::Status run_echo_cases(const ServingRun& run, const RawTcpServer& plain) {
+  const auto daemon = Daemon::start();
+  if (!daemon.ok()) return daemon.status();
+  TwinScene scene(**daemon, "echo");
+  absl::Status status = scene.create();
+  EchoCases cases(run, plain, scene);
+  for (const Echo& echo : kEchos)
+    if (status.ok()) status = cases.echo(echo);
+  if (status.ok() && wants_moves(run)) status = cases.insert_objects();
+  for (const Moves& moves : kMoves) {
+    if (status.ok()) status = cases.parsed(moves);
+    if (status.ok()) status = cases.applied(moves);
+  }
+  return status;
+}
+
+}  // namespace locus::bench::serving

@@ -1,0 +1,67 @@
+// Programs that a benchmark starts beside itself, and what the kernel says of them. For the suite serving. One thread a
+// process; none outlives the thread that started it, however that ends.
+#ifndef LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
+#define LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace locus::bench::serving {
+
+// A folder under /tmp, removed with what is in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::string file(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+class Process {
+ public:
+  // Runs the program `path` under the names in `arguments`, the first of which is its own; what it prints goes to the
+  // file `log`. UNAVAILABLE if there is no such program.
+  static absl::StatusOr<std::unique_ptr<Process>> start(const std::string& path,
+                                                        const std::vector<std::string>& arguments,
+                                                        const std::string& log);
+  // Asks it to end; after five seconds makes it.
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  pid_t pid() const { return pid_; }
+  bool has_ended();
+
+  double cpu_seconds() const;  // that all of its threads have computed, to the nanosecond
+  int64_t resident_bytes() const;
+  int64_t open_files() const;
+  int64_t threads() const;
+
+ private:
+  explicit Process(pid_t pid) : pid_(pid) {}
+
+  pid_t pid_;
+  bool ended_ = false;
+};
+
+// The program of that name beside this one, or in the PATH; empty if there is none.
+std::string program_beside(const std::string& name);
+std::string program_in_path(const std::string& name);
+
+void sleep_seconds(double seconds);
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_PROCESS_H_

@@ -1,0 +1,66 @@
+// Batches of queries over and over: by a server, over streams that each have a connection and a thread of their own, or
+// in this process by as many threads. For every case that counts queries a second. One thread.
+#ifndef LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
+#define LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "locus/v1/query_service.grpc.pb.h"
+#include "tests/bench/serving/stream_load.h"
+#include "tests/bench/serving/twin_scene.h"
+
+namespace locus::bench::serving {
+
+using QueryStreamLoad = StreamLoad<v1::StreamQueriesRequest, v1::StreamQueriesResponse>;
+std::unique_ptr<QueryStreamLoad> open_query_stream(const Daemon& daemon);
+
+// Messages, and the same as columns for this process. Every stream and every thread has its own share of them.
+struct Batches {
+  std::vector<v1::StreamQueriesRequest> messages;
+  std::vector<QueryBatch> columns;  // borrowed from the messages
+  size_t queries = 0;               // in all messages together
+
+  // Call it when the messages are complete.
+  void borrow();
+};
+
+class ServerLoad {
+ public:
+  ServerLoad(const Daemon& daemon, Batches& batches, size_t streams, size_t window);
+
+  // As many messages as there are batches, `passes` times, by all streams together. Whatever goes wrong shows in
+  // status().
+  void run(size_t passes);
+  // Every batch once: a hash of each answer, in the order of the batches, and the rows in all of them.
+  std::vector<uint64_t> hashes();
+  size_t rows() const { return rows_; }
+
+  const absl::Status& status() const { return status_; }
+
+ private:
+  Batches& batches_;
+  std::vector<std::unique_ptr<QueryStreamLoad>> streams_;
+  const size_t window_;
+  size_t rows_ = 0;
+  absl::Status status_;
+};
+
+class LocalLoad {
+ public:
+  LocalLoad(SnapshotPtr snapshot, const Batches& batches, size_t threads);
+
+  void run(size_t passes) const;
+  std::vector<uint64_t> hashes() const;
+
+ private:
+  const SnapshotPtr snapshot_;
+  const Batches& batches_;
+  const size_t threads_;
+};
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_

@@ -1,0 +1,57 @@
+// What the kernel's sockets can do with the same bytes: a process that reads messages of one size and answers each with
+// as many bytes of another, and its clients. For the cases that count what messages cost. One thread.
+#ifndef LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
+#define LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
+
+#include <sys/types.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "tests/bench/serving/socket_load.h"
+
+namespace locus::bench::serving {
+
+struct MessageBytes {
+  uint32_t request = 0;
+  uint32_t reply = 0;
+};
+
+class RawTcpServer {
+ public:
+  // A copy of this process, so it must be made before there is another thread; ends with this object.
+  static absl::StatusOr<std::unique_ptr<RawTcpServer>> start();
+  ~RawTcpServer();
+  RawTcpServer(const RawTcpServer&) = delete;
+  RawTcpServer& operator=(const RawTcpServer&) = delete;
+
+  int port() const { return port_; }
+
+ private:
+  RawTcpServer(pid_t pid, int port) : pid_(pid), port_(port) {}
+
+  const pid_t pid_;
+  const int port_;
+};
+
+// Messages over connections that each have a thread of their own.
+class RawTcpLoad {
+ public:
+  RawTcpLoad(const RawTcpServer& server, const MessageBytes& bytes, size_t connections, size_t window);
+
+  // So many messages by all connections together.
+  void run(size_t messages);
+  const absl::Status& status() const { return status_; }
+
+ private:
+  const size_t window_;
+  const std::string message_;
+  std::vector<std::unique_ptr<SocketLoad>> connections_;
+  absl::Status status_;
+};
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_

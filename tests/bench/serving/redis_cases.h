@@ -1,0 +1,16 @@
+// Moves and balls over one connection beside Redis's GEOADD and GEOSEARCH, in a flat world. For the suite serving.
+#ifndef LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
+#define LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
+
+#include "absl/status/status.h"
+#include "tests/bench/serving/serving_run.h"
+
+namespace locus::bench::serving {
+
+// moves/100k, ball/10k, ball/100k, ball/1M; in small moves/10k and ball/10k. Without Redis they are left out, and that
+// is said.
+absl::Status run_redis_cases(const ServingRun& run);
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_

@@ -1,0 +1,22 @@
+#include "tests/bench/serving/serving_suite.h"
+
+#include "tests/bench/serving/crowd_cases.h"
+#include "tests/bench/serving/echo_cases.h"
+#include "tests/bench/serving/ray_cases.h"
+#include "tests/bench/serving/redis_cases.h"
+
+namespace locus::bench::serving {
+absl::Status run_serving_suite(const Options& options, const Progress& progress, Report& report) {
+  const ServingRun run{options, progress, report};
+  // First of all: while there is one thread.
+  absl::StatusOr<std::unique_ptr<RawTcpServer>> plain = nullptr;
+  if (wants_raw_tcp(run)) plain = RawTcpServer::start();
+  if (!plain.ok()) return plain.status();
+  absl::Status status = run_ray_cases(run);
+  if (status.ok() && *plain != nullptr) status = run_echo_cases(run, **plain);
+  if (status.ok()) status = run_redis_cases(run);
+  if (status.ok()) status = run_crowd_cases(run);
+  return status;
+}
+
+}  // namespace locus::bench::serving

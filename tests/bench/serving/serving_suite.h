@@ -1,0 +1,16 @@
+// The suite `serving`: a server and its client as two processes on the loopback, beside the same work in this process,
+// plain sockets and Redis. For main.cc.
+#ifndef LOCUS_TESTS_BENCH_SERVING_SERVING_SUITE_H_
+#define LOCUS_TESTS_BENCH_SERVING_SERVING_SUITE_H_
+
+#include "absl/status/status.h"
+#include "tests/bench/frame/suite.h"
+
+namespace locus::bench::serving {
+
+// Starts build/release/bin/locusd, beside this program, as often as cases need one. UNAVAILABLE if it is not there.
+absl::Status run_serving_suite(const Options& options, const Progress& progress, Report& report);
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_SERVING_SUITE_H_

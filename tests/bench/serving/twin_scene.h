@@ -1,0 +1,58 @@
+// One scene twice: in a server, and in this process, where the same batches run without a network. For every case that
+// compares the two. One thread fills it; then any thread may read.
+#ifndef LOCUS_TESTS_BENCH_SERVING_TWIN_SCENE_H_
+#define LOCUS_TESTS_BENCH_SERVING_TWIN_SCENE_H_
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/types/span.h"
+#include "core/query/query_batch.h"
+#include "core/query/run_batch.h"
+#include "core/scene/scene.h"
+#include "locus/v1/query_service.pb.h"
+#include "locus/v1/update_service.pb.h"
+#include "tests/bench/serving/daemon.h"
+#include "tests/bench/static/bench_mesh.h"
+
+namespace locus::bench::serving {
+
+class TwinScene {
+ public:
+  TwinScene(const Daemon& daemon, const std::string& name);
+
+  // Each once; the error of the server otherwise.
+  absl::Status create();
+  absl::Status place(const BenchMesh& mesh);
+  // Applied on both sides; an error too if an item is refused.
+  absl::Status apply(const v1::UpdateBatch& batch);
+
+  const std::string& name() const { return name_; }
+  Scene& here() { return here_; }
+  const Daemon& daemon() const { return daemon_; }
+
+ private:
+  const Daemon& daemon_;
+  const std::string name_;
+  Scene here_;
+};
+
+// The columns of a message, borrowed, as the server borrows them: rays and balls, inserts of points and balls, moves.
+QueryBatch columns_of(const v1::QueryBatch& batch);
+UpdateBatch columns_of(const v1::UpdateBatch& batch);
+
+// What the server does with a batch that it has parsed: every value is checked, then the batch answered, by this thread
+// alone.
+BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& batch);
+
+// Equal for equal answers, wherever they come from.
+uint64_t hash_of(const BatchResult& result);
+uint64_t hash_of(const v1::QueryResult& result);
+
+// How many rows there are: hits of rays, results of balls.
+size_t rows_of(const v1::QueryResult& result);
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_TWIN_SCENE_H_

@@ -1,0 +1,91 @@
+// `locus top` against a real server.
+#include <csignal>
+#include <sstream>
+
+#include "client/cli/run.h"
+#include "tests/support/rpc_test.h"
+
+namespace locus::test {
+namespace {
+
+using cli::Json;
+using ::testing::HasSubstr;
+
+server::ServerConfig with_http() {
+  server::ServerConfig config = test_config();
+  config.http_listen = "127.0.0.1:0";
+  return config;
+}
+
+struct Outcome {
+  cli::ExitCode code;
+  std::string out;
+  std::string err;
+};
+
+Outcome run_top(const std::string& address, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"top", "--metrics-address", address, "--interval", "0.1"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  std::ostringstream out;
+  std::ostringstream err;
+  cli::Context context(out, err, cli::Progress::kSilent);
+  const cli::ExitCode code = cli::run_line(arguments, context);
+  return {code, out.str(), err.str()};
+}
+
+class TopTest : public RpcTest {
+ protected:
+  TopTest() : RpcTest(with_http()) {}
+
+  std::string http() { return "127.0.0.1:" + std::to_string(running_.server().http_port()); }
+};
+
+TEST_F(TopTest, OnceAsJsonIsOneDocument) {
+  ASSERT_TRUE(apply(insert_balls(1, 5)).ok());
+  const Outcome outcome = run_top(http(), {"--once", "--json"});
+  ASSERT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
+  const Json top = Json::parse(outcome.out, nullptr, /*allow_exceptions=*/false);
+  EXPECT_EQ(top["server"]["ready"], true);
+  EXPECT_GT(top["server"]["memory_bytes"], 0);
+  ASSERT_EQ(top["scenes"].size(), 1u);
+  EXPECT_EQ(top["scenes"][0]["scene"], "world");
+  EXPECT_EQ(top["scenes"][0]["objects"], 5);
+  EXPECT_EQ(top["queries"].size(), 5u);
+}
+
+TEST_F(TopTest, OnceAsATableNamesTheSceneAndHasNoEscapes) {
+  const Outcome outcome = run_top(http(), {"--once"});
+  EXPECT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("world"));
+  EXPECT_THAT(outcome.out, HasSubstr("revisions_per_s"));
+  EXPECT_EQ(outcome.out.find('\x1b'), std::string::npos);
+}
+
+TEST_F(TopTest, ASignalEndsItWithZero) {
+  // Blocked from here on, so that it stays pending until `top` waits for it.
+  sigset_t interrupt;
+  sigset_t before;
+  sigemptyset(&interrupt);
+  sigaddset(&interrupt, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &interrupt, &before);
+  pthread_kill(pthread_self(), SIGINT);
+  const Outcome outcome = run_top(http(), {});
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  EXPECT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
+}
+
+TEST_F(TopTest, NobodyThereIsUnreachableAndTheHintNamesTheOption) {
+  const Outcome outcome = run_top("127.0.0.1:1", {"--once"});
+  EXPECT_EQ(outcome.code, cli::ExitCode::kUnreachable);
+  EXPECT_THAT(outcome.err, HasSubstr("--http-listen"));
+}
+
+TEST_F(TopTest, AnotherKindOfServerIsToldApart) {
+  const Outcome grpc = run_top(running_.address(), {"--once"});
+  EXPECT_NE(grpc.code, cli::ExitCode::kOk);
+  const Outcome nothing = run_top("not an address", {"--once"});
+  EXPECT_NE(nothing.code, cli::ExitCode::kOk);
+}
+
+}  // namespace
+}  // namespace locus::test

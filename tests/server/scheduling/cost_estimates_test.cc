@@ -1,0 +1,110 @@
+#include "server/scheduling/cost_estimates.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <thread>
+#include <vector>
+
+namespace locus::server {
+namespace {
+
+// Of so many queries; the columns' numbers are never looked at.
+QueryBlock block_of(decltype(QueryBlock::kind) kind, Source source = Source::kBoth) {
+  QueryBlock block;
+  block.kind = kind;
+  block.source = source;
+  return block;
+}
+
+class CostEstimatesTest : public testing::Test {
+ protected:
+  QueryBlock rays(size_t count, RayMode mode = RayMode::kFirst, Source source = Source::kBoth) const {
+    RayColumns columns;
+    columns.origins = absl::MakeConstSpan(numbers_).subspan(0, 3 * count);
+    columns.mode = mode;
+    return block_of(columns, source);
+  }
+  QueryBlock balls(size_t count) const {
+    BallColumns columns;
+    columns.centers = absl::MakeConstSpan(numbers_).subspan(0, 3 * count);
+    return block_of(columns);
+  }
+
+  const std::vector<float> numbers_ = std::vector<float>(30'000);
+  const std::unique_ptr<CostEstimates> costs_ = std::make_unique<CostEstimates>();
+};
+
+TEST_F(CostEstimatesTest, BeforeAnythingIsKnownEveryKindHasAGuess) {
+  for (const QueryBlock& block : {rays(1), rays(1, RayMode::kAll), balls(1), block_of(NearestColumns()),
+                                  block_of(BoxColumns()), block_of(LookupColumns())}) {
+    EXPECT_GE(costs_->nanoseconds_a_query(1, block), 1);
+    EXPECT_LE(costs_->nanoseconds_a_query(1, block), 100'000);
+  }
+}
+
+TEST_F(CostEstimatesTest, TheFirstFinishedBlockReplacesTheGuess) {
+  costs_->learn(1, rays(1000), 70'000);
+  EXPECT_NEAR(costs_->nanoseconds_a_query(1, rays(5)), 70, 0.1);
+}
+
+TEST_F(CostEstimatesTest, ScenesKindsAndSourcesAreKeptApart) {
+  const double guess = costs_->nanoseconds_a_query(1, rays(1));
+  costs_->learn(1, rays(1000), 7'000'000);
+  EXPECT_EQ(costs_->nanoseconds_a_query(2, rays(1)), guess);
+  EXPECT_EQ(costs_->nanoseconds_a_query(1, rays(1, RayMode::kFirst, Source::kStatic)), guess);
+  EXPECT_NE(costs_->nanoseconds_a_query(1, rays(1, RayMode::kAny)), costs_->nanoseconds_a_query(1, rays(1)));
+  EXPECT_NE(costs_->nanoseconds_a_query(1, balls(1)), costs_->nanoseconds_a_query(1, rays(1)));
+}
+
+TEST_F(CostEstimatesTest, AnEstimateFollowsWhatIsSeen) {
+  costs_->learn(1, rays(1000), 100'000);
+  for (int i = 0; i < 20; ++i) costs_->learn(1, rays(1000), 1'000'000);
+  EXPECT_NEAR(costs_->nanoseconds_a_query(1, rays(1)), 1000, 10);
+}
+
+TEST_F(CostEstimatesTest, FewQueriesCountLessThanMany) {
+  costs_->learn(1, rays(1000), 100'000);
+  costs_->learn(1, rays(1), 1'000'000);
+  EXPECT_LT(costs_->nanoseconds_a_query(1, rays(1)), 100 + 1'000'000 / 32);
+  costs_->learn(2, rays(1000), 100'000);
+  costs_->learn(2, rays(10'000), 10'000'000'000);
+  EXPECT_GT(costs_->nanoseconds_a_query(2, rays(1)), 100'000);
+}
+
+TEST_F(CostEstimatesTest, ABatchTakesWhatItsBlocksTakeTogether) {
+  costs_->learn(1, rays(1000), 100'000);
+  costs_->learn(1, balls(1000), 900'000);
+  QueryBatch batch;
+  batch.blocks = {rays(100), balls(10)};
+  EXPECT_NEAR(static_cast<double>(costs_->nanoseconds(1, batch)), 100 * 100 + 10 * 900, 2000);
+}
+
+TEST_F(CostEstimatesTest, ABlockWithoutQueriesTeachesNothing) {
+  const double before = costs_->nanoseconds_a_query(1, rays(1));
+  costs_->learn(1, rays(0), 1'000'000);
+  EXPECT_EQ(costs_->nanoseconds_a_query(1, rays(1)), before);
+}
+
+TEST_F(CostEstimatesTest, MoreScenesThanThereIsRoomForAreNoHarm) {
+  for (uint64_t scene = 0; scene < 3 * CostEstimates::kEntries; ++scene) costs_->learn(scene, rays(1000), 50'000);
+  const uint64_t last = 3 * CostEstimates::kEntries - 1;
+  EXPECT_NEAR(costs_->nanoseconds_a_query(last, rays(1)), 50, 0.1) << "the latest is known";
+}
+
+TEST_F(CostEstimatesTest, ThreadsThatLearnAtOnceLeaveAValueThatOneOfThemSaw) {
+  std::vector<std::thread> threads;
+  for (uint64_t thread = 1; thread <= 4; ++thread)
+    threads.emplace_back([this, thread] {
+      for (int i = 0; i < 2'000; ++i) {
+        costs_->learn(1, rays(1000), thread * 100'000);
+        const double seen = costs_->nanoseconds_a_query(1, rays(1));
+        EXPECT_GE(seen, 99.9);
+        EXPECT_LE(seen, 400.1);
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+}
+
+}  // namespace
+}  // namespace locus::server

@@ -1,0 +1,369 @@
+#include "server/scheduling/update_pump.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "core/base/refusal.h"
+
+namespace locus::server {
+namespace {
+
+using testing::Each;
+
+constexpr Scene::Deadline kNow = Scene::Deadline::min();
+
+ScenePtr make_scene(OverloadPolicy overload = OverloadPolicy::kEveryBatch, uint64_t pinned_bytes = 0) {
+  SceneSpec spec;
+  spec.overload = overload;
+  spec.pinned_bytes = pinned_bytes;
+  return std::make_shared<Scene>("scene", spec, 1, StaticSet::empty());
+}
+
+// A batch of points that move, or come, with its own columns.
+class Points final : public PendingUpdate {
+ public:
+  enum class What : uint8_t { kInsert, kMove };
+
+  Points(What what, std::vector<uint64_t> ids, float x) : ids_(std::move(ids)) {
+    for (size_t i = 0; i < ids_.size(); ++i) positions_.insert(positions_.end(), {x, 0, 0});
+    if (what == What::kInsert) {
+      batch_.inserts.emplace_back();
+      batch_.inserts[0].ids = ids_;
+      batch_.inserts[0].positions = positions_;
+    } else {
+      batch_.moves.emplace_back();
+      batch_.moves[0].ids = ids_;
+      batch_.moves[0].positions = positions_;
+    }
+  }
+
+  const UpdateBatch& batch() const override { return batch_; }
+  absl::Status stop() const override {
+    asked_ = true;
+    while (held_) std::this_thread::yield();
+    return stopped_ ? absl::CancelledError("gone") : absl::OkStatus();
+  }
+  void done(absl::StatusOr<UpdateAck> ack) override {
+    ack_ = std::move(ack);
+    done_ = true;
+  }
+
+  UpdateBatch& change() { return batch_; }
+  void hold() { held_ = true; }
+  void let_go() { held_ = false; }
+  void cancel() { stopped_ = true; }
+  bool is_done() const { return done_; }
+  void wait_until_asked() const {
+    while (!asked_) std::this_thread::yield();
+  }
+  const absl::StatusOr<UpdateAck>& wait() const {
+    while (!done_) std::this_thread::yield();
+    return ack_;
+  }
+
+ private:
+  std::vector<uint64_t> ids_;
+  std::vector<float> positions_;
+  UpdateBatch batch_;
+  std::atomic<bool> held_{false}, stopped_{false}, done_{false};
+  mutable std::atomic<bool> asked_{false};
+  absl::StatusOr<UpdateAck> ack_;
+};
+
+std::unique_ptr<Points> insert(std::vector<uint64_t> ids) {
+  return std::make_unique<Points>(Points::What::kInsert, std::move(ids), 0);
+}
+std::unique_ptr<Points> move(std::vector<uint64_t> ids, float x) {
+  return std::make_unique<Points>(Points::What::kMove, std::move(ids), x);
+}
+
+// A pump whose threads do everything, and a scene with the points 1 to 3.
+class UpdatePumpTest : public testing::Test {
+ protected:
+  explicit UpdatePumpTest(OverloadPolicy overload = OverloadPolicy::kEveryBatch) : scene_(make_scene(overload)) {
+    UpdateBatch batch;
+    const std::vector<uint64_t> ids = {1, 2, 3};
+    const std::vector<float> positions(3, 0.0f);
+    batch.inserts.emplace_back();
+    batch.inserts[0].ids = ids;
+    batch.inserts[0].positions = positions;
+    EXPECT_TRUE(scene_->apply(batch).ok());
+  }
+
+  static UpdatePumpOptions by_threads(uint32_t threads = 1) {
+    UpdatePumpOptions options;
+    options.threads = threads;
+    options.inline_nanoseconds = 0;
+    return options;
+  }
+
+  // Posts a batch that keeps whoever applies it busy until it is let go.
+  std::unique_ptr<Points> occupy(UpdatePump& pump) {
+    auto held = move({1}, -1);
+    held->hold();
+    EXPECT_TRUE(pump.post(scene_, *held, WhenFull::kRefuse).ok());
+    held->wait_until_asked();
+    return held;
+  }
+
+  double x_of(Id id) const { return scene_->latest()->objects.find(id)->shape.position.x; }
+
+  ScenePtr scene_;
+};
+
+class LatestWinsTest : public UpdatePumpTest {
+ protected:
+  LatestWinsTest() : UpdatePumpTest(OverloadPolicy::kLatestWins) {}
+};
+
+TEST_F(UpdatePumpTest, ASmallBatchForAnIdleSceneIsAppliedByWhoBringsIt) {
+  UpdatePump pump({});
+  const auto update = move({1}, 5);
+  EXPECT_EQ(*pump.post(scene_, *update, WhenFull::kRefuse), Posted::kTaken);
+  ASSERT_TRUE(update->is_done());
+  EXPECT_EQ(update->wait()->applied, 1u);
+  EXPECT_EQ(x_of(1), 5);
+  EXPECT_EQ(pump.stats().applied_inline, 1u);
+}
+
+TEST_F(UpdatePumpTest, ABatchThatLooksAtEveryObjectIsNotAppliedByWhoBringsIt) {
+  UpdatePump pump({});
+  const auto update = insert({7});
+  update->change().clear = true;
+  ASSERT_TRUE(pump.post(scene_, *update, WhenFull::kRefuse).ok());
+  EXPECT_TRUE(update->wait().ok());
+  EXPECT_EQ(pump.stats().applied_inline, 0u);
+  EXPECT_EQ(pump.stats().applied, 1u);
+}
+
+TEST_F(UpdatePumpTest, WhoBringsABatchNeverWaitsForTheOneBefore) {
+  UpdatePump pump({});
+  const auto held = move({1}, 1);
+  held->hold();
+  std::thread other([&] { EXPECT_TRUE(pump.post(scene_, *held, WhenFull::kRefuse).ok()); });
+  held->wait_until_asked();
+  const auto next = move({1}, 2);
+  ASSERT_TRUE(pump.post(scene_, *next, WhenFull::kRefuse).ok());
+  EXPECT_FALSE(next->is_done());
+  held->let_go();
+  other.join();
+  EXPECT_EQ(next->wait()->revision, held->wait()->revision + 1);
+  EXPECT_EQ(x_of(1), 2);
+}
+
+TEST_F(UpdatePumpTest, BatchesOfASceneAreAppliedInTheOrderOfArrival) {
+  UpdatePump pump(by_threads(3));
+  std::vector<std::unique_ptr<Points>> updates;
+  for (int i = 0; i < 200; ++i) {
+    updates.push_back(move({1}, static_cast<float>(i + 1)));
+    ASSERT_TRUE(pump.post(scene_, *updates.back(), WhenFull::kHold).ok());
+  }
+  for (size_t i = 0; i < updates.size(); ++i) EXPECT_EQ(updates[i]->wait()->revision, 2 + i) << "each its own";
+  EXPECT_EQ(x_of(1), 200);
+  EXPECT_EQ(pump.stats().coalesced, 0u);
+}
+
+TEST_F(UpdatePumpTest, ScenesDoNotWaitForEachOther) {
+  UpdatePump pump(by_threads(2));
+  const auto held = occupy(pump);
+  const ScenePtr other = make_scene();
+  const auto update = insert({1});
+  ASSERT_TRUE(pump.post(other, *update, WhenFull::kRefuse).ok());
+  EXPECT_TRUE(update->wait().ok());
+  EXPECT_FALSE(held->is_done());
+  held->let_go();
+  EXPECT_TRUE(held->wait().ok());
+}
+
+TEST_F(UpdatePumpTest, AFullMailboxRefusesAtOnceNamingTheLimitAndHoldsStreams) {
+  UpdatePumpOptions options = by_threads();
+  options.max_updates = 2;
+  UpdatePump pump(options);
+  const auto held = occupy(pump);
+  const auto first = move({1}, 1), second = move({1}, 2), refused = move({1}, 3), streamed = move({1}, 4);
+  EXPECT_EQ(*pump.post(scene_, *first, WhenFull::kRefuse), Posted::kTaken);
+  EXPECT_EQ(*pump.post(scene_, *second, WhenFull::kRefuse), Posted::kTaken);
+  const absl::Status status = pump.post(scene_, *refused, WhenFull::kRefuse).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refusal_of(status)->limit, "waiting_updates");
+  EXPECT_EQ(refusal_of(status)->limit_value, 2);
+  EXPECT_GE(refusal_of(status)->retry_after_ms, 1u);
+  EXPECT_EQ(*pump.post(scene_, *streamed, WhenFull::kHold), Posted::kFull);
+  EXPECT_EQ(pump.stats().updates, 3u);
+  EXPECT_EQ(pump.stats().refused, 1u);
+  EXPECT_EQ(pump.stats().held, 1u);
+  held->let_go();
+  EXPECT_TRUE(streamed->wait().ok());
+  EXPECT_FALSE(refused->is_done());
+  EXPECT_EQ(x_of(1), 4);
+}
+
+TEST_F(UpdatePumpTest, TheItemsOfAMailboxAreLimitedTooButOneBatchIsAlwaysTaken) {
+  UpdatePumpOptions options = by_threads();
+  options.max_items = 3;
+  UpdatePump pump(options);
+  const auto held = occupy(pump);
+  const auto large = move({1, 2, 3, 1, 2, 3}, 1), small = move({1}, 2);
+  EXPECT_TRUE(pump.post(scene_, *large, WhenFull::kRefuse).ok());
+  const absl::Status status = pump.post(scene_, *small, WhenFull::kRefuse).status();
+  EXPECT_EQ(refusal_of(status)->limit, "waiting_update_items");
+  EXPECT_EQ(refusal_of(status)->asked, 7);
+  held->let_go();
+  EXPECT_TRUE(large->wait().ok());
+}
+
+TEST_F(UpdatePumpTest, WhatNobodyWantsAnyMoreIsNotApplied) {
+  UpdatePump pump(by_threads());
+  const auto held = occupy(pump);
+  const auto cancelled = move({1}, 1), wanted = move({2}, 1);
+  ASSERT_TRUE(pump.post(scene_, *cancelled, WhenFull::kRefuse).ok());
+  ASSERT_TRUE(pump.post(scene_, *wanted, WhenFull::kRefuse).ok());
+  cancelled->cancel();
+  held->let_go();
+  EXPECT_EQ(cancelled->wait().status().code(), absl::StatusCode::kCancelled);
+  EXPECT_TRUE(wanted->wait().ok());
+  EXPECT_EQ(x_of(1), -1);
+}
+
+TEST_F(UpdatePumpTest, ARefusedBatchDoesNotHoldUpTheNext) {
+  UpdatePump pump(by_threads());
+  const auto wrong = move({1}, 1), right = move({1}, 2);
+  wrong->change().moves[0].positions = {};
+  ASSERT_TRUE(pump.post(scene_, *wrong, WhenFull::kRefuse).ok());
+  ASSERT_TRUE(pump.post(scene_, *right, WhenFull::kRefuse).ok());
+  EXPECT_EQ(wrong->wait().status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_TRUE(right->wait().ok());
+}
+
+// A reader that was told to end and does not: its scene waits, others do not, and the pump's thread is free.
+TEST_F(UpdatePumpTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
+  const ScenePtr pinned = make_scene(OverloadPolicy::kEveryBatch, limits::kLeastPinnedBytes);
+  std::vector<uint64_t> ids(50'000);
+  for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
+  UpdatePump pump(by_threads());
+  const auto fill = insert(ids);
+  ASSERT_TRUE(pump.post(pinned, *fill, WhenFull::kRefuse).ok());
+  ASSERT_TRUE(fill->wait().ok());
+  std::optional<SnapshotPin> pin = *pinned->pin({}, kNow);
+  std::vector<std::unique_ptr<Points>> moves;
+  float x = 0;
+  while (pin->status().ok()) {
+    moves.push_back(move(ids, ++x));
+    ASSERT_TRUE(pump.post(pinned, *moves.back(), WhenFull::kRefuse).ok());
+    ASSERT_TRUE(moves.back()->wait().ok());
+  }
+  const auto stalled = move(ids, ++x), elsewhere = move({1}, 7);
+  ASSERT_TRUE(pump.post(pinned, *stalled, WhenFull::kRefuse).ok());
+  ASSERT_TRUE(pump.post(scene_, *elsewhere, WhenFull::kRefuse).ok());
+  EXPECT_TRUE(elsewhere->wait().ok()) << "by the only thread";
+  while (pump.stats().stalls == 0) std::this_thread::yield();
+  EXPECT_FALSE(stalled->is_done());
+  pin.reset();
+  EXPECT_TRUE(stalled->wait().ok());
+}
+
+TEST_F(UpdatePumpTest, EveryBatchIsDoneBeforeThePumpIsGone) {
+  std::vector<std::unique_ptr<Points>> updates;
+  {
+    UpdatePump pump(by_threads(2));
+    const auto held = occupy(pump);
+    for (int i = 0; i < 20; ++i) {
+      updates.push_back(move({1}, static_cast<float>(i)));
+      ASSERT_TRUE(pump.post(scene_, *updates.back(), WhenFull::kHold).ok());
+    }
+    std::thread later([&held] { held->let_go(); });
+    later.join();
+    held->wait();
+  }
+  for (const auto& update : updates) EXPECT_TRUE(update->is_done());
+}
+
+TEST_F(UpdatePumpTest, ManyBringBatchesAtOnceAndNoneIsLost) {
+  UpdatePump pump({2});
+  constexpr int kEach = 300;
+  std::vector<std::thread> senders;
+  for (uint64_t sender = 1; sender <= 3; ++sender)
+    senders.emplace_back([&, sender] {
+      uint64_t last = 0;
+      for (int i = 1; i <= kEach; ++i) {
+        const auto update = move({sender}, static_cast<float>(i));
+        EXPECT_TRUE(pump.post(scene_, *update, WhenFull::kHold).ok());
+        const uint64_t revision = update->wait()->revision;
+        EXPECT_GT(revision, last);
+        last = revision;
+      }
+    });
+  for (std::thread& sender : senders) sender.join();
+  EXPECT_EQ(scene_->latest()->revision, 1u + 3 * kEach);
+  for (const Id id : {1, 2, 3}) EXPECT_EQ(x_of(id), kEach);
+  EXPECT_EQ(pump.stats().applied, 3u * kEach);
+}
+
+TEST_F(LatestWinsTest, MovesThatWaitTogetherBecomeOneRevision) {
+  UpdatePump pump(by_threads());
+  const auto held = occupy(pump);
+  std::vector<std::unique_ptr<Points>> moves;
+  for (int i = 1; i <= 10; ++i) {
+    moves.push_back(move({1, static_cast<uint64_t>(2 + i % 2)}, static_cast<float>(i)));
+    ASSERT_TRUE(pump.post(scene_, *moves.back(), WhenFull::kRefuse).ok());
+  }
+  held->let_go();
+  std::vector<uint64_t> revisions;
+  for (const auto& update : moves) revisions.push_back(update->wait()->revision);
+  EXPECT_THAT(revisions, Each(held->wait()->revision + 1));
+  EXPECT_EQ(x_of(1), 10);
+  EXPECT_EQ(x_of(2), 10);
+  EXPECT_EQ(x_of(3), 9);
+  EXPECT_EQ(pump.stats().coalesced, 9u);
+  EXPECT_EQ(scene_->status().joined_updates, 9u);
+}
+
+TEST_F(LatestWinsTest, NothingOvertakesABatchThatIsMoreThanMoves) {
+  UpdatePump pump(by_threads());
+  const auto held = occupy(pump);
+  const auto before = move({1}, 1), middle = insert({4}), after = move({1, 4}, 2), last = move({1, 4}, 3);
+  for (Points* update : {before.get(), middle.get(), after.get(), last.get()})
+    ASSERT_TRUE(pump.post(scene_, *update, WhenFull::kRefuse).ok());
+  held->let_go();
+  const uint64_t first = before->wait()->revision;
+  EXPECT_EQ(middle->wait()->revision, first + 1);
+  EXPECT_EQ(after->wait()->revision, first + 2);
+  EXPECT_EQ(last->wait()->revision, first + 2);
+  EXPECT_EQ(after->wait()->refused, 0u);
+  EXPECT_EQ(x_of(4), 3);
+}
+
+TEST_F(LatestWinsTest, MovesOfAnotherTickAreAnotherRevision) {
+  UpdatePump pump(by_threads());
+  const auto held = occupy(pump);
+  const auto tick_one = move({1}, 1), tick_two = move({1}, 2);
+  tick_one->change().tick = 1;
+  tick_two->change().tick = 2;
+  for (Points* update : {tick_one.get(), tick_two.get()})
+    ASSERT_TRUE(pump.post(scene_, *update, WhenFull::kRefuse).ok());
+  held->let_go();
+  EXPECT_EQ(tick_one->wait()->tick, 1u);
+  EXPECT_EQ(tick_two->wait()->revision, tick_one->wait()->revision + 1);
+}
+
+TEST_F(LatestWinsTest, OneThatWasCancelledMeanwhileIsLeftOut) {
+  UpdatePump pump(by_threads());
+  const auto held = occupy(pump);
+  const auto first = move({1}, 1), cancelled = move({1, 2}, 2);
+  for (Points* update : {first.get(), cancelled.get()}) ASSERT_TRUE(pump.post(scene_, *update, WhenFull::kRefuse).ok());
+  cancelled->cancel();
+  held->let_go();
+  EXPECT_TRUE(first->wait().ok());
+  EXPECT_FALSE(cancelled->wait().ok());
+  EXPECT_EQ(x_of(1), 1);
+  EXPECT_EQ(x_of(2), 0);
+}
+
+}  // namespace
+}  // namespace locus::server
