@@ -125,6 +125,7 @@ class HotCall final : private IoThread::Resident {
 
   static void listen(Listener<Method>& listener) {
     HotCall& call = *new HotCall(listener);
+    listener.io_.expect();
     call.context_.AsyncNotifyWhenDone(&call.gone_tag_);
     if constexpr (Method::kStream)
       listener.rpc_.listen(&call.context_, &call.wire_, listener.io_.queue(), &call.accepted_tag_);
@@ -144,7 +145,10 @@ class HotCall final : private IoThread::Resident {
 
   explicit HotCall(Listener<Method>& listener) : listener_(listener) {}
   ~HotCall() {
-    if (resident_) listener_.io_.leave(*resident_);
+    if (resident_)
+      listener_.io_.leave(*resident_);
+    else
+      listener_.io_.forgo();
   }
 
   // Everything that happens to a call goes through here. What follows from it is decided once, when it has happened.

@@ -74,20 +74,23 @@ void IoThread::post(IoTag& tag) {
 void IoThread::woken(bool) { alarm_set_.store(false); }
 
 IoThread::Residents::iterator IoThread::enter(Resident& call) {
-  resident_count_.fetch_add(1);
   return residents_.insert(residents_.end(), &call);
 }
 
 void IoThread::leave(Residents::iterator call) {
   residents_.erase(call);
-  resident_count_.fetch_sub(1);
-  resident_count_.notify_all();
+  forgo();
+}
+
+void IoThread::forgo() {
+  expected_or_resident_.fetch_sub(1);
+  expected_or_resident_.notify_all();
 }
 
 void IoThread::wait_until_empty(bool running) {
-  for (uint32_t left = resident_count_.load(); left > 0; left = resident_count_.load())
+  for (uint32_t left = expected_or_resident_.load(); left > 0; left = expected_or_resident_.load())
     if (running)
-      resident_count_.wait(left);
+      expected_or_resident_.wait(left);
     else
       turn();
 }

@@ -5,7 +5,8 @@
 // Threads: a thread's members belong to that thread, but for post() and queue(). post() is safe for threads of lower
 // priority: it calls no gRPC and takes no lock, so nobody waits for the poster if it loses its core. A thread of its
 // own, the waker, tells gRPC where that is needed.
-// Lifetime: stop() comes after the last call has left; posts must have ended by then, as those of calls have.
+// Lifetime: stop() comes after the server's end and waits for the last call. A poster may still be in post() when its
+// call has left, so posters end before the IoThreads go.
 #ifndef LOCUS_SERVER_SERVICE_IO_THREADS_H_
 #define LOCUS_SERVER_SERVICE_IO_THREADS_H_
 
@@ -82,10 +83,16 @@ class IoThread {
   // thread does again and again.
   bool turn();
 
-  // Whether no call lives here. From any thread.
-  bool empty() const { return resident_count_.load() == 0; }
+  // A call that gRPC may begin here: expected until it enters, or until gRPC says that it will not come.
+  void expect() { expected_or_resident_.fetch_add(1); }
+  void forgo();
   Residents::iterator enter(Resident& call);
   void leave(Residents::iterator call);
+
+  // Whether no call lives here. On this thread.
+  bool idle() const { return residents_.empty(); }
+  // Whether none does and none can come any more. From any thread.
+  bool empty() const { return expected_or_resident_.load() == 0; }
 
  private:
   friend class IoThreads;
@@ -104,7 +111,7 @@ class IoThread {
   std::atomic<IoTag*> posted_{nullptr};
   std::atomic<bool> asleep_{false};  // or about to be: what is posted needs a wake-up
   std::atomic<bool> alarm_set_{false};
-  std::atomic<uint32_t> resident_count_{0};
+  std::atomic<uint32_t> expected_or_resident_{0};
   grpc::Alarm alarm_;  // the waker's
   MemberTag<IoThread> woken_{*this, &IoThread::woken};
   MemberTag<IoThread> drain_{*this, &IoThread::drain_residents};
@@ -129,7 +136,8 @@ class IoThreads {
   void start();
   // Tells every call, now and later, that the server drains. Once, from any thread.
   void drain();
-  // Waits until every call has left, then ends the threads. The server is shut down already.
+  // Waits until every call has left, those included that came just before the server's end, then ends the threads. The
+  // server is shut down already.
   void stop();
 
  private:
