@@ -103,14 +103,20 @@ Progress BatchRun::work(uint64_t nanoseconds) {
     if (!can_begin()) return progress();
     piece = begin_piece();
   }
+  Stretch stretch = begin_stretch(piece->block);
+  const uint64_t worked_before = stretch.start;
   while (true) {
     end_piece(piece, run(*piece));
-    const bool enough = !options_.clock || now() - start >= nanoseconds;
+    // Who lost the core meanwhile has not worked yet.
+    const bool enough = !options_.clock || (now() - start >= nanoseconds && worked() - worked_before >= nanoseconds);
     const MutexLock lock(mutex_);
     --at_work_;
     const Progress reached = progress();
-    if (reached != Progress::kMore || enough) return reached;
-    piece = begin_piece();
+    const bool over = reached != Progress::kMore || enough;
+    if (!over) piece = begin_piece();
+    if (over || piece->block != stretch.block) end_stretch(stretch);
+    if (over) return reached;
+    if (piece->block != stretch.block) stretch = begin_stretch(piece->block);
   }
 }
 
@@ -148,13 +154,12 @@ void BatchRun::pass_empty_blocks() {
 
 size_t BatchRun::run(Piece& piece) {
   Block& block = blocks_[piece.block];
-  const uint64_t start = now();
   QueryTask task(snapshot_, control_, options_.brute_force);
   BlockRunner runner(task, batch_.blocks[piece.block], block.moments, block.place,
                      room_.load(std::memory_order_relaxed));
   const size_t reached = runner.run(piece.begin, piece.end);
   piece.rows = runner.take_rows();
-  piece.cost = {task.work(), now() - start};
+  piece.work = task.work();
   return reached;
 }
 
@@ -198,8 +203,7 @@ void BatchRun::write_out() {
 
 void BatchRun::write(const Piece& piece) {
   Block& block = blocks_[piece.block];
-  block.cost.work += piece.cost.work;
-  block.cost.nanoseconds += piece.cost.nanoseconds;
+  block.cost.work += piece.work;
   if (row_layout(batch_.blocks[piece.block]) == RowLayout::kCounted) return write_counted(piece);
   const std::vector<uint32_t>& cut = piece.rows.truncated;
   if (!cut.empty()) std::copy(cut.begin(), cut.end(), answer_.add_truncated(piece.block, cut.size()));

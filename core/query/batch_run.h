@@ -34,9 +34,11 @@ struct RunOptions {
   // Asked every limits::kTestsBetweenChecks primitive tests, from any thread: a status that is not OK ends the batch
   // with it. [never ends]
   std::function<absl::Status()> stop;
-  // Nanoseconds since some moment, asked before and after each piece of work, from any thread. [times are 0, and work()
-  // takes one piece]
+  // Nanoseconds since some moment, asked before and after each piece of work, from any thread. [work() takes one piece]
   std::function<uint64_t()> clock;
+  // What the calling thread has worked in its life; may be dear, as it is asked about twice a call of work() and a
+  // block. [clock; without that, times are 0]
+  std::function<uint64_t()> work_clock;
   // Test every value instead of asking the structures: for checking them. Same answers, different work.
   bool brute_force = false;
 };
@@ -44,7 +46,7 @@ struct RunOptions {
 // What queries took, by all threads together. No part of the answer.
 struct QueryCost {
   Work work;
-  uint64_t nanoseconds = 0;  // by RunOptions::clock
+  uint64_t nanoseconds = 0;  // by RunOptions::work_clock
 };
 
 class BatchRun {
@@ -73,7 +75,7 @@ class BatchRun {
     const size_t queries;
     const size_t step;  // queries of a piece, at most
     BlockPlace place;
-    QueryCost cost;  // of what is written out
+    QueryCost cost;  // its work as far as it is written out
   };
   // Some queries of a block, in a row.
   struct Piece {
@@ -81,9 +83,14 @@ class BatchRun {
     size_t begin, end;
     bool done = false;
     BlockResult rows = {};  // of blocks that count them
-    QueryCost cost = {};
+    Work work = {};
   };
   using Pieces = std::list<Piece>;
+  // What one thread does for one block without a break.
+  struct Stretch {
+    size_t block;
+    uint64_t start;
+  };
 
   BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOptions options, AnswerSink& answer);
   void add_block(QueryMoments moments);
@@ -102,6 +109,11 @@ class BatchRun {
   void write_counted(const Piece& piece);
   Progress progress() LOCUS_REQUIRES(mutex_);
   uint64_t now() const { return options_.clock ? options_.clock() : 0; }
+  Stretch begin_stretch(size_t block) const { return {block, worked()}; }
+  void end_stretch(const Stretch& stretch) LOCUS_REQUIRES(mutex_) {
+    blocks_[stretch.block].cost.nanoseconds += worked() - stretch.start;
+  }
+  uint64_t worked() const { return options_.work_clock ? options_.work_clock() : now(); }
 
   const SceneSnapshot& snapshot_;
   const QueryBatch& batch_;

@@ -15,6 +15,7 @@ inline constexpr uint32_t kMaxHttpWaiting = 16;         // connections that wait
 inline constexpr uint32_t kMaxHttpRequestBytes = 8192;  // request line and headers
 inline constexpr uint32_t kHttpTimeoutMs = 2000;        // for a request to come, and for its answer to be taken
 inline constexpr size_t kMaxRequestIdLength = 64;       // characters of a caller's x-request-id
+inline constexpr uint32_t kMaxHealthWatchers = 32;      // each keeps a thread
 inline constexpr uint32_t kMaxSlowQueryMs = 3'600'000;  // what --slow-query-ms may be
 inline constexpr uint32_t kMaxSlowQueryLines = 10;      // logged a second, the rest are counted
 

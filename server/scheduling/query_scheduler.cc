@@ -1,13 +1,13 @@
 #include "server/scheduling/query_scheduler.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "server/scheduling/batch_priority.h"
+#include "server/scheduling/clocks.h"
 
 namespace locus::server {
 namespace {
@@ -23,11 +23,6 @@ constexpr const char* kJobLimits[kJobClasses] = {"small_batches", "large_batches
 constexpr const char* kWorkLimits[kJobClasses] = {"small_batch_work_ms", "large_batch_work_ms"};
 constexpr const char* kAllJobsLimit = "batches";
 constexpr const char* kAllWorkLimit = "batch_work_ms";
-
-uint64_t steady_nanoseconds() {
-  const auto since = std::chrono::steady_clock::now().time_since_epoch();
-  return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since).count());
-}
 
 SchedulerOptions filled_in(SchedulerOptions options) {
   if (!options.clock) options.clock = &steady_nanoseconds;
@@ -89,16 +84,10 @@ QueryScheduler::~QueryScheduler() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::start(QueryJob& job, uint64_t client, uint64_t nanoseconds) {
-  if (nanoseconds < options_.inline_nanoseconds) {
-    if (job.work(options_.inline_nanoseconds) == Progress::kDone) {
-      inline_done_.fetch_add(1, std::memory_order_relaxed);
-      return TicketPtr();
-    }
-    // It has shown that the estimate was too low.
-    nanoseconds = options_.inline_nanoseconds;
-  }
-  return submit(job, client, nanoseconds);
+Progress QueryScheduler::run_inline(QueryJob& job) {
+  const Progress progress = job.work(options_.inline_nanoseconds);
+  if (progress == Progress::kDone) inline_done_.fetch_add(1, std::memory_order_relaxed);
+  return progress;
 }
 
 absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) {

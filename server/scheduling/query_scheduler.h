@@ -50,7 +50,7 @@ struct QueueLimit {
 struct SchedulerOptions {
   uint32_t threads = 1;
   BatchPriority priority = BatchPriority::kNice;
-  uint64_t inline_nanoseconds = 100'000;  // jobs estimated below are not queued
+  uint64_t inline_nanoseconds = 250'000;  // jobs estimated below are not queued
   uint64_t turn_nanoseconds = 100'000;    // between two looks at whose turn it is
   uint64_t small_nanoseconds = 400'000;   // jobs estimated up to here are small
   // Of each class, by its number, and of both together. The work is for one thread: more threads, more work.
@@ -83,12 +83,15 @@ class QueryScheduler {
   QueryScheduler(const QueryScheduler&) = delete;
   QueryScheduler& operator=(const QueryScheduler&) = delete;
 
-  // Runs a job that should take `nanoseconds`: where that is little, here and now, as far as it gets within the budget;
-  // what is left is queued. Null: it is done, and done() is not called. Otherwise done() will be, perhaps before this
-  // returns. RESOURCE_EXHAUSTED naming the limit when the queue is full; then the job is left as it is.
-  absl::StatusOr<TicketPtr> start(QueryJob& job, uint64_t client, uint64_t nanoseconds);
+  // Whether a job that should take so long is better done by whoever has it than queued.
+  bool runs_inline(uint64_t nanoseconds) const { return nanoseconds < options_.inline_nanoseconds; }
 
-  // The same without a part of it being done here.
+  // Does that, as far as it gets within the budget. kDone: done() is not called. Otherwise the estimate was too low,
+  // and the rest is to be submitted.
+  Progress run_inline(QueryJob& job);
+
+  // Queues a job: done() will be called, perhaps before this returns. RESOURCE_EXHAUSTED naming the limit when the
+  // queue is full; then the job is left as it is.
   absl::StatusOr<TicketPtr> submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
   // Takes a job that nobody works on right now out of the queue: true, and done() is not called. Otherwise somebody

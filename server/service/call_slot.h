@@ -1,4 +1,4 @@
-// What the work on one message sees of the call it belongs to. The work begins on the call's IO thread and says there,
+// What the work on one message sees of the call it belongs to. The work begins on the call's IO loop and says there,
 // once, that it is over; in between it may be anywhere.
 #ifndef LOCUS_SERVER_SERVICE_CALL_SLOT_H_
 #define LOCUS_SERVER_SERVICE_CALL_SLOT_H_
@@ -22,16 +22,16 @@ class CallSlot {
 
   // While a message is in work.
   virtual const Caller& caller() const = 0;
-  virtual IoThread& io() const = 0;
+  virtual IoLoop& io() const = 0;
   // The same for all calls of a connection, and, as far as can be told, of no other.
   virtual uint64_t client() const = 0;
   // Whether the call goes on after this message.
   virtual bool stream() const = 0;
 
-  // On the IO thread: the call reads no further message until this one is answered.
+  // On the IO loop: the call reads no further message until this one is answered.
   virtual void hold() = 0;
 
-  // On the IO thread only, once a message. OK: the response is filled in. The slot may serve another message before
+  // On the IO loop only, once a message. OK: the response is filled in. The slot may serve another message before
   // this returns.
   virtual void answered(absl::Status status) = 0;
 

@@ -4,16 +4,17 @@
 #define LOCUS_SERVER_SERVICE_HOST_H_
 
 #include "core/scene/registry.h"
+#include "server/config/observability_limits.h"
 #include "server/config/server_config.h"
 #include "server/observability/metrics.h"
 #include "server/observability/slow_queries.h"
 #include "server/scheduling/change_queue.h"
+#include "server/scheduling/clocks.h"
 #include "server/scheduling/cost_estimates.h"
 #include "server/scheduling/drain.h"
 #include "server/scheduling/gate.h"
 #include "server/scheduling/memory_budget.h"
 #include "server/scheduling/query_scheduler.h"
-#include "server/scheduling/thread_clock.h"
 #include "server/scheduling/update_pump.h"
 #include "server/scheduling/worker_pool.h"
 #include "server/service/memory_use.h"
@@ -58,6 +59,7 @@ struct Host {
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
   Gate calls;    // in work, streams apart
   Gate streams;  // open
+  Gate health_watchers{kMaxHealthWatchers};
   Drain drain;
 };
 

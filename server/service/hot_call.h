@@ -1,10 +1,10 @@
 // The calls that come by the thousand, unary or streams, as one state machine on completion queues. A Method says what
 // is asked and how it is answered; everything that gRPC demands of a call is here, once.
 //
-// Lifetime. A call belongs to its IO thread; only there is it touched, so it has no locks. It waits for a caller, and
+// Lifetime. A call belongs to its IO loop; only there is it touched, so it has no locks. It waits for a caller, and
 // from accepted() on lives until three things are true: its status was sent (finished_), gRPC has said that the call is
 // over (gone_), and nothing is out: no read, no write, no message in work. Then, at the end of advance(), it deletes
-// itself. Work on a message may be anywhere, but comes back to the IO thread exactly once, by answered(); when the
+// itself. Work on a message may be anywhere, but comes back to the IO loop exactly once, by answered(); when the
 // caller is gone or the server drains, give_up() asks it to do so soon. Slots hold a message, its answer and the work
 // on it; they outlive calls and are used again and again, so that steady traffic allocates no columns.
 //
@@ -44,7 +44,7 @@ namespace locus::server {
 template <class Method>
 class HotCall;
 
-// Waits for calls of one rpc on one IO thread, and keeps what they use again. Outlives the thread's calls.
+// Waits for calls of one rpc on one IO loop, and keeps what they use again. Outlives the loop's calls.
 //
 // What a Method is: the types Request, Response and Work; kRpc, kStream, kInOrder; listen(), which asks gRPC for the
 // next call; and begin(), which has the work on a message begun. A Work is built from a CallSlot and has give_up():
@@ -52,9 +52,9 @@ class HotCall;
 template <class Method>
 class Listener {
  public:
-  Listener(Host& host, const Method& rpc, IoThread& io) : host_(host), rpc_(rpc), io_(io) {}
+  Listener(Host& host, const Method& rpc, IoLoop& io) : host_(host), rpc_(rpc), io_(io) {}
 
-  // Once, after the server started and before the IO thread did.
+  // Once, after the server started and before the IO threads did.
   void listen() {
     for (int i = 0; i < kWaiting; ++i) HotCall<Method>::listen(*this);
   }
@@ -78,12 +78,12 @@ class Listener {
 
   Host& host_;
   const Method rpc_;
-  IoThread& io_;
+  IoLoop& io_;
   std::vector<std::unique_ptr<Slot>> spare_;
 };
 
 template <class Method>
-class HotCall final : private IoThread::Resident {
+class HotCall final : private IoLoop::Resident {
  public:
   using Request = typename Method::Request;
   using Response = typename Method::Response;
@@ -94,7 +94,7 @@ class HotCall final : private IoThread::Resident {
     explicit Slot(Host& host) : CallSlot(host), work_(*this) {}
 
     const Caller& caller() const override { return *call_->caller_; }
-    IoThread& io() const override { return call_->listener_.io_; }
+    IoLoop& io() const override { return call_->listener_.io_; }
     uint64_t client() const override { return call_->client(); }
     bool stream() const override { return Method::kStream; }
     void hold() override { holds_ = true; }
@@ -393,7 +393,7 @@ class HotCall final : private IoThread::Resident {
   Tag finished_tag_{*this, &HotCall::finished};
   Tag gone_tag_{*this, &HotCall::gone};
 
-  std::optional<IoThread::Residents::iterator> resident_;
+  std::optional<IoLoop::Residents::iterator> resident_;
   std::atomic<bool> stopped_{false};  // for work on other threads: nobody waits for it
   SteadyTime arrived_;
   std::optional<OpenStream> open_;

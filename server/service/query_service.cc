@@ -60,9 +60,9 @@ QueryService::QueryService(Host& host) : host_(host), listeners_(std::make_uniqu
 QueryService::~QueryService() = default;
 
 void QueryService::listen(IoThreads& threads) {
-  for (size_t i = 0; i < threads.size(); ++i) {
-    listeners_->query.emplace_back(host_, QueryMethod{this}, threads[i]).listen();
-    listeners_->stream.emplace_back(host_, StreamQueriesMethod{this}, threads[i]).listen();
+  for (size_t i = 0; i < threads.loops(); ++i) {
+    listeners_->query.emplace_back(host_, QueryMethod{this}, threads.loop(i)).listen();
+    listeners_->stream.emplace_back(host_, StreamQueriesMethod{this}, threads.loop(i)).listen();
   }
 }
 

@@ -1,4 +1,4 @@
-// QueryService over the scenes of a host: one batch a call, or a stream of them. Both live on IO threads.
+// QueryService over the scenes of a host: one batch a call, or a stream of them. Both live on IO loops.
 #ifndef LOCUS_SERVER_SERVICE_QUERY_SERVICE_H_
 #define LOCUS_SERVER_SERVICE_QUERY_SERVICE_H_
 

@@ -6,13 +6,20 @@
 
 #include "absl/strings/str_join.h"
 #include "server/observability/log.h"
-#include "server/scheduling/thread_clock.h"
+#include "server/scheduling/clocks.h"
 #include "server/service/convert.h"
 #include "server/service/status.h"
 
 namespace locus::server {
 
 using std::chrono::steady_clock;
+
+namespace {
+
+// Work that is not worth waking another thread for, which would watch for events meanwhile.
+constexpr uint64_t kShortNanoseconds = 30'000;
+
+}  // namespace
 
 void QueryWork::begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result) {
   message_ = &batch;
@@ -99,16 +106,28 @@ void QueryWork::run() {
     return told.ok() ? slot_.caller().stop() : told;
   };
   // Not by the clock on the wall: what is learned from a thread that waits for a core would keep it waiting.
-  options.clock = &thread_nanoseconds;
+  options.work_clock = &thread_nanoseconds;
+  options.clock = &steady_nanoseconds;
   columns_.emplace(*result_, batch_.blocks.size());
   absl::StatusOr<std::unique_ptr<BatchRun>> run = BatchRun::prepare(**pin_, batch_, std::move(options), *columns_);
   if (!run.ok()) return answer(run.status());
   run_ = *std::move(run);
   const uint64_t cost = slot_.host().costs.nanoseconds((*pin_)->epoch, batch_);
-  absl::StatusOr<QueryScheduler::TicketPtr> ticket = slot_.host().scheduler.start(*this, slot_.client(), cost);
+  if (!slot_.host().scheduler.runs_inline(cost)) return submit(cost);
+  slot_.io().set_aside(*this, cost < kShortNanoseconds ? AsideLength::kShort : AsideLength::kLong);
+}
+
+void QueryWork::run_aside() { progress_ = slot_.host().scheduler.run_inline(*this); }
+
+void QueryWork::aside_done() {
+  if (progress_ == Progress::kDone) return finished(true);
+  submit(slot_.host().scheduler.options().inline_nanoseconds);  // it has shown that it takes longer
+}
+
+void QueryWork::submit(uint64_t nanoseconds) {
+  absl::StatusOr<QueryScheduler::TicketPtr> ticket = slot_.host().scheduler.submit(*this, slot_.client(), nanoseconds);
   if (!ticket.ok()) return answer(ticket.status());
   ticket_ = *std::move(ticket);
-  if (ticket_ == nullptr) finished(true);
 }
 
 void QueryWork::done() { slot_.io().post(finished_); }

@@ -1,5 +1,6 @@
 // One query batch from message to columns: checks, the revision it asks for, its turn, the work, the answer. Nothing of
-// it waits on the IO thread: for a revision that is to come it is parked, and what takes long goes to the scheduler.
+// it waits on the IO loop: for a revision that is to come it is parked, the work is set aside, and what takes long goes
+// to the scheduler.
 #ifndef LOCUS_SERVER_SERVICE_QUERY_WORK_H_
 #define LOCUS_SERVER_SERVICE_QUERY_WORK_H_
 
@@ -19,7 +20,7 @@
 
 namespace locus::server {
 
-class QueryWork final : private QueryJob {
+class QueryWork final : private QueryJob, private AsideWork {
  public:
   explicit QueryWork(CallSlot& slot) : slot_(slot) {}
 
@@ -41,6 +42,11 @@ class QueryWork final : private QueryJob {
   absl::Status no_longer() const;
 
   void run();
+  // Where it is short.
+  void run_aside() override;
+  void aside_done() override;
+  // Otherwise.
+  void submit(uint64_t nanoseconds);
   Progress work(uint64_t nanoseconds) override { return run_->work(nanoseconds); }
   void done() override;
   void finished(bool);
@@ -58,7 +64,7 @@ class QueryWork final : private QueryJob {
   SteadyTime started_;  // its turn: after any wait for a revision
 
   // While waiting.
-  std::optional<IoThread::Timers::iterator> timer_;
+  std::optional<IoLoop::Timers::iterator> timer_;
   std::optional<Scene::Watch> watch_;
   std::atomic<bool> told_{false};  // woken() is on its way
   MemberTag<QueryWork> woken_{*this, &QueryWork::woken};
@@ -66,6 +72,7 @@ class QueryWork final : private QueryJob {
   std::optional<SnapshotPin> pin_;
   std::optional<ResultColumns> columns_;
   std::unique_ptr<BatchRun> run_;
+  Progress progress_ = Progress::kMore;  // of the work set aside
   QueryScheduler::TicketPtr ticket_;
   MemberTag<QueryWork> finished_{*this, &QueryWork::finished};
 };

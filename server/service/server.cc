@@ -1,7 +1,6 @@
 #include "server/service/server.h"
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
-#include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
@@ -13,6 +12,7 @@
 #include "server/config/listen_address.h"
 #include "server/observability/http_server.h"
 #include "server/observability/log.h"
+#include "server/service/health_service.h"
 #include "server/service/host.h"
 #include "server/service/io_threads.h"
 #include "server/service/listening.h"
@@ -68,7 +68,6 @@ absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& confi
 // Before the first ServerBuilder of the process, once.
 void enable_extras() {
   static const bool kDone = [] {
-    grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     return true;
   }();
@@ -98,21 +97,24 @@ struct Server::Parts {
   explicit Parts(const ServerConfig& config)
       : host(config),
         scrape(host),
+        health_service(host),
         server_service(host),
         scene_service(host),
         update_service(host),
         query_service(host) {}
 
-  std::vector<grpc::Service*> services() { return {&server_service, &scene_service, &update_service, &query_service}; }
+  std::vector<grpc::Service*> services() {
+    return {&health_service, &server_service, &scene_service, &update_service, &query_service};
+  }
 
+  std::unique_ptr<IoThreads> io;  // ended with the server; what its calls had in work may still be on its way to it
   Host host;
   Scrape scrape;
+  HealthService health_service;
   ServerService server_service;
   SceneService scene_service;
   UpdateService update_service;
   QueryService query_service;
-  // Ended before the services they serve, and after the server.
-  std::unique_ptr<IoThreads> io;
   std::unique_ptr<grpc::Server> grpc;
   std::unique_ptr<HttpServer> http;  // from before calls are served until none are
   bool ended = false;
@@ -157,10 +159,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
     const bool tcp = (*addresses)[i].kind == ListenAddress::Kind::kTcp;
     if (tcp && server->port_ == 0) server->port_ = port;
   }
-  grpc::HealthCheckServiceInterface* health = server->parts_->grpc->GetHealthCheckService();
-  for (const char* name :
-       {"locus.v1.ServerService", "locus.v1.SceneService", "locus.v1.UpdateService", "locus.v1.QueryService"})
-    health->SetServingStatus(name, true);
+  server->parts_->health_service.serving();
   server->parts_->scrape.serving(server->addresses_);
   return server;
 }
@@ -170,11 +169,12 @@ uint16_t Server::http_port() const { return parts_->http == nullptr ? 0 : parts_
 void Server::drain(milliseconds grace) {
   const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
-  parts_->grpc->GetHealthCheckService()->SetServingStatus(false);
+  parts_->health_service.not_serving();
   host.drain.begin();
   parts_->io->drain();
   const bool idle = host.streams.wait_until_empty(deadline) && host.calls.wait_until_empty(deadline);
   host.drain.end();
+  parts_->health_service.end();
   parts_->grpc->Shutdown(system_clock::now() + (idle ? kLastWords : milliseconds(0)));
   parts_->grpc->Wait();
   parts_->io->stop();

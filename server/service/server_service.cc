@@ -48,6 +48,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"blocks", limits::kMaxBlocks},
       {"calls", static_cast<double>(host.calls.max()), static_cast<double>(host.calls.used())},
       {"coordinate", limits::kMaxCoordinate},
+      {"health_watchers", kMaxHealthWatchers, static_cast<double>(host.health_watchers.used())},
       {"history_bytes", static_cast<double>(limits::kMaxHistoryBytes)},
       {"history_ticks", limits::kMaxHistoryTicks},
       {"http_connections", kHttpThreads + kMaxHttpWaiting},

@@ -60,9 +60,9 @@ UpdateService::UpdateService(Host& host) : host_(host), listeners_(std::make_uni
 UpdateService::~UpdateService() = default;
 
 void UpdateService::listen(IoThreads& threads) {
-  for (size_t i = 0; i < threads.size(); ++i) {
-    listeners_->apply.emplace_back(host_, ApplyUpdatesMethod{this}, threads[i]).listen();
-    listeners_->stream.emplace_back(host_, StreamUpdatesMethod{this}, threads[i]).listen();
+  for (size_t i = 0; i < threads.loops(); ++i) {
+    listeners_->apply.emplace_back(host_, ApplyUpdatesMethod{this}, threads.loop(i)).listen();
+    listeners_->stream.emplace_back(host_, StreamUpdatesMethod{this}, threads.loop(i)).listen();
   }
 }
 

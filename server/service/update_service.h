@@ -1,4 +1,4 @@
-// UpdateService over the scenes of a host: one batch a call, or a stream of them. Both live on IO threads.
+// UpdateService over the scenes of a host: one batch a call, or a stream of them. Both live on IO loops.
 #ifndef LOCUS_SERVER_SERVICE_UPDATE_SERVICE_H_
 #define LOCUS_SERVER_SERVICE_UPDATE_SERVICE_H_
 

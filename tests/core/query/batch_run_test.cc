@@ -140,8 +140,35 @@ TEST(BatchRunTest, WithAClockATurnTakesPiecesUntilTheTimeIsUp) {
   Asked asked(*snapshot, blocks, options);
   int turns = 1;
   while (asked.run->work(50) == Progress::kMore) ++turns;
-  EXPECT_EQ(turns, 5) << "a piece looks at the clock three times; ten pieces";
-  EXPECT_EQ(asked.run->cost(0).nanoseconds, 10u * 10u) << "from the second look to the third";
+  EXPECT_EQ(turns, 3) << "ten pieces that look at the clock once, and twice more a turn at both of its ends";
+  EXPECT_EQ(asked.run->cost(0).nanoseconds, 60u + 60 + 30) << "from the second look of a turn to its last";
+}
+
+TEST(BatchRunTest, WhoLostItsCoreWorksOnUntilItHasWorkedSoLong) {
+  const SnapshotPtr snapshot = snapshot_of(world_of(1));
+  const std::vector<OwnedBlock> blocks = {many_balls(2'560, StaticDetail::kInstances)};
+  uint64_t now = 0, worked = 0;
+  RunOptions options;
+  options.clock = [&now] { return now += 1'000; };
+  options.work_clock = [&worked] { return worked += 10; };
+  Asked asked(*snapshot, blocks, options);
+  EXPECT_EQ(asked.run->work(90), Progress::kMore);
+  EXPECT_EQ(worked, 110u) << "the beginning, nine pieces, the end";
+  EXPECT_EQ(asked.run->cost(0).nanoseconds, 100u);
+}
+
+TEST(BatchRunTest, EachBlockIsToldWhatItTook) {
+  const SnapshotPtr snapshot = snapshot_of(world_of(1));
+  const std::vector<OwnedBlock> blocks = {many_balls(256, StaticDetail::kInstances),
+                                          many_balls(512, StaticDetail::kInstances)};
+  uint64_t now = 0;
+  RunOptions options;
+  options.clock = [&now] { return now += 10; };
+  Asked asked(*snapshot, blocks, options);
+  EXPECT_EQ(asked.run->work(1'000), Progress::kDone);
+  EXPECT_EQ(asked.run->cost(0).nanoseconds, 20u) << "a piece, and a look at its end";
+  EXPECT_EQ(asked.run->cost(1).nanoseconds, 30u);
+  EXPECT_EQ(asked.run->cost().nanoseconds, 50u);
 }
 
 TEST(BatchRunTest, RowsThatWaitForAnEarlierPieceAreOfAtMostSixteenPieces) {

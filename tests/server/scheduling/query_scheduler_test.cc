@@ -135,20 +135,19 @@ TEST(QuerySchedulerTest, EveryJobIsDoneExactlyOnce) {
 TEST(QuerySchedulerTest, AJobEstimatedUnderTheBudgetIsRunByItsCallerAndNeverQueued) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(1);
-  const auto ticket = scheduler.start(job, 1, kTurn / 2);
-  ASSERT_TRUE(ticket.ok());
-  EXPECT_EQ(*ticket, nullptr);
+  EXPECT_TRUE(scheduler.runs_inline(scheduler.options().inline_nanoseconds - 1));
+  EXPECT_FALSE(scheduler.runs_inline(scheduler.options().inline_nanoseconds));
+  EXPECT_EQ(scheduler.run_inline(job), Progress::kDone);
   EXPECT_EQ(job.done_count(), 0u) << "the caller knows";
   EXPECT_EQ(scheduler.stats().inline_done, 1u);
   EXPECT_EQ(scheduler.stats().worked_nanoseconds, 0u);
 }
 
-TEST(QuerySchedulerTest, WhatAnInlineRunDoesNotFinishIsHandedOn) {
+TEST(QuerySchedulerTest, WhatAnInlineRunDoesNotFinishCanBeQueued) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(5);
-  const auto ticket = scheduler.start(job, 1, kTurn / 2);
-  ASSERT_TRUE(ticket.ok());
-  EXPECT_NE(*ticket, nullptr);
+  EXPECT_EQ(scheduler.run_inline(job), Progress::kMore);
+  ASSERT_TRUE(scheduler.submit(job, 1, kTurn / 2).ok());
   job.wait();
   EXPECT_EQ(scheduler.stats().inline_done, 0u);
 }

@@ -21,7 +21,7 @@ namespace {
 
 using server::CallSlot;
 using server::Host;
-using server::IoThread;
+using server::IoLoop;
 using server::IoThreads;
 using server::Listener;
 using server::MemberTag;
@@ -34,10 +34,11 @@ enum What : uint64_t {
   kLetGo = 4,
   kRefused = 5,
   kHoldsOthers = 6,  // as kElsewhere, and nothing is read meanwhile
+  kAside = 7,        // set aside
 };
 
 // Work that can be watched.
-class FakeWork {
+class FakeWork : private server::AsideWork {
  public:
   explicit FakeWork(CallSlot& slot) : slot_(slot) {}
   ~FakeWork() {
@@ -49,6 +50,8 @@ class FakeWork {
     if (what == kHoldsOthers) slot_.hold();
     if (what == kElsewhere || what == kHoldsOthers) {
       thread_ = std::thread([this, &io = slot_.io()] { io.post(returned_); });
+    } else if (what == kAside) {
+      slot_.io().set_aside(*this, server::AsideLength::kLong);
     } else if (what == kHeld) {
       place_ = held_.insert(held_.end(), this);
     } else {
@@ -68,6 +71,8 @@ class FakeWork {
     slot_.answered(status);
   }
   void returned(bool) { slot_.answered(absl::OkStatus()); }
+  void run_aside() override {}
+  void aside_done() override { slot_.answered(absl::OkStatus()); }
 
   static inline std::list<FakeWork*> held_;
 
@@ -153,7 +158,7 @@ class Bench {
     io_->stop();
   }
 
-  IoThread& io() { return (*io_)[0]; }
+  IoLoop& io() { return io_->loop(0); }
   Host& host() { return host_; }
   v1::QueryService::Stub& stub() { return *stub_; }
 
@@ -206,7 +211,7 @@ v1::StreamQueriesRequest message(uint64_t sequence, uint64_t what) {
 
 // What a client sends, and what came back.
 struct Conversation {
-  std::vector<uint64_t> messages = {kAtOnce, kElsewhere, kHeld, kRefused, kHoldsOthers, kAtOnce, kHeld, kLetGo};
+  std::vector<uint64_t> messages = {kAtOnce, kElsewhere, kHeld, kRefused, kAside, kHoldsOthers, kAtOnce, kHeld, kLetGo};
   grpc::ClientContext context;
   std::vector<uint64_t> answers;
   grpc::Status status;
@@ -282,7 +287,7 @@ TYPED_TEST(HotCallTest, TheServerMayDrainAfterAnyEventOfAStreamAndAnswersWhatItR
 }
 
 TEST(UnaryHotCallTest, ACallMayEndInAnyWayAfterAnyEvent) {
-  for (const uint64_t what : {kAtOnce, kElsewhere, kHeld, kRefused})
+  for (const uint64_t what : {kAtOnce, kElsewhere, kHeld, kRefused, kAside})
     for (const char* how : {"cancel", "break", "drain"}) {
       bool in_time = true;
       // A held call has one event before its end, that it came.

@@ -1,4 +1,4 @@
-#include "server/scheduling/thread_clock.h"
+#include "server/scheduling/clocks.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 namespace locus::server {
 namespace {
 
-TEST(ThreadClockTest, WorkCountsAndSleepDoesNot) {
+TEST(ClocksTest, WorkCountsAndSleepDoesNot) {
   const uint64_t start = thread_nanoseconds();
   while (thread_nanoseconds() < start + 1'000'000) {
   }
@@ -18,7 +18,7 @@ TEST(ThreadClockTest, WorkCountsAndSleepDoesNot) {
   EXPECT_LT(thread_nanoseconds() - worked, 100'000'000u);
 }
 
-TEST(ThreadClockTest, EachThreadHasItsOwn) {
+TEST(ClocksTest, EachThreadHasItsOwn) {
   while (thread_nanoseconds() < 1'000'000) {
   }
   uint64_t other = 0;

@@ -1,0 +1,91 @@
+// Watchers of the standard health service: what they are told, and when.
+#include <gtest/gtest.h>
+
+#include <future>
+
+#include "google/protobuf/empty.pb.h"
+#include "google/protobuf/unknown_field_set.h"
+#include "server/config/observability_limits.h"
+#include "tests/support/rpc_test.h"
+
+namespace locus::test {
+namespace {
+
+using google::protobuf::Empty;
+
+// HealthCheckResponse.status.
+enum Health : uint64_t { kNothing = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
+
+class Watcher {
+ public:
+  Watcher(const std::shared_ptr<grpc::Channel>& channel, const std::string& service) {
+    Empty request;
+    *Empty::GetReflection()->MutableUnknownFields(&request)->AddLengthDelimited(1) = service;
+    const grpc::internal::RpcMethod method("/grpc.health.v1.Health/Watch", grpc::internal::RpcMethod::SERVER_STREAMING,
+                                           channel);
+    set_timeout(context_);
+    reader_.reset(grpc::internal::ClientReaderFactory<Empty>::Create(channel.get(), method, &context_, request));
+  }
+
+  // What comes next; kNothing at the end.
+  uint64_t next() {
+    Empty response;
+    if (!reader_->Read(&response)) return kNothing;
+    const auto& fields = Empty::GetReflection()->GetUnknownFields(response);
+    return fields.field_count() == 1 ? fields.field(0).varint() : kNothing;
+  }
+  grpc::Status end() { return reader_->Finish(); }
+  void cancel() { context_.TryCancel(); }
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<Empty>> reader_;
+};
+
+TEST(HealthTest, AWatcherIsToldAtOnceAndWhenTheServerDrains) {
+  RunningServer running;
+  Watcher watcher(running.stubs().channel, "");
+  EXPECT_EQ(watcher.next(), kServing);
+  Watcher of_one(running.stubs().channel, "locus.v1.QueryService");
+  EXPECT_EQ(of_one.next(), kServing);
+  const auto drained = std::async(std::launch::async, [&] { running.server().drain(std::chrono::seconds(5)); });
+  EXPECT_EQ(watcher.next(), kNotServing);
+  EXPECT_EQ(watcher.next(), kNothing);
+  EXPECT_EQ(watcher.end().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST(HealthTest, AServiceThatIsNotThereIsUnknownToItsWatcher) {
+  RunningServer running;
+  Watcher watcher(running.stubs().channel, "no.such.Service");
+  EXPECT_EQ(watcher.next(), kServiceUnknown);
+  watcher.cancel();
+  EXPECT_EQ(watcher.end().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST(HealthTest, OneWatcherTooManyIsRefusedAndThereIsRoomAgainWhenOneLeaves) {
+  RunningServer running;
+  std::vector<std::unique_ptr<Watcher>> watchers;
+  for (uint32_t i = 0; i < server::kMaxHealthWatchers; ++i) {
+    watchers.push_back(std::make_unique<Watcher>(running.stubs().channel, ""));
+    EXPECT_EQ(watchers.back()->next(), kServing);
+  }
+  Watcher refused(running.stubs().channel, "");
+  EXPECT_EQ(refused.next(), kNothing);
+  const v1::Error error = error_of(refused.end());
+  EXPECT_EQ(error.limit(), "health_watchers");
+  watchers.back()->cancel();
+  EXPECT_FALSE(watchers.back()->end().ok());
+  // Its thread notices soon.
+  uint64_t told = kNothing;
+  for (int tries = 0; told == kNothing && tries < 600; ++tries) {
+    Watcher next(running.stubs().channel, "");
+    told = next.next();
+    next.cancel();
+    next.end();
+    if (told == kNothing) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  EXPECT_EQ(told, kServing);
+}
+
+}  // namespace
+}  // namespace locus::test
