@@ -35,11 +35,12 @@ KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed")
 # The suite serving.
 SERVING = {(f"rays/{cost}/{size}", "in_process") for cost in ("90ns", "270ns") for size in (1024, 8192)}
 SERVING |= {(f"one_stream/{size}", "two_streams") for size in (1024, 8192)}
-SERVING |= {(f"echo/{size}", "raw_tcp") for size in (1024, 8192)}
+SERVING |= {(f"{case}/{size}", "raw_tcp") for size in (1024, 8192) for case in ("echo", "empty")}
 SERVING |= {(f"{case}/{size}", peer) for size in (256, 4096)
             for case, peer in (("moves", "raw_tcp"), ("moves_applied", "in_process"))}
-SERVING |= {("mixed_p50/16", "idle"), ("mixed_p99/16", "idle"), ("overload/10x", "peak"),
-            ("deadline/1ms", "whole_job"), ("cancel/1000", "whole_job")}
+SERVING |= {("mixed_p50/16", "idle"), ("mixed_p99/16", "idle"), ("overload/10x/as_told", "peak"),
+            ("overload/10x/at_once", "peak"), ("silent_reader/1", "idle"), ("silent_reader/8", "idle"),
+            ("churn/50", "idle"), ("deadline/1ms", "whole_job"), ("cancel/1000", "whole_job")}
 REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
 HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
 

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "tests/bench/dynamic/world.h"
+#include "tests/bench/serving/echo_answer.h"
+#include "tests/bench/serving/processor_time.h"
 #include "tests/bench/serving/query_load.h"
 #include "tests/bench/serving/update_load.h"
 
@@ -28,6 +30,7 @@ struct Moves {
 constexpr Moves kMoves[] = {{256, 30}, {4096, 75}};
 
 std::string echo_name(const Echo& echo) { return absl::StrCat("echo/", echo.rays); }
+std::string empty_name(const Echo& echo) { return absl::StrCat("empty/", echo.rays); }
 std::string parsed_name(const Moves& moves) { return absl::StrCat("moves/", moves.moves); }
 std::string applied_name(const Moves& moves) { return absl::StrCat("moves_applied/", moves.moves); }
 
@@ -58,33 +61,32 @@ class EchoCases {
   EchoCases(const ServingRun& run, const RawTcpServer& plain, TwinScene& scene)
       : run_(run), plain_(plain), scene_(scene) {}
 
+  // Columns there and back by what the server's calls are made of, and nothing else.
   absl::Status echo(const Echo& echo) {
     const std::string name = echo_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();
-    run_.progress(name);
-    const size_t messages = (run_.options.quick ? 65'536 : 1'048'576) / echo.rays;
-    Batches batches = echo_batches(echo.rays, messages, scene_.name());
-    ServerLoad server(scene_.daemon(), batches, kStreams, echo.window);
-    const LocalLoad process(scene_.here().latest(), batches, kStreams);
-    const std::vector<uint64_t> here = process.hashes();
-    if (server.hashes() != here) run_.disagree(absl::StrCat(name, ": other answers over gRPC"));
-    if (!server.status().ok()) return server.status();
-    const MessageBytes bytes = {static_cast<uint32_t>(batches.messages.front().ByteSizeLong()),
-                                static_cast<uint32_t>(24 * echo.rays)};
-    RawTcpLoad plain(plain_, bytes, kStreams, echo.window);
-    const auto count = static_cast<double>(batches.queries * chunks());
-    const std::vector<Contestant> contestants = {{"grpc", [&](size_t) { server.run(1); }, count, {}},
-                                                 {"raw_tcp", [&](size_t) { plain.run(messages); }, count, {}},
-                                                 {"in_process", [&](size_t) { process.run(1); }, count, {}}};
-    const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
-    add_cell(run_, cell_of(name, "ns/ray", hash_of_number(here.front())), "raw_tcp", times[0], times[1], Better::kLess);
+    const absl::StatusOr<std::unique_ptr<LocalServer>> server = LocalServer::start("locus-echo");
+    if (!server.ok()) return server.status();
+    Batches batches = echo_batches(echo.rays, messages_of(echo), "echo");
+    std::vector<uint64_t> expected;
+    for (const v1::StreamQueriesRequest& message : batches.messages) {
+      v1::QueryResult result;
+      answer_echo(message.batch(), result);
+      expected.push_back(hash_of(result));
+    }
+    const absl::Status status = there_and_back(name, echo, **server, batches, expected);
     constexpr double kBar = 0.8;
-    judge(run_, kBar);
-    run_.note(absl::StrFormat("%s: %.1f M rays/s, plain sockets %.1f; to check and answer them takes %.1f ns a ray",
-                              name, 1e3 / median(times[0]), 1e3 / median(times[1]), kStreams * median(times[2])));
-    absl::Status status = server.status();
-    status.Update(plain.status());
+    if (status.ok()) judge(run_, kBar);
     return status;
+  }
+
+  // As many bytes by the daemon: the rays are checked and a scene without anything is asked.
+  absl::Status empty(const Echo& echo) {
+    const std::string name = empty_name(echo);
+    if (!run_.wants(name)) return absl::OkStatus();
+    Batches batches = echo_batches(echo.rays, messages_of(echo), scene_.name());
+    const LocalLoad process(scene_.here().latest(), batches, kStreams);
+    return there_and_back(name, echo, scene_.daemon(), batches, process.hashes());
   }
 
   // The writer's first batch has been applied: as such every message is read whole and acked, and nothing moves.
@@ -104,15 +106,18 @@ class EchoCases {
                                 static_cast<uint32_t>(server.ack_bytes())};
     RawTcpLoad plain(plain_, bytes, 1, kUpdateWindow);
     const size_t passes = passes_of_a_chunk(run_, [&](size_t) { server.run(1); });
-    const auto count = static_cast<double>(moves.moves * messages.size() * passes * chunks());
+    const size_t chunk = passes * messages.size();
+    const auto count = static_cast<double>(moves.moves * chunk * chunks());
+    ProcessorTime time(scene_.daemon().process().pid()), plain_time(plain_.pid());
     const std::vector<Contestant> contestants = {
-        {"grpc", [&](size_t) { server.run(passes); }, count, {}},
-        {"raw_tcp", [&](size_t) { plain.run(passes * messages.size()); }, count, {}}};
+        {"grpc", [&](size_t) { time.during(chunk, [&] { server.run(passes); }); }, count, {}},
+        {"raw_tcp", [&](size_t) { plain_time.during(chunk, [&] { plain.run(chunk); }); }, count, {}}};
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/move", hash_of_number(messages.size())), run_.report);
     const double rate = 1e3 / median(times[0]);
     run_.note(absl::StrFormat("%s: %.1f M moves/s parsed and acked, to be shown %.0f: %s", name, rate, moves.bar,
                               rate >= moves.bar ? "shown" : "MISSED"));
+    note_time(name, time, plain_time);
     absl::Status status = server.status();
     status.Update(plain.status());
     return status;
@@ -158,6 +163,37 @@ class EchoCases {
 
  private:
   size_t chunks() const { return run_.options.quick ? 1 : 8; }
+  size_t messages_of(const Echo& echo) const { return (run_.options.quick ? 65'536 : 1'048'576) / echo.rays; }
+
+  absl::Status there_and_back(const std::string& name, const Echo& echo, const LocalServer& there, Batches& batches,
+                              const std::vector<uint64_t>& expected) {
+    run_.progress(name);
+    const size_t messages = batches.messages.size();
+    ServerLoad server(there, batches, kStreams, echo.window);
+    if (server.hashes() != expected) run_.disagree(absl::StrCat(name, ": other answers over gRPC"));
+    if (!server.status().ok()) return server.status();
+    const MessageBytes bytes = {static_cast<uint32_t>(batches.messages.front().ByteSizeLong()),
+                                static_cast<uint32_t>(24 * echo.rays)};
+    RawTcpLoad plain(plain_, bytes, kStreams, echo.window);
+    ProcessorTime time(there.process().pid()), plain_time(plain_.pid());
+    const auto count = static_cast<double>(batches.queries * chunks());
+    const std::vector<Contestant> contestants = {
+        {"grpc", [&](size_t) { time.during(messages, [&] { server.run(1); }); }, count, {}},
+        {"raw_tcp", [&](size_t) { plain_time.during(messages, [&] { plain.run(messages); }); }, count, {}}};
+    const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
+    add_cells(contestants, times, cell_of(name, "ns/ray", hash_of_number(expected.front())), run_.report);
+    run_.note(
+        absl::StrFormat("%s: %.1f M rays/s, plain sockets %.1f", name, 1e3 / median(times[0]), 1e3 / median(times[1])));
+    note_time(name, time, plain_time);
+    absl::Status status = server.status();
+    status.Update(plain.status());
+    return status;
+  }
+
+  void note_time(const std::string& name, const ProcessorTime& time, const ProcessorTime& plain) const {
+    run_.note(
+        absl::StrFormat("%s: processor time a message: %s; over plain sockets %s", name, time.text(), plain.text()));
+  }
 
   // So many ticks, cut into messages of `size`; the last of a tick may be shorter.
   std::vector<v1::StreamUpdatesRequest> move_messages(size_t size, size_t ticks) {
@@ -209,8 +245,9 @@ bool wants_moves(const ServingRun& run) {
 }  // namespace
 
 bool wants_raw_tcp(const ServingRun& run) {
-  return wants_moves(run) || std::any_of(std::begin(kEchos), std::end(kEchos),
-                                         [&](const Echo& echo) { return run.wants(echo_name(echo)); });
+  return wants_moves(run) || std::any_of(std::begin(kEchos), std::end(kEchos), [&](const Echo& echo) {
+           return run.wants(echo_name(echo)) || run.wants(empty_name(echo));
+         });
 }
 
 absl::Status run_echo_cases(const ServingRun& run, const RawTcpServer& plain) {
@@ -219,8 +256,10 @@ absl::Status run_echo_cases(const ServingRun& run, const RawTcpServer& plain) {
   TwinScene scene(**daemon, "echo");
   absl::Status status = scene.create();
   EchoCases cases(run, plain, scene);
-  for (const Echo& echo : kEchos)
+  for (const Echo& echo : kEchos) {
     if (status.ok()) status = cases.echo(echo);
+    if (status.ok()) status = cases.empty(echo);
+  }
   if (status.ok() && wants_moves(run)) status = cases.insert_objects();
   for (const Moves& moves : kMoves) {
     if (status.ok()) status = cases.parsed(moves);

@@ -78,8 +78,10 @@ absl::StatusOr<std::unique_ptr<Process>> Process::start(const std::string& path,
 }
 
 bool Process::has_ended() {
-  if (!ended_) ended_ = waitpid(pid_, nullptr, WNOHANG) == pid_;
-  return ended_;
+  int status = 0;
+  if (ended_ || waitpid(pid_, &status, WNOHANG) != pid_) return ended_;
+  if (WIFEXITED(status)) exit_code_ = WEXITSTATUS(status);
+  return ended_ = true;
 }
 
 Process::~Process() {
@@ -91,10 +93,10 @@ Process::~Process() {
   waitpid(pid_, nullptr, 0);
 }
 
-double Process::cpu_seconds() const {
+double cpu_seconds_of(pid_t pid) {
   clockid_t clock{};
   timespec computed{};
-  if (clock_getcpuclockid(pid_, &clock) != 0 || clock_gettime(clock, &computed) != 0) return 0;
+  if (clock_getcpuclockid(pid, &clock) != 0 || clock_gettime(clock, &computed) != 0) return 0;
   return static_cast<double>(computed.tv_sec) + 1e-9 * static_cast<double>(computed.tv_nsec);
 }
 

@@ -29,6 +29,9 @@ class TemporaryFolder {
   std::string path_;
 };
 
+// That all threads of a process have computed, to the nanosecond; 0 if there is no such process.
+double cpu_seconds_of(pid_t pid);
+
 class Process {
  public:
   // Runs the program `path` under the names in `arguments`, the first of which is its own; what it prints goes to the
@@ -43,8 +46,10 @@ class Process {
 
   pid_t pid() const { return pid_; }
   bool has_ended();
+  // Of one that has ended: what it returned; -1 if a signal ended it.
+  int exit_code() const { return exit_code_; }
 
-  double cpu_seconds() const;  // that all of its threads have computed, to the nanosecond
+  double cpu_seconds() const { return cpu_seconds_of(pid_); }
   int64_t resident_bytes() const;
   int64_t open_files() const;
   int64_t threads() const;
@@ -54,6 +59,7 @@ class Process {
 
   pid_t pid_;
   bool ended_ = false;
+  int exit_code_ = -1;
 };
 
 // The program of that name beside this one, or in the PATH; empty if there is none.

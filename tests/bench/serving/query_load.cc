@@ -28,8 +28,8 @@ class Share {
 
 }  // namespace
 
-std::unique_ptr<QueryStreamLoad> open_query_stream(const Daemon& daemon) {
-  const auto stub = std::shared_ptr(v1::QueryService::NewStub(daemon.channel()));
+std::unique_ptr<QueryStreamLoad> open_query_stream(const LocalServer& server) {
+  const auto stub = std::shared_ptr(v1::QueryService::NewStub(server.channel()));
   return std::make_unique<QueryStreamLoad>([stub](grpc::ClientContext* context, grpc::CompletionQueue* queue,
                                                   void* tag) { return stub->AsyncStreamQueries(context, queue, tag); });
 }
@@ -39,9 +39,9 @@ void Batches::borrow() {
   for (const v1::StreamQueriesRequest& message : messages) columns.push_back(columns_of(message.batch()));
 }
 
-ServerLoad::ServerLoad(const Daemon& daemon, Batches& batches, size_t streams, size_t window)
+ServerLoad::ServerLoad(const LocalServer& server, Batches& batches, size_t streams, size_t window)
     : batches_(batches), window_(window) {
-  for (size_t i = 0; i < streams; ++i) streams_.push_back(open_query_stream(daemon));
+  for (size_t i = 0; i < streams; ++i) streams_.push_back(open_query_stream(server));
 }
 
 void ServerLoad::run(size_t passes) {

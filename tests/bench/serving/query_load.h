@@ -15,7 +15,7 @@
 namespace locus::bench::serving {
 
 using QueryStreamLoad = StreamLoad<v1::StreamQueriesRequest, v1::StreamQueriesResponse>;
-std::unique_ptr<QueryStreamLoad> open_query_stream(const Daemon& daemon);
+std::unique_ptr<QueryStreamLoad> open_query_stream(const LocalServer& server);
 
 // Messages, and the same as columns for this process. Every stream and every thread has its own share of them.
 struct Batches {
@@ -29,7 +29,7 @@ struct Batches {
 
 class ServerLoad {
  public:
-  ServerLoad(const Daemon& daemon, Batches& batches, size_t streams, size_t window);
+  ServerLoad(const LocalServer& server, Batches& batches, size_t streams, size_t window);
 
   // As many messages as there are batches, `passes` times, by all streams together. Whatever goes wrong shows in
   // status().

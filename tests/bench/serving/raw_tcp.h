@@ -28,6 +28,7 @@ class RawTcpServer {
   RawTcpServer& operator=(const RawTcpServer&) = delete;
 
   int port() const { return port_; }
+  pid_t pid() const { return pid_; }
 
  private:
   RawTcpServer(pid_t pid, int port) : pid_(pid), port_(port) {}

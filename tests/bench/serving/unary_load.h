@@ -1,5 +1,6 @@
-// Single calls, so many under way, each answered or refused one followed by the next: a closed loop that does not wait
-// when it is told to, as a flood does not. Asynchronous, over a connection of its own. One thread.
+// Single calls, so many callers at once, each of whom sends its next one when the one before is answered. One who is
+// refused tries again at once, as a flood does, or waits as it is told, as the client library does. Asynchronous, over
+// a connection of its own. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_UNARY_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_UNARY_LOAD_H_
 
@@ -13,14 +14,17 @@
 
 namespace locus::bench::serving {
 
+enum class Again : uint8_t { kAtOnce, kAsTold };
+
 struct Flood {
   size_t answered = 0;
-  std::vector<double> refusals;  // seconds that each took
-  absl::Status failure;          // of a call that was neither answered nor refused for the time being
+  std::vector<double> refusals;                   // seconds that each took
+  double client_seconds = 0, server_seconds = 0;  // of processor time
+  absl::Status failure;                           // of a call that was neither answered nor refused for the time being
 };
 
-// For `seconds`, then until every call is over.
-Flood run_unary_load(const Daemon& daemon, const Batches& batches, size_t under_way, double seconds);
+// For `seconds`, during the first twentieth of which the callers come, then until every call is over.
+Flood run_unary_load(const Daemon& daemon, const Batches& batches, size_t callers, double seconds, Again again);
 
 }  // namespace locus::bench::serving
 

@@ -1,0 +1,26 @@
+// What the echo answers: 24 bytes a ray, copied from the ray's own columns as fast as memory goes. For the server and
+// for whoever checks it. Pure function.
+#ifndef LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
+#define LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
+
+#include "locus/v1/query_service.pb.h"
+
+namespace locus::bench::serving {
+
+// Of the batch's first block, which has rays with a t_max and a mask each.
+inline void answer_echo(const v1::QueryBatch& batch, v1::QueryResult& result) {
+  result.Clear();
+  v1::BlockResult& block = *result.add_blocks();
+  const v1::QueryBlock& asked = batch.blocks(0);
+  const google::protobuf::RepeatedField<float>& origins = asked.rays().origins();
+  const int rays = asked.masks_size();
+  *block.mutable_t() = asked.rays().t_max();
+  *block.mutable_triangles() = asked.masks();
+  block.mutable_uvs()->Add(origins.begin(), origins.begin() + 2 * rays);
+  block.mutable_ids()->Reserve(rays);
+  for (int ray = 0; ray < rays; ++ray) block.mutable_ids()->AddAlreadyReserved(static_cast<uint64_t>(ray));
+}
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_

@@ -1,0 +1,44 @@
+// Who of a client and its server computes how much: the processor time of both processes while messages go back and
+// forth. Says what of a ratio is the client's own. One thread.
+#ifndef LOCUS_TESTS_BENCH_SERVING_PROCESSOR_TIME_H_
+#define LOCUS_TESTS_BENCH_SERVING_PROCESSOR_TIME_H_
+
+#include <sys/types.h>
+
+#include <string>
+
+#include "absl/strings/str_format.h"
+#include "tests/bench/frame/race.h"
+#include "tests/bench/serving/process.h"
+
+namespace locus::bench::serving {
+
+class ProcessorTime {
+ public:
+  // This process is the client.
+  explicit ProcessorTime(pid_t server) : server_(server) {}
+
+  // `messages` of them are sent and answered by `run`.
+  template <class Run>
+  void during(size_t messages, const Run& run) {
+    const double here = process_seconds(), there = cpu_seconds_of(server_);
+    run();
+    here_ += process_seconds() - here;
+    there_ += cpu_seconds_of(server_) - there;
+    messages_ += messages;
+  }
+
+  // Microseconds a message.
+  double client() const { return 1e6 * here_ / static_cast<double>(messages_); }
+  double server() const { return 1e6 * there_ / static_cast<double>(messages_); }
+  std::string text() const { return absl::StrFormat("client %.1f us, server %.1f us", client(), server()); }
+
+ private:
+  const pid_t server_;
+  double here_ = 0, there_ = 0;
+  size_t messages_ = 0;
+};
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_PROCESSOR_TIME_H_
