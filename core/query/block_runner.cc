@@ -81,6 +81,13 @@ void BlockRunner::append_counted(absl::Span<const Hit> rows, bool truncated, siz
   count_rows(kept, truncated || kept < rows.size(), i);
 }
 
+void BlockRunner::append_rows(const OverlapAnswer& answer, size_t i) {
+  if (answer.objects.empty()) return append_runs(answer, i);
+  const size_t kept = std::min<uint64_t>(answer.objects.size(), max_rows_ - rows_);
+  write_object_rows(answer.objects.subspan(0, kept), moments_.of(i), add_rows(result_, columns_, kept));
+  count_rows(kept, answer.truncated || kept < answer.objects.size(), i);
+}
+
 void BlockRunner::append_runs(const OverlapAnswer& answer, size_t i) {
   size_t all = 0;
   for (const RowRun& run : answer.runs) all += run.rows();
@@ -144,7 +151,7 @@ void BlockRunner::run_query(const BallColumns& balls, size_t i) {
   if (!task_.ended())
     answer = run_ball(task_, moments_.of(i), ball_of(block_, balls, i), overlap_options(block_, balls.detail),
                       Filter(block_, i));
-  append_runs(answer, i);
+  append_rows(answer, i);
 }
 
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
@@ -152,7 +159,7 @@ void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   if (!task_.ended())
     answer = run_box(task_, moments_.of(i), box_of(block_, boxes, i), overlap_options(block_, boxes.detail),
                      Filter(block_, i));
-  append_runs(answer, i);
+  append_rows(answer, i);
 }
 
 void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {

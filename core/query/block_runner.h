@@ -47,6 +47,7 @@ class BlockRunner {
   void run_query(const NearestColumns& nearest, size_t i);
   void take_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i);
   void append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest& request);
+  void append_rows(const OverlapAnswer& answer, size_t i);
   void append_runs(const OverlapAnswer& answer, size_t i);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);
   void count_rows(size_t rows, bool cut, size_t i);

@@ -32,7 +32,7 @@ bool LowestRows::in_order() const {
 
 void LowestRows::keep_lowest() {
   if (rows_ <= max_results_ && in_order()) return;
-  const OverlapAnswer all = std::exchange(answer_, {{}, {}, answer_.truncated || rows_ > max_results_});
+  const OverlapAnswer all = std::exchange(answer_, {{}, {}, {}, answer_.truncated || rows_ > max_results_});
   std::vector<RowRun> runs = all.runs;
   // An instance whose rows were put in order before may have a second run with the later triangles.
   std::stable_sort(runs.begin(), runs.end(), lower_id);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/types/span.h"
+#include "core/query/found_objects.h"
 #include "core/query/hit.h"
 
 namespace locus {
@@ -22,6 +23,9 @@ struct RowRun {
 struct OverlapAnswer {
   std::vector<RowRun> runs;
   std::vector<uint32_t> triangles;
+  // In place of runs where only objects were found: they, ascending by id, as the task that was asked holds them until
+  // the next query.
+  absl::Span<const FoundObject> objects;
   bool truncated = false;  // there were more, of higher ids
 
   absl::Span<const uint32_t> triangles_of(const RowRun& run) const {

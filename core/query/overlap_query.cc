@@ -89,22 +89,24 @@ template <class Kind>
 class ObjectRows {
  public:
   ObjectRows(QueryTask& task, const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options,
-             const Filter& filter, LowestRows& rows)
-      : task_(task), moment_(moment), shape_(shape), options_(options), filter_(filter), rows_(rows) {}
+             const Filter& filter)
+      : task_(task), moment_(moment), shape_(shape), options_(options), filter_(filter), found_(task.found_objects()) {
+    found_.restart(options.max_results);
+  }
 
   Aabbd bounds() const { return typename Kind::WorldRegion(shape_).bounds(); }
   GridRegion region() const { return region_asked<Kind>(moment_, shape_, options_); }
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;
-    if (overlaps(object)) rows_.offer(hit_on(object, 0, moment_));
+    if (overlaps(object)) found_.offer(object);
     return true;
   }
 
  private:
   bool overlaps(const GridRef& object) const {
     const bool exact = options_.precision == Precision::kExact;
-    if (exact && moment_.between()) {  // most objects need not be looked up in the next tick
+    if (exact) {  // most objects need neither be looked up in the next tick nor be told by their shape
       const Verdict verdict = Kind::verdict(shape_, loosely_placed(object, moment_.astray(object)));
       if (verdict != Verdict::kOpen) return verdict == Verdict::kIn;
     }
@@ -117,7 +119,7 @@ class ObjectRows {
   const typename Kind::World& shape_;
   const OverlapOptions& options_;
   const Filter& filter_;
-  LowestRows& rows_;
+  FoundObjects& found_;
 };
 
 // Rows of one instance: itself once, or each of its triangles found, which come in storage order.
@@ -256,6 +258,29 @@ class InstanceSearch {
   LowestRows& rows_;
 };
 
+// The rows of instances, and of objects: of either that come first, and of both.
+OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const Moment& moment,
+                           const OverlapOptions& options) {
+  const absl::Span<const FoundObject> objects = found.finish();
+  if (instances.runs.empty()) {
+    instances.objects = objects;
+    instances.truncated |= found.truncated();
+    return instances;
+  }
+  if (objects.empty()) return instances;
+  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
+  for (const RowRun& run : instances.runs) {
+    if (run.triangle_count == 0)
+      rows.offer(run.row);
+    else
+      rows.offer(run.row, instances.triangles_of(run));
+  }
+  for (const FoundObject& one : objects) rows.offer(hit_on(one.object, 0, moment));
+  OverlapAnswer both = rows.finish();
+  both.truncated |= instances.truncated || found.truncated();
+  return both;
+}
+
 template <class Kind>
 OverlapAnswer run_overlap(QueryTask& task, const Moment& moment, const typename Kind::World& shape,
                           const OverlapOptions& options, const Filter& filter) {
@@ -265,8 +290,9 @@ OverlapAnswer run_overlap(QueryTask& task, const Moment& moment, const typename 
     task.visit_region(task.snapshot().statics->tree(), search);
   }
   if (options.source != Source::kStatic && !task.ended()) {
-    ObjectRows<Kind> search(task, moment, shape, options, filter, rows);
+    ObjectRows<Kind> search(task, moment, shape, options, filter);
     task.visit_objects_in_region(moment, search);
+    return with_objects(rows.finish(), task.found_objects(), moment, options);
   }
   return rows.finish();
 }

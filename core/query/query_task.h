@@ -13,6 +13,7 @@
 #include "core/base/limits.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/work.h"
+#include "core/query/found_objects.h"
 #include "core/query/query_batch.h"
 #include "core/scene/moment.h"
 
@@ -85,6 +86,9 @@ class QueryTask {
 
   // Kernels for exact hits of rays in meshes; null where there are none, or where all values are to be tested.
   const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
+
+  // Where a ball or box puts its objects: one query after the other.
+  FoundObjects& found_objects() { return found_objects_; }
 
   // Whether ball and box queries may ask the kernels.
   bool searches_triangles() const { return !brute_force_; }
@@ -167,6 +171,7 @@ class QueryTask {
   const bool brute_force_;
   Work work_;
   std::optional<RegionWalk> walk_;
+  FoundObjects found_objects_;
   uint64_t tests_ = 0;
   uint64_t booked_ = 0;
   bool ended_ = false;

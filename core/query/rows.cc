@@ -171,6 +171,14 @@ void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, c
   for (size_t i = 0; i < triangles.size(); ++i) write_labels(hit, to, row + i);
 }
 
+void write_object_rows(absl::Span<const FoundObject> objects, const Moment& moment, const RowSpans& to) {
+  if (to.ids != nullptr)
+    for (size_t row = 0; row < objects.size(); ++row) to.ids[row] = objects[row].id;
+  if (to.triangles != nullptr) std::fill_n(to.triangles, objects.size(), kNoTriangle);
+  if (!has_labels(to)) return;
+  for (size_t row = 0; row < objects.size(); ++row) write_labels(hit_on(objects[row].object, 0, moment), to, row);
+}
+
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row) {
   if (to.uvs != nullptr || to.normals != nullptr) {

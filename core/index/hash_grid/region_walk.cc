@@ -20,7 +20,7 @@ void prefetch_rows(const GridRows& rows) {
 
 void RegionSteps::find_bricks(const GridRegion& region) {
   region_ = region;
-  piece_count_ = value_count_ = 0;
+  piece_count_ = slot_count_ = 0;
   Work work;
   is_small_ =
       region.grid->for_few_bricks(region.bounds, kMostBricks, work, [&](const Brick& brick, const KeyRange& cells) {
@@ -33,7 +33,7 @@ void RegionSteps::find_bricks(const GridRegion& region) {
 
 void RegionSteps::find_blocks() {
   if (!is_small_) return;
-  for (size_t i = 0; i < piece_count_; ++i) {
+  for (uint32_t i = 0; i < piece_count_; ++i) {
     const Piece& piece = pieces_[i];
     const GridBlock& sorted = *piece.brick->sorted;
     __builtin_prefetch(&sorted);
@@ -48,7 +48,7 @@ void RegionSteps::find_blocks() {
 
 void RegionSteps::find_rows() {
   if (!is_small_) return;
-  for (size_t i = 0; i < piece_count_; ++i) {
+  for (uint32_t i = 0; i < piece_count_; ++i) {
     Piece& piece = pieces_[i];
     piece.rows = rows_of(*piece.brick, piece.cells);
     prefetch_rows(piece.rows);
@@ -70,15 +70,18 @@ template <class CullOf>
 void RegionSteps::cull(const CullOf& cull_of) {
   Work work;
   const auto keep = [this](const GridRef& value) {
-    if (value_count_ == kMostValues) return false;
-    values_[value_count_++] = value;
+    if (slot_count_ == kMostValues) return false;
+    slots_[slot_count_++] = value.slot();
     return true;
   };
-  for (size_t i = 0; is_small_ && i < piece_count_; ++i) {
-    const Brick& brick = *pieces_[i].brick;
+  for (uint32_t i = 0; is_small_ && i < piece_count_; ++i) {
+    Piece& piece = pieces_[i];
+    const Brick& brick = *piece.brick;
     const auto cull = cull_of(brick);
-    is_small_ = scan_rows(*brick.sorted, brick.number, pieces_[i].rows, work, cull, keep) &&
-                scan_recent(brick, work, cull, keep);
+    is_small_ = scan_rows(*brick.sorted, brick.number, piece.rows, work, cull, keep);
+    piece.sorted_end = slot_count_;
+    is_small_ = is_small_ && scan_recent(brick, work, cull, keep);
+    piece.recent_end = slot_count_;
   }
   cells_ += work.cells;
 }

@@ -48,12 +48,13 @@ class RegionSteps {
 
  private:
   static constexpr size_t kMostBricks = 8;
-  static constexpr size_t kMostValues = 64;
+  static constexpr size_t kMostValues = 256;
 
   struct Piece {
     const Brick* brick;
     KeyRange cells;
     GridRows rows;
+    uint32_t sorted_end, recent_end;  // of its slots: those in the sorted block, then those in the log
   };
 
   template <class CullOf>
@@ -61,19 +62,28 @@ class RegionSteps {
 
   GridRegion region_;
   bool is_small_ = false;  // all there is to find fits here
-  size_t piece_count_ = 0, value_count_ = 0;
+  uint32_t piece_count_ = 0, slot_count_ = 0;
   uint64_t cells_ = 0;
   std::array<Piece, kMostBricks> pieces_;
-  std::array<GridRef, kMostValues> values_;
+  std::array<uint32_t, kMostValues> slots_;
 };
 
 template <class Visit>
 void RegionSteps::visit(Work& work, const Visit& visit) const {
   if (!is_small_) return region_.visit(work, visit);
   work.cells += cells_;
-  for (size_t i = 0; i < value_count_; ++i) {
-    ++work.tests;
-    if (!visit(values_[i])) return;
+  uint32_t next = 0;
+  const auto visit_up_to = [&](uint32_t end, const GridBlock& block, uint32_t brick) {
+    for (; next < end; ++next) {
+      ++work.tests;
+      if (!visit(GridRef(block, slots_[next], brick))) return false;
+    }
+    return true;
+  };
+  for (uint32_t i = 0; i < piece_count_; ++i) {
+    const Piece& piece = pieces_[i];
+    if (!visit_up_to(piece.sorted_end, *piece.brick->sorted, piece.brick->number)) return;
+    if (next != piece.recent_end && !visit_up_to(piece.recent_end, *piece.brick->recent, piece.brick->number)) return;
   }
 }
 
