@@ -6,8 +6,8 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
-#include "server/scheduling/batch_priority.h"
 #include "server/scheduling/clocks.h"
+#include "server/scheduling/thread_priority.h"
 
 namespace locus::server {
 namespace {
@@ -177,7 +177,7 @@ SchedulerStats QueryScheduler::stats() const {
 }
 
 void QueryScheduler::run() {
-  take_priority(options_.priority);
+  take_batch_priority(options_.priority);
   while (Ticket* const ticket = next()) {
     const uint64_t start = options_.clock();
     const Progress progress = ticket->job.work(options_.turn_nanoseconds);

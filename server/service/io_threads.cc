@@ -7,6 +7,7 @@
 
 #include "core/base/check.h"
 #include "server/scheduling/semaphore.h"
+#include "server/scheduling/thread_priority.h"
 
 namespace locus::server {
 namespace {
@@ -119,6 +120,7 @@ IoThreads::~IoThreads() { stop(); }
 void IoThreads::start() {
   for (uint32_t i = 0; i < count_; ++i)
     running_.emplace_back([&loop = *loops_[i % loops_.size()]] {
+      take_short_slices();
       while (loop.turn()) {
       }
     });

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <thread>
 
-#include "server/scheduling/batch_priority.h"
+#include "server/scheduling/thread_priority.h"
 #include "tests/bench/frame/race.h"
 
 namespace locus::bench::dynamic {
@@ -71,7 +71,7 @@ Seen Arena::run(const Window& window) {
   std::vector<std::thread> threads;
   for (size_t i = 0; i < seen.size(); ++i) {
     threads.emplace_back([&, i] {
-      if (window.stand == Readers::kBelow) server::take_priority(server::BatchPriority::kNice);
+      if (window.stand == Readers::kBelow) server::take_batch_priority(server::BatchPriority::kNice);
       read(i * kBatchesApart, seen[i]);
     });
   }

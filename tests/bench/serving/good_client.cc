@@ -9,7 +9,7 @@ GoodClient::GoodClient(const ServingRun& run, TwinScene& scene, const std::strin
       case_name_(case_name),
       batches_(std::move(batches)),
       expected_(LocalLoad(scene.here().latest(), batches_, 1).hashes()),
-      stream_(open_query_stream(scene.daemon())) {}
+      stream_(open_query_streams(scene.daemon(), 1)) {}
 
 void GoodClient::ask(size_t count, std::vector<double>& seconds) {
   size_t sent = 0, wrong = 0;

@@ -1,6 +1,5 @@
 #include "tests/bench/serving/query_load.h"
 
-#include <atomic>
 #include <utility>
 
 #include "tests/bench/serving/threads.h"
@@ -28,10 +27,15 @@ class Share {
 
 }  // namespace
 
-std::unique_ptr<QueryStreamLoad> open_query_stream(const LocalServer& server) {
-  const auto stub = std::shared_ptr(v1::QueryService::NewStub(server.channel()));
-  return std::make_unique<QueryStreamLoad>([stub](grpc::ClientContext* context, grpc::CompletionQueue* queue,
-                                                  void* tag) { return stub->AsyncStreamQueries(context, queue, tag); });
+std::unique_ptr<QueryStreamLoad> open_query_streams(const LocalServer& server, size_t streams) {
+  std::vector<QueryStreamLoad::Open> opens;
+  for (size_t i = 0; i < streams; ++i) {
+    const auto stub = std::shared_ptr(v1::QueryService::NewStub(server.channel()));
+    opens.push_back([stub](grpc::ClientContext* context, grpc::CompletionQueue* queue, void* tag) {
+      return stub->AsyncStreamQueries(context, queue, tag);
+    });
+  }
+  return std::make_unique<QueryStreamLoad>(opens);
 }
 
 void Batches::borrow() {
@@ -40,50 +44,45 @@ void Batches::borrow() {
 }
 
 ServerLoad::ServerLoad(const LocalServer& server, Batches& batches, size_t streams, size_t window)
-    : batches_(batches), window_(window) {
-  for (size_t i = 0; i < streams; ++i) streams_.push_back(open_query_stream(server));
-}
+    : batches_(batches), count_(streams), streams_(open_query_streams(server, streams)), window_(window) {}
 
 void ServerLoad::run(size_t passes) {
-  Turns turns(passes * batches_.messages.size());
-  std::vector<absl::Status> ends(streams_.size());
-  std::atomic<size_t> refused = 0;
-  on_threads(streams_.size(), [&](size_t stream) {
-    Share share(stream, streams_.size(), batches_.messages.size());
-    const auto next = [&](uint64_t& number) -> v1::StreamQueriesRequest* {
-      if (!turns.take()) return nullptr;
+  size_t left = passes * batches_.messages.size(), refused = 0;
+  std::vector<QueryStreamLoad::Next> next;
+  for (size_t stream = 0; stream < count_; ++stream)
+    next.push_back([this, &left, share = Share(stream, count_, batches_.messages.size())](
+                       uint64_t& number) mutable -> v1::StreamQueriesRequest* {
+      if (left == 0) return nullptr;
+      --left;
       number = share.next();
       return &batches_.messages[number];
-    };
-    const auto reply = [&](uint64_t, const v1::StreamQueriesResponse& response, double) {
-      if (!response.has_result()) ++refused;
-    };
-    ends[stream] = streams_[stream]->run(window_, next, reply);
-  });
-  for (const absl::Status& end : ends) status_.Update(end);
-  if (refused != 0) status_.Update(absl::DataLossError(absl::StrCat(refused.load(), " batches were refused")));
+    });
+  const auto reply = [&](uint64_t, const v1::StreamQueriesResponse& response, double) {
+    if (!response.has_result()) ++refused;
+  };
+  status_.Update(streams_->run(window_, next, reply));
+  if (refused != 0) status_.Update(absl::DataLossError(absl::StrCat(refused, " batches were refused")));
 }
 
 std::vector<uint64_t> ServerLoad::hashes() {
   std::vector<uint64_t> hashes(batches_.messages.size());
-  std::vector<absl::Status> ends(streams_.size());
-  std::atomic<size_t> rows = 0;
-  on_threads(streams_.size(), [&](size_t stream) {
-    Share share(stream, streams_.size(), batches_.messages.size());
-    size_t left = share.size();
-    const auto next = [&](uint64_t& number) -> v1::StreamQueriesRequest* {
-      if (left-- == 0) return nullptr;
+  rows_ = 0;
+  std::vector<QueryStreamLoad::Next> next;
+  for (size_t stream = 0; stream < count_; ++stream) {
+    Share share(stream, count_, batches_.messages.size());
+    const size_t size = share.size();
+    next.push_back([this, share, left = size](uint64_t& number) mutable -> v1::StreamQueriesRequest* {
+      if (left == 0) return nullptr;
+      --left;
       number = share.next();
       return &batches_.messages[number];
-    };
-    const auto reply = [&](uint64_t number, const v1::StreamQueriesResponse& response, double) {
-      hashes[number] = hash_of(response.result());
-      rows += rows_of(response.result());
-    };
-    ends[stream] = streams_[stream]->run(window_, next, reply);
-  });
-  for (const absl::Status& end : ends) status_.Update(end);
-  rows_ = rows;
+    });
+  }
+  const auto reply = [&](uint64_t number, const v1::StreamQueriesResponse& response, double) {
+    hashes[number] = hash_of(response.result());
+    rows_ += rows_of(response.result());
+  };
+  status_.Update(streams_->run(window_, next, reply));
   return hashes;
 }
 

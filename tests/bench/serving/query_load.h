@@ -1,5 +1,5 @@
-// Batches of queries over and over: by a server, over streams that each have a connection and a thread of their own, or
-// in this process by as many threads. For every case that counts queries a second. One thread.
+// Batches of queries over and over: by a server, over streams that each have a connection of their own, or in this
+// process by threads. For every case that counts queries a second. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 
@@ -15,7 +15,7 @@
 namespace locus::bench::serving {
 
 using QueryStreamLoad = StreamLoad<v1::StreamQueriesRequest, v1::StreamQueriesResponse>;
-std::unique_ptr<QueryStreamLoad> open_query_stream(const LocalServer& server);
+std::unique_ptr<QueryStreamLoad> open_query_streams(const LocalServer& server, size_t streams);
 
 // Messages, and the same as columns for this process. Every stream and every thread has its own share of them.
 struct Batches {
@@ -42,7 +42,8 @@ class ServerLoad {
 
  private:
   Batches& batches_;
-  std::vector<std::unique_ptr<QueryStreamLoad>> streams_;
+  const size_t count_;
+  const std::unique_ptr<QueryStreamLoad> streams_;
   const size_t window_;
   size_t rows_ = 0;
   absl::Status status_;

@@ -1,6 +1,7 @@
-// The load generator: one bidirectional call on a connection and a completion queue of its own, so many messages under
-// way, driven by the thread that runs it. Messages are written and read as any client would: serialised and parsed.
-// Blocking clients would take more of the cores than what they measure. One thread at a time.
+// The load generator: bidirectional calls, each on a connection of its own, so many messages under way on each, all on
+// one completion queue and driven by the thread that runs them. Messages are written and read as any client would:
+// serialised and parsed. Blocking clients, or a thread a connection, would take more of the cores than what they
+// measure. One thread at a time.
 #ifndef LOCUS_TESTS_BENCH_SERVING_STREAM_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_STREAM_LOAD_H_
 
@@ -8,6 +9,7 @@
 #include <grpcpp/completion_queue.h>
 #include <grpcpp/support/async_stream.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -40,14 +42,23 @@ class StreamLoad {
   // An answer, and how long it took since its message was written.
   using Reply = std::function<void(uint64_t number, const Response& response, double seconds)>;
 
-  explicit StreamLoad(const Open& open) {
-    call_ = open(&context_, &queue_, tag(kStarted));
-    alive_ = await() == kStarted && ok_;
-    if (alive_) call_->Read(&response_, tag(kRead));
+  explicit StreamLoad(const Open& open) : StreamLoad(std::vector<Open>{open}) {}
+
+  explicit StreamLoad(const std::vector<Open>& opens) {
+    for (const Open& open : opens) {
+      Stream& stream = *streams_.emplace_back(std::make_unique<Stream>());
+      stream.call = open(&stream.context, &queue_, &stream.started);
+    }
+    for (size_t started = 0; alive_ && started < streams_.size(); ++started) {
+      const Event* const event = await();
+      alive_ = event != nullptr && event->what == kStarted && ok_;
+    }
+    for (const auto& stream : streams_)
+      if (alive_) stream->call->Read(&stream->response, &stream->read);
   }
 
   ~StreamLoad() {
-    context_.TryCancel();
+    for (const auto& stream : streams_) stream->context.TryCancel();
     queue_.Shutdown();
     void* ignored = nullptr;
     bool ok = false;
@@ -57,92 +68,116 @@ class StreamLoad {
   StreamLoad(const StreamLoad&) = delete;
   StreamLoad& operator=(const StreamLoad&) = delete;
 
-  // Keeps `window` messages under way until there are no more and all are answered.
+  // Keeps `window` messages under way on the only stream until there are no more and all are answered.
   absl::Status run(size_t window, const Next& next, const Reply& reply) {
-    slots_.assign(window, {});
-    free_.clear();
-    for (size_t i = 0; i < window; ++i) free_.push_back(i);
-    more_ = true;
-    if (alive_) write(next);
-    while (alive_ && (more_ || writing_ || free_.size() < window)) {
-      switch (await()) {
-        case kRead:
-          if (!ok_ || !take(reply)) return end();
-          call_->Read(&response_, tag(kRead));
-          break;
-        case kWritten:
-          writing_ = false;
-          break;
-        default:
-          return end();
-      }
-      write(next);
+    return run(window, std::vector<Next>{next}, reply);
+  }
+
+  // The same on each stream, with messages of its own.
+  absl::Status run(size_t window, const std::vector<Next>& next, const Reply& reply) {
+    for (size_t i = 0; i < streams_.size(); ++i) {
+      streams_[i]->begin(window, next[i]);
+      if (alive_) streams_[i]->write();
     }
-    return alive_ ? absl::OkStatus() : end();
+    while (alive_ && std::any_of(streams_.begin(), streams_.end(), [](const auto& stream) { return stream->busy(); })) {
+      const Event* const event = await();
+      if (event == nullptr) return end(*streams_.front());
+      Stream& stream = *event->stream;
+      if (event->what == kRead) {
+        if (!ok_ || !stream.take(reply)) return end(stream);
+        stream.call->Read(&stream.response, &stream.read);
+      } else if (event->what == kWritten) {
+        stream.writing = false;
+      } else {
+        return end(stream);
+      }
+      stream.write();
+    }
+    return alive_ ? absl::OkStatus() : end(*streams_.front());
   }
 
  private:
-  enum Event : intptr_t { kSilent, kStarted, kRead, kWritten, kFinished };
+  enum What : uint8_t { kStarted, kRead, kWritten, kFinished };
+  struct Stream;
+  struct Event {
+    Stream* stream;
+    What what;
+  };
   struct Slot {
     uint64_t number = 0;
     double written = 0;
   };
 
-  static void* tag(Event event) { return reinterpret_cast<void*>(event); }
+  struct Stream {
+    bool busy() const { return more || writing || free.size() < slots.size(); }
 
-  Event await() {
+    void begin(size_t window, const Next& from) {
+      slots.assign(window, {});
+      free.clear();
+      for (size_t i = 0; i < window; ++i) free.push_back(i);
+      more = true;
+      next = from;
+    }
+
+    void write() {
+      if (writing || !more || free.empty()) return;
+      uint64_t number = 0;
+      Request* const request = next(number);
+      if (request == nullptr) {
+        more = false;
+        return;
+      }
+      const size_t slot = free.back();
+      free.pop_back();
+      slots[slot] = {number, wall_seconds()};
+      request->set_sequence(slot);
+      writing = true;
+      call->Write(*request, &written);
+    }
+
+    // False: an answer to nothing.
+    bool take(const Reply& reply) {
+      const size_t slot = response.sequence();
+      if (slot >= slots.size()) return false;
+      free.push_back(slot);
+      reply(slots[slot].number, response, wall_seconds() - slots[slot].written);
+      return true;
+    }
+
+    Event started{this, kStarted}, read{this, kRead}, written{this, kWritten}, finished{this, kFinished};
+    grpc::ClientContext context;
+    std::unique_ptr<Call> call;
+    Response response;
+    Next next;
+    std::vector<Slot> slots;
+    std::vector<size_t> free;
+    bool more = false;
+    bool writing = false;
+  };
+
+  // Null where nothing came for long.
+  Event* await() {
     void* event = nullptr;
     const auto deadline = std::chrono::system_clock::now() + kSilence;
-    if (queue_.AsyncNext(&event, &ok_, deadline) != grpc::CompletionQueue::GOT_EVENT) return kSilent;
-    return static_cast<Event>(reinterpret_cast<intptr_t>(event));
-  }
-
-  void write(const Next& next) {
-    if (writing_ || !more_ || free_.empty()) return;
-    uint64_t number = 0;
-    Request* const request = next(number);
-    if (request == nullptr) {
-      more_ = false;
-      return;
-    }
-    const size_t slot = free_.back();
-    free_.pop_back();
-    slots_[slot] = {number, wall_seconds()};
-    request->set_sequence(slot);
-    writing_ = true;
-    call_->Write(*request, tag(kWritten));
-  }
-
-  // False: an answer to nothing.
-  bool take(const Reply& reply) {
-    const size_t slot = response_.sequence();
-    if (slot >= slots_.size()) return false;
-    free_.push_back(slot);
-    reply(slots_[slot].number, response_, wall_seconds() - slots_[slot].written);
-    return true;
+    if (queue_.AsyncNext(&event, &ok_, deadline) != grpc::CompletionQueue::GOT_EVENT) return nullptr;
+    return static_cast<Event*>(event);
   }
 
   // Why nothing comes any more.
-  absl::Status end() {
+  absl::Status end(Stream& stream) {
     alive_ = false;
     grpc::Status status;
-    context_.TryCancel();
-    call_->Finish(&status, tag(kFinished));
-    for (Event event = await(); event != kFinished; event = await())
-      if (event == kSilent) return absl::DeadlineExceededError("the server keeps silent");
+    for (const auto& each : streams_) each->context.TryCancel();
+    stream.call->Finish(&status, &stream.finished);
+    for (const Event* event = await(); event != &stream.finished; event = await())
+      if (event == nullptr) return absl::DeadlineExceededError("the server keeps silent");
     return status.ok() ? absl::DataLossError("the server ended the stream") : failed(status);
   }
 
-  grpc::ClientContext context_;
   grpc::CompletionQueue queue_;
-  std::unique_ptr<Call> call_;
-  Response response_;
-  std::vector<Slot> slots_;
-  std::vector<size_t> free_;
+  std::vector<std::unique_ptr<Stream>> streams_;
   bool ok_ = false;
-  bool alive_ = false;
-  bool more_ = false;
-  bool writing_ = false;
+  bool alive_ = true;
 };
 
 }  // namespace locus::bench::serving

@@ -1,4 +1,4 @@
-#include "server/scheduling/batch_priority.h"
+#include "server/scheduling/thread_priority.h"
 
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -13,21 +13,33 @@ namespace {
 
 int nice_of_this_thread() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
 
-TEST(BatchPriorityTest, NiceIsTheThreadsOwn) {
+TEST(ThreadPriorityTest, NiceIsTheThreadsOwn) {
   const int before = nice_of_this_thread();
   int there = 0;
   std::thread([&there] {
-    take_priority(BatchPriority::kNice);
+    take_batch_priority(BatchPriority::kNice);
     there = nice_of_this_thread();
   }).join();
   EXPECT_EQ(there, std::min(before + 10, 19));
   EXPECT_EQ(nice_of_this_thread(), before);
 }
 
-TEST(BatchPriorityTest, IdleThreadsRunWhenNobodyElseDoes) {
+TEST(ThreadPriorityTest, ShortSlicesLeaveNicenessAndPolicyAsTheyWere) {
+  int nice = 0, policy = -1;
+  std::thread([&] {
+    setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 7);
+    take_short_slices();
+    nice = nice_of_this_thread();
+    policy = sched_getscheduler(0);
+  }).join();
+  EXPECT_EQ(nice, 7);
+  EXPECT_EQ(policy, SCHED_OTHER);
+}
+
+TEST(ThreadPriorityTest, IdleThreadsRunWhenNobodyElseDoes) {
   int policy = 0;
   std::thread([&policy] {
-    take_priority(BatchPriority::kIdle);
+    take_batch_priority(BatchPriority::kIdle);
     policy = sched_getscheduler(0);
   }).join();
   EXPECT_EQ(policy, SCHED_IDLE);
