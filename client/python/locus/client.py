@@ -18,7 +18,7 @@ import grpc
 
 from . import columns, meshes, schema
 from .connection import Connection, Retry, scene_metadata
-from .enums import Winding
+from .enums import OverloadPolicy, Winding
 from .errors import LocusError, from_call, parsed
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import QueryBatch
@@ -90,10 +90,11 @@ class Client:
 
     def create_scene(self, name: str, *, if_absent: bool = False, labels: Optional[Mapping[str, str]] = None,
                      winding: Winding = Winding.UNSPECIFIED, static_from: str = "", history_ticks: int = 0,
-                     history_bytes: int = 0) -> Scene:
+                     history_bytes: int = 0, overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED) -> Scene:
         """Creates an empty scene, or one that starts with the instances of `static_from`.
 
         `history_ticks`: for how many ticks the past can be asked about; `history_bytes`: memory it may take, 0 = 256 MiB.
+        `overload`: what becomes of moves that come faster than they can be applied.
         `if_absent` returns a scene of that name as it is; otherwise that is ALREADY_EXISTS.
         """
         rpc = _rpc("Scene", "CreateScene")
@@ -103,6 +104,7 @@ class Client:
         request.spec.static_from = static_from
         request.spec.history_ticks = history_ticks
         request.spec.history_bytes = history_bytes
+        request.spec.overload = overload
         return Scene.of(self._unary(rpc, request, scene=name).scene)
 
     def scene(self, name: str) -> Scene:

@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, Dict, Optional, Tuple
 
-from .enums import Reason, SceneState, Winding
+from .enums import OverloadPolicy, Reason, SceneState, Winding
 from .errors import reason_of
 
 
@@ -73,6 +73,7 @@ class Scene(Revision):
     oldest_tick: int = 0
     recorded_ticks: int = 0
     history_bytes: int = 0
+    overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED
 
     @classmethod
     def of(cls, message: Any) -> "Scene":
@@ -83,7 +84,8 @@ class Scene(Revision):
         return cls(message.epoch, message.revision, message.name, SceneState(state), message.tick, message.objects,
                    message.instances, message.triangles, message.memory_bytes, message.pending_changes,
                    message.last_build_error, dict(message.spec.labels), Winding(message.spec.winding), bounds,
-                   message.spec.history_ticks, message.oldest_tick, message.recorded_ticks, message.history_bytes)
+                   message.spec.history_ticks, message.oldest_tick, message.recorded_ticks, message.history_bytes,
+                   OverloadPolicy(message.spec.overload))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -65,6 +65,11 @@ class ClientTest(DaemonTest):
         copy = self.client.create_scene("copy", static_from=self.scene, winding=locus.Winding.CLOCKWISE)
         self.assertEqual((copy.instances, copy.winding), (1, locus.Winding.CLOCKWISE))
 
+    def test_a_scene_may_keep_only_the_latest_of_waiting_moves(self):
+        made = self.client.create_scene("crowd", overload=locus.OverloadPolicy.LATEST_WINS)
+        self.assertEqual(made.overload, locus.OverloadPolicy.LATEST_WINS)
+        self.assertEqual(self.client.scene(self.scene).overload, locus.OverloadPolicy.EVERY_BATCH)
+
     def test_a_name_that_is_no_header_is_refused_by_the_server(self):
         for name in ("Grüße", "two words", ""):
             with self.assertRaises(locus.LocusError) as raised:
