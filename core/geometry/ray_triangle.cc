@@ -5,6 +5,7 @@
 
 #include "core/base/planted_bug.h"
 #include "core/geometry/edge_on_triangle.h"
+#include "core/geometry/float_step.h"
 
 namespace locus {
 namespace {
@@ -108,9 +109,9 @@ float TriangleRay::to_scaled(float t) const {
   if (std::isinf(t)) return t;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   if (t == std::numeric_limits<float>::max()) return kInfinity;
-  const double scaled = std::ldexp(static_cast<double>(std::nextafter(t, kInfinity)), exponent_);
+  const double scaled = std::ldexp(static_cast<double>(next_above(t)), exponent_);
   if (scaled >= std::numeric_limits<float>::max()) return kInfinity;
-  return std::nextafter(static_cast<float>(scaled), kInfinity);
+  return next_above(static_cast<float>(scaled));
 }
 
 // Bounds the rounding of `depth` in edge_test(): under 264 roundings of 2^-53 of reach^3 on the way from the vertices,

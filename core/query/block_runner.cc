@@ -70,15 +70,22 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
   return end;
 }
 
-void BlockRunner::append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest& request) {
-  const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
+// Rows of query `i`, from row `row` on. Few ask for more than where and what is hit.
+void BlockRunner::write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
+                             size_t row) {
+  for (size_t number = 0; number < hits.size(); ++number) write_row(hits[number], to, row + number);
+  if (to.uvs == nullptr && to.normals == nullptr && to.points == nullptr) return;
   const Winding winding = task_.snapshot().winding;
-  const RowSpans to = add_rows(result_, columns_, kept);
-  for (size_t row = 0; row < kept; ++row) {
-    write_row(rows[row], to, row);
-    write_surface(request, block_.frame, rows[row], winding, to, row);
-  }
-  count_rows(kept, truncated || kept < rows.size(), i);
+  const RayRequest request = ray_request(block_, rays, winding, i);
+  for (size_t number = 0; number < hits.size(); ++number)
+    write_surface(request, block_.frame, hits[number], winding, to, row + number);
+}
+
+void BlockRunner::append_counted(const RayColumns& rays, const RayAnswer& answer, size_t i) {
+  const absl::Span<const Hit> hits = answer.hits;
+  const size_t kept = std::min<uint64_t>(hits.size(), max_rows_ - rows_);
+  write_hits(rays, hits.subspan(0, kept), i, add_rows(result_, columns_, kept), 0);
+  count_rows(kept, answer.truncated || kept < hits.size(), i);
 }
 
 void BlockRunner::append_rows(const OverlapAnswer& answer, size_t i) {
@@ -112,13 +119,12 @@ void BlockRunner::count_rows(size_t rows, bool cut, size_t i) {
 }
 
 size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) {
-  const Winding winding = task_.snapshot().winding;
   for (size_t first = begin; first < end;) {
     if (first != begin && enough()) return first;
     const size_t last = std::min<size_t>(end, first + place_.rays_at_once.load(std::memory_order_relaxed));
     const uint64_t before = work_done();
-    const RayAnswers answers = run_rays(task_, block_, rays, moments_, winding, first, last);
-    for (size_t i = first; i < last; ++i) take_ray(rays, answers[i - first], ray_request(block_, rays, winding, i), i);
+    const RayAnswers answers = run_rays(task_, block_, rays, moments_, task_.snapshot().winding, first, last);
+    for (size_t i = first; i < last; ++i) take_ray(rays, answers[i - first], i);
     pace_rays(last - first, work_done() - before);
     first = last;
   }
@@ -134,16 +140,15 @@ void BlockRunner::pace_rays(size_t rays, uint64_t work) {
   place_.rays_at_once.store(static_cast<uint32_t>(next), std::memory_order_relaxed);
 }
 
-void BlockRunner::take_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i) {
-  if (rays.mode == RayMode::kAll) return append_counted(answer.hits, answer.truncated, i, request);
+void BlockRunner::take_ray(const RayColumns& rays, const RayAnswer& answer, size_t i) {
+  if (rays.mode == RayMode::kAll) return append_counted(rays, answer, i);
   if (answer.truncated) result_.truncated.push_back(static_cast<uint32_t>(i));
   if (rays.mode == RayMode::kAny) {
     place_.hits[i] = answer.hits.empty() ? '\0' : '\1';
     return;
   }
-  const Hit hit = answer.hits.empty() ? Hit{} : answer.hits.front();
-  write_row(hit, place_.rows, i);
-  write_surface(request, block_.frame, hit, task_.snapshot().winding, place_.rows, i);
+  const Hit miss;
+  write_hits(rays, {answer.hits.empty() ? &miss : answer.hits.data(), 1}, i, place_.rows, i);
 }
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {

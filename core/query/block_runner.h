@@ -45,8 +45,9 @@ class BlockRunner {
   void run_query(const BoxColumns& boxes, size_t i);
   void run_query(const LookupColumns& lookup, size_t i);
   void run_query(const NearestColumns& nearest, size_t i);
-  void take_ray(const RayColumns& rays, const RayAnswer& answer, const RayRequest& request, size_t i);
-  void append_counted(absl::Span<const Hit> rows, bool truncated, size_t i, const RayRequest& request);
+  void take_ray(const RayColumns& rays, const RayAnswer& answer, size_t i);
+  void write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
+  void append_counted(const RayColumns& rays, const RayAnswer& answer, size_t i);
   void append_rows(const OverlapAnswer& answer, size_t i);
   void append_runs(const OverlapAnswer& answer, size_t i);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);

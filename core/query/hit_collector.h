@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/geometry/float_step.h"
 #include "core/geometry/ray.h"
 #include "core/query/hit.h"
 #include "core/query/ray_query.h"
@@ -78,9 +79,7 @@ inline std::optional<float> entry(const SlabRay<double>& slabs, const Aabbd& bou
 }
 
 // Distances of the double slab test that would round down to `limit` as a float are not beyond it.
-inline double raised(float limit) {
-  return static_cast<double>(std::nextafter(limit, std::numeric_limits<float>::infinity()));
-}
+inline double raised(float limit) { return double{next_above(limit)}; }
 
 }  // namespace locus
 

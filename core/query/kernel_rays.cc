@@ -27,9 +27,12 @@ class Round {
  public:
   Round(QueryTask& task, std::vector<AskedRay>& rays) : task_(task), rays_(rays) {
     const Bvh<Instance>& instances = task.snapshot().statics->tree();
-    walks_.reserve(rays.size());
-    for (const AskedRay& ray : rays)
-      walks_.emplace_back(instances, SlabRay<double>(Rayd{ray.request.origin, ray.request.direction}, kInstancePad));
+    if (instances.size() == 1) only_ = instances.values().data();
+    slabs_.reserve(rays.size());
+    for (const AskedRay& ray : rays) slabs_.emplace_back(Rayd{ray.request.origin, ray.request.direction}, kInstancePad);
+    walks_.reserve(only_ == nullptr ? rays.size() : 0);
+    if (only_ == nullptr)
+      for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
     most_ = std::min(kMostRows, rays.front().request.max_results + 1);  // one more tells whether there are more
@@ -37,12 +40,18 @@ class Round {
   }
 
   void run() {
-    for (uint32_t ray = 0; ray < rays_.size(); ++ray) walk_on(ray);
+    for (uint32_t ray = 0; ray < rays_.size(); ++ray) {
+      if (only_ == nullptr)
+        walk_on(ray);
+      else
+        go_to_only(ray);
+    }
     while (!stops_.empty() && !task_.ended()) {
       now_.swap(stops_);
       stops_.clear();
       sort_by_mesh();
       for (size_t first = 0; first < now_.size();) first = ask_mesh(first);
+      if (only_ != nullptr) return;
       for (const Stop& stop : now_) walk_on(stop.ray);
     }
   }
@@ -60,10 +69,21 @@ class Round {
       if (!task_.count_test()) return;
       if (!ray.filter.accepts(*instance)) continue;
       // Part of the verdict, and hits are no nearer: the tree over instances may cull by it.
-      const std::optional<float> nearest = entry(walk.slabs(), instance->bounds);
+      const std::optional<float> nearest = entry(slabs_[number], instance->bounds);
       if (!nearest || *nearest > ray.collector.limit()) continue;
       return stops_.push_back({number, *nearest, instance});
     }
+  }
+
+  // The same where there is one instance: its bounds say at once whether the ray comes to it.
+  void go_to_only(uint32_t number) {
+    AskedRay& ray = rays_[number];
+    if (task_.ended()) return;
+    const std::optional<float> nearest = entry(slabs_[number], only_->bounds);
+    if (!nearest || *nearest > ray.collector.limit()) return;
+    ++task_.work().tests;
+    if (!task_.count_test() || !ray.filter.accepts(*only_)) return;
+    stops_.push_back({number, *nearest, only_});
   }
 
   void sort_by_mesh() {
@@ -141,7 +161,7 @@ class Round {
 
   void ask_triangles(const Stop& stop) {
     AskedRay& ray = rays_[stop.ray];
-    ask_instance(task_, ray.request, walks_[stop.ray].slabs(), *stop.instance, stop.nearest, ray.collector);
+    ask_instance(task_, ray.request, slabs_[stop.ray], *stop.instance, stop.nearest, ray.collector);
   }
 
   // Nothing where the kernels' bounds do not hold.
@@ -161,7 +181,9 @@ class Round {
 
   QueryTask& task_;
   std::vector<AskedRay>& rays_;
-  std::vector<InstanceWalk> walks_;
+  std::vector<SlabRay<double>> slabs_;  // of each ray
+  const Instance* only_ = nullptr;      // where there is one
+  std::vector<InstanceWalk> walks_;     // of each ray, where there are more
   std::vector<Stop> stops_, now_;
   std::vector<KernelRay> kernel_rays_;
   std::vector<size_t> asked_;  // which stop each of kernel_rays_ is
@@ -173,7 +195,7 @@ class Round {
 }  // namespace
 
 void ask_meshes(QueryTask& task, std::vector<AskedRay>& rays) {
-  if (!rays.empty()) Round(task, rays).run();
+  if (!rays.empty() && task.snapshot().statics->size() != 0) Round(task, rays).run();
 }
 
 }  // namespace locus

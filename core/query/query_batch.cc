@@ -1,6 +1,7 @@
 #include "core/query/query_batch.h"
 
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -76,8 +77,18 @@ class BlockCheck {
     return check_column(numbers, width, n_, need, name(field));
   }
 
+  // Whether all points lie within the world: without branches, since nearly always they do.
+  bool all_within_world(absl::Span<const float> numbers) const {
+    bool all = numbers.size() % 3 == 0;
+    for (size_t i = 0; i + 2 < numbers.size(); i += 3)
+      for (int axis = 0; axis < 3; ++axis)
+        all &= std::abs(block_.frame[axis] + double{numbers[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
+    return all;
+  }
+
   // Points relative to the frame, all within the world.
   absl::Status check_points(absl::Span<const float> numbers, absl::string_view field) const {
+    if (all_within_world(numbers)) return absl::OkStatus();
     for (size_t i = 0; i < numbers.size(); ++i) {
       if (!std::isfinite(numbers[i])) return wrong(Reason::kNotFinite, field, i / 3, "needs finite numbers");
       const double world = block_.frame[static_cast<int>(i % 3)] + double{numbers[i]};
@@ -99,6 +110,9 @@ class BlockCheck {
 
   // Numbers from 0 to infinity.
   absl::Status check_reaches(absl::Span<const float> numbers, absl::string_view field) const {
+    bool all = true;
+    for (const float number : numbers) all &= number >= 0;
+    if (all) return absl::OkStatus();
     for (size_t i = 0; i < numbers.size(); ++i) {
       if (std::isnan(numbers[i])) return wrong(Reason::kNotFinite, field, i, "must be a number");
       if (numbers[i] < 0) return wrong(Reason::kOutOfRange, field, i, "must not be negative");
@@ -110,7 +124,18 @@ class BlockCheck {
     return refuse_argument(reason, name(field), static_cast<uint32_t>(index), message);
   }
 
+  static bool all_directions_serve(absl::Span<const float> numbers) {
+    constexpr float kLargest = std::numeric_limits<float>::max();
+    bool all = true;
+    for (size_t i = 0; i + 2 < numbers.size(); i += 3) {
+      const float x = std::abs(numbers[i]), y = std::abs(numbers[i + 1]), z = std::abs(numbers[i + 2]);
+      all &= (x <= kLargest) & (y <= kLargest) & (z <= kLargest) & ((x > 0) | (y > 0) | (z > 0));
+    }
+    return all;
+  }
+
   absl::Status check_directions(absl::Span<const float> numbers) const {
+    if (all_directions_serve(numbers)) return absl::OkStatus();
     for (size_t i = 0; i + 2 < numbers.size(); i += 3) {
       const Vec3f direction{numbers[i], numbers[i + 1], numbers[i + 2]};
       if (!is_finite(direction)) return wrong(Reason::kNotFinite, "rays.directions", i / 3, "needs finite numbers");

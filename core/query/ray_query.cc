@@ -118,9 +118,11 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
       InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
       task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
     }
-    if (block.source != Source::kStatic && !ray.collector.done() && !task.ended()) {
-      ObjectVisitor visitor(task, moments.of(i), ray.request, ray.filter, ray.collector);
-      task.visit_objects_on_ray(moments.of(i), visitor.slabs(), visitor);
+    const Moment& moment = moments.of(i);
+    const bool asks_objects = block.source != Source::kStatic && moment.objects().grid().size() != 0;
+    if (asks_objects && !ray.collector.done() && !task.ended()) {
+      ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);
+      task.visit_objects_on_ray(moment, visitor.slabs(), visitor);
     }
     answers.push_back(ray.collector.finish());
     answers.back().truncated |= task.ended();

@@ -1,0 +1,22 @@
+// The next larger float, inline: std::nextafter() is a call of the C library, which is felt where every ray needs some.
+// Pure functions; any thread.
+#ifndef LOCUS_CORE_GEOMETRY_FLOAT_STEP_H_
+#define LOCUS_CORE_GEOMETRY_FLOAT_STEP_H_
+
+#include <bit>
+#include <cstdint>
+#include <limits>
+
+namespace locus {
+
+// std::nextafter(value, infinity), bit for bit; of NaN some NaN.
+inline float next_above(float value) {
+  if (!(value < std::numeric_limits<float>::infinity())) return value;
+  if (value == 0) return std::numeric_limits<float>::denorm_min();
+  const auto bits = std::bit_cast<uint32_t>(value);
+  return std::bit_cast<float>(value > 0 ? bits + 1 : bits - 1);
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_FLOAT_STEP_H_
