@@ -76,7 +76,9 @@ void BlockRunner::write_hits(const RayColumns& rays, absl::Span<const Hit> hits,
   for (size_t number = 0; number < hits.size(); ++number) write_row(hits[number], to, row + number);
   if (to.uvs == nullptr && to.normals == nullptr && to.points == nullptr) return;
   const Winding winding = task_.snapshot().winding;
-  const RayRequest request = ray_request(block_, rays, winding, i);
+  // The surface of a miss is nothing, whatever the ray.
+  const bool is_miss = hits.empty() || hits.front().id == kNoId;
+  const RayRequest request = is_miss ? RayRequest() : ray_request(block_, rays, winding, i);
   for (size_t number = 0; number < hits.size(); ++number)
     write_surface(request, block_.frame, hits[number], winding, to, row + number);
 }
