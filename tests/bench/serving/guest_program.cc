@@ -1,6 +1,10 @@
 // The program `locus-guests`: callers who misbehave, or come by the hundred. Started by locus-bench, as
 //   locus-guests silent|churn ADDRESS COUNT FILE
-// where the file has the message that each of them sends. Churn ends by itself, silent readers with a signal.
+// where the file has the message that each of them sends. Churn ends by itself, silent readers with a signal. Runs at
+// a lower priority, which takes nothing from the server's part: from machines of their own, guests would not compute
+// on the cores that the server has.
+#include <sys/resource.h>
+
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -14,6 +18,8 @@ namespace {
 
 int run_guests(const std::string& kind, const std::string& address, size_t count,
                const v1::StreamQueriesRequest& message) {
+  constexpr int kSteps = 10;
+  setpriority(PRIO_PROCESS, 0, kSteps);
   allow_many_files();
   if (kind == "silent") {
     SilentReaders guests(address, count, message);
