@@ -31,6 +31,9 @@ using std::chrono::system_clock;
 
 // gRPC's own threads, and calls that are being refused for want of room.
 constexpr int kSpareThreads = 64;
+// Of the memory limit, and never too little for a few of the largest messages.
+constexpr uint64_t kNetworkShare = 8;
+constexpr size_t kLeastNetworkBytes = size_t{256} << 20;
 // A caller whose machine is gone would otherwise keep its streams for ever.
 constexpr int kPingEveryMs = 30'000;
 constexpr int kPingAnswerMs = 10'000;
@@ -78,6 +81,8 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   grpc::ResourceQuota quota("locusd");
   const int calls = static_cast<int>(config.max_calls);
   quota.SetMaxThreads(2 * calls + kSpareThreads);
+  // What connections hold of messages under way: who sends and never reads is cut off when it is used up.
+  quota.Resize(std::max(kLeastNetworkBytes, static_cast<size_t>(config.memory_limit / kNetworkShare)));
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
   builder.SetMaxSendMessageSize(-1);

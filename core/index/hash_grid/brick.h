@@ -72,6 +72,8 @@ struct Brick {
   static constexpr size_t kGoneInPlace = 20;
   absl::InlinedVector<uint64_t, kGoneInPlace> gone;
 
+  // How many values the log of changes holds: by the number of sorted ones, so that it stays a part of the memory.
+  uint32_t recent_room() const { return std::clamp(sorted->count() / 2, 16u, kMostRecent); }
   uint32_t size() const { return sorted->count() - gone_count + recent_count - recent_gone_count; }
   bool is_gone(uint32_t slot) const { return !gone.empty() && (gone[slot / 64] >> (slot % 64) & 1) != 0; }
   bool is_recent_gone(uint32_t slot) const { return (recent_gone[slot / 64] >> (slot % 64) & 1) != 0; }

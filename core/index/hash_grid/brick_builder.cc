@@ -8,7 +8,7 @@ namespace locus::internal {
 namespace {
 
 // A brick of fewer values is sorted anew whatever changes: that costs no more.
-constexpr uint32_t kFewestSorted = 128;
+constexpr uint32_t kFewestSorted = 48;
 constexpr uint32_t kSortedPerChange = 8;  // sorted values for each change of one batch
 constexpr uint32_t kSortedPerGone = 4;    // sorted values for each that is gone
 constexpr size_t kAhead = 16;             // values whose memory is asked for before their turn
@@ -52,7 +52,7 @@ BrickPtr BrickBuilder::build(const Brick* old, const BrickPlace& place, uint32_t
 bool BrickBuilder::is_few(const Brick* old, absl::Span<const BrickChange> changes) {
   if (old == nullptr || old->sorted->count() < kFewestSorted) return false;
   return changes.size() * kSortedPerChange <= old->sorted->count() &&
-         old->recent_count + changes.size() <= Brick::kMostRecent &&
+         old->recent_count + changes.size() <= old->recent_room() &&
          (old->gone_count + changes.size()) * kSortedPerGone <= old->sorted->count();
 }
 
@@ -191,8 +191,7 @@ BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSo
 BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange> changes) {
   auto brick = std::make_shared<Brick>(old);
   if (brick->gone.empty()) brick->gone.resize(old.sorted->count() / 64 + 2);
-  if (brick->recent == nullptr)
-    brick->recent = std::make_shared<GridBlock>(Brick::kMostRecent, old.sorted->has_forms());
+  if (brick->recent == nullptr) brick->recent = std::make_shared<GridBlock>(old.recent_room(), old.sorted->has_forms());
   sources_.clear();
   for (const BrickChange& change : changes) {
     if (arrives(change)) {

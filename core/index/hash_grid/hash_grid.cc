@@ -209,7 +209,7 @@ void HashGrid::prefetch_changes(size_t touched) const {
     const uint32_t slot = change.slot & ~GridSlot::kRecent;
     ((change.slot & GridSlot::kRecent) != 0 ? *brick->recent : *brick->sorted).prefetch_value(slot);
   }
-  if (brick->recent != nullptr && brick->recent_count < internal::Brick::kMostRecent)
+  if (brick->recent != nullptr && brick->recent_count < brick->recent_room())
     brick->recent->prefetch_place(brick->recent_count);
 }
 
