@@ -1,13 +1,12 @@
 #include "tests/bench/serving/crowd_cases.h"
 
 #include <algorithm>
-#include <atomic>
-#include <thread>
 #include <utility>
 
 #include "tests/bench/serving/ending_cases.h"
 #include "tests/bench/serving/good_client.h"
 #include "tests/bench/serving/guest_cases.h"
+#include "tests/bench/serving/guest_process.h"
 #include "tests/bench/serving/ray_batches.h"
 #include "tests/bench/serving/unary_load.h"
 
@@ -16,8 +15,9 @@ namespace {
 
 constexpr size_t kLarge = 8192;  // rays
 constexpr size_t kBulkWindow = 4;
-constexpr size_t kCalls = 16;  // that the overloaded server admits
-constexpr size_t kFlood = 10;  // times as many
+constexpr double kUntilBusy = 0.2;  // seconds that the other client has to connect
+constexpr size_t kCalls = 16;       // that the overloaded server admits
+constexpr size_t kFlood = 10;       // times as many
 constexpr const char* kAtOnce = "overload/10x/at_once";
 constexpr const char* kAsTold = "overload/10x/as_told";
 
@@ -30,24 +30,19 @@ class CrowdCases {
     run_.progress("mixed_p99/16");
     constexpr size_t kSmall = GoodClient::kRays;
     GoodClient good(run_, scene, "mixed_p99/16", batches_of(scattered_rays(mesh_, 64 * kSmall), kSmall, scene.name()));
-    Batches large = batches_of(coherent_rays(mesh_, 16 * kLarge), kLarge, scene.name());
-    ServerLoad bulk(scene.daemon(), large, 1, kBulkWindow);
+    const GuestProgram bulk(scene.daemon(), "bulk", kBulkWindow, scene.name(),
+                            batches_of(coherent_rays(mesh_, kLarge), kLarge, "").messages.front().batch());
     const size_t count = run_.options.quick ? 300 : 5000;
     std::vector<double> idle[2], beside[2];
     for (int round = 0; round <= run_.options.rounds; ++round) {
       std::vector<double> alone, crowded;
       good.ask(count, alone);
-      std::atomic<bool> stop = false;
-      std::thread other([&] {
-        while (!stop) bulk.run(1);
-      });
-      sleep_seconds(0.05);
+      const absl::StatusOr<std::unique_ptr<Process>> other = bulk.start();
+      if (!other.ok()) return other.status();
+      sleep_seconds(kUntilBusy);
       good.ask(count, crowded);
-      stop = true;
-      other.join();
-      absl::Status status = bulk.status();
-      status.Update(good.status());
-      if (!status.ok()) return status;
+      if ((*other)->has_ended()) return absl::DataLossError("the other client was not served: " + bulk.log());
+      if (!good.status().ok()) return good.status();
       for (size_t i = 0; i < 2 && round > 0; ++i) {
         idle[i].push_back(1e6 * percentile(alone, kShares[i]));
         beside[i].push_back(1e6 * percentile(crowded, kShares[i]));

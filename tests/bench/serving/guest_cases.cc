@@ -1,10 +1,9 @@
 #include "tests/bench/serving/guest_cases.h"
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 
 #include "tests/bench/serving/good_client.h"
+#include "tests/bench/serving/guest_process.h"
 #include "tests/bench/serving/ray_batches.h"
 
 namespace locus::bench::serving {
@@ -17,37 +16,6 @@ std::string silent_name(size_t readers) { return absl::StrCat("silent_reader/", 
 std::string churn_name(const ServingRun& run) { return absl::StrCat("churn/", churners(run)); }
 
 double mib(int64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
-
-// The program that they are, and what it is to do.
-class GuestProgram {
- public:
-  GuestProgram(const Daemon& daemon, const std::string& kind, size_t guests, const std::string& scene,
-               const v1::QueryBatch& batch)
-      : words_{"locus-guests", kind, daemon.address(), absl::StrCat(guests), folder_.file("message")},
-        ends_(kind == "churn") {
-    v1::StreamQueriesRequest message;
-    message.set_scene(scene);
-    *message.mutable_batch() = batch;
-    std::ofstream file(folder_.file("message"), std::ios::binary);
-    message.SerializeToOstream(&file);
-  }
-
-  absl::StatusOr<std::unique_ptr<Process>> start() const {
-    return Process::start(program_beside("locus-guests"), words_, folder_.file("log"));
-  }
-  // Whether it does by itself.
-  bool ends() const { return ends_; }
-  std::string log() const {
-    std::ostringstream text;
-    text << std::ifstream(folder_.file("log")).rdbuf();
-    return text.str();
-  }
-
- private:
-  const TemporaryFolder folder_;
-  const std::vector<std::string> words_;
-  const bool ends_;
-};
 
 class GuestCases {
  public:

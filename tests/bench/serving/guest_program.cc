@@ -1,9 +1,10 @@
-// The program `locus-guests`: callers who misbehave, or come by the hundred. Started by locus-bench, as
-//   locus-guests silent|churn ADDRESS COUNT FILE
-// where the file has the message that each of them sends. Churn ends by itself, silent readers with a signal. Runs at
-// a lower priority, which takes nothing from the server's part: from machines of their own, guests would not compute
-// on the cores that the server has.
-#include <sys/resource.h>
+// The program `locus-guests`: another client with much to ask, callers who misbehave, or who come by the hundred.
+// Started by locus-bench, as
+//   locus-guests bulk|silent|churn ADDRESS COUNT FILE
+// where the file has the message that each of them sends. Bulk is one client with COUNT messages under way. Churn ends
+// by itself, the others with a signal. Those who misbehave run at a lower priority, which takes nothing from the
+// server's part: from machines of their own, they would not compute on the cores that the server has.
+#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -18,8 +19,14 @@ namespace {
 
 int run_guests(const std::string& kind, const std::string& address, size_t count,
                const v1::StreamQueriesRequest& message) {
+  if (kind == "bulk") {
+    BulkCaller caller(address, count, message);
+    while (caller.status().ok()) caller.run();
+    std::cerr << caller.status() << "\n";
+    return EXIT_FAILURE;
+  }
   constexpr int kSteps = 10;
-  setpriority(PRIO_PROCESS, 0, kSteps);
+  if (nice(kSteps) == -1) std::cerr << "not at a lower priority\n";
   allow_many_files();
   if (kind == "silent") {
     SilentReaders guests(address, count, message);
@@ -39,7 +46,7 @@ int main(int argc, char** argv) {
   size_t count = 0;
   std::ifstream file(argc == 5 ? argv[4] : "", std::ios::binary);
   if (argc != 5 || !absl::SimpleAtoi(argv[3], &count) || !message.ParseFromIstream(&file)) {
-    std::cerr << "usage: locus-guests silent|churn ADDRESS COUNT FILE\n";
+    std::cerr << "usage: locus-guests bulk|silent|churn ADDRESS COUNT FILE\n";
     return 2;
   }
   return locus::bench::serving::run_guests(argv[1], argv[2], count, message);

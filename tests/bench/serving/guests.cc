@@ -22,6 +22,23 @@ void allow_many_files() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
+BulkCaller::BulkCaller(const std::string& address, size_t window, v1::StreamQueriesRequest message)
+    : window_(window), message_(std::move(message)) {
+  const auto stub = std::shared_ptr(v1::QueryService::NewStub(connection_to(address)));
+  stream_ = std::make_unique<Load>([stub](grpc::ClientContext* context, grpc::CompletionQueue* queue, void* tag) {
+    return stub->AsyncStreamQueries(context, queue, tag);
+  });
+}
+
+void BulkCaller::run() {
+  size_t left = 64;
+  const auto next = [&](uint64_t&) { return left-- == 0 ? nullptr : &message_; };
+  const auto reply = [&](uint64_t, const v1::StreamQueriesResponse& response, double) {
+    if (!response.has_result()) status_.Update(absl::DataLossError("a batch was refused"));
+  };
+  status_.Update(stream_->run(window_, next, reply));
+}
+
 struct SilentReaders::Guest {
   std::unique_ptr<v1::QueryService::Stub> stub;
   grpc::ClientContext context;

@@ -1,7 +1,7 @@
-// Callers as a server does not wish for: many who never read what they asked for, and many who come, ask once and go.
-// Each has a connection and a stream of its own; one thread drives them all. For the cases that look what they leave
-// behind, in a program of their own: gRPC shares threads between the connections of a process, and who waits for an
-// answer would do the work of the others.
+// Callers beside the one who is measured: one with large batches all the time, many who never read what they asked for,
+// and many who come, ask once and go. Each has a connection and a stream of its own; one thread drives them all. For
+// the cases that look what they leave behind, in a program of their own: gRPC shares threads between the connections of
+// a process, and who waits for an answer would do the work of the others.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 
@@ -18,6 +18,24 @@ namespace locus::bench::serving {
 
 // As many connections as the system lets this process have: each is a file.
 void allow_many_files();
+
+// Keeps so many messages under way, all the same.
+class BulkCaller {
+ public:
+  BulkCaller(const std::string& address, size_t window, v1::StreamQueriesRequest message);
+
+  // Some of them. Whatever goes wrong shows in status().
+  void run();
+  const absl::Status& status() const { return status_; }
+
+ private:
+  using Load = StreamLoad<v1::StreamQueriesRequest, v1::StreamQueriesResponse>;
+
+  const size_t window_;
+  v1::StreamQueriesRequest message_;
+  std::unique_ptr<Load> stream_;
+  absl::Status status_;
+};
 
 // They write until nothing more is taken from them, and read nothing.
 class SilentReaders {

@@ -17,6 +17,15 @@ v1::StreamQueriesRequest one_ray() {
   return message;
 }
 
+TEST(BulkCallerTest, IsAnswered) {
+  const auto server = LocalServer::start("locus-echo");
+  ASSERT_TRUE(server.ok()) << server.status();
+  BulkCaller caller((*server)->address(), 3, one_ray());
+  caller.run();
+  caller.run();
+  EXPECT_TRUE(caller.status().ok()) << caller.status();
+}
+
 TEST(ChurnTest, AllGuestsComeAreAnsweredAndGo) {
   const auto server = LocalServer::start("locus-echo");
   ASSERT_TRUE(server.ok()) << server.status();
