@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +13,35 @@ namespace locus::server {
 namespace {
 
 int nice_of_this_thread() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
+
+// Linux's sched_attr up to what it says of slices; 0 where it is too old to tell.
+uint64_t slice_of_this_thread() {
+  struct {
+    uint32_t size, policy;
+    uint64_t flags;
+    int32_t nice;
+    uint32_t priority;
+    uint64_t slice, deadline, period;
+  } attributes = {};
+  EXPECT_EQ(syscall(SYS_sched_getattr, 0, &attributes, sizeof(attributes), 0), 0);
+  return attributes.slice;
+}
+
+TEST(ThreadPriorityTest, SlicesAreShortWhereLinuxTellsThem) {
+  uint64_t usual = 0, of_batches = 0, asked = 0;
+  std::thread([&] {
+    usual = slice_of_this_thread();
+    take_short_slices();
+    asked = slice_of_this_thread();
+  }).join();
+  std::thread([&] {
+    take_batch_priority(BatchPriority::kNice);
+    of_batches = slice_of_this_thread();
+  }).join();
+  const uint64_t wanted = usual == 0 ? 0 : 100'000;
+  EXPECT_EQ(asked, wanted);
+  EXPECT_EQ(of_batches, wanted);
+}
 
 TEST(ThreadPriorityTest, NiceIsTheThreadsOwn) {
   const int before = nice_of_this_thread();
