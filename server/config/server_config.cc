@@ -22,7 +22,8 @@ namespace {
 constexpr const char* kDescription =
     "locusd hosts scenes of static meshes and moving objects, and answers exact batched\n"
     "ray, ball and box queries over gRPC (locus.v1) while updates stream in.\n"
-    "Scenes live in memory: they are gone when the daemon ends.";
+    "With --data-dir scenes outlive it, every acknowledged update included; without,\n"
+    "they live in memory and are gone when the daemon ends.";
 
 constexpr const char* kFooter = R"(Every option can also be set by the environment or by the file that --config
 names: --drain-grace-s 5, LOCUS_DRAIN_GRACE_S=5 and the line `drain-grace-s = 5`
@@ -32,6 +33,7 @@ Examples:
   locusd                                      serve this machine on 127.0.0.1:7575
   locusd --listen unix:/run/locus/locus.sock  serve this machine over a unix socket
   locusd --listen 127.0.0.1:0 --port-file p   take a free port and write it to the file p
+  locusd --data-dir /var/lib/locus            keep scenes, and every acknowledged update
   locusd --config /etc/locus/locusd.conf --log-format json
 
 Try it: locus health; locus limits; locus scene create demo; locus top
@@ -76,6 +78,8 @@ void add_options(CLI::App& app, ServerConfig& config) {
                  "Address of the HTTP port with /metrics, /healthz and /readyz; empty = none")
       ->capture_default_str();
   app.add_option("--http-port-file", config.http_port_file, "File to write the HTTP port to once it answers")
+      ->capture_default_str();
+  app.add_option("--data-dir", config.data_dir, "Directory that scenes are kept in; empty = memory only")
       ->capture_default_str();
   app.add_option("--threads", config.threads, "Threads that may work on one batch; 0 = the cores it may use")
       ->check(CLI::Range(0u, limits::kMaxThreads))

@@ -39,6 +39,11 @@ struct ServerConfig {
   // Written with the HTTP port as `port_file` is; empty = not written.
   std::string http_port_file;
 
+  // The directory that scenes and meshes are kept in, so that they outlive the daemon: made where it is missing, used
+  // by one daemon at a time. Empty = memory only. Give it a disk of its own where updates are many: every acknowledged
+  // update waits for that disk.
+  std::string data_dir;
+
   // Threads that may work on one query batch, the caller's own included; 0 = the cores this process may use, by its
   // affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
   uint32_t threads = 0;

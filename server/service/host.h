@@ -4,6 +4,7 @@
 #define LOCUS_SERVER_SERVICE_HOST_H_
 
 #include "core/scene/registry.h"
+#include "core/scene/update_log.h"
 #include "server/config/observability_limits.h"
 #include "server/config/server_config.h"
 #include "server/observability/metrics.h"
@@ -22,8 +23,10 @@
 namespace locus::server {
 
 struct Host {
-  explicit Host(const ServerConfig& with)
+  // `with_log` is borrowed; null keeps scenes in memory only.
+  Host(const ServerConfig& with, UpdateLog* with_log)
       : config(with),
+        log(with_log),
         slow_queries(with.slow_query_ms),
         memory(with.memory_limit, process_memory(registry)),
         pool(with.threads),
@@ -48,6 +51,7 @@ struct Host {
   }
 
   const ServerConfig config;
+  UpdateLog* const log;
   CallMetrics metrics;
   SlowQueries slow_queries;
   Registry registry;

@@ -99,8 +99,8 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
 }  // namespace
 
 struct Server::Parts {
-  explicit Parts(const ServerConfig& config)
-      : host(config),
+  Parts(const ServerConfig& config, UpdateLog* log)
+      : host(config, log),
         scrape(host),
         health_service(host),
         server_service(host),
@@ -131,11 +131,11 @@ Server::~Server() {
   if (!parts_->ended) drain(milliseconds(0));
 }
 
-absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config) {
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config, UpdateLog* log) {
   const absl::StatusOr<std::vector<ListenAddress>> addresses = read_addresses(config);
   if (!addresses.ok()) return addresses.status();
   enable_extras();
-  auto parts = std::make_unique<Parts>(config);
+  auto parts = std::make_unique<Parts>(config, log);
   absl::StatusOr<std::unique_ptr<HttpServer>> http = start_http(config, parts->scrape);
   if (!http.ok()) return http.status();
   parts->http = *std::move(http);

@@ -12,14 +12,16 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/scene/update_log.h"
 #include "server/config/server_config.h"
 
 namespace locus::server {
 
 class Server {
  public:
-  // Listens on every address of `config` or on none: an error names the address and the reason.
-  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config);
+  // Listens on every address of `config` or on none: an error names the address and the reason. Scenes are kept in
+  // `log`, which outlives the server, or in memory only where there is none.
+  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config, UpdateLog* log = nullptr);
 
   // Ends without grace if drain() was not called.
   ~Server();

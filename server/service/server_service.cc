@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/base/instruction_set.h"
 #include "core/base/limits.h"
 #include "server/config/observability_limits.h"
 #include "server/config/version.h"
@@ -98,7 +99,7 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
                                       v1::GetServerResponse* response) {
   const auto body = [&](const Caller&) {
     response->set_version(kVersion);
-    response->set_instruction_set("portable");
+    response->set_instruction_set(std::string(instruction_set()));
     for (const char* feature : {"as_of", "balls", "boxes", "download_mesh", "history", "latest_wins", "lookup",
                                 "nearest", "rays", "static_from"})
       response->add_features(feature);

@@ -1,5 +1,6 @@
 #include <set>
 
+#include "core/base/instruction_set.h"
 #include "core/base/limits.h"
 #include "tests/support/raw_call.h"
 #include "tests/support/rpc_test.h"
@@ -27,7 +28,7 @@ const v1::Limit& limit_of(const v1::GetServerResponse& server, const std::string
 TEST_F(ServerRpcTest, TheServerSaysWhatItIsAndServes) {
   const v1::GetServerResponse server = get_server(stubs());
   EXPECT_EQ(server.version(), LOCUS_VERSION);
-  EXPECT_FALSE(server.instruction_set().empty());
+  EXPECT_EQ(server.instruction_set(), instruction_set());
   EXPECT_THAT(server.features(), ::testing::ElementsAre("as_of", "balls", "boxes", "download_mesh", "history",
                                                         "latest_wins", "lookup", "nearest", "rays", "static_from"));
 }

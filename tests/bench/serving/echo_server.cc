@@ -84,7 +84,7 @@ bool write_port(const std::string& path, int port) {
 
 // Until a signal ends the process.
 int serve(const server::ServerConfig& config) {
-  server::Host host(config);
+  server::Host host(config, nullptr);
   Service service;
   grpc::ServerBuilder builder;
   set_limits(config, builder);

@@ -126,7 +126,7 @@ struct Streamed {
 template <class Stream>
 class Bench {
  public:
-  Bench() : host_(test_config()) {
+  Bench() : host_(test_config(), nullptr) {
     grpc::ServerBuilder builder;
     builder.RegisterService(&service_);
     io_ = std::make_unique<IoThreads>(builder, 1);
