@@ -66,12 +66,17 @@ inline constexpr uint32_t kMaxDrainGraceS = 3600;             // for calls in wo
 inline constexpr uint32_t kMaxListenAddresses = 16;
 inline constexpr uint32_t kMaxPageSize = 1000;  // scenes or meshes a page
 
+inline constexpr uint32_t kMaxBackups = 1;  // under way at once
+inline constexpr uint32_t kMaxBackupFiles = 1u << 20;
+inline constexpr uint32_t kBackupPieceBytes = 1u << 20;  // of a file, in one message
+
 static_assert(kMaxBlocks <= kMaxQueries);
 static_assert(kDefaultHistoryBytes <= kMaxHistoryBytes);
 static_assert(kDefaultMaxResults <= kMaxMaxResults);
 static_assert(kMaxNearest <= kMaxMaxResults);
 static_assert(kDefaultReplyBytes < 4u << 20, "clients refuse messages over 4 MiB by default");
 static_assert(kDefaultReplyBytes <= kMaxReplyBytes);
+static_assert(kBackupPieceBytes < kDefaultReplyBytes / 2, "a path and a hash fit beside it");
 static_assert(kMaxInstances <= kMaxBvhValues);
 static_assert(uint64_t{kMaxMeshTriangles} * 3 < uint64_t{1} << 32, "index positions fit 32 bits");
 

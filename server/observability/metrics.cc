@@ -21,9 +21,9 @@ RefusalName name_of(const absl::Status& status) {
 
 absl::string_view rpc_name(Rpc rpc) {
   static constexpr std::array<absl::string_view, kRpcs> kNames = {
-      "GetServer",  "CreateScene",  "GetScene",      "ListScenes",   "DeleteScene",
-      "UploadMesh", "ListMeshes",   "DeleteMesh",    "DownloadMesh", "ChangeInstances",
-      "DumpScene",  "ApplyUpdates", "StreamUpdates", "Query",        "StreamQueries"};
+      "GetServer",    "Backup",        "CreateScene", "GetScene",     "ListScenes",      "DeleteScene",
+      "UploadMesh",   "ListMeshes",    "DeleteMesh",  "DownloadMesh", "ChangeInstances", "DumpScene",
+      "ApplyUpdates", "StreamUpdates", "Query",       "StreamQueries"};
   return kNames[static_cast<size_t>(rpc)];
 }
 

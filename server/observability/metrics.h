@@ -31,6 +31,7 @@ namespace locus::server {
 
 enum class Rpc : uint8_t {
   kGetServer,
+  kBackup,
   kCreateScene,
   kGetScene,
   kListScenes,
@@ -46,7 +47,7 @@ enum class Rpc : uint8_t {
   kQuery,
   kStreamQueries,
 };
-inline constexpr size_t kRpcs = 15;
+inline constexpr size_t kRpcs = 16;
 // As the protocol calls it: "StreamQueries".
 absl::string_view rpc_name(Rpc rpc);
 

@@ -64,6 +64,7 @@ struct Host {
   Gate calls;    // in work, streams apart
   Gate streams;  // open
   Gate health_watchers{kMaxHealthWatchers};
+  Gate backups{limits::kMaxBackups};
   Drain drain;
 };
 

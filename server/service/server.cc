@@ -12,6 +12,7 @@
 #include "server/config/listen_address.h"
 #include "server/observability/http_server.h"
 #include "server/observability/log.h"
+#include "server/service/backup.h"
 #include "server/service/health_service.h"
 #include "server/service/host.h"
 #include "server/service/io_threads.h"
@@ -136,6 +137,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
   if (!addresses.ok()) return addresses.status();
   enable_extras();
   auto parts = std::make_unique<Parts>(config, log);
+  if (can_back_up(parts->host)) remove_leftover_backup(parts->host);
   absl::StatusOr<std::unique_ptr<HttpServer>> http = start_http(config, parts->scrape);
   if (!http.ok()) return http.status();
   parts->http = *std::move(http);

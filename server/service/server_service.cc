@@ -7,6 +7,7 @@
 #include "core/base/limits.h"
 #include "server/config/observability_limits.h"
 #include "server/config/version.h"
+#include "server/service/backup.h"
 #include "server/service/call.h"
 
 namespace locus::server {
@@ -46,6 +47,8 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
 // Every limit under the name that refusals use.
 std::vector<NamedLimit> limits_of(const Host& host) {
   std::vector<NamedLimit> all = {
+      {"backup_files", limits::kMaxBackupFiles},
+      {"backups", static_cast<double>(host.backups.max()), static_cast<double>(host.backups.used())},
       {"blocks", limits::kMaxBlocks},
       {"calls", static_cast<double>(host.calls.max()), static_cast<double>(host.calls.used())},
       {"coordinate", limits::kMaxCoordinate},
@@ -100,9 +103,9 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
   const auto body = [&](const Caller&) {
     response->set_version(kVersion);
     response->set_instruction_set(std::string(instruction_set()));
-    for (const char* feature : {"as_of", "balls", "boxes", "download_mesh", "history", "latest_wins", "lookup",
-                                "nearest", "rays", "static_from"})
-      response->add_features(feature);
+    for (const char* feature : {"as_of", "backup", "balls", "boxes", "download_mesh", "history", "latest_wins",
+                                "lookup", "nearest", "rays", "static_from"})
+      if (can_back_up(host_) || absl::string_view(feature) != kBackupFeature) response->add_features(feature);
     for (const NamedLimit& limit : limits_of(host_)) {
       v1::Limit* out = response->add_limits();
       out->set_name(limit.name);
@@ -112,6 +115,11 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
     return absl::OkStatus();
   };
   return serve(host_, *context, Rpc::kGetServer, body, WhileDraining::kServe);
+}
+
+grpc::Status ServerService::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
+                                   grpc::ServerWriter<v1::BackupResponse>* writer) {
+  return serve(host_, *context, Rpc::kBackup, [&](const Caller& caller) { return back_up(host_, caller, *writer); });
 }
 
 }  // namespace locus::server

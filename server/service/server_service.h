@@ -1,4 +1,4 @@
-// ServerService: what this server is, what it serves, where its limits are.
+// ServerService: what this server is, what it serves, where its limits are; and a copy of what it has on its disk.
 #ifndef LOCUS_SERVER_SERVICE_SERVER_SERVICE_H_
 #define LOCUS_SERVER_SERVICE_SERVER_SERVICE_H_
 
@@ -13,6 +13,8 @@ class ServerService final : public v1::ServerService::Service {
 
   grpc::Status GetServer(grpc::ServerContext* context, const v1::GetServerRequest* request,
                          v1::GetServerResponse* response) override;
+  grpc::Status Backup(grpc::ServerContext* context, const v1::BackupRequest* request,
+                      grpc::ServerWriter<v1::BackupResponse>* writer) override;
 
  private:
   Host& host_;

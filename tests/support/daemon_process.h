@@ -17,29 +17,9 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/temporary_folder.h"
+
 namespace locus::test {
-
-// A folder of the test's own, removed with it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string path = "/tmp/locus-test-XXXXXX";
-    if (mkdtemp(path.data()) == nullptr) ADD_FAILURE() << "no temporary folder";
-    path_ = path;
-  }
-  ~TemporaryFolder() {
-    for (const char* name : {"port", "port.tmp", "http", "locus.sock", "log", "refused", "second"})
-      unlink((path_ + "/" + name).c_str());
-    rmdir(path_.c_str());
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 inline std::string text_of(const std::string& path) {
   std::ostringstream text;

@@ -63,10 +63,11 @@ inline server::ServerConfig test_config() {
 
 class RunningServer {
  public:
-  explicit RunningServer(const server::ServerConfig& config = test_config()) {
+  // `log` outlives it.
+  explicit RunningServer(const server::ServerConfig& config = test_config(), UpdateLog* log = nullptr) {
     server::start_logging(config.log_level, config.log_format);
     server::capture_library_logs(config.log_level);
-    absl::StatusOr<std::unique_ptr<server::Server>> started = server::Server::start(config);
+    absl::StatusOr<std::unique_ptr<server::Server>> started = server::Server::start(config, log);
     if (!started.ok()) ADD_FAILURE() << started.status();
     LOCUS_CHECK(started.ok());
     server_ = *std::move(started);

@@ -1,0 +1,65 @@
+// A log that keeps nothing and whose backups are a few files that a test has chosen: for tests of what happens to a
+// backup once the log has made it.
+//
+// Threads: back_up() from any thread; the members that a test sets before the server is started.
+#ifndef LOCUS_TESTS_SUPPORT_FAKE_LOG_H_
+#define LOCUS_TESTS_SUPPORT_FAKE_LOG_H_
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "core/scene/update_log.h"
+
+namespace locus::test {
+
+class FakeLog final : public UpdateLog {
+ public:
+  const std::vector<StoredScene>& stored_scenes() const override { return scenes_; }
+  const std::vector<StoredMesh>& stored_meshes() const override { return meshes_; }
+  bool closed_in_order() const override { return true; }
+
+  absl::StatusOr<SceneKey> create_scene(absl::string_view, absl::string_view, uint64_t, ChunkSource) override {
+    return ++last_key_;
+  }
+  absl::Status delete_scene(SceneKey) override { return absl::OkStatus(); }
+  absl::Status restart_scene(SceneKey, uint64_t) override { return refusal(); }
+  absl::StatusOr<uint64_t> append(SceneKey, absl::Span<const LogEntry>, AckLevel) override { return refusal(); }
+  absl::Status read(SceneKey, uint64_t, RecordSink) const override { return refusal(); }
+  absl::StatusOr<uint64_t> latest(SceneKey) const override { return refusal(); }
+  absl::Status write_snapshot(SceneKey, uint64_t, ChunkSource) override { return refusal(); }
+  absl::Status read_snapshot(SceneKey, ChunkSink) const override { return refusal(); }
+  absl::Status add_mesh(absl::string_view, const std::array<uint8_t, 32>&, ChunkSource) override { return refusal(); }
+  absl::Status delete_mesh(absl::string_view) override { return refusal(); }
+  absl::Status read_mesh(const std::array<uint8_t, 32>&, ChunkSink) const override { return refusal(); }
+
+  // Writes `files` below the new directory, then does what the test has planned.
+  absl::Status back_up(const std::string& path) override {
+    std::error_code why;
+    if (!std::filesystem::create_directory(path, why)) return absl::UnavailableError("the directory is not new");
+    for (const auto& [name, bytes] : files) {
+      const std::filesystem::path file = std::filesystem::path(path) / name;
+      std::filesystem::create_directories(file.parent_path(), why);
+      std::ofstream(file, std::ios::binary) << bytes;
+    }
+    return afterwards ? afterwards(path) : absl::OkStatus();
+  }
+
+  std::map<std::string, std::string> files;  // bytes by path
+  std::function<absl::Status(const std::string&)> afterwards;
+
+ private:
+  static absl::Status refusal() { return absl::UnimplementedError("a fake log keeps nothing"); }
+
+  std::vector<StoredScene> scenes_;
+  std::vector<StoredMesh> meshes_;
+  SceneKey last_key_ = 0;
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_FAKE_LOG_H_
