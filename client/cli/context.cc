@@ -19,6 +19,7 @@ absl::StatusOr<client::Client*> Context::connect() {
     options.connect_timeout = timeout;
     options.deadline = timeout;
     options.long_deadline = timeout;
+    options.backup_deadline = timeout;
   }
   absl::StatusOr<std::unique_ptr<client::Client>> client = client::Client::connect(options_.address, options);
   if (absl::IsUnavailable(client.status())) {

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "client/lib/backup_download.h"
 #include "client/lib/call_metadata.h"
 #include "client/lib/connection.h"
 #include "client/lib/health_check.h"
@@ -101,6 +102,11 @@ absl::StatusOr<Health> Client::health(absl::string_view service) const {
     return health.status();
   }).IgnoreError();
   return health;
+}
+
+absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
+  const std::unique_ptr<v1::ServerService::StubInterface> server = v1::ServerService::NewStub(connection_->bulk);
+  return download_backup(*server, sink, absl::Now() + connection_->options.backup_deadline);
 }
 
 absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {

@@ -25,6 +25,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "client/lib/backup.h"
 #include "client/lib/mesh.h"
 #include "client/lib/options.h"
 #include "client/lib/query_stream.h"
@@ -66,6 +67,10 @@ class Client {
   absl::StatusOr<v1::GetServerResponse> get_server() const;
   // Health of the whole server, or of one service by its full name. Repeated when safe.
   absl::StatusOr<Health> health(absl::string_view service = "") const;
+  // Everything on the server's disk as it is at one moment, handed to `sink` in this thread; what came in all. Not
+  // repeated: a second try begins anew, with a new sink. DATA_LOSS if what came is not what the server announced
+  // (files, sizes, hashes), or a path leads out of the backup. UNIMPLEMENTED where the server has no data directory.
+  absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
   absl::StatusOr<v1::Scene> create_scene(const v1::CreateSceneRequest& request) const;
   absl::StatusOr<v1::Scene> get_scene(absl::string_view name) const;

@@ -3,17 +3,15 @@
 #ifndef LOCUS_CLIENT_LIB_MESH_H_
 #define LOCUS_CLIENT_LIB_MESH_H_
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "absl/types/span.h"
+#include "client/lib/sha256.h"
 #include "locus/v1/scene_service.pb.h"
 
 namespace locus::client {
-
-using Sha256 = std::array<uint8_t, 32>;
 
 // Borrowed columns of a mesh.
 struct MeshColumns {

@@ -34,6 +34,8 @@ struct ClientOptions {
   absl::Duration deadline = absl::Seconds(10);
   // The same for calls that build or send a lot: mesh uploads, changes of instances, dumps.
   absl::Duration long_deadline = absl::Minutes(10);
+  // The same for a backup, which may be as large as a disk.
+  absl::Duration backup_deadline = absl::Hours(24);
   // Largest message sent; the server's default receives 32 MiB.
   int max_send_bytes = 32 << 20;
   // Largest message received; the protocol's max_reply_bytes goes up to 64 MiB.

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "client/lib/sha256.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "locus/v1/scene_service.grpc.pb.h"
 #include "locus/v1/server_service.grpc.pb.h"
@@ -387,6 +388,37 @@ class FakeServerService final : public v1::ServerService::Service {
     limit.set_used(2);
     return grpc::Status::OK;
   }
+
+  // The planned pieces, then the planned end.
+  grpc::Status Backup(grpc::ServerContext*, const v1::BackupRequest*,
+                      grpc::ServerWriter<v1::BackupResponse>* writer) override {
+    for (const v1::BackupResponse& piece : backup_pieces) {
+      if (!writer->Write(piece)) break;
+    }
+    return backup_end;
+  }
+
+  // A backup of these files by path, in pieces as the server makes them of files below 1 MiB.
+  void plan_backup(const std::map<std::string, std::string>& files) {
+    backup_pieces.assign(1, {});
+    v1::BackupSize& announced = *backup_pieces[0].mutable_announced();
+    announced.set_files(static_cast<uint32_t>(files.size()));
+    for (const auto& [path, bytes] : files) {
+      announced.set_bytes(announced.bytes() + bytes.size());
+      v1::BackupResponse piece;
+      piece.set_path(path);
+      piece.set_data(bytes);
+      Sha256Hasher hasher;
+      hasher.add(bytes);
+      const Sha256 hash = hasher.finish();
+      piece.mutable_end()->set_bytes(bytes.size());
+      piece.mutable_end()->set_sha256(hash.data(), hash.size());
+      backup_pieces.push_back(piece);
+    }
+  }
+
+  std::vector<v1::BackupResponse> backup_pieces;
+  grpc::Status backup_end;
 };
 
 // All of them on a loopback port of the kernel's choice.

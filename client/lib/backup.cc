@@ -1,0 +1,43 @@
+#include "client/lib/backup.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "absl/strings/str_split.h"
+
+namespace locus::client {
+namespace {
+
+// Bytes of UTF-8 beyond ASCII are some alphabet's. A checksum file would have to escape the backslash.
+bool is_printable(char byte) {
+  const auto code = static_cast<unsigned char>(byte);
+  return code >= 0x20 && code != 0x7F && byte != '\\';
+}
+
+absl::Status check(const std::string& path) {
+  if (path.empty()) return absl::InvalidArgumentError("is empty");
+  if (path.size() > kMaxBackupPathLength) return absl::InvalidArgumentError("is too long");
+  if (!std::all_of(path.begin(), path.end(), is_printable))
+    return absl::InvalidArgumentError("has a character that a path may not have");
+  const std::vector<absl::string_view> names = absl::StrSplit(path, '/');
+  const bool leads_away = std::any_of(
+      names.begin(), names.end(), [](absl::string_view name) { return name.empty() || name == "." || name == ".."; });
+  return leads_away ? absl::InvalidArgumentError("leads out of its directory") : absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status BackupPaths::add(const std::string& path) {
+  if (absl::Status checked = check(path); !checked.ok()) return checked;
+  if (files_.size() >= kMaxBackupFiles) return absl::InvalidArgumentError("is one more than a backup may have");
+  if (folders_.contains(path)) return absl::InvalidArgumentError("is a folder of another file");
+  for (size_t slash = path.find('/'); slash != std::string::npos; slash = path.find('/', slash + 1)) {
+    const std::string folder = path.substr(0, slash);
+    if (files_.contains(folder)) return absl::InvalidArgumentError("has another file for a folder");
+    folders_.insert(folder);
+    if (folders_.size() > kMaxBackupFiles) return absl::InvalidArgumentError("has more folders than a backup may have");
+  }
+  return files_.insert(path).second ? absl::OkStatus() : absl::InvalidArgumentError("comes twice");
+}
+
+}  // namespace locus::client

@@ -1,0 +1,117 @@
+#include "client/lib/backup_download.h"
+
+#include <algorithm>
+#include <string>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "client/lib/status.h"
+#include "grpcpp/client_context.h"
+
+namespace locus::client {
+namespace {
+
+absl::Status damaged(absl::string_view what) {
+  return absl::DataLossError(absl::StrCat("the backup came damaged: ", what, "; back up again"));
+}
+
+absl::Status damaged_file(absl::string_view path, absl::string_view what) {
+  return damaged(absl::StrCat("its file \"", absl::CEscape(path), "\" ", what));
+}
+
+bool equal(const Sha256& hash, absl::string_view bytes) {
+  return std::equal(hash.begin(), hash.end(), bytes.begin(), bytes.end(),
+                    [](uint8_t a, char b) { return a == static_cast<uint8_t>(b); });
+}
+
+// Hands on what comes for as long as it is what was announced.
+class Receiver {
+ public:
+  explicit Receiver(BackupSink& sink) : sink_(sink) {}
+
+  absl::Status take(const v1::BackupResponse& piece) {
+    if (piece.has_announced() != first_) return damaged("what comes is not announced in the first piece alone");
+    if (first_) return begin(piece);
+    if (!piece.path().empty()) {
+      if (absl::Status begun = begin_file(piece.path()); !begun.ok()) return begun;
+    }
+    if (!in_file_) return damaged("bytes came that belong to no file");
+    if (absl::Status added = add(piece.data()); !added.ok()) return added;
+    return piece.has_end() ? end_file(piece.end()) : absl::OkStatus();
+  }
+
+  absl::StatusOr<BackupSize> finish() const {
+    if (first_) return damaged("nothing came");
+    if (in_file_) return damaged_file(file_.path, "has no end");
+    if (came_.files != announced_.files || came_.bytes != announced_.bytes)
+      return damaged("less came than was announced");
+    return came_;
+  }
+
+ private:
+  absl::Status begin(const v1::BackupResponse& piece) {
+    if (!piece.path().empty() || !piece.data().empty() || piece.has_end())
+      return damaged("its first piece is not the announcement alone");
+    first_ = false;
+    announced_ = {piece.announced().files(), piece.announced().bytes()};
+    if (announced_.files > kMaxBackupFiles)
+      return damaged(absl::StrCat(announced_.files, " files are announced, at most ", kMaxBackupFiles, " may be"));
+    return sink_.begin(announced_);
+  }
+
+  absl::Status begin_file(const std::string& path) {
+    if (in_file_) return damaged_file(file_.path, "has no end");
+    if (came_.files == announced_.files) return damaged("more came than was announced");
+    if (absl::Status fit = paths_.add(path); !fit.ok()) return damaged_file(path, fit.message());
+    in_file_ = true;
+    file_ = {.path = path};
+    return sink_.begin_file(path);
+  }
+
+  absl::Status add(const std::string& data) {
+    if (data.empty()) return absl::OkStatus();
+    if (data.size() > announced_.bytes - came_.bytes) return damaged("more came than was announced");
+    came_.bytes += data.size();
+    file_.bytes += data.size();
+    hasher_.add(data);
+    return sink_.add(data);
+  }
+
+  absl::Status end_file(const v1::BackupFileEnd& end) {
+    in_file_ = false;
+    ++came_.files;
+    file_.sha256 = hasher_.finish();
+    if (file_.bytes != end.bytes()) return damaged_file(file_.path, "has another size than the server says");
+    if (!equal(file_.sha256, end.sha256())) return damaged_file(file_.path, "has another SHA-256 than the server says");
+    return sink_.end_file(file_);
+  }
+
+  BackupSink& sink_;
+  bool first_ = true;
+  bool in_file_ = false;
+  BackupSize announced_;
+  BackupSize came_;  // files: those that ended
+  BackupPaths paths_;
+  BackupFile file_;
+  Sha256Hasher hasher_;
+};
+
+}  // namespace
+
+absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stub, BackupSink& sink,
+                                           absl::Time deadline) {
+  grpc::ClientContext context;
+  context.set_deadline(absl::ToChronoTime(deadline));
+  const auto reader = stub.Backup(&context, v1::BackupRequest());
+  Receiver receiver(sink);
+  v1::BackupResponse piece;
+  absl::Status taken;
+  while (taken.ok() && reader->Read(&piece)) taken = receiver.take(piece);
+  if (!taken.ok()) context.TryCancel();
+  const absl::Status end = to_absl_status(reader->Finish());
+  if (!taken.ok()) return taken;
+  if (!end.ok()) return end;
+  return receiver.finish();
+}
+
+}  // namespace locus::client
