@@ -21,6 +21,8 @@ void add_get_command(CLI::App& parent, Context& context);
 void add_render_command(CLI::App& parent, Context& context);
 void add_dump_command(CLI::App& parent, Context& context);
 void add_export_command(CLI::App& parent, Context& context);
+void add_backup_command(CLI::App& parent, Context& context);
+void add_restore_command(CLI::App& parent, Context& context);
 void add_demo_command(CLI::App& parent, Context& context);
 void add_run_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);

@@ -25,6 +25,7 @@ constexpr char kExamples[] = R"(Examples:
   locus -o csv query ray arena --from-csv rays.csv > hits.csv
   generator | locus move arena --from-ndjson -
   locus export arena arena.glb
+  locus backup arena-backup
   locus -a unix:/run/locus.sock health
   locus top
   locus config show --origin
@@ -108,7 +109,7 @@ void build_cli(CLI::App& app, Context& context) {
       ->type_name("ADDRESS")
       ->capture_default_str();
   app.add_option("--timeout", options.timeout_seconds,
-                 "Seconds for each call [10; 600 for uploads and changes of instances]")
+                 "Seconds for each call [10; 600 for uploads and changes of instances; a day for backups]")
       ->type_name("SECONDS")
       ->check(CLI::PositiveNumber);
   const NamedValues<Format> formats = {
@@ -133,6 +134,8 @@ void build_cli(CLI::App& app, Context& context) {
   add_render_command(app, context);
   add_dump_command(app, context);
   add_export_command(app, context);
+  add_backup_command(app, context);
+  add_restore_command(app, context);
   add_demo_command(app, context);
   add_top_command(app, context);
   add_limits_command(app, context);

@@ -26,6 +26,7 @@ ALLOWED = {
     "server/config": ["core/base"],
     "client/lib": ["proto"],
     "client/cli": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
+    "client/cli/backup": ["client/cli", "client/lib", "core/base"],
     "client/cli/demo": ["client/cli", "client/cli/generate", "client/cli/import", "client/lib", "core/geometry", "core/base"],
     "client/cli/completion": ["client/cli"],
     "client/cli/top": ["client/cli"],

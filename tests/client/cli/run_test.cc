@@ -71,6 +71,8 @@ TEST(HelpTest, EveryCommandExplainsItselfWithExamples) {
                                                           {"config", "show"},
                                                           {"dump"},
                                                           {"export"},
+                                                          {"backup"},
+                                                          {"restore"},
                                                           {"insert"},
                                                           {"move"},
                                                           {"remove"},

@@ -1,0 +1,51 @@
+#include <memory>
+#include <string>
+
+#include "client/cli/backup/backup_writer.h"
+#include "client/cli/backup/progress_line.h"
+#include "client/cli/commands.h"
+#include "client/cli/output.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+namespace {
+
+struct BackupOptions {
+  std::string directory;
+};
+
+absl::Status back_up(const BackupOptions& options, Context& context) {
+  PartialDirectory directory(options.directory, TargetRule::kNothing);
+  if (absl::Status checked = directory.check(); !checked.ok()) return checked;
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  ProgressLine line("backing up", context);
+  BackupWriter writer(directory, line.progress());
+  const absl::StatusOr<client::BackupSize> size = (*client)->backup(writer);
+  line.clear();
+  if (!size.ok()) return size.status();
+  if (absl::Status finished = writer.finish(); !finished.ok()) return finished;
+  Report report;
+  report.head = {{"directory", directory.target()}, {"files", size->files}, {"bytes", size->bytes}};
+  context.write(report);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void add_backup_command(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<BackupOptions>();
+  CLI::App& command = *parent.add_subcommand(
+      "backup", "Copy everything on the server's disk, as it is at one moment, while the server goes on");
+  command.footer(R"(Examples:
+  locus backup arena-backup
+  locus -a 10.0.0.5:7575 backup backups/$(date +%F)
+  cd arena-backup && sha256sum -c SHA256SUMS
+
+The directory appears once every file of it is here, proven and on this disk; until then it is DIRECTORY.partial.
+`locus restore` makes a data directory of it.)");
+  command.add_option("DIRECTORY", options->directory, "The directory to make")->required();
+  run_when_chosen(command, options, context, back_up);
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,42 @@
+#include "client/cli/backup/backup_writer.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace locus::cli {
+
+BackupWriter::BackupWriter(PartialDirectory& directory, BackupProgress progress)
+    : directory_(directory), progress_(std::move(progress)) {}
+
+absl::Status BackupWriter::begin(const client::BackupSize& announced) {
+  announced_ = announced;
+  return directory_.make(announced.bytes);
+}
+
+absl::Status BackupWriter::begin_file(const std::string& path) {
+  if (path == kChecksumFile)
+    return absl::DataLossError(
+        absl::StrCat("the server sent a file ", path, ", which a backup has for itself; is this a locus server?"));
+  return directory_.open_file(path);
+}
+
+absl::Status BackupWriter::add(absl::string_view bytes) {
+  came_ += bytes.size();
+  if (progress_) progress_(came_, announced_.bytes);
+  return directory_.write(bytes);
+}
+
+absl::Status BackupWriter::end_file(const client::BackupFile& file) {
+  checksums_.push_back({file.path, file.sha256});
+  return directory_.close_file();
+}
+
+absl::Status BackupWriter::finish() {
+  if (absl::Status opened = directory_.open_file(kChecksumFile); !opened.ok()) return opened;
+  if (absl::Status written = directory_.write(checksum_text(checksums_)); !written.ok()) return written;
+  if (absl::Status closed = directory_.close_file(); !closed.ok()) return closed;
+  return directory_.keep();
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,44 @@
+// Writes a server's backup to a directory, with its SHA256SUMS. For `locus backup`. Not thread-safe.
+#ifndef LOCUS_CLIENT_CLI_BACKUP_BACKUP_WRITER_H_
+#define LOCUS_CLIENT_CLI_BACKUP_BACKUP_WRITER_H_
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "client/cli/backup/checksums.h"
+#include "client/cli/backup/partial_directory.h"
+#include "client/lib/backup.h"
+
+namespace locus::cli {
+
+// Called now and then with the bytes done so far and the bytes in all.
+using BackupProgress = std::function<void(uint64_t done, uint64_t total)>;
+
+class BackupWriter final : public client::BackupSink {
+ public:
+  // Borrows the directory, which was not made yet.
+  BackupWriter(PartialDirectory& directory, BackupProgress progress);
+
+  absl::Status begin(const client::BackupSize& announced) override;
+  absl::Status begin_file(const std::string& path) override;
+  absl::Status add(absl::string_view bytes) override;
+  absl::Status end_file(const client::BackupFile& file) override;
+
+  // Once everything came: adds SHA256SUMS and gives the directory its name.
+  absl::Status finish();
+
+ private:
+  PartialDirectory& directory_;
+  const BackupProgress progress_;
+  client::BackupSize announced_;
+  uint64_t came_ = 0;
+  std::vector<Checksum> checksums_;
+};
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_BACKUP_BACKUP_WRITER_H_

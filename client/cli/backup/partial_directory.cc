@@ -1,0 +1,137 @@
+#include "client/cli/backup/partial_directory.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/backup/file_error.h"
+#include "core/base/check.h"
+
+namespace locus::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Only for whoever runs this: scenes may be secret.
+constexpr mode_t kFolderMode = 0700;
+constexpr mode_t kFileMode = 0600;
+
+// Without a slash at its end, so that a name can be added to.
+std::string absolute(const std::string& path) {
+  std::error_code why;
+  std::string text = fs::absolute(path, why).lexically_normal().string();
+  if (why || text.empty()) text = path;
+  while (text.size() > 1 && text.back() == '/') text.pop_back();
+  return text;
+}
+
+absl::Status sync_folder(const std::string& path) {
+  const int folder = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return file_error("open", path, errno);
+  const int failed = fsync(folder) == 0 ? 0 : errno;
+  close(folder);
+  return failed == 0 ? absl::OkStatus() : file_error("sync", path, failed);
+}
+
+absl::Status make_folder(const std::string& path) {
+  return mkdir(path.c_str(), kFolderMode) == 0 ? absl::OkStatus() : file_error("make", path, errno);
+}
+
+}  // namespace
+
+PartialDirectory::PartialDirectory(const std::string& target, TargetRule rule)
+    : target_(absolute(target)), partial_(target_ + ".partial"), rule_(rule) {}
+
+PartialDirectory::~PartialDirectory() {
+  if (file_ >= 0) close(file_);
+  std::error_code ignored;
+  if (made_) fs::remove_all(partial_, ignored);
+}
+
+absl::Status PartialDirectory::check() const {
+  std::error_code why;
+  const fs::file_status there = fs::symlink_status(target_, why);
+  if (fs::exists(there)) {
+    if (rule_ == TargetRule::kNothing)
+      return absl::FailedPreconditionError(absl::StrCat(target_, " is there already: choose another directory"));
+    if (!fs::is_directory(there) || !fs::is_empty(target_, why) || why)
+      return absl::FailedPreconditionError(absl::StrCat(
+          target_, " is no empty directory, and nothing is overwritten: choose another, or move this one away"));
+  }
+  if (fs::exists(fs::symlink_status(partial_, why)))
+    return absl::FailedPreconditionError(
+        absl::StrCat(partial_,
+                     " is there, left by an interrupted run or in use by another: remove it if nobody writes "
+                     "to it, or choose another directory"));
+  return absl::OkStatus();
+}
+
+absl::Status PartialDirectory::make(uint64_t bytes) {
+  if (absl::Status checked = check(); !checked.ok()) return checked;
+  if (absl::Status folder = make_folder(partial_); !folder.ok()) return folder;
+  made_ = true;
+  std::error_code why;
+  const fs::space_info space = fs::space(partial_, why);
+  if (!why && space.available < bytes)
+    return absl::ResourceExhaustedError(absl::StrCat(target_, " would take ", bytes, " bytes, its disk has room for ",
+                                                     space.available, ": free some of it, or choose another disk"));
+  return absl::OkStatus();
+}
+
+absl::Status PartialDirectory::make_folders_of(const std::string& path) {
+  for (size_t slash = path.find('/'); slash != std::string::npos; slash = path.find('/', slash + 1)) {
+    const std::string folder = path.substr(0, slash);
+    if (!folders_.insert(folder).second) continue;
+    if (absl::Status made = make_folder(absl::StrCat(partial_, "/", folder)); !made.ok()) return made;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PartialDirectory::open_file(const std::string& path) {
+  LOCUS_CHECK(made_);
+  LOCUS_CHECK(file_ < 0);
+  if (absl::Status folders = make_folders_of(path); !folders.ok()) return folders;
+  file_path_ = absl::StrCat(partial_, "/", path);
+  file_ = open(file_path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kFileMode);
+  return file_ >= 0 ? absl::OkStatus() : file_error("make", file_path_, errno);
+}
+
+absl::Status PartialDirectory::write(absl::string_view bytes) {
+  LOCUS_CHECK(file_ >= 0);
+  while (!bytes.empty()) {
+    const ssize_t some = ::write(file_, bytes.data(), bytes.size());
+    if (some < 0 && errno == EINTR) continue;
+    if (some < 0) return file_error("write", file_path_, errno);
+    bytes.remove_prefix(static_cast<size_t>(some));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PartialDirectory::close_file() {
+  LOCUS_CHECK(file_ >= 0);
+  const int failed = fsync(file_) == 0 ? 0 : errno;
+  close(file_);
+  file_ = -1;
+  return failed == 0 ? absl::OkStatus() : file_error("sync", file_path_, failed);
+}
+
+absl::Status PartialDirectory::keep() {
+  LOCUS_CHECK(made_);
+  LOCUS_CHECK(file_ < 0);
+  for (const std::string& folder : folders_) {
+    if (absl::Status synced = sync_folder(absl::StrCat(partial_, "/", folder)); !synced.ok()) return synced;
+  }
+  if (absl::Status synced = sync_folder(partial_); !synced.ok()) return synced;
+  // Takes the place of an empty directory, and of nothing else.
+  if (std::rename(partial_.c_str(), target_.c_str()) != 0) return file_error("make", target_, errno);
+  made_ = false;
+  return sync_folder(fs::path(target_).parent_path().string());
+}
+
+}  // namespace locus::cli

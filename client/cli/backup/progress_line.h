@@ -1,0 +1,40 @@
+// The line that says how far a backup is while it comes or is read, where lines that overwrite themselves make sense.
+#ifndef LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
+#define LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
+
+#include <ostream>
+#include <string>
+#include <utility>
+
+#include "client/cli/backup/backup_writer.h"
+#include "client/cli/context.h"
+
+namespace locus::cli {
+
+// Borrows the context, which outlives it and what it hands out.
+class ProgressLine {
+ public:
+  ProgressLine(std::string doing, Context& context) : doing_(std::move(doing)), context_(context) {}
+
+  // Empty where nobody looks.
+  BackupProgress progress() const {
+    if (context_.progress() != Progress::kLive) return {};
+    return [this](uint64_t done, uint64_t total) {
+      constexpr uint64_t kMebibyte = 1u << 20;
+      context_.err() << "\r\x1b[K" << doing_ << ": " << done / kMebibyte << " of " << total / kMebibyte << " MiB"
+                     << std::flush;
+    };
+  }
+
+  void clear() const {
+    if (context_.progress() == Progress::kLive) context_.err() << "\r\x1b[K" << std::flush;
+  }
+
+ private:
+  const std::string doing_;
+  Context& context_;
+};
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_

@@ -1,0 +1,67 @@
+#include <memory>
+#include <string>
+
+#include "client/cli/backup/progress_line.h"
+#include "client/cli/backup/read_backup.h"
+#include "client/cli/commands.h"
+#include "client/cli/output.h"
+
+namespace locus::cli {
+namespace {
+
+struct RestoreOptions {
+  std::string backup;
+  std::string data_dir;
+  bool verify_only = false;
+};
+
+absl::Status verify(const RestoreOptions& options, Context& context) {
+  ProgressLine line("verifying", context);
+  const absl::StatusOr<client::BackupSize> size = read_backup(options.backup, nullptr, line.progress());
+  line.clear();
+  if (!size.ok()) return size.status();
+  Report report;
+  report.head = {{"backup", options.backup}, {"files", size->files}, {"bytes", size->bytes}, {"whole", true}};
+  context.write(report);
+  return absl::OkStatus();
+}
+
+absl::Status restore(const RestoreOptions& options, Context& context) {
+  if (options.verify_only && !options.data_dir.empty())
+    return usage_error("--verify-only restores nothing: leave DATA_DIR out");
+  if (options.verify_only) return verify(options, context);
+  if (options.data_dir.empty()) return usage_error("give the DATA_DIR to restore into, or --verify-only");
+  PartialDirectory copy(options.data_dir, TargetRule::kNothingOrEmpty);
+  if (absl::Status checked = copy.check(); !checked.ok()) return checked;
+  ProgressLine line("restoring", context);
+  const absl::StatusOr<client::BackupSize> size = read_backup(options.backup, &copy, line.progress());
+  line.clear();
+  if (!size.ok()) return size.status();
+  if (absl::Status kept = copy.keep(); !kept.ok()) return kept;
+  Report report;
+  report.head = {{"data_dir", copy.target()}, {"files", size->files}, {"bytes", size->bytes}};
+  context.write(report);
+  context.err() << "next: `locusd check " << copy.target() << "`, then `locusd --data-dir " << copy.target()
+                << "`; where the daemon runs as another user, give it the directory first (chown -R)\n";
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void add_restore_command(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<RestoreOptions>();
+  CLI::App& command =
+      *parent.add_subcommand("restore", "Make a data directory for locusd from a backup; needs no server");
+  command.footer(R"(Examples:
+  locus restore arena-backup new-data
+  locusd check new-data && locusd --data-dir new-data
+  locus restore arena-backup --verify-only
+
+Every file is proven by SHA256SUMS. DATA_DIR must be new or empty, and appears once everything in it is on the disk.)");
+  command.add_option("BACKUP", options->backup, "A directory that `locus backup` made")->required();
+  command.add_option("DATA_DIR", options->data_dir, "The data directory to make");
+  command.add_flag("--verify-only", options->verify_only, "Only prove that the backup is whole");
+  run_when_chosen(command, options, context, restore);
+}
+
+}  // namespace locus::cli
