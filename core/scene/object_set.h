@@ -46,6 +46,12 @@ class ObjectSet {
     });
   }
 
+  // The same from a cursor on, which it moves, until fn is false: to be gone on with.
+  template <class Fn>
+  void for_each_from(GridCursor& cursor, const Fn& fn) const {
+    grid_.for_each_from(cursor, [&fn](const GridRef& value) { return fn(object_of(value)); });
+  }
+
   // As SpatialIndex asks.
   template <RayVisitor<Object> Visitor>
   void visit_ray(const SlabRay<double>& ray, Visitor& visitor, Work& work) const {

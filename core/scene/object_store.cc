@@ -106,6 +106,28 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   return grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
 }
 
+bool ObjectStore::fill(std::vector<std::vector<Object>> pieces, double cell_size) {
+  LOCUS_CHECK_EQ(next_handle_, 0u);
+  size_t count = 0;
+  for (const std::vector<Object>& piece : pieces) count += piece.size();
+  handles_.fit(count);
+  std::vector<GridItem> items;
+  items.reserve(count);
+  for (std::vector<Object>& piece : pieces) {
+    for (size_t i = 0; i < piece.size(); ++i) {
+      if (i + kAhead < piece.size()) handles_.prefetch(piece[i + kAhead].id);
+      const uint32_t handle = new_handle();
+      if (!handles_.set(piece[i].id, handle)) return false;
+      if (moves_ != nullptr) moves_->born(handle);
+      items.push_back(grid_item_of(piece[i], handle));
+    }
+    std::vector<Object>().swap(piece);
+  }
+  grid_.fill(items, cell_size);
+  handles_.take_replaced_bytes();
+  return true;
+}
+
 bool ObjectStore::remove(const Object& object) {
   const std::optional<Object> known = find(object.id);
   if (!known) return false;

@@ -55,6 +55,9 @@ class ObjectStore {
   // Returns as apply().
   size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
+  // The first objects of a store, all at once, in cells of about that size; `pieces` are gone after. False where an id
+  // occurs twice: then the store is of no use any more.
+  bool fill(std::vector<std::vector<Object>> pieces, double cell_size);
   // False, and no change, when contains() is false.
   bool remove(const Object& object);
 

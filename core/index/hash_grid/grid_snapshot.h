@@ -50,6 +50,12 @@ KeyRange within_brick(const KeyRange& range, const GridKey& brick);
 
 }  // namespace internal
 
+// How far a walk through a snapshot has come; of no meaning to another snapshot.
+struct GridCursor {
+  size_t brick = 0;
+  size_t values = 0;  // of that brick that are done with
+};
+
 class GridSnapshot {
  public:
   GridSnapshot() = default;
@@ -57,6 +63,8 @@ class GridSnapshot {
                internal::BrickNumbers bricks_by_handle, double cell_size);
 
   size_t size() const { return size_; }
+  // Of the base level.
+  double cell_size() const { return cell_size_; }
 
   // visit(GridRef) for every value whose bounds overlap `region`, and for others near it; false ends the visit.
   template <class Visit>
@@ -86,6 +94,10 @@ class GridSnapshot {
   // visit(GridRef) for each value, until it returns false, which is then returned.
   template <class Visit>
   bool for_each(const Visit& visit) const;
+  // The same for those from the cursor on, which it moves beyond each that is visited: so that a long walk can be made
+  // in steps. O(visited values, and a look at those of the brick where it goes on).
+  template <class Visit>
+  bool for_each_from(GridCursor& cursor, const Visit& visit) const;
 
   // The value of a handle that is in use here. O(values in its brick).
   GridRef at(uint32_t handle) const;
@@ -348,6 +360,22 @@ bool GridSnapshot::for_each(const Visit& visit) const {
   for (const internal::GridLevel& level : levels_) {
     const bool go_on =
         level.table->for_each([&](uint32_t number) { return internal::for_each_value(*bricks_[number], visit); });
+    if (!go_on) return false;
+  }
+  return true;
+}
+
+template <class Visit>
+bool GridSnapshot::for_each_from(GridCursor& cursor, const Visit& visit) const {
+  for (; cursor.brick < bricks_.size(); cursor = {cursor.brick + 1, 0}) {
+    const internal::Brick* const brick = bricks_[cursor.brick].get();
+    if (brick == nullptr) continue;
+    size_t number = 0;
+    const bool go_on = internal::for_each_value(*brick, [&](const GridRef& value) {
+      if (number++ < cursor.values) return true;
+      ++cursor.values;
+      return visit(value);
+    });
     if (!go_on) return false;
   }
   return true;

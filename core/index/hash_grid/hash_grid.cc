@@ -293,6 +293,14 @@ size_t HashGrid::apply(const GridBatch& batch) {
   return replaced_bytes_;
 }
 
+void HashGrid::fill(absl::Span<const GridItem> items, double cell_size) {
+  LOCUS_CHECK_EQ(size_, 0u);
+  base_exponent_ = internal::exponent_covering(cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent);
+  if (items.size() >= first_choice_) size_at_choice_ = items.size();
+  changes_since_choice_ = 0;
+  apply_to_bricks({{}, {}, items});
+}
+
 bool HashGrid::choice_is_stale() const {
   return size_ >= first_choice_ && (size_ >= 2 * size_at_choice_ || size_ <= size_at_choice_ / 8 ||
                                     changes_since_choice_ >= kChangesPerLook * size_);

@@ -52,6 +52,10 @@ class HashGrid {
   // Returns the bytes of what the snapshots so far hold and later ones will not. O(n) and the bricks that are touched.
   size_t apply(const GridBatch& batch);
 
+  // The first values of a grid, as another grid had them whose cell_size() is given: it fits, and is not chosen again
+  // until it would be anyway.
+  void fill(absl::Span<const GridItem> items, double cell_size);
+
   // visit(GridRef) for each value, until it returns false. O(size).
   template <class Visit>
   void for_each(const Visit& visit) const {
