@@ -16,6 +16,7 @@ std::shared_ptr<const HistoryRecord> record_of(const HistoryRecord& record, cons
 
 void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last,
                             uint64_t next_tick) {
+  has_past_ = true;
   History next;
   if (history_ != nullptr) {
     next = *history_;
@@ -35,6 +36,7 @@ void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displ
 }
 
 void HistoryRecorder::drop() {
+  has_past_ = false;
   if (history_ != nullptr) dropped_bytes_ += history_->bytes;
   history_ = nullptr;
 }

@@ -49,6 +49,10 @@ class HistoryRecorder {
   // What the present is now, so that memory is counted for the last record, too. Once after close().
   void measure(const ObjectSet& now);
   void drop();
+  // Whether a tick ended since drop(), kept or not: unlike what is kept, which goes by memory, this says the same for
+  // the same batches at any time.
+  bool has_past() const { return has_past_; }
+  void set_has_past(bool has_past) { has_past_ = has_past; }
   // Of all records so far that are not kept any more.
   uint64_t dropped_bytes() const { return dropped_bytes_; }
   // Nothing that is only in records below this tick is kept.
@@ -61,6 +65,7 @@ class HistoryRecorder {
   HistoryOptions options_;
   HistoryPtr history_;
   bool measured_ = true;
+  bool has_past_ = false;
   uint64_t dropped_bytes_ = 0;
 };
 

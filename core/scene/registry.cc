@@ -1,11 +1,16 @@
 #include "core/scene/registry.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/scene/mesh_codec.h"
+#include "core/scene/spec_codec.h"
+#include "core/scene/state_writer.h"
 
 namespace locus {
 namespace {
@@ -43,51 +48,97 @@ absl::Status check_mesh_name(absl::string_view name, absl::string_view field) {
   return refuse_argument(Reason::kMalformed, field, {}, "a mesh's name has 1 to 63 printable characters, no spaces");
 }
 
-absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string& name, const SceneSpec& spec,
-                                                              uint64_t epoch, const std::string& static_from,
-                                                              bool if_absent) {
-  if (absl::Status status = check_scene_name(name, "name"); !status.ok()) return status;
+absl::StatusOr<Registry::Beginning> Registry::begin_scene(const std::string& name, const std::string& static_from,
+                                                          bool if_absent) const {
   const MutexLock lock(mutex_);
+  if (const auto damaged = damaged_scenes_.find(name); damaged != damaged_scenes_.end()) return damaged->second.damage;
   if (const auto known = scenes_.find(name); known != scenes_.end()) {
-    if (if_absent) return CreatedScene{known->second, true};
+    if (if_absent) return Beginning{known->second, nullptr};
     return refuse_name(absl::StatusCode::kAlreadyExists, Reason::kAlreadyExists, "name",
                        absl::StrCat("scene ", name, " exists; choose another name or set if_absent"));
   }
   if (scenes_.size() >= limits::kMaxScenes)
     return refuse_full("name", "scenes", limits::kMaxScenes, static_cast<double>(scenes_.size() + 1), 0);
-  std::shared_ptr<const StaticSet> statics = StaticSet::empty();
-  if (!static_from.empty()) {
-    const auto source = scenes_.find(static_from);
-    if (source == scenes_.end())
-      return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "spec.static_from",
-                         absl::StrCat("no scene is called ", static_from));
-    statics = source->second->latest()->statics;
+  if (static_from.empty()) return Beginning{nullptr, StaticSet::empty()};
+  if (const auto damaged = damaged_scenes_.find(static_from); damaged != damaged_scenes_.end())
+    return damaged->second.damage;
+  const auto source = scenes_.find(static_from);
+  if (source == scenes_.end())
+    return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "spec.static_from",
+                       absl::StrCat("no scene is called ", static_from));
+  return Beginning{nullptr, source->second->latest()->statics};
+}
+
+absl::StatusOr<ScenePtr> Registry::log_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
+                                             std::shared_ptr<const StaticSet> statics) {
+  SceneWriter writer(epoch, spec.winding, std::move(statics), limits::kMaxObjects, spec.history);
+  SceneLog on;
+  if (log_ != nullptr) {
+    FrozenScene beginning;
+    beginning.snapshot = writer.published();
+    StateWriter state(std::move(beginning));
+    absl::StatusOr<SceneKey> key =
+        log_->create_scene(name, encode_spec(spec), epoch, [&state] { return state.next(); });
+    if (!key.ok()) return key.status();
+    on = {log_, *key, ack_level(spec.durability), {}};
   }
-  auto scene = std::make_shared<Scene>(name, spec, epoch, std::move(statics));
-  scenes_.emplace(name, scene);
-  return CreatedScene{std::move(scene), false};
+  return std::make_shared<Scene>(name, spec, std::move(writer), on);
+}
+
+// Others of the name, and deletions of meshes that `static_from` uses, wait for changes_mutex_ meanwhile.
+absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string& name, const SceneSpec& spec,
+                                                              uint64_t epoch, const std::string& static_from,
+                                                              bool if_absent) {
+  if (absl::Status status = check_scene_name(name, "name"); !status.ok()) return status;
+  const MutexLock change(changes_mutex_);
+  absl::StatusOr<Beginning> beginning = begin_scene(name, static_from, if_absent);
+  if (!beginning.ok()) return beginning.status();
+  if (beginning->existing != nullptr) return CreatedScene{std::move(beginning->existing), true};
+  absl::StatusOr<ScenePtr> scene = log_scene(name, spec, epoch, std::move(beginning->statics));
+  if (!scene.ok()) return scene.status();
+  put_in(*scene);
+  return CreatedScene{*std::move(scene), false};
+}
+
+void Registry::put_in(const ScenePtr& scene) {
+  if (log_ != nullptr) scene->check_meshes([this](const StaticMesh* mesh) { return is_kept(mesh); });
+  const MutexLock lock(mutex_);
+  scenes_.emplace(scene->name(), scene);
 }
 
 absl::StatusOr<ScenePtr> Registry::find_scene(const std::string& name) const {
   const MutexLock lock(mutex_);
   const auto known = scenes_.find(name);
   if (known != scenes_.end()) return known->second;
+  if (const auto damaged = damaged_scenes_.find(name); damaged != damaged_scenes_.end()) return damaged->second.damage;
   return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "scene",
                      absl::StrCat("no scene is called '", name, "'; create it first"));
 }
 
+std::optional<SceneKey> Registry::damaged_scene(const std::string& name) const {
+  const MutexLock lock(mutex_);
+  const auto damaged = damaged_scenes_.find(name);
+  return damaged == damaged_scenes_.end() ? std::nullopt : std::optional<SceneKey>(damaged->second.key);
+}
+
+absl::Status Registry::delete_damaged_scene(const std::string& name, SceneKey key) {
+  if (absl::Status status = log_->delete_scene(key); !status.ok()) return status;
+  const MutexLock lock(mutex_);
+  damaged_scenes_.erase(name);
+  return absl::OkStatus();
+}
+
 absl::Status Registry::delete_scene(const std::string& name) {
-  ScenePtr scene;
-  {
-    const MutexLock lock(mutex_);
-    const auto known = scenes_.find(name);
-    if (known == scenes_.end())
-      return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "name",
-                         absl::StrCat("no scene is called '", name, "'"));
-    scene = std::move(known->second);
-    scenes_.erase(known);
-  }
-  scene->close();
+  const MutexLock change(changes_mutex_);
+  if (const std::optional<SceneKey> key = damaged_scene(name)) return delete_damaged_scene(name, *key);
+  absl::StatusOr<ScenePtr> scene = find_scene(name);
+  if (!scene.ok())
+    return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "name",
+                       absl::StrCat("no scene is called '", name, "'"));
+  // Meanwhile it is found, and closed once its deletion is logged.
+  if (absl::Status status = (*scene)->remove(); !status.ok()) return status;
+  const MutexLock lock(mutex_);
+  scenes_.erase(name);
   return absl::OkStatus();
 }
 
@@ -119,13 +170,14 @@ absl::StatusOr<MeshPtr> Registry::find_mesh(const std::string& name, absl::strin
   const MutexLock lock(mutex_);
   const auto known = meshes_.find(name);
   if (known != meshes_.end()) return known->second;
+  if (const auto damaged = damaged_meshes_.find(name); damaged != damaged_meshes_.end()) return damaged->second;
   return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, field,
                      absl::StrCat("no mesh is called '", name, "'; upload it first"));
 }
 
-absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh) {
-  if (absl::Status status = check_mesh_name(name, "mesh"); !status.ok()) return status;
+absl::StatusOr<MeshPtr> Registry::begin_mesh(const std::string& name, MeshPtr& mesh) const {
   const MutexLock lock(mutex_);
+  if (const auto damaged = damaged_meshes_.find(name); damaged != damaged_meshes_.end()) return damaged->second;
   if (const auto known = meshes_.find(name); known != meshes_.end()) {
     if (known->second->sha256() == mesh->sha256()) return known->second;
     return refuse_name(absl::StatusCode::kAlreadyExists, Reason::kAlreadyExists, "mesh",
@@ -134,6 +186,23 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
   if (meshes_.size() >= limits::kMaxMeshes)
     return refuse_full("mesh", "meshes", limits::kMaxMeshes, static_cast<double>(meshes_.size() + 1), 0);
   if (MeshPtr equal = content(mesh->sha256()); equal != nullptr) mesh = std::move(equal);
+  return MeshPtr();
+}
+
+absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh) {
+  if (absl::Status status = check_mesh_name(name, "mesh"); !status.ok()) return status;
+  const MutexLock change(changes_mutex_);
+  absl::StatusOr<MeshPtr> known = begin_mesh(name, mesh);
+  if (!known.ok() || *known != nullptr) return known;
+  if (log_ != nullptr) {
+    std::optional<MeshWriter> content;  // made only if it is asked for
+    const auto next = [&]() -> absl::StatusOr<std::optional<std::string>> {
+      if (!content) content.emplace(mesh);
+      return content->next();
+    };
+    if (absl::Status status = log_->add_mesh(name, mesh->sha256(), next); !status.ok()) return status;
+  }
+  const MutexLock lock(mutex_);
   meshes_.emplace(name, mesh);
   return mesh;
 }
@@ -144,22 +213,67 @@ uint32_t Registry::count_uses(const StaticMesh* mesh) const {
   return uses;
 }
 
-absl::Status Registry::delete_mesh(const std::string& name) {
+absl::StatusOr<MeshPtr> Registry::take_mesh(const std::string& name) {
   const MutexLock lock(mutex_);
+  if (damaged_meshes_.contains(name)) return MeshPtr();
   const auto known = meshes_.find(name);
   if (known == meshes_.end())
     return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "mesh",
                        absl::StrCat("no mesh is called '", name, "'"));
-  if (const uint32_t uses = count_uses(known->second.get()); uses > 0) {
+  const StaticMesh* mesh = known->second.get();
+  const bool in_use =
+      std::any_of(scenes_.begin(), scenes_.end(), [mesh](const auto& entry) { return entry.second->in_use(mesh); });
+  if (in_use) {
+    const uint32_t uses = count_uses(mesh);
     Refusal refusal;
     refusal.reason = Reason::kInUse;
     refusal.field = "mesh";
     refusal.asked = uses;
     return refuse(absl::StatusCode::kFailedPrecondition,
-                  absl::StrCat("mesh ", name, " is used by ", uses, " instances; remove them first"), refusal);
+                  uses > 0 ? absl::StrCat("mesh ", name, " is used by ", uses, " instances; remove them first")
+                           : absl::StrCat("mesh ", name, " is being placed; try again once that is done"),
+                  refusal);
   }
+  MeshPtr taken = std::move(known->second);
   meshes_.erase(known);
-  return absl::OkStatus();
+  return taken;
+}
+
+// The name goes first, so that no scene begins to use the mesh while the log forgets it, and comes back if it cannot.
+absl::Status Registry::delete_mesh(const std::string& name) {
+  const MutexLock change(changes_mutex_);
+  absl::StatusOr<MeshPtr> taken = take_mesh(name);
+  if (!taken.ok()) return taken.status();
+  const absl::Status status = log_ == nullptr ? absl::OkStatus() : log_->delete_mesh(name);
+  const MutexLock lock(mutex_);
+  if (*taken == nullptr && status.ok()) damaged_meshes_.erase(name);
+  if (*taken != nullptr && !status.ok()) meshes_.emplace(name, *std::move(taken));
+  return status;
+}
+
+bool Registry::is_kept(const StaticMesh* mesh) const {
+  const MutexLock lock(mutex_);
+  return content(mesh->sha256()).get() == mesh;
+}
+
+void Registry::restore_scene(const ScenePtr& scene) { put_in(scene); }
+
+void Registry::restore_mesh(const std::string& name, MeshPtr mesh) {
+  const MutexLock lock(mutex_);
+  if (MeshPtr equal = content(mesh->sha256()); equal != nullptr) mesh = std::move(equal);
+  meshes_.emplace(name, std::move(mesh));
+}
+
+void Registry::restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) {
+  LOCUS_CHECK(log_ != nullptr && !damage.ok());
+  const MutexLock lock(mutex_);
+  damaged_scenes_.emplace(name, DamagedScene{key, damage});
+}
+
+void Registry::restore_damaged_mesh(const std::string& name, const absl::Status& damage) {
+  LOCUS_CHECK(log_ != nullptr && !damage.ok());
+  const MutexLock lock(mutex_);
+  damaged_meshes_.emplace(name, damage);
 }
 
 std::vector<Registry::NamedMesh> Registry::list_meshes(const std::string& after, size_t limit) const {

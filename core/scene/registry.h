@@ -1,16 +1,20 @@
-// What a server hosts: scenes by name, and meshes by name and by content. Scenes keep the meshes they use alive.
+// What a server hosts: scenes by name, and meshes by name and by content. Scenes keep the meshes they use alive. With a
+// log, what is created is there once it is logged, and what is deleted is gone once that is.
 //
-// Threads: every member may be called from any thread; none waits for a build or a writer. The registry's lock is taken
-// before a scene's.
+// Threads: every member may be called from any thread. Those that change something are serialised and wait for the log,
+// delete_scene() for a batch at work, too; all others wait for nothing. changes_mutex_ is taken before a scene's locks,
+// mutex_ only to look something up or to put it in, before a scene's lock for readers.
 #ifndef LOCUS_CORE_SCENE_REGISTRY_H_
 #define LOCUS_CORE_SCENE_REGISTRY_H_
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/scene/scene.h"
+#include "core/scene/update_log.h"
 
 namespace locus {
 
@@ -24,16 +28,22 @@ absl::Status check_mesh_name(absl::string_view name, absl::string_view field);
 
 class Registry {
  public:
+  // `log`, where there is one, outlives the registry and its scenes. The registry outlives the changes of its scenes.
+  explicit Registry(UpdateLog* log = nullptr) : log_(log) {}
+
   struct CreatedScene {
     ScenePtr scene;
     bool existed = false;
   };
-  // ALREADY_EXISTS unless `if_absent`; NOT_FOUND when `static_from` (may be empty) does not exist.
+  // ALREADY_EXISTS unless `if_absent`; NOT_FOUND when `static_from` (may be empty) does not exist; DATA_LOSS where a
+  // damaged scene has the name; or the log's error.
   absl::StatusOr<CreatedScene> create_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
-                                            const std::string& static_from, bool if_absent) LOCUS_EXCLUDES(mutex_);
+                                            const std::string& static_from, bool if_absent)
+      LOCUS_EXCLUDES(changes_mutex_, mutex_);
+  // DATA_LOSS for one that is damaged.
   absl::StatusOr<ScenePtr> find_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
-  // Closes and forgets it: waiters get NOT_FOUND.
-  absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(mutex_);
+  // Closes and forgets it, damaged or not: waiters get NOT_FOUND. After the log's error it goes on.
+  absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
   // In name order, after `after` (exclusive), at most `limit`.
   std::vector<ScenePtr> list_scenes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
   size_t scene_count() const LOCUS_EXCLUDES(mutex_);
@@ -43,9 +53,9 @@ class Registry {
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
   // Puts `mesh` under `name`, or the mesh of the same content that is there under any name, so that equal content is
   // held once; returns the one that counts. Other content under a known name is ALREADY_EXISTS.
-  absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
-  // FAILED_PRECONDITION IN_USE with the count while instances of any scene use it.
-  absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
+  absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(changes_mutex_, mutex_);
+  // FAILED_PRECONDITION IN_USE with the count while instances of any scene use it, or are about to.
+  absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
   struct NamedMesh {
     std::string name;
     MeshPtr mesh;
@@ -56,13 +66,48 @@ class Registry {
   // Instances of `mesh` in all scenes, under whichever of its names it was placed.
   uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
+  // What the log had when it was opened: see core/scene/recovery.h. Each name once; meshes first, so that scenes find
+  // them by find_content(), which holds equal content once.
+  void restore_scene(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
+  void restore_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
+  // A scene or a mesh that cannot be believed: its name answers with `damage`, DATA_LOSS, until it is deleted.
+  void restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
+  void restore_damaged_mesh(const std::string& name, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
+
  private:
+  struct DamagedScene {
+    SceneKey key;
+    absl::Status damage;
+  };
+  // What a new scene begins with, or why there can be none; the scene that is there already.
+  struct Beginning {
+    ScenePtr existing;
+    std::shared_ptr<const StaticSet> statics;
+  };
+  absl::StatusOr<Beginning> begin_scene(const std::string& name, const std::string& static_from, bool if_absent) const
+      LOCUS_EXCLUDES(mutex_);
+  absl::StatusOr<ScenePtr> log_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
+                                     std::shared_ptr<const StaticSet> statics) LOCUS_REQUIRES(changes_mutex_);
+  void put_in(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
+  // The damaged scene's key, where there is one of that name.
+  std::optional<SceneKey> damaged_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
+  absl::Status delete_damaged_scene(const std::string& name, SceneKey key) LOCUS_REQUIRES(changes_mutex_)
+      LOCUS_EXCLUDES(mutex_);
+  // The mesh that is under `name` already, or null where `mesh` may come to be there, which may become another.
+  absl::StatusOr<MeshPtr> begin_mesh(const std::string& name, MeshPtr& mesh) const LOCUS_EXCLUDES(mutex_);
+  // The mesh's name is gone; what was there, null for one that is damaged.
+  absl::StatusOr<MeshPtr> take_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
+  bool is_kept(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
   uint32_t count_uses(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
   MeshPtr content(const Sha256& sha256) const LOCUS_REQUIRES(mutex_);
 
+  UpdateLog* const log_;
+  Mutex changes_mutex_;  // one change at a time
   mutable Mutex mutex_;
   std::map<std::string, ScenePtr> scenes_ LOCUS_GUARDED_BY(mutex_);
+  std::map<std::string, DamagedScene> damaged_scenes_ LOCUS_GUARDED_BY(mutex_);
   std::map<std::string, MeshPtr> meshes_ LOCUS_GUARDED_BY(mutex_);
+  std::map<std::string, absl::Status> damaged_meshes_ LOCUS_GUARDED_BY(mutex_);
 };
 
 }  // namespace locus

@@ -64,14 +64,41 @@ absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id)
                          absl::StrCat("the id ", id, " was taken by an object meanwhile"));
 }
 
+absl::Status mesh_is_gone(const StaticChange& change, size_t list) {
+  Refusal refusal;
+  refusal.reason = Reason::kNotFound;
+  refusal.field = absl::StrCat("place[", list, "].mesh");
+  return refuse(absl::StatusCode::kNotFound,
+                absl::StrCat("mesh ", change.place[list].mesh->name(), " was deleted meanwhile; upload it again"),
+                refusal);
+}
+
+// Those of right form; an entry for each, which says what is wrong with the others.
+std::vector<const UpdateBatch*> good_ones(absl::Span<const UpdateBatch* const> batches, Scene::Acks& acks) {
+  std::vector<const UpdateBatch*> good;
+  good.reserve(batches.size());
+  acks.reserve(batches.size());
+  for (const UpdateBatch* batch : batches) {
+    absl::Status form = check_form(*batch);
+    if (form.ok()) good.push_back(batch);
+    acks.push_back(form.ok() ? absl::StatusOr<UpdateAck>(UpdateAck()) : std::move(form));
+  }
+  return good;
+}
+
 }  // namespace
 
 Scene::Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics)
+    : Scene(std::move(name), spec,
+            SceneWriter(epoch, spec.winding, std::move(statics), limits::kMaxObjects, spec.history), SceneLog()) {}
+
+Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLog& log)
     : name_(std::move(name)),
       spec_(std::move(spec)),
-      writer_(epoch, spec_.winding, std::move(statics), limits::kMaxObjects, spec_.history),
+      writer_(std::move(writer)),
+      journal_(log),
       pins_(std::make_shared<PinLedger>(spec_.pinned_bytes)) {
-  LOCUS_CHECK_NE(epoch, uint64_t{0});
+  LOCUS_CHECK_NE(writer_.epoch(), uint64_t{0});
   latest_ = writer_.published();
   recent_.push_back(latest_);
 }
@@ -93,66 +120,119 @@ absl::Status Scene::wait_for_readers(Deadline until) const {
 }
 
 absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until) {
-  if (absl::Status status = check_form(batch); !status.ok()) return status;
+  const UpdateBatch* const one = &batch;
+  absl::StatusOr<Acks> acks = apply_each({&one, 1}, until);
+  if (!acks.ok()) return acks.status();
+  return std::move(acks->front());
+}
+
+// What the writer table can tell already is not logged. Once anything is, it may tell otherwise by then.
+absl::Status Scene::log_each(absl::Span<const UpdateBatch* const> batches) {
+  const WriterTable& writers = writer_.writers();
+  while (!batches.empty() && !writers.is_new(batches.front()->writer, batches.front()->batch)) batches.remove_prefix(1);
+  return journal_.append_each(writer_.epoch(), batches);
+}
+
+absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until) {
+  Acks acks;
+  const std::vector<const UpdateBatch*> good = good_ones(batches, acks);
+  if (good.empty()) return acks;
   while (true) {
     // Not under the writer's lock, where others could not wait for so long as they like.
     if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
     const MutexLock lock(writer_mutex_);
     if (absl::Status status = check_open(); !status.ok()) return status;
     if (pins_->over()) continue;  // through another batch meanwhile
-    absl::StatusOr<SceneWriter::Applied> applied = writer_.apply(batch);
-    if (!applied.ok()) return applied.status();
-    if (applied->snapshot != nullptr) publish(applied->snapshot);
-    return std::move(applied->ack);
+    if (absl::Status status = log_each(good); !status.ok()) return status;
+    // What is logged is applied, whatever happens.
+    auto next = good.begin();
+    for (absl::StatusOr<UpdateAck>& ack : acks) {
+      if (!ack.ok()) continue;
+      absl::StatusOr<SceneWriter::Applied> applied = writer_.apply(**next++);
+      if (applied.ok() && applied->snapshot != nullptr) publish(applied->snapshot);
+      if (applied.ok())
+        ack = std::move(applied->ack);
+      else
+        ack = applied.status();
+    }
+    return acks;
   }
 }
 
-absl::StatusOr<std::vector<absl::StatusOr<UpdateAck>>> Scene::apply_joined(absl::Span<const UpdateBatch* const> batches,
-                                                                           Deadline until) {
-  std::vector<absl::StatusOr<UpdateAck>> acks;
-  std::vector<const UpdateBatch*> good;
-  for (const UpdateBatch* batch : batches) {
-    absl::Status form = check_form(*batch);
-    if (form.ok()) good.push_back(batch);
-    acks.push_back(form.ok() ? absl::StatusOr<UpdateAck>(UpdateAck()) : std::move(form));
-  }
+absl::Status Scene::log_joined(absl::Span<const UpdateBatch* const> batches) {
+  // Where none is new, none becomes so through another.
+  const bool any_new = std::any_of(batches.begin(), batches.end(), [this](const UpdateBatch* batch) {
+    return writer_.writers().is_new(batch->writer, batch->batch);
+  });
+  return any_new ? journal_.append_joined(writer_.epoch(), batches) : absl::OkStatus();
+}
+
+absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* const> batches, Deadline until) {
+  Acks acks;
+  const std::vector<const UpdateBatch*> good = good_ones(batches, acks);
   while (true) {
     if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
     const MutexLock lock(writer_mutex_);
     if (absl::Status status = check_open(); !status.ok()) return status;
     if (pins_->over()) continue;
+    if (absl::Status status = log_joined(good); !status.ok()) return status;
     SceneWriter::Joined joined = writer_.apply_joined(good);
     if (joined.snapshot != nullptr) publish(joined.snapshot);
     auto next = joined.acks.begin();
     for (absl::StatusOr<UpdateAck>& ack : acks)
       if (ack.ok()) ack = std::move(*next++);
-    const auto applied = std::count_if(
-        acks.begin(), acks.end(), [](const absl::StatusOr<UpdateAck>& ack) { return ack.ok() && !ack->duplicate; });
-    const MutexLock counting(mutex_);
-    joined_updates_ += static_cast<uint64_t>(std::max<std::ptrdiff_t>(applied, 1) - 1);
+    count_joined(acks);
     return acks;
   }
 }
 
-absl::Status Scene::admit_change() {
+void Scene::count_joined(const Acks& acks) {
+  const auto applied = std::count_if(acks.begin(), acks.end(),
+                                     [](const absl::StatusOr<UpdateAck>& ack) { return ack.ok() && !ack->duplicate; });
+  const MutexLock lock(mutex_);
+  joined_updates_ += static_cast<uint64_t>(std::max<std::ptrdiff_t>(applied, 1) - 1);
+}
+
+absl::Status Scene::admit_change(const StaticChange& change) {
   const MutexLock lock(mutex_);
   if (closed_) return closed_status();
   if (pending_changes_ >= limits::kMaxPendingChanges)
     return refuse_full("scene", "pending_changes", limits::kMaxPendingChanges, pending_changes_ + 1.0, 100);
   ++pending_changes_;
+  for (const PlacementColumns& place : change.place) meshes_to_place_.push_back(place.mesh.get());
+  return absl::OkStatus();
+}
+
+void Scene::leave_change(const StaticChange& change, const absl::Status& result) {
+  const MutexLock lock(mutex_);
+  --pending_changes_;
+  for (const PlacementColumns& place : change.place)
+    meshes_to_place_.erase(std::find(meshes_to_place_.begin(), meshes_to_place_.end(), place.mesh.get()));
+  if (!result.ok()) last_build_error_ = std::string(result.message());
+}
+
+bool Scene::in_use(const StaticMesh* mesh) const {
+  const MutexLock lock(mutex_);
+  return latest_->statics->uses(mesh) > 0 ||
+         std::find(meshes_to_place_.begin(), meshes_to_place_.end(), mesh) != meshes_to_place_.end();
+}
+
+absl::Status Scene::check_kept(const StaticChange& change) const {
+  for (size_t i = 0; is_kept_ != nullptr && i < change.place.size(); ++i)
+    if (!is_kept_(change.place[i].mesh.get())) return mesh_is_gone(change, i);
   return absl::OkStatus();
 }
 
 absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& change) {
-  if (absl::Status status = admit_change(); !status.ok()) return status;
-  absl::StatusOr<InstanceChange> result;
-  {
+  if (absl::Status status = admit_change(change); !status.ok()) return status;
+  absl::StatusOr<InstanceChange> result = InstanceChange();
+  if (absl::Status kept = check_kept(change); !kept.ok()) {
+    result = std::move(kept);
+  } else {
     const MutexLock change_lock(change_mutex_);
     result = build_and_publish(change);
   }
-  const MutexLock lock(mutex_);
-  --pending_changes_;
-  if (!result.ok()) last_build_error_ = std::string(result.status().message());
+  leave_change(change, result.status());
   return result;
 }
 
@@ -168,6 +248,8 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
   // Objects inserted while the tree was being built may have taken an id.
   for (size_t i = 0; i < changed->placed.size(); ++i)
     if (writer_.is_object(changed->placed[i])) return taken_meanwhile(change, i, changed->placed[i]);
+  if (absl::Status status = journal_.append_change(writer_.epoch(), change, changed->placed); !status.ok())
+    return status;
   SnapshotPtr snapshot = writer_.replace_statics(std::move(changed->set));
   InstanceChange result{std::move(changed->placed), snapshot->revision, snapshot->epoch};
   publish(snapshot);
@@ -262,6 +344,20 @@ void Scene::close() {
   pins_->close();
   published_.notify_all();
   tell_watches(std::numeric_limits<uint64_t>::max());
+}
+
+absl::Status Scene::remove() {
+  const MutexLock lock(writer_mutex_);  // so that nothing is logged or acknowledged after
+  if (absl::Status status = check_open(); !status.ok()) return status;
+  if (absl::Status status = journal_.remove(); !status.ok()) return status;
+  close();
+  return absl::OkStatus();
+}
+
+FrozenScene Scene::freeze() {
+  const MutexLock lock(writer_mutex_);
+  return {writer_.published(), writer_.writers(), writer_.has_past(), journal_.position().sequence,
+          journal_.total_bytes()};
 }
 
 SceneStatus Scene::status() const {

@@ -10,62 +10,38 @@
 #include "core/scene/batch_application.h"
 
 namespace locus {
-namespace {
-
-absl::Status gap(uint64_t expected, uint64_t batch) {
-  Refusal refusal;
-  refusal.reason = Reason::kBatchGap;
-  refusal.field = "batch";
-  refusal.limit_value = static_cast<double>(expected);
-  refusal.asked = static_cast<double>(batch);
-  return refuse(absl::StatusCode::kFailedPrecondition,
-                absl::StrCat("the next batch of this writer is ", expected, ", not ", batch,
-                             expected == 1 ? "; unknown writers start at 1" : "; send what is missing first"),
-                refusal);
-}
-
-}  // namespace
-
-absl::StatusOr<std::optional<UpdateAck>> WriterTable::admit(uint64_t writer, uint64_t batch) const {
-  if (writer == 0) return std::optional<UpdateAck>();
-  const auto known = writers_.find(writer);
-  const uint64_t last = known == writers_.end() ? 0 : known->second.batch;
-  if (batch == last + 1) return std::optional<UpdateAck>();
-  if (batch > last) return gap(last + 1, batch);
-  UpdateAck ack;
-  if (batch == last) ack = known->second.ack;
-  ack.duplicate = true;
-  return std::optional<UpdateAck>(std::move(ack));
-}
-
-void WriterTable::record(uint64_t writer, uint64_t batch, const UpdateAck& ack) {
-  if (writer == 0) return;
-  if (writers_.size() >= limits::kMaxWriters && !writers_.contains(writer)) forget_oldest();
-  Last& last = writers_[writer];
-  kept_errors_ -= last.ack.errors.size();
-  if (kept_errors_ + ack.errors.size() > kMaxKeptErrors) forget_acks();
-  kept_errors_ += ack.errors.size();
-  last = {batch, ++clock_, ack};
-}
-
-void WriterTable::forget_oldest() {
-  const auto oldest = std::min_element(writers_.begin(), writers_.end(),
-                                       [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; });
-  kept_errors_ -= oldest->second.ack.errors.size();
-  writers_.erase(oldest);
-}
-
-// The numbers stay, so that no batch is applied twice.
-void WriterTable::forget_acks() {
-  for (auto& [writer, last] : writers_) last.ack = {};
-  kept_errors_ = 0;
-}
 
 SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics, size_t max_objects,
                          const HistoryOptions& history)
     : epoch_(epoch), max_objects_(max_objects), winding_(winding), statics_(std::move(statics)), recorder_(history) {
   if (recorder_.on()) objects_.follow_lives();
   published_ = freeze();
+}
+
+absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding winding, const HistoryOptions& history) {
+  SceneWriter writer(state.epoch, winding, std::move(state.statics), limits::kMaxObjects, history);
+  if (!writer.objects_.fill(std::move(state.objects), state.cell_size))
+    return absl::DataLossError("two objects have one id");
+  for (const Instance& instance : writer.statics_->tree().values())
+    if (writer.is_object(instance.id))
+      return absl::DataLossError(absl::StrCat("the id ", instance.id, " is an object's and an instance's"));
+  writer.revision_ = state.revision;
+  writer.tick_ = state.tick;
+  writer.writers_ = std::move(state.writers);
+  writer.recorder_.set_has_past(state.has_past);
+  writer.published_ = writer.freeze();
+  return writer;
+}
+
+void SceneWriter::end_replay() {
+  make_pending_moves();
+  replaying_ = false;
+  published_ = freeze();
+}
+
+void SceneWriter::restart(uint64_t epoch) {
+  epoch_ = epoch;
+  if (!replaying_) published_ = freeze();
 }
 
 SnapshotPtr SceneWriter::freeze() {
@@ -79,7 +55,7 @@ SnapshotPtr SceneWriter::freeze() {
 
 SnapshotPtr SceneWriter::next_revision() {
   ++revision_;
-  published_ = freeze();
+  published_ = sees_nobody() ? nullptr : freeze();
   return published_;
 }
 
@@ -134,6 +110,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatch& batch) {
   Applied result;
+  make_pending_moves();
   BatchApplication application(objects_, *statics_, batch, recorder_.on() ? Lives::kTold : Lives::kAlike);
   application.run();
   if (application.object_count() > max_objects_)
@@ -176,11 +153,22 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
   return joined;
 }
 
+bool SceneWriter::make_moves() {
+  if (sees_nobody()) return pending_moves_.add(moves_.moves(), objects_);
+  if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves());
+  return moves_.changes();
+}
+
+void SceneWriter::make_pending_moves() {
+  if (!pending_moves_.empty()) objects_.move(pending_moves_.moves());
+  pending_moves_.clear();
+}
+
 SnapshotPtr SceneWriter::commit_moves(const UpdateBatch& batch) {
   Applied all;
   start_tick(batch);
-  if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves());
-  commit(batch, moves_.changes(), all);
+  const bool changes = make_moves();
+  commit(batch, changes, all);
   moves_.clear();
   return std::move(all.snapshot);
 }

@@ -5,51 +5,28 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 #include "core/base/limits.h"
 #include "core/scene/batch_application.h"
 #include "core/scene/move_application.h"
 #include "core/scene/object_store.h"
+#include "core/scene/pending_moves.h"
 #include "core/scene/scene_snapshot.h"
+#include "core/scene/scene_state.h"
 #include "core/scene/update_batch.h"
+#include "core/scene/writer_table.h"
 
 namespace locus {
-
-// What each known writer sent last, so that a batch sent twice is applied once. Bounded: the writer heard longest ago
-// is forgotten first, and its next batch is refused rather than risked. Old acks go earlier if they list too many
-// errors.
-class WriterTable {
- public:
-  // Item errors listed by all acks that are kept.
-  static constexpr size_t kMaxKeptErrors = size_t{64} * limits::kMaxListedItemErrors;
-
-  // Nothing if the batch is new and next in order; the old ack (or one marked duplicate) if it was applied before;
-  // FAILED_PRECONDITION BATCH_GAP if a batch before it is missing.
-  absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
-  void record(uint64_t writer, uint64_t batch, const UpdateAck& ack);
-
- private:
-  struct Last {
-    uint64_t batch = 0;
-    uint64_t heard = 0;
-    UpdateAck ack;
-  };
-  void forget_oldest();
-  void forget_acks();
-
-  absl::flat_hash_map<uint64_t, Last> writers_;
-  uint64_t clock_ = 0;
-  size_t kept_errors_ = 0;  // of all acks in writers_
-};
 
 class SceneWriter {
  public:
   SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics,
               size_t max_objects = limits::kMaxObjects, const HistoryOptions& history = {});
+
+  // A writer that goes on from `state`: DATA_LOSS where an id occurs twice in it.
+  static absl::StatusOr<SceneWriter> restore(SceneState state, Winding winding, const HistoryOptions& history);
 
   struct Applied {
     UpdateAck ack;
@@ -69,8 +46,19 @@ class SceneWriter {
   // The next revision with other statics.
   SnapshotPtr replace_statics(std::shared_ptr<const StaticSet> statics);
 
+  // From here on nobody asks for snapshots, and none are made, until end_replay(): apply() and the others tell of none,
+  // and published() says nothing.
+  void begin_replay() { replaying_ = true; }
+  void end_replay();
+  // From now on revisions are of another epoch. They go on being counted.
+  void restart(uint64_t epoch);
+
   // The revision reached so far.
   const SnapshotPtr& published() const { return published_; }
+  uint64_t epoch() const { return epoch_; }
+  const WriterTable& writers() const { return writers_; }
+  // Whether restarting ticks forgets anything, and so makes a revision.
+  bool has_past() const { return recorder_.has_past(); }
 
   bool is_object(Id id) const { return objects_.handle(id) != ObjectStore::kNoHandle; }
   const std::shared_ptr<const StaticSet>& statics() const { return statics_; }
@@ -85,13 +73,19 @@ class SceneWriter {
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
   // What the moves at hand come to, at the tick of `batch`; null when that is nothing.
   SnapshotPtr commit_moves(const UpdateBatch& batch);
+  // Whether snapshots can wait: what was published is what the past is made of.
+  bool sees_nobody() const { return replaying_ && !recorder_.on(); }
+  // Makes the moves at hand; whether they change anything.
+  bool make_moves();
+  // Makes those that were put off.
+  void make_pending_moves();
   // Where an applied batch became visible, into its ack, which is remembered.
   void settle(const UpdateBatch& batch, UpdateAck& ack);
   // Of a batch that was applied before.
   UpdateAck old_ack(const UpdateBatch& batch) const;
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
   // Whether the batch drops anything of the past.
-  bool forgets(const UpdateBatch& batch) const { return batch.restart_ticks && recorder_.history() != nullptr; }
+  bool forgets(const UpdateBatch& batch) const { return batch.restart_ticks && has_past(); }
   uint64_t tick_of(const UpdateBatch& batch) const;
   // What the batch means to the past, before anything of it is applied: the end of the tick before, or of all.
   void start_tick(const UpdateBatch& batch);
@@ -106,9 +100,11 @@ class SceneWriter {
   std::shared_ptr<const StaticSet> statics_;
   ObjectStore objects_;
   MoveApplication moves_;
+  PendingMoves pending_moves_;  // put off; only where sees_nobody()
   WriterTable writers_;
   HistoryRecorder recorder_;
   uint64_t replaced_bytes_ = 0;  // of objects and statics so far
+  bool replaying_ = false;
   SnapshotPtr published_;
 };
 

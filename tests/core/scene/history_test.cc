@@ -114,6 +114,18 @@ TEST_F(HistoryTest, RestartingAtTheSameTickForgetsTooAndIsARevision) {
   EXPECT_EQ(scene.apply(restart)->revision, before + 1);
 }
 
+// Whatever room there was: what a batch does goes by batches alone, so that a log of them does the same again.
+TEST_F(HistoryTest, RestartingIsARevisionEvenWhereNothingCouldBeKept) {
+  Scene scene("scene", spec(100, 1), 1, StaticSet::empty());
+  live(scene, 5);
+  EXPECT_EQ(recorded(scene), 0u);
+  UpdateBatch restart;
+  restart.restart_ticks = true;
+  const uint64_t before = scene.latest()->revision;
+  EXPECT_EQ(scene.apply(restart)->revision, before + 1);
+  EXPECT_EQ(scene.apply(restart)->revision, before + 1);
+}
+
 TEST_F(HistoryTest, ARefusedBatchEndsNoTick) {
   Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 5);

@@ -301,6 +301,44 @@ TEST(HashGridTest, AHitEndsTheMarchThroughWhatLiesBehindIt) {
   EXPECT_LT(to_the_hit.cells * 4, all_the_way.cells);
 }
 
+TEST(HashGridTest, AWalkGoesOnWhereItStoppedHoweverManyValuesABrickHas) {
+  ObjectGrid grid;
+  grid.apply({}, crowd(3000, 50, 1, 1));
+  const ObjectSet set = grid.snapshot();
+  Random random(2);
+  GridCursor cursor;
+  std::vector<Id> ids;
+  for (bool all = false; !all;) {
+    uint64_t most = 1 + random.below(700);
+    all = set.grid().for_each_from(cursor, [&](const GridRef& value) {
+      ids.push_back(value.entry().id);
+      return --most > 0;
+    });
+  }
+  std::vector<Id> at_once;
+  set.for_each([&](const Object& object) { at_once.push_back(object.id); });
+  std::sort(ids.begin(), ids.end());
+  std::sort(at_once.begin(), at_once.end());
+  EXPECT_EQ(ids, at_once);
+}
+
+TEST(HashGridTest, AGridThatIsFilledAsAnotherWasHasItsCells) {
+  HashGrid chosen, filled;
+  std::vector<GridItem> items;
+  for (const Object& object : crowd(5000, 500, 1, 1)) items.push_back(grid_item_of(object, uint32_t(items.size())));
+  chosen.apply({{}, {}, items});
+  std::vector<GridItem> in_order;
+  chosen.for_each([&](const GridRef& value) {
+    in_order.push_back(value.item());
+    return true;
+  });
+  filled.fill(in_order, chosen.cell_size());
+  EXPECT_EQ(filled.cell_size(), chosen.cell_size());
+  EXPECT_EQ(filled.size(), chosen.size());
+  EXPECT_EQ(filled.snapshot().statistics().bricks, chosen.snapshot().statistics().bricks);
+  EXPECT_EQ(filled.snapshot().cell_size(), chosen.cell_size());
+}
+
 TEST(HashGridDeathTest, RemovingWhatIsNotThereIsAProgrammersError) {
   ObjectGrid grid;
   grid.insert(ball(1, {1, 1, 1}, 1));

@@ -1,0 +1,196 @@
+#include "core/scene/recovery.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <set>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "core/scene/mesh_codec.h"
+#include "core/scene/record_codec.h"
+#include "core/scene/spec_codec.h"
+
+namespace locus {
+namespace {
+
+constexpr uint64_t kRecordsPerReport = 64;
+
+std::string hex(const Sha256& sha256) {
+  return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
+}
+
+// `what` in front of the message.
+absl::Status named(absl::string_view what, const absl::Status& status) {
+  return status.ok() ? status : absl::Status(status.code(), absl::StrCat(what, ": ", status.message()));
+}
+
+// Finds meshes. For one that is not there it gives another in its place: its instances may have gone, and the mesh been
+// deleted, later than what is being made again.
+class Meshes {
+ public:
+  explicit Meshes(const FindMesh& find) : find_(find) {}
+
+  MeshPtr operator()(const Sha256& sha256) {
+    MeshPtr& mesh = known_[sha256];
+    if (mesh == nullptr) mesh = find_(sha256);
+    if (mesh == nullptr) mesh = stand_in(sha256);
+    return mesh;
+  }
+
+  // That all which are used are there.
+  absl::Status check(const StaticSet& statics) const {
+    for (const MeshPtr& mesh : stand_ins_)
+      if (statics.uses(mesh.get()) > 0)
+        return data_loss(
+            absl::StrCat("the mesh of content ", hex(mesh->sha256()), " is not there, but instances use it"));
+    return absl::OkStatus();
+  }
+
+ private:
+  MeshPtr stand_in(const Sha256& sha256) {
+    absl::StatusOr<TriangleMesh> triangle = TriangleMesh::create({0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 1, 2}, {});
+    LOCUS_CHECK(triangle.ok());
+    absl::StatusOr<MeshPtr> mesh = StaticMesh::build("", sha256, *std::move(triangle));
+    LOCUS_CHECK(mesh.ok());
+    stand_ins_.push_back(*mesh);
+    return *mesh;
+  }
+
+  const FindMesh& find_;
+  std::map<Sha256, MeshPtr> known_;
+  std::vector<MeshPtr> stand_ins_;
+};
+
+// Applies records one after another to the state of a snapshot.
+class Replay {
+ public:
+  Replay(const StoredScene& stored, SceneWriter& writer, Meshes& meshes, const RecoveryProgress& progress)
+      : stored_(stored), writer_(writer), meshes_(meshes), progress_(progress), last_(stored.snapshot_sequence) {}
+
+  absl::Status apply(const LogRecord& record) {
+    if (record.sequence != last_ + 1)
+      return data_loss(absl::StrCat("record ", record.sequence, " follows record ", last_));
+    absl::Status status = go_to_epoch(record.entry.epoch);
+    absl::StatusOr<Record> decoded = Record::decode(record.entry.bytes);
+    if (status.ok()) status = decoded.status();
+    if (status.ok()) status = apply(decoded->content());
+    if (!status.ok()) return named(absl::StrCat("record ", record.sequence), status);
+    last_ = record.sequence;
+    if (progress_ != nullptr && (done() % kRecordsPerReport == 0 || last_ == stored_.last_sequence))
+      progress_(done(), stored_.last_sequence - stored_.snapshot_sequence);
+    return absl::OkStatus();
+  }
+
+  // That all records came, and the log's epoch.
+  absl::Status finish() {
+    if (last_ != stored_.last_sequence)
+      return data_loss(absl::StrCat("records ", last_ + 1, " to ", stored_.last_sequence, " are not there"));
+    return go_to_epoch(stored_.epoch);
+  }
+
+ private:
+  uint64_t done() const { return last_ - stored_.snapshot_sequence; }
+
+  // One that was left does not come back.
+  absl::Status go_to_epoch(uint64_t epoch) {
+    if (epoch == writer_.epoch()) return absl::OkStatus();
+    left_.insert(writer_.epoch());
+    if (epoch == 0 || left_.contains(epoch))
+      return data_loss(absl::StrCat("epoch ", epoch, " follows epoch ", writer_.epoch()));
+    writer_.restart(epoch);
+    return absl::OkStatus();
+  }
+
+  // What was refused then is refused again: such a record has no effect.
+  absl::Status apply(Record::Content& content) {
+    if (const auto* batch = std::get_if<UpdateBatch>(&content); batch != nullptr) {
+      writer_.apply(*batch).IgnoreError();
+      return absl::OkStatus();
+    }
+    if (const auto* joined = std::get_if<Record::Joined>(&content); joined != nullptr) {
+      std::vector<const UpdateBatch*> batches;
+      for (const UpdateBatch& batch : joined->batches) batches.push_back(&batch);
+      writer_.apply_joined(batches);
+      return absl::OkStatus();
+    }
+    return apply(std::get<Record::Change>(content));
+  }
+
+  absl::Status apply(Record::Change& change) {
+    for (size_t i = 0; i < change.meshes.size(); ++i) change.change.place[i].mesh = meshes_(change.meshes[i]);
+    const auto is_object = [this](Id id) { return writer_.is_object(id); };
+    absl::StatusOr<StaticSet::Changed> changed = writer_.statics()->apply(change.change, is_object, 0);
+    // It was found right before it was written.
+    if (!changed.ok()) return data_loss(absl::StrCat("the change is wrong: ", changed.status().message()));
+    writer_.replace_statics(std::move(changed->set));
+    return absl::OkStatus();
+  }
+
+  const StoredScene& stored_;
+  SceneWriter& writer_;
+  Meshes& meshes_;
+  const RecoveryProgress& progress_;
+  uint64_t last_;
+  std::set<uint64_t> left_;
+};
+
+absl::StatusOr<SceneWriter> read_snapshot(const UpdateLog& log, SceneKey key, const SceneSpec& spec, Meshes& meshes) {
+  StateReader reader;
+  absl::Status status = log.read_snapshot(key, [&reader](absl::string_view chunk) { return reader.add(chunk); });
+  if (!status.ok()) return named("snapshot", status);
+  absl::StatusOr<SceneState> state =
+      std::move(reader).finish([&meshes](const Sha256& sha256) { return meshes(sha256); });
+  if (!state.ok()) return named("snapshot", state.status());
+  absl::StatusOr<SceneWriter> writer = SceneWriter::restore(*std::move(state), spec.winding, spec.history);
+  if (!writer.ok()) return named("snapshot", writer.status());
+  return writer;
+}
+
+absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
+                                 const RecoveryProgress& progress) {
+  if (!stored.damage.ok()) return stored.damage;
+  absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
+  if (!spec.ok()) return named("specification", spec.status());
+  Meshes meshes(find_mesh);
+  absl::StatusOr<SceneWriter> writer = read_snapshot(log, stored.key, *spec, meshes);
+  if (!writer.ok()) return writer.status();
+  writer->begin_replay();
+  Replay replay(stored, *writer, meshes, progress);
+  const auto apply = [&replay](const LogRecord& record) { return replay.apply(record); };
+  if (absl::Status status = log.read(stored.key, stored.snapshot_sequence + 1, apply); !status.ok()) return status;
+  if (absl::Status status = replay.finish(); !status.ok()) return status;
+  if (absl::Status status = meshes.check(*writer->statics()); !status.ok()) return status;
+  writer->end_replay();
+  const AckLevel level = ack_level(spec->durability);
+  const SceneLog on{&log, stored.key, level, {stored.last_sequence, stored.snapshot_sequence, stored.log_bytes}};
+  return std::make_shared<Scene>(stored.name, *std::move(spec), *std::move(writer), on);
+}
+
+}  // namespace
+
+absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
+                                       const RecoveryProgress& progress) {
+  absl::StatusOr<ScenePtr> scene = recover(log, stored, find_mesh, progress);
+  if (!scene.ok()) return named(absl::StrCat("scene ", stored.name), scene.status());
+  return scene;
+}
+
+absl::StatusOr<MeshPtr> recover_mesh(const UpdateLog& log, const StoredMesh& stored, const BvhOptions& options) {
+  const std::string name = absl::StrCat("mesh ", stored.name);
+  if (!stored.damage.ok()) return named(name, stored.damage);
+  MeshReader reader;
+  absl::Status status = log.read_mesh(stored.sha256, [&reader](absl::string_view chunk) { return reader.add(chunk); });
+  if (!status.ok()) return named(name, status);
+  absl::StatusOr<TriangleMesh> columns = std::move(reader).finish();
+  if (!columns.ok()) return named(name, columns.status());
+  absl::StatusOr<MeshPtr> mesh = StaticMesh::build(stored.name, stored.sha256, *std::move(columns), options);
+  if (!mesh.ok()) return named(name, mesh.status());
+  return mesh;
+}
+
+}  // namespace locus

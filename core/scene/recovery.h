@@ -1,0 +1,35 @@
+// Makes scenes and meshes again from what a log has of them: the state of a snapshot, and after it every record,
+// applied as it was before. DATA_LOSS names the scene or the mesh and says what is wrong with it; other errors are the
+// log's.
+//
+// What has passed is not recorded: a scene that was made again can be asked about the past from its snapshot on.
+// Plain functions; any thread, several scenes at a time.
+#ifndef LOCUS_CORE_SCENE_RECOVERY_H_
+#define LOCUS_CORE_SCENE_RECOVERY_H_
+
+#include <cstdint>
+#include <functional>
+
+#include "absl/status/statusor.h"
+#include "core/index/bvh/bvh_build.h"
+#include "core/scene/registry.h"
+#include "core/scene/state_reader.h"
+#include "core/scene/update_log.h"
+
+namespace locus {
+
+// How many records of how many were applied; from time to time.
+using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
+
+// The scene as it was when its last record was written, in the epoch that the log has of it. It goes on appending to
+// `log`, which outlives it. `find_mesh` is asked for each mesh that was ever used since the snapshot: only those that
+// still are used need to be there.
+absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
+                                       const RecoveryProgress& progress = nullptr);
+
+// Builds the tree anew.
+absl::StatusOr<MeshPtr> recover_mesh(const UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_RECOVERY_H_

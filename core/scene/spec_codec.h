@@ -1,0 +1,19 @@
+// A scene's specification as bytes, for its log. Plain functions; any thread.
+#ifndef LOCUS_CORE_SCENE_SPEC_CODEC_H_
+#define LOCUS_CORE_SCENE_SPEC_CODEC_H_
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "core/scene/scene.h"
+
+namespace locus {
+
+std::string encode_spec(const SceneSpec& spec);
+// DATA_LOSS saying what is wrong with the bytes.
+absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_SPEC_CODEC_H_

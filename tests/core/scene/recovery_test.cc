@@ -1,0 +1,184 @@
+#include "core/scene/recovery.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/support/recovery_lockstep.h"
+#include "tests/support/scene_fixture.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+TEST(RecoveryTest, AScenePutTogetherAgainIsTheOneThatAppliedWhatTheLogHas) {
+  uint64_t crashes = 0, lost = 0, turned_up = 0;
+  for (uint64_t seed = 0; seed < scaled_count(60); ++seed) {
+    RecoveryLockstep lockstep(seed);
+    ASSERT_EQ(lockstep.run(300), "") << "seed " << seed;
+    crashes += lockstep.crashes();
+    lost += lockstep.lost();
+    turned_up += lockstep.turned_up();
+  }
+  EXPECT_LT(scaled_count(60), crashes);
+  EXPECT_NE(lost, 0u);
+  EXPECT_NE(turned_up, 0u);
+}
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class RecoverTest : public SceneFixture {
+ protected:
+  RecoverTest() {
+    EXPECT_TRUE(registry_.add_mesh("m", mesh_).ok());
+    logged_ = registry_.create_scene("arena", {}, kEpoch, "", false)->scene;
+  }
+
+  MemoryLog::KeptScene& stored(MemoryLog::Kept& kept) { return kept.scenes.begin()->second; }
+
+  absl::StatusOr<ScenePtr> recover(const MemoryLog::Kept& kept, const RecoveryProgress& progress = nullptr) {
+    again_ = std::make_unique<MemoryLog>(kept);
+    return recover_scene(*again_, again_->stored_scenes().front(), find_, progress);
+  }
+  // What recovery says of damage, which is always DATA_LOSS.
+  std::string message(const MemoryLog::Kept& kept) {
+    const absl::Status status = recover(kept).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << status;
+    return std::string(status.message());
+  }
+
+  void apply(const UpdateBatch& batch) { ASSERT_TRUE(logged_->apply(batch).ok()); }
+
+  MemoryLog log_;
+  Registry registry_{&log_};
+  ScenePtr logged_;
+  std::unique_ptr<MemoryLog> again_;
+  FindMesh find_ = [this](const Sha256& sha256) { return sha256 == mesh_->sha256() ? mesh_ : nullptr; };
+};
+
+TEST_F(RecoverTest, ARecordThatIsMissingIsSeen) {
+  for (Id id = 1; id <= 3; ++id) apply(with(points({id}, {0, 0, 0})));
+  MemoryLog::Kept kept = log_.crash();
+  MemoryLog fewer(kept);
+  StoredScene promised = fewer.stored_scenes().front();
+  promised.last_sequence = 5;
+  EXPECT_EQ(recover_scene(fewer, promised, find_).status(),
+            absl::DataLossError("scene arena: records 4 to 5 are not there"));
+}
+
+// Gives records with a hole, as no log may.
+class HoleyLog : public MemoryLog {
+ public:
+  using MemoryLog::MemoryLog;
+  absl::Status read(SceneKey key, uint64_t from, RecordSink sink) const override {
+    return MemoryLog::read(
+        key, from, [&](const LogRecord& record) { return record.sequence == 2 ? absl::OkStatus() : sink(record); });
+  }
+};
+
+TEST_F(RecoverTest, AHoleInTheRecordsIsSeen) {
+  for (Id id = 1; id <= 3; ++id) apply(with(points({id}, {0, 0, 0})));
+  HoleyLog holey(log_.crash());
+  EXPECT_EQ(recover_scene(holey, holey.stored_scenes().front(), find_).status(),
+            absl::DataLossError("scene arena: record 3 follows record 1"));
+}
+
+TEST_F(RecoverTest, DamagedRecordsSnapshotsAndSpecificationsAreNamed) {
+  apply(with(points({1}, {0, 0, 0})));
+  const MemoryLog::Kept kept = log_.crash();
+  MemoryLog::Kept wrong = kept;
+  stored(wrong).records[0].bytes = std::make_shared<std::string>("short");
+  EXPECT_EQ(message(wrong), "scene arena: record 1: the kind is cut off");
+  wrong = kept;
+  stored(wrong).snapshot.clear();
+  EXPECT_EQ(message(wrong), "scene arena: snapshot: the header is not there");
+  wrong = kept;
+  stored(wrong).spec = "";
+  EXPECT_EQ(message(wrong), "scene arena: specification: the kind is cut off");
+}
+
+TEST_F(RecoverTest, WhatTheLogFoundDamagedIsNotLookedAt) {
+  MemoryLog again(log_.crash());
+  StoredScene damaged = again.stored_scenes().front();
+  damaged.damage = absl::DataLossError("a file is gone");
+  EXPECT_EQ(recover_scene(again, damaged, find_).status(), absl::DataLossError("scene arena: a file is gone"));
+  StoredMesh mesh = again.stored_meshes().front();
+  mesh.damage = absl::DataLossError("a file is gone");
+  EXPECT_EQ(recover_mesh(again, mesh).status(), absl::DataLossError("mesh m: a file is gone"));
+}
+
+TEST_F(RecoverTest, ASceneOfWhichSomethingWasLostGoesOnInAnotherEpoch) {
+  const UpdateBatch insert = numbered(with(points({1}, {0, 0, 0})), 9, 1);
+  apply(insert);
+  ASSERT_TRUE(log_.restart_scene(logged_->log_key(), 99).ok());
+  const absl::StatusOr<ScenePtr> scene = recover(log_.crash());
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ((*scene)->latest()->epoch, 99u);
+  EXPECT_EQ((*scene)->latest()->revision, 1u);
+  EXPECT_EQ((*scene)->apply(insert)->epoch, kEpoch);
+  EXPECT_EQ((*scene)->apply(with(move_to({1}, {1, 0, 0})))->epoch, 99u);
+  const absl::StatusOr<ScenePtr> third = recover(again_->crash());
+  ASSERT_TRUE(third.ok()) << third.status();
+  EXPECT_EQ((*third)->latest()->epoch, 99u);
+  EXPECT_EQ((*third)->latest()->revision, 2u);
+}
+
+TEST_F(RecoverTest, AnEpochThatWasLeftDoesNotComeBack) {
+  for (Id id = 1; id <= 3; ++id) apply(with(points({id}, {0, 0, 0})));
+  MemoryLog::Kept kept = log_.crash();
+  stored(kept).records[1].epoch = 99;
+  EXPECT_EQ(message(kept), "scene arena: record 3: epoch 77 follows epoch 99");
+  stored(kept).records[2].epoch = 0;
+  EXPECT_EQ(message(kept), "scene arena: record 3: epoch 0 follows epoch 99");
+}
+
+TEST_F(RecoverTest, AMeshMayHaveGoneThatNothingUsesAnyMore) {
+  ASSERT_TRUE(logged_->change_instances(placing(placement({5}, {1, 2, 3}))).ok());
+  MemoryLog::Kept used = log_.crash();
+  StaticChange removal;
+  removal.remove_ids = columns_.ids({5});
+  ASSERT_TRUE(logged_->change_instances(removal).ok());
+  find_ = [](const Sha256&) { return nullptr; };
+  EXPECT_THAT(message(used), HasSubstr("scene arena: the mesh of content 0100"));
+  const absl::StatusOr<ScenePtr> scene = recover(log_.crash());
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ((*scene)->latest()->statics->size(), 0u);
+}
+
+TEST_F(RecoverTest, AStaticChangeThatDoesNotFitIsDamage) {
+  ASSERT_TRUE(logged_->change_instances(placing(placement({5}, {1, 2, 3}))).ok());
+  MemoryLog::Kept kept = log_.crash();
+  stored(kept).records.push_back(stored(kept).records[0]);
+  EXPECT_THAT(message(kept), HasSubstr("scene arena: record 2: the change is wrong"));
+}
+
+TEST_F(RecoverTest, ThePastReachesBackToTheSnapshot) {
+  SceneSpec spec;
+  spec.history = {50, uint64_t{1} << 30};
+  const ScenePtr remembering = registry_.create_scene("remembering", spec, kEpoch, "", false)->scene;
+  const auto go_to = [&](uint64_t tick) {
+    UpdateBatch batch = with(points({1}, {static_cast<float>(tick), 0, 0}));
+    batch.upsert = true;
+    batch.tick = tick;
+    ASSERT_TRUE(remembering->apply(batch).ok());
+  };
+  for (uint64_t tick = 1; tick <= 5; ++tick) go_to(tick);
+  const FrozenScene frozen = remembering->freeze();
+  StateWriter state(frozen);
+  ASSERT_TRUE(log_.write_snapshot(remembering->log_key(), 5, [&state] { return state.next(); }).ok());
+  for (uint64_t tick = 6; tick <= 8; ++tick) go_to(tick);
+  MemoryLog again(log_.crash());
+  const auto scene = recover_scene(again, again.stored_scenes()[1], find_);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ((*scene)->latest()->oldest_tick(), 5u);
+  EXPECT_EQ(find_moment(*(*scene)->latest(), {7, 0})->objects().find(1)->shape.position.x, 7);
+}
+
+TEST_F(RecoverTest, ProgressIsReported) {
+  for (Id id = 1; id <= 100; ++id) apply(with(points({id}, {0, 0, 0})));
+  std::vector<std::pair<uint64_t, uint64_t>> reports;
+  ASSERT_TRUE(recover(log_.crash(), [&](uint64_t applied, uint64_t of) { reports.emplace_back(applied, of); }).ok());
+  EXPECT_THAT(reports, ElementsAre(std::pair(64u, 100u), std::pair(100u, 100u)));
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,174 @@
+// A registry with a log: what is there after a restart is what was acknowledged.
+#include <gmock/gmock.h>
+
+#include <thread>
+
+#include "core/scene/recovery.h"
+#include "core/scene/registry.h"
+#include "tests/support/memory_log.h"
+#include "tests/support/scene_difference.h"
+#include "tests/support/scene_fixture.h"
+
+namespace locus::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Pair;
+
+class RegistryLogTest : public SceneFixture {
+ protected:
+  absl::StatusOr<Registry::CreatedScene> create(const std::string& name, const std::string& static_from = "") {
+    return registry_->create_scene(name, {}, kEpoch, static_from, false);
+  }
+
+  std::vector<std::string> scene_names() const {
+    std::vector<std::string> names;
+    for (const ScenePtr& scene : registry_->list_scenes("", 100)) names.push_back(scene->name());
+    return names;
+  }
+
+  // The machine stops and starts.
+  void restart() {
+    auto log = std::make_unique<MemoryLog>(log_->crash());
+    registry_ = std::make_unique<Registry>(log.get());
+    log_ = std::move(log);
+    for (const StoredMesh& stored : log_->stored_meshes()) {
+      const absl::StatusOr<MeshPtr> mesh = recover_mesh(*log_, stored);
+      ASSERT_TRUE(mesh.ok()) << mesh.status();
+      registry_->restore_mesh(stored.name, *mesh);
+    }
+    for (const StoredScene& stored : log_->stored_scenes()) {
+      const absl::StatusOr<ScenePtr> scene =
+          recover_scene(*log_, stored, [this](const Sha256& sha256) { return registry_->find_content(sha256); });
+      ASSERT_TRUE(scene.ok()) << scene.status();
+      registry_->restore_scene(*scene);
+    }
+  }
+
+  std::unique_ptr<MemoryLog> log_ = std::make_unique<MemoryLog>();
+  std::unique_ptr<Registry> registry_ = std::make_unique<Registry>(log_.get());
+};
+
+const absl::Status kFull = absl::ResourceExhaustedError("the disk is full");
+
+TEST_F(RegistryLogTest, ScenesMeshesAndWhatWasPlacedAreThereAfterARestart) {
+  ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
+  ASSERT_TRUE(registry_->add_mesh("alias", mesh_).ok());
+  const ScenePtr first = create("first")->scene;
+  ASSERT_TRUE(first->change_instances(placing(placement({5}, {1, 2, 3}))).ok());
+  const ScenePtr second = create("second", "first")->scene;
+  ASSERT_TRUE(second->apply(with(points({1}, {0, 0, 0}))).ok());
+  restart();
+  EXPECT_THAT(scene_names(), ElementsAre("first", "second"));
+  Random random(1);
+  EXPECT_EQ(scene_difference(**registry_->find_scene("first"), *first, random), "");
+  EXPECT_EQ(scene_difference(**registry_->find_scene("second"), *second, random), "");
+  const MeshPtr mesh = *registry_->find_mesh("m", "mesh");
+  EXPECT_EQ(mesh->triangle(0).b, mesh_->triangle(0).b);
+  EXPECT_EQ(*registry_->find_mesh("alias", "mesh"), mesh);
+  EXPECT_EQ(registry_->mesh_uses(mesh.get()), 2u);
+  EXPECT_EQ(registry_->delete_mesh("m").code(), absl::StatusCode::kFailedPrecondition);
+}
+
+TEST_F(RegistryLogTest, WhatWasDeletedStaysSo) {
+  ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
+  ASSERT_TRUE(create("gone").ok());
+  EXPECT_TRUE(registry_->delete_scene("gone").ok());
+  EXPECT_TRUE(registry_->delete_mesh("m").ok());
+  restart();
+  EXPECT_THAT(scene_names(), IsEmpty());
+  EXPECT_EQ(registry_->mesh_count(), 0u);
+}
+
+TEST_F(RegistryLogTest, WhereTheLogRefusesNothingHasChanged) {
+  ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
+  const ScenePtr scene = create("a")->scene;
+  log_->fail_with(kFull);
+  EXPECT_EQ(create("b").status(), kFull);
+  EXPECT_EQ(registry_->delete_scene("a"), kFull);
+  EXPECT_EQ(registry_->add_mesh("n", make_mesh("n", 2)).status(), kFull);
+  EXPECT_EQ(registry_->delete_mesh("m"), kFull);
+  EXPECT_THAT(scene_names(), ElementsAre("a"));
+  EXPECT_EQ(registry_->find_scene("b").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_FALSE(registry_->find_mesh("n", "mesh").ok());
+  EXPECT_EQ(*registry_->find_mesh("m", "mesh"), mesh_);
+  log_->fail_with(absl::OkStatus());
+  EXPECT_TRUE(scene->apply(with(points({1}, {0, 0, 0}))).ok());
+  EXPECT_TRUE(create("b").ok());
+}
+
+TEST_F(RegistryLogTest, OthersAreFoundWhileASceneIsCreated) {
+  const ScenePtr known = create("known")->scene;
+  log_->hold();
+  std::thread creator([this] { EXPECT_TRUE(create("new").ok()); });
+  log_->wait_for_writer();
+  EXPECT_EQ(*registry_->find_scene("known"), known);
+  EXPECT_EQ(registry_->find_scene("new").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(registry_->scene_count(), 1u);
+  log_->release();
+  creator.join();
+  EXPECT_TRUE(registry_->find_scene("new").ok());
+}
+
+TEST_F(RegistryLogTest, AMeshThatWasDeletedIsNotPlaced) {
+  ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
+  const ScenePtr scene = create("a")->scene;
+  ASSERT_TRUE(registry_->delete_mesh("m").ok());
+  expect_refusal(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status(), absl::StatusCode::kNotFound,
+                 Reason::kNotFound, "place[0].mesh");
+  // Nor is it once another of the same content came: uses are counted by the one that is kept.
+  ASSERT_TRUE(registry_->add_mesh("m", make_mesh("m", 1)).ok());
+  EXPECT_EQ(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(RegistryLogTest, AMeshThatIsBeingPlacedIsNotDeleted) {
+  ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
+  const ScenePtr scene = create("a")->scene;
+  log_->hold();
+  std::thread changer([&] { EXPECT_TRUE(scene->change_instances(placing(placement({5}, {0, 0, 0}))).ok()); });
+  log_->wait_for_writer();
+  const absl::Status status = registry_->delete_mesh("m");
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(status.message(), HasSubstr("is being placed"));
+  log_->release();
+  changer.join();
+  EXPECT_EQ(registry_->mesh_uses(mesh_.get()), 1u);
+}
+
+TEST_F(RegistryLogTest, ADamagedSceneAnswersWithItsDamageUntilItIsDeleted) {
+  ASSERT_TRUE(create("bad").ok());
+  const SceneKey key = (*registry_->find_scene("bad"))->log_key();
+  registry_ = std::make_unique<Registry>(log_.get());
+  const absl::Status damage = absl::DataLossError("scene bad: record 7 is cut off");
+  registry_->restore_damaged_scene("bad", key, damage);
+  EXPECT_EQ(registry_->find_scene("bad").status(), damage);
+  EXPECT_EQ(create("bad").status(), damage);
+  EXPECT_EQ(registry_->create_scene("bad", {}, 9, "", true).status(), damage);
+  EXPECT_EQ(create("other", "bad").status(), damage);
+  EXPECT_THAT(scene_names(), IsEmpty());
+  EXPECT_EQ(registry_->scene_count(), 0u);
+  log_->fail_with(kFull);
+  EXPECT_EQ(registry_->delete_scene("bad"), kFull);
+  EXPECT_EQ(registry_->find_scene("bad").status(), damage);
+  log_->fail_with(absl::OkStatus());
+  EXPECT_TRUE(registry_->delete_scene("bad").ok());
+  EXPECT_THAT(log_->crash().scenes, IsEmpty());
+  EXPECT_TRUE(create("bad").ok());
+}
+
+TEST_F(RegistryLogTest, ADamagedMeshAnswersWithItsDamageUntilItIsDeleted) {
+  ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
+  registry_ = std::make_unique<Registry>(log_.get());
+  const absl::Status damage = absl::DataLossError("mesh m: vertices is cut off");
+  registry_->restore_damaged_mesh("m", damage);
+  EXPECT_EQ(registry_->find_mesh("m", "mesh").status(), damage);
+  EXPECT_EQ(registry_->add_mesh("m", mesh_).status(), damage);
+  EXPECT_TRUE(registry_->delete_mesh("m").ok());
+  EXPECT_THAT(log_->crash().meshes, IsEmpty());
+  EXPECT_TRUE(registry_->add_mesh("m", mesh_).ok());
+}
+
+}  // namespace
+}  // namespace locus::test
