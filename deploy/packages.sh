@@ -25,7 +25,7 @@ TEXT
 # The compiler and what find_package and pkg-config look for.
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev
-  prometheus-cpp-dev libcivetweb-dev libcurl4-openssl-dev"
+  prometheus-cpp-dev libcivetweb-dev libcurl4-openssl-dev librocksdb-dev libxxhash-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
 # binutils gives nm to the house test; prometheus-client and yaml read what is made for Prometheus; zsh and fish run the
 # completions; groff and mandoc read the manual.
@@ -38,7 +38,7 @@ lint_packages="clang-tidy mypy"
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
 # The libraries that the programs name themselves; these bring their own.
 runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6
-  libprometheus-cpp-core1.0 libcivetweb1 libcurl4"
+  libprometheus-cpp-core1.0 libcivetweb1 libcurl4 librocksdb7.8 libxxhash0"
 
 action=install
 packages=

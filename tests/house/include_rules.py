@@ -53,6 +53,8 @@ THIRD_PARTY = {
     "spdlog/": ["server/observability"],
     "prometheus/": ["server/observability"],
     "civetweb.h": ["server/observability"],
+    "rocksdb/": ["server/storage"],
+    "xxhash.h": ["server/storage"],
     "curl/": ["client/cli/top"],
     "CLI/": ["server/config", "client/cli", "deploy/manual"],
     "nlohmann/": ["client/cli"],

@@ -1,0 +1,336 @@
+#include "server/storage/rocksdb_log.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "core/base/refusal.h"
+#include "rocksdb/utilities/checkpoint.h"
+#include "server/storage/bytes.h"
+#include "server/storage/errors.h"
+#include "server/storage/reading.h"
+
+namespace locus::server {
+namespace {
+
+constexpr auto kKeeperPause = std::chrono::milliseconds(100);  // between two looks at the disk
+constexpr uint64_t kBatchOverhead = 128;                       // of RocksDB, a record
+constexpr uint64_t kBytesBetweenLooks = uint64_t{8} << 20;
+constexpr uint64_t kRoomToRecover = uint64_t{1} << 20;
+
+// What stands after the last record that counts, from appends that failed.
+void drop_records_from(rocksdb::WriteBatch& batch, const Database& database, SceneKey scene, uint64_t sequence) {
+  LOCUS_CHECK(batch.DeleteRange(database.log(), log_key(scene, sequence), end_of(scene_prefix(scene))).ok());
+}
+
+absl::Status too_large(uint64_t bytes) {
+  return refuse_limit("entries", "record_bytes", static_cast<double>(UpdateLog::kMaxRecordBytes),
+                      static_cast<double>(bytes));
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<RocksdbLog>> RocksdbLog::open(const StorageOptions& options) {
+  const StorageOptions with_defaults = settled(options);
+  absl::StatusOr<OpenedDirectory> opened = open_directory(with_defaults);
+  if (!opened.ok()) return opened.status();
+  std::unique_ptr<RocksdbLog> log(new RocksdbLog(with_defaults, *std::move(opened)));
+  if (absl::Status begun = log->begin(); !begun.ok()) return begun;
+  return log;
+}
+
+RocksdbLog::RocksdbLog(const StorageOptions& options, OpenedDirectory opened)
+    : options_(options),
+      lock_(std::move(opened.lock)),
+      database_(std::move(opened.database)),
+      findings_(std::move(opened.findings)),
+      closed_in_order_(opened.high_water.closed),
+      high_water_file_(std::move(opened.high_water_file)),
+      high_water_(std::move(opened.high_water)) {}
+
+RocksdbLog::~RocksdbLog() {
+  if (!keeper_.joinable()) return;  // it never began
+  {
+    MutexLock lock(keeper_mutex_);
+    ended_ = true;
+    keeper_wakes_.notify_all();
+  }
+  keeper_.join();
+  const auto written = scenes_.written();
+  const bool in_order = database_->sync().ok();
+  if (in_order) scenes_.on_disk(written);
+  write_high_water(in_order);
+}
+
+void RocksdbLog::list_stored() {
+  for (const SceneFinding& found : findings_.scenes) {
+    StoredScene& stored = stored_scenes_.emplace_back();
+    auto place = std::make_shared<SceneState>();
+    place->key = stored.key = found.key;
+    place->name = stored.name = found.name;
+    stored.last_sequence = found.last;
+    stored.log_bytes = found.log_bytes;
+    if (found.row) {
+      stored.spec = found.row->spec;
+      place->epoch = stored.epoch = found.row->epoch;
+      stored.snapshot_sequence = found.row->snapshot_sequence;
+    }
+    if (!found.damage.empty()) {
+      stored.damage = absl::DataLossError(
+          absl::StrCat("scene '", found.name, "' is damaged: ", found.damage, remedy(options_.path)));
+      place->damage = stored.damage;
+      place->damage_found = found.damage;
+    }
+    place->row_seal = found.row_seal;
+    place->written = {found.last, found.chain};
+    place->synced = place->written;  // all that is there was synced before it was read
+    // What must be there stays what it was where it is not.
+    if (found.last < found.promised) place->synced.sequence = place->written.sequence = found.promised;
+    scenes_.add(std::move(place));
+  }
+  std::sort(stored_scenes_.begin(), stored_scenes_.end(),
+            [](const StoredScene& a, const StoredScene& b) { return a.name < b.name; });
+  for (const MeshFinding& found : findings_.meshes) {
+    StoredMesh& stored = stored_meshes_.emplace_back();
+    stored.name = found.name;
+    stored.sha256 = found.sha256;
+    if (!found.damage.empty())
+      stored.damage = absl::DataLossError(
+          absl::StrCat("mesh '", found.name, "' is damaged: ", found.damage, remedy(options_.path)));
+  }
+}
+
+absl::Status RocksdbLog::begin() {
+  list_stored();
+  {
+    MutexLock lock(catalogue_mutex_);
+    MutexLock high_water_lock(high_water_mutex_);
+    const CatalogueRow said = findings_.catalogue.value_or(CatalogueRow());
+    catalogue_ = Catalogue(std::move(findings_.rows), std::max(said.generation, high_water_.catalogue),
+                           std::max(said.next_scene, high_water_.next_scene));
+    next_scene_ = catalogue_.totals().next_scene;
+    rocksdb::WriteBatch batch;
+    for (const std::string& key : findings_.pending) {
+      ByteReader in(absl::string_view(key).substr(1));
+      if (key[0] == kPendingMeshTag && !catalogue_.find(absl::StrCat(std::string(1, kContentTag), in.rest()))) {
+        LOCUS_CHECK(batch.DeleteRange(database_->mesh(), std::string(in.rest()), end_of(std::string(in.rest()))).ok());
+      } else if (key[0] == kPendingSnapshotTag) {
+        const std::string prefix(in.rest());
+        const SceneKey scene = in.big_u64();
+        const absl::StatusOr<SceneRow> row = row_of(scene);
+        if (!row.ok() || snapshot_prefix(scene, row->snapshot_number) != prefix)
+          LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), prefix, end_of(prefix)).ok());
+        next_scene_ = std::max(next_scene_, scene + 1);
+      }
+      LOCUS_CHECK(batch.Delete(database_->meta(), key).ok());
+    }
+    const bool whole = said.generation == catalogue_.totals().generation &&
+                       said.scene_sum == catalogue_.totals().scene_sum && said.mesh_sum == catalogue_.totals().mesh_sum;
+    if (!whole || batch.Count() > 0) {
+      if (absl::Status status = commit(CatalogueChange(), batch); !status.ok()) return status;
+    }
+    scenes_.set_catalogue(catalogue_.totals());
+  }
+  findings_ = Findings();
+  look_at_the_disk();
+  write_high_water(false);
+  if (high_water_failed_)
+    return absl::UnavailableError(absl::StrCat("writing ", options_.path, "/", HighWaterFile::kName));
+  keeper_ = std::thread([this] { keep(); });
+  return absl::OkStatus();
+}
+
+absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel level) {
+  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  if (!place.ok()) return place.status();
+  SceneState& scene = **place;
+  if (entries.empty()) return scenes_.last_of(scene);
+  uint64_t bytes = 0;
+  for (const LogEntry& entry : entries) bytes += entry.bytes.size();
+  if (bytes > kMaxRecordBytes) return too_large(bytes);
+  if (absl::Status room = room_for("appending", bytes); !room.ok()) return room;
+
+  MutexLock lock(scene.writing);
+  const auto start = scenes_.begin_append(scene, entries.front().epoch, database_->db().GetLatestSequenceNumber());
+  if (!start.ok()) return start.status();
+  rocksdb::WriteBatch batch(bytes + entries.size() * kBatchOverhead);
+  Position at = start->written;
+  if (start->doubtful_end) drop_records_from(batch, *database_, key, at.sequence + 1);
+  for (const LogEntry& entry : entries) {
+    LOCUS_CHECK_EQ(entry.epoch, entries.front().epoch);
+    const std::string record_key = log_key(key, ++at.sequence);
+    const std::string head = record_head(entry);
+    at.chain = record_checksum(record_key, head, entry.bytes, at.chain);
+    const std::string seal = ByteWriter().u64(at.chain).take();
+    const rocksdb::Slice key_part(record_key);
+    const rocksdb::Slice parts[] = {head, slice_of(entry.bytes), seal};
+    LOCUS_CHECK(batch.Put(database_->log(), rocksdb::SliceParts(&key_part, 1), rocksdb::SliceParts(parts, 3)).ok());
+  }
+  const bool synced = level == AckLevel::kLocal;
+  if (absl::Status status = database_->write(batch, synced && options_.sync); !status.ok()) {
+    scenes_.fail_append(scene);
+    return status;
+  }
+  written_bytes_ += bytes;
+  scenes_.end_append(scene, at, synced);
+  wake_keeper(synced);
+  return at.sequence;
+}
+
+absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
+  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  if (!place.ok()) return place.status();
+  const uint64_t last = scenes_.last_of(**place);
+  SceneRow row;
+  {
+    MutexLock lock(catalogue_mutex_);
+    absl::StatusOr<SceneRow> found = row_of(key);
+    if (!found.ok()) return found.status();
+    row = *std::move(found);
+  }
+  if (from <= row.snapshot_sequence)
+    return refuse_argument(
+        Reason::kOutOfRange, "from", std::nullopt,
+        absl::StrCat("the records up to ", row.snapshot_sequence, " are in the snapshot: read that"));
+  if (from > last) return absl::OkStatus();
+  const absl::StatusOr<uint64_t> chain = chain_of(row, from - 1);
+  if (!chain.ok()) return chain.status();
+  absl::Status status = read_records(*database_, key, from, last, *chain, sink);
+  if (!absl::IsDataLoss(status)) return status;
+  return absl::DataLossError(
+      absl::StrCat("scene '", row.name, "' is damaged: ", status.message(), remedy(options_.path)));
+}
+
+absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequence) const {
+  if (sequence == row.snapshot_sequence) return row.chain;
+  rocksdb::PinnableSlice value;
+  const rocksdb::Status status =
+      database_->db().Get(rocksdb::ReadOptions(), database_->log(), log_key(row.key, sequence), &value);
+  if (status.ok() && value.size() >= kRecordOverhead) return seal_of(view_of(value));
+  if (status.ok() || status.IsNotFound())
+    return absl::DataLossError(
+        absl::StrCat("scene '", row.name, "' is damaged: record ", sequence, " is missing", remedy(options_.path)));
+  return disk_error(absl::StrCat("reading record ", sequence, " of scene '", row.name, "'"), status);
+}
+
+absl::StatusOr<uint64_t> RocksdbLog::latest(SceneKey key) const {
+  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  if (!place.ok()) return place.status();
+  return scenes_.last_of(**place);
+}
+
+absl::Status RocksdbLog::back_up(const std::string& path) {
+  rocksdb::Env& env = *options_.env;
+  const std::string unfinished = path + ".unfinished";
+  if (env.FileExists(path).ok() || env.FileExists(unfinished).ok())
+    return refuse_argument(Reason::kAlreadyExists, "path", std::nullopt,
+                           absl::StrCat(path, " or ", unfinished, " is there already: name a directory that is not"));
+  MutexLock lock(catalogue_mutex_);
+  HighWater high_water;
+  {
+    // Taken before the copy, and so never more than what is in it; after a sync, so that it is nearly as much.
+    const auto written = scenes_.written();
+    if (absl::Status status = database_->sync(); !status.ok()) return status;
+    scenes_.on_disk(written);
+    scenes_.describe(0, high_water);
+  }
+  {
+    MutexLock high_water_lock(high_water_mutex_);
+    high_water.mesh_damage = high_water_.mesh_damage;
+  }
+  rocksdb::Status status = env.CreateDir(unfinished);
+  rocksdb::Checkpoint* made = nullptr;
+  if (status.ok()) status = rocksdb::Checkpoint::Create(&database_->db(), &made);
+  const std::unique_ptr<rocksdb::Checkpoint> checkpoint(made);
+  if (status.ok()) status = checkpoint->CreateCheckpoint(absl::StrCat(unfinished, "/", kDatabaseFolder));
+  if (!status.ok()) return disk_error(absl::StrCat("backing up to ", path), status);
+  if (absl::Status written = HighWaterFile(env, unfinished).replace(high_water); !written.ok()) return written;
+  status = env.RenameFile(unfinished, path);
+  if (status.ok()) status = sync_folder(env, path);
+  return status.ok() ? absl::OkStatus() : disk_error(absl::StrCat("backing up to ", path), status);
+}
+
+absl::Status RocksdbLog::room_for(absl::string_view what, uint64_t bytes) {
+  if (written_bytes_ + bytes > kBytesBetweenLooks) look_at_the_disk();
+  const uint64_t free = free_bytes_;
+  if (free < *options_.reserve_bytes || free - *options_.reserve_bytes < bytes)
+    return refuse_full_disk(what, *options_.reserve_bytes, free);
+  if (high_water_failed_)
+    return absl::UnavailableError(
+        absl::StrCat(options_.path, "/", HighWaterFile::kName, " cannot be written; writing goes on when it can"));
+  return absl::OkStatus();
+}
+
+void RocksdbLog::look_at_the_disk() {
+  uint64_t free = 0;
+  written_bytes_ = 0;
+  free_bytes_ = options_.env->GetFreeSpace(options_.path, &free).ok() ? free : ~uint64_t{0};
+}
+
+void RocksdbLog::write_high_water(bool closed) {
+  MutexLock lock(high_water_mutex_);
+  scenes_.describe(database_->db().GetLatestSequenceNumber(), high_water_);
+  describe_file_list(*database_, high_water_);
+  high_water_.closed = closed;
+  high_water_failed_ = !high_water_file_->write(high_water_).ok();
+}
+
+void RocksdbLog::wake_keeper(bool synced) {
+  MutexLock lock(keeper_mutex_);
+  const SteadyTime now = std::chrono::steady_clock::now();
+  bool earlier = false;
+  if (synced && !marks_due_) {
+    marks_due_ = now + options_.high_water_delay;
+    earlier = true;
+  }
+  if (!synced && !sync_due_) {
+    sync_due_ = now + options_.memory_sync_delay;
+    earlier = true;
+  }
+  if (earlier) keeper_wakes_.notify_one();
+}
+
+void RocksdbLog::keep() {
+  SteadyTime look = std::chrono::steady_clock::now();
+  while (true) {
+    bool marks = false;
+    bool sync = false;
+    {
+      MutexLock lock(keeper_mutex_);
+      SteadyTime until = look;
+      if (marks_due_) until = std::min(until, *marks_due_);
+      if (sync_due_) until = std::min(until, *sync_due_);
+      if (!ended_) keeper_wakes_.wait_until(keeper_mutex_, until);
+      if (ended_) return;
+      const SteadyTime now = std::chrono::steady_clock::now();
+      marks = marks_due_ && *marks_due_ <= now;
+      sync = sync_due_ && *sync_due_ <= now;
+      if (marks) marks_due_.reset();
+      if (sync) sync_due_.reset();
+    }
+    if (sync) {
+      const auto written = scenes_.written();
+      if (database_->sync().ok()) scenes_.on_disk(written);
+      marks = true;
+    }
+    if (marks || high_water_failed_) write_high_water(false);
+    if (const SteadyTime now = std::chrono::steady_clock::now(); look <= now) {
+      look = now + kKeeperPause;
+      look_after();
+    }
+  }
+}
+
+void RocksdbLog::look_after() {
+  look_at_the_disk();
+  if (!database_->needs_recovery()) return;
+  // Recovery writes what is in memory into tables.
+  if (free_bytes_ < database_->buffered_bytes() + kRoomToRecover) return;
+  const auto written = scenes_.written();
+  if (!database_->recover().ok()) return;  // writes say why not
+  scenes_.on_disk(written);
+  write_high_water(false);
+}
+
+}  // namespace locus::server

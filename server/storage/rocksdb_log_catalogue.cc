@@ -1,0 +1,324 @@
+// RocksdbLog: what changes the catalogue, and the chunks of snapshots and meshes.
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "core/base/limits.h"
+#include "core/base/refusal.h"
+#include "server/storage/errors.h"
+#include "server/storage/reading.h"
+#include "server/storage/rocksdb_log.h"
+
+namespace locus::server {
+namespace {
+
+// What is written at once: small enough that an append beside it waits little for the disk.
+constexpr size_t kChunkBatchBytes = size_t{2} << 20;
+// What may lie in memory and in logs after a snapshot before it is worth making tables of.
+constexpr uint64_t kBufferedWorthFlushing = uint64_t{8} << 20;
+
+absl::Status already_there(absl::string_view field, absl::string_view what) {
+  Refusal refusal;
+  refusal.reason = Reason::kAlreadyExists;
+  refusal.field = std::string(field);
+  return refuse(absl::StatusCode::kAlreadyExists, what, refusal);
+}
+
+absl::Status not_there(absl::string_view what) {
+  Refusal refusal;
+  refusal.reason = Reason::kNotFound;
+  return refuse(absl::StatusCode::kNotFound, what, refusal);
+}
+
+CatalogueChange change_of(const SceneRow& row) { return {{{scene_key(row.key), encode(row)}}, 0}; }
+
+}  // namespace
+
+absl::Status RocksdbLog::commit(const CatalogueChange& change, rocksdb::WriteBatch& batch) {
+  catalogue_.add_to(batch, database_->meta(), change);
+  absl::Status status = database_->write(batch, options_.sync);
+  if (status.ok()) {
+    catalogue_.apply(change);
+  } else {
+    catalogue_.fail(change);
+  }
+  return status;
+}
+
+absl::StatusOr<SceneRow> RocksdbLog::row_of(SceneKey scene) const {
+  const std::optional<absl::string_view> bytes = catalogue_.find(scene_key(scene));
+  std::optional<SceneRow> row = bytes ? decode_scene(*bytes) : std::nullopt;
+  if (!row) return not_there(absl::StrCat("the log has no scene ", scene, "; it may have been deleted"));
+  return *std::move(row);
+}
+
+uint64_t RocksdbLog::seal_of_row(SceneKey scene) const {
+  const auto row = catalogue_.rows().find(scene_key(scene));
+  return row == catalogue_.rows().end() ? 0 : seal_of(row->second);
+}
+
+absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending,
+                                                 const std::string& prefix, ChunkSource source) {
+  ChunkList list;
+  rocksdb::WriteBatch batch;
+  LOCUS_CHECK(batch.Put(database_->meta(), pending, sealed(pending, "")).ok());
+  LOCUS_CHECK(batch.DeleteRange(family, prefix, end_of(prefix)).ok());
+  absl::Status status;
+  while (status.ok()) {
+    const absl::StatusOr<std::optional<std::string>> chunk = source();
+    if (!chunk.ok()) status = chunk.status();
+    if (chunk.ok() && *chunk && (*chunk)->size() > kMaxChunkBytes)
+      status = refuse_limit("state", "chunk_bytes", static_cast<double>(kMaxChunkBytes),
+                            static_cast<double>((*chunk)->size()));
+    if (!status.ok()) break;
+    if (*chunk) {
+      const std::string key = chunk_key(prefix, static_cast<uint32_t>(list.chunks));
+      const std::string value = sealed(key, **chunk);
+      list.add(value);
+      LOCUS_CHECK(batch.Put(family, key, value).ok());
+    }
+    if (*chunk && batch.GetDataSize() < kChunkBatchBytes) continue;
+    database_->wait_for_buffers(family);
+    // What makes these chunks count is written and synced after them, in the same log.
+    status = database_->write(batch, false);
+    batch.Clear();
+    if (status.ok() && !*chunk) return list;
+  }
+  drop_chunks(family, pending, prefix);
+  return status;
+}
+
+void RocksdbLog::drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending,
+                             const std::string& prefix) {
+  rocksdb::WriteBatch batch;
+  LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
+  LOCUS_CHECK(batch.DeleteRange(family, prefix, end_of(prefix)).ok());
+  // If this fails, the next opening does it.
+  database_->write(batch, false).IgnoreError();
+}
+
+absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
+                                                  ChunkSource state) {
+  if (absl::Status room = room_for("a new scene", spec.size()); !room.ok()) return room;
+  if (scenes_.size() >= limits::kMaxScenes)
+    return refuse_full("", "scenes", limits::kMaxScenes, static_cast<double>(scenes_.size() + 1), 0);
+  SceneRow row;
+  {
+    MutexLock lock(catalogue_mutex_);
+    row.key = next_scene_++;
+  }
+  row.name = std::string(name);
+  row.spec = std::string(spec);
+  row.epoch = epoch;
+  row.snapshot_number = 1;
+  row.chain = checksum(scene_key(row.key));
+  const std::string pending = pending_snapshot_key(row.key, row.snapshot_number);
+  const std::string prefix = snapshot_prefix(row.key, row.snapshot_number);
+  absl::StatusOr<ChunkList> chunks = put_chunks(database_->snapshot(), pending, prefix, state);
+  if (!chunks.ok()) return chunks.status();
+  row.snapshot = *chunks;
+  {
+    MutexLock lock(catalogue_mutex_);
+    absl::Status status;
+    if (scenes_.has_name(name))
+      status = already_there("name",
+                             absl::StrCat("a scene '", name, "' is stored already: delete it or choose another name"));
+    if (status.ok()) {
+      CatalogueChange change = change_of(row);
+      change.next_scene = next_scene_;
+      rocksdb::WriteBatch batch;
+      LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
+      status = commit(change, batch);
+    }
+    if (!status.ok()) {
+      drop_chunks(database_->snapshot(), pending, prefix);
+      return status;
+    }
+    auto place = std::make_shared<SceneState>();
+    place->key = row.key;
+    place->name = row.name;
+    place->written = place->synced = {0, row.chain};
+    SceneState& scene = *place;
+    scenes_.add(std::move(place));
+    scenes_.set_row(scene, row, seal_of_row(row.key), catalogue_.totals());
+    write_high_water(false);
+  }
+  return row.key;
+}
+
+absl::Status RocksdbLog::delete_scene(SceneKey key) {
+  const ScenePlace place = scenes_.find_any(key);
+  if (place == nullptr) return not_there(absl::StrCat("the log has no scene ", key, "; it may have been deleted"));
+  MutexLock writing(place->writing);
+  MutexLock lock(catalogue_mutex_);
+  rocksdb::WriteBatch batch;
+  const std::string prefix = scene_prefix(key);
+  LOCUS_CHECK(batch.DeleteRange(database_->log(), prefix, end_of(prefix)).ok());
+  LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), prefix, end_of(prefix)).ok());
+  if (absl::Status status = commit({{{scene_key(key), std::nullopt}}, 0}, batch); !status.ok()) return status;
+  scenes_.remove(key, catalogue_.totals());
+  write_high_water(false);
+  return absl::OkStatus();
+}
+
+absl::Status RocksdbLog::restart_scene(SceneKey key, uint64_t epoch) {
+  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  if (!place.ok()) return place.status();
+  MutexLock writing((*place)->writing);
+  MutexLock lock(catalogue_mutex_);
+  absl::StatusOr<SceneRow> row = row_of(key);
+  if (!row.ok()) return row.status();
+  row->epoch = epoch;
+  rocksdb::WriteBatch batch;
+  if (absl::Status status = commit(change_of(*row), batch); !status.ok()) return status;
+  scenes_.set_row(**place, *row, seal_of_row(key), catalogue_.totals());
+  write_high_water(false);
+  return absl::OkStatus();
+}
+
+absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSource state) {
+  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  if (!place.ok()) return place.status();
+  uint64_t number = 0;
+  {
+    MutexLock lock(catalogue_mutex_);
+    const absl::StatusOr<SceneRow> row = row_of(key);
+    if (!row.ok()) return row.status();
+    const uint64_t last = scenes_.last_of(**place);
+    if (sequence < row->snapshot_sequence || sequence > last)
+      return refuse_argument(Reason::kOutOfRange, "sequence", std::nullopt,
+                             absl::StrCat("a snapshot may hold the records up to one from ", row->snapshot_sequence,
+                                          " to ", last, ", not ", sequence));
+    number = row->snapshot_number + 1;
+  }
+  const std::string pending = pending_snapshot_key(key, number);
+  const std::string prefix = snapshot_prefix(key, number);
+  const absl::StatusOr<ChunkList> chunks = put_chunks(database_->snapshot(), pending, prefix, state);
+  if (!chunks.ok()) return chunks.status();
+  absl::Status status = put_snapshot(*place, number, sequence, *chunks);
+  if (!status.ok()) {
+    drop_chunks(database_->snapshot(), pending, prefix);
+    return status;
+  }
+  if (database_->buffered_bytes() >= kBufferedWorthFlushing) database_->flush_soon();
+  return absl::OkStatus();
+}
+
+absl::Status RocksdbLog::put_snapshot(const ScenePlace& place, uint64_t number, uint64_t sequence,
+                                      const ChunkList& chunks) {
+  MutexLock lock(catalogue_mutex_);
+  const SceneKey key = place->key;
+  absl::StatusOr<SceneRow> row = row_of(key);
+  if (!row.ok()) return row.status();
+  if (row->snapshot_number + 1 != number)
+    return absl::AbortedError(absl::StrCat("another snapshot of scene '", row->name, "' was written meanwhile"));
+  const absl::StatusOr<uint64_t> chain = chain_of(*row, sequence);
+  if (!chain.ok()) return chain.status();
+  const std::string before = snapshot_prefix(key, row->snapshot_number);
+  row->snapshot_number = number;
+  row->snapshot_sequence = sequence;
+  row->chain = *chain;
+  row->snapshot = chunks;
+  rocksdb::WriteBatch batch;
+  LOCUS_CHECK(batch.Delete(database_->meta(), pending_snapshot_key(key, number)).ok());
+  LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), before, end_of(before)).ok());
+  LOCUS_CHECK(batch.DeleteRange(database_->log(), scene_prefix(key), log_key(key, sequence + 1)).ok());
+  if (absl::Status status = commit(change_of(*row), batch); !status.ok()) return status;
+  scenes_.set_row(*place, *row, seal_of_row(key), catalogue_.totals());
+  write_high_water(false);
+  return absl::OkStatus();
+}
+
+absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
+  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  if (!place.ok()) return place.status();
+  absl::StatusOr<SceneRow> row;
+  {
+    MutexLock lock(catalogue_mutex_);
+    row = row_of(key);
+  }
+  if (!row.ok()) return row.status();
+  absl::Status status =
+      read_chunks(*database_, database_->snapshot(), snapshot_prefix(key, row->snapshot_number), row->snapshot, sink);
+  if (!absl::IsDataLoss(status)) return status;
+  return absl::DataLossError(
+      absl::StrCat("scene '", row->name, "' is damaged: its snapshot: ", status.message(), remedy(options_.path)));
+}
+
+bool RocksdbLog::content_in_use(const Sha256& sha256, absl::string_view but) const {
+  const absl::string_view wanted(reinterpret_cast<const char*>(sha256.data()), sha256.size());
+  const std::string start(1, kMeshTag);
+  for (auto row = catalogue_.rows().lower_bound(start); row != catalogue_.rows().end() && row->first[0] == kMeshTag;
+       ++row) {
+    if (row->first.substr(1) != but && catalogue_.find(row->first) == wanted) return true;
+  }
+  return false;
+}
+
+absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, ChunkSource content) {
+  MutexLock adding(adding_mesh_);
+  if (absl::Status room = room_for("a new mesh", 0); !room.ok()) return room;
+  const absl::string_view hash(reinterpret_cast<const char*>(sha256.data()), sha256.size());
+  bool known = false;
+  {
+    MutexLock lock(catalogue_mutex_);
+    const std::optional<absl::string_view> there = catalogue_.find(mesh_key(name));
+    if (there == hash) return absl::OkStatus();
+    if (there)
+      return already_there("name", absl::StrCat("a mesh '", name,
+                                                "' of other content is stored already: delete it or "
+                                                "choose another name"));
+    known = catalogue_.find(content_key(sha256)).has_value();
+  }
+  CatalogueChange change{{{mesh_key(name), std::string(hash)}}, 0};
+  rocksdb::WriteBatch batch;
+  const std::string pending = pending_mesh_key(sha256);
+  if (!known) {
+    const absl::StatusOr<ChunkList> chunks = put_chunks(database_->mesh(), pending, mesh_prefix(sha256), content);
+    if (!chunks.ok()) return chunks.status();
+    change.rows.push_back({content_key(sha256), encode(*chunks)});
+    LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
+  }
+  MutexLock lock(catalogue_mutex_);
+  if (absl::Status status = commit(change, batch); !status.ok()) {
+    if (!known) drop_chunks(database_->mesh(), pending, mesh_prefix(sha256));
+    return status;
+  }
+  scenes_.set_catalogue(catalogue_.totals());
+  write_high_water(false);
+  return absl::OkStatus();
+}
+
+absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
+  MutexLock adding(adding_mesh_);
+  MutexLock lock(catalogue_mutex_);
+  const std::optional<absl::string_view> hash = catalogue_.find(mesh_key(name));
+  if (!hash) return not_there(absl::StrCat("the log has no mesh '", name, "'"));
+  Sha256 sha256 = {};
+  if (hash->size() == sha256.size()) std::copy(hash->begin(), hash->end(), sha256.begin());
+  CatalogueChange change{{{mesh_key(name), std::nullopt}}, 0};
+  rocksdb::WriteBatch batch;
+  if (!content_in_use(sha256, name)) {
+    change.rows.push_back({content_key(sha256), std::nullopt});
+    LOCUS_CHECK(batch.DeleteRange(database_->mesh(), mesh_prefix(sha256), end_of(mesh_prefix(sha256))).ok());
+  }
+  if (absl::Status status = commit(change, batch); !status.ok()) return status;
+  scenes_.set_catalogue(catalogue_.totals());
+  write_high_water(false);
+  return absl::OkStatus();
+}
+
+absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
+  std::optional<ChunkList> list;
+  {
+    MutexLock lock(catalogue_mutex_);
+    const std::optional<absl::string_view> bytes = catalogue_.find(content_key(sha256));
+    if (bytes) list = decode_chunk_list(*bytes);
+  }
+  if (!list) return not_there("the log has no mesh of this content");
+  absl::Status status = read_chunks(*database_, database_->mesh(), mesh_prefix(sha256), *list, sink);
+  if (!absl::IsDataLoss(status)) return status;
+  return absl::DataLossError(absl::StrCat("a mesh is damaged: ", status.message(), remedy(options_.path)));
+}
+
+}  // namespace locus::server
