@@ -6,8 +6,10 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <string>
 #include <thread>
 
@@ -18,8 +20,11 @@
 #include "server/config/server_config.h"
 #include "server/config/version.h"
 #include "server/observability/log.h"
+#include "server/scheduling/semaphore.h"
 #include "server/service/library_logs.h"
 #include "server/service/server.h"
+#include "server/storage/check.h"
+#include "server/storage/rocksdb_log.h"
 
 namespace locus::server {
 namespace {
@@ -42,20 +47,49 @@ void allow_many_files() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-sigset_t ending_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  return signals;
-}
-
 int wait_for_signal(const sigset_t& signals) {
   int signal = 0;
   while (sigwait(&signals, &signal) != 0) {
   }
   return signal;
 }
+
+// Hears of signals from before the server starts, which may take a while, and for good: never destroyed.
+class EndingSignals {
+ public:
+  static EndingSignals& hear() {
+    static EndingSignals* const signals = new EndingSignals;
+    return *signals;
+  }
+
+  const std::atomic<bool>& came() const { return came_; }
+  // The first one.
+  int wait() {
+    first_.wait();
+    return signal_;
+  }
+
+ private:
+  // Before any other thread starts, so that all of them leave these signals to this one.
+  EndingSignals() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGTERM);
+    sigaddset(&signals_, SIGINT);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    std::thread([this] {
+      signal_ = wait_for_signal(signals_);
+      came_.store(true);
+      first_.post();
+      wait_for_signal(signals_);
+      std::_Exit(kEndedAtOnce);
+    }).detach();
+  }
+
+  sigset_t signals_;
+  int signal_ = 0;
+  std::atomic<bool> came_{false};
+  Semaphore first_;
+};
 
 // Whole or not at all: a reader never sees half a number. Nothing where there is no path; says itself why it failed.
 bool write_port_file(const std::string& path, uint16_t port) {
@@ -82,8 +116,16 @@ void log_start(const Server& server, const ServerConfig& config) {
        {"memory_bytes", absl::StrCat(config.memory_limit)},
        {"receive_bytes", absl::StrCat(config.max_receive_bytes)},
        {"streams", absl::StrCat(config.max_streams)},
-       {"storage", "memory only: scenes are lost at exit"}});
+       {"storage", config.data_dir.empty() ? "memory only: scenes are lost at exit" : config.data_dir}});
   if (config.insecure) log(LogLevel::kWarning, "insecure: nothing is encrypted and nobody is asked who they are");
+}
+
+// Null where scenes are kept in memory only.
+absl::StatusOr<std::unique_ptr<UpdateLog>> open_log(const ServerConfig& config) {
+  if (config.data_dir.empty()) return nullptr;
+  StorageOptions options;
+  options.path = config.data_dir;
+  return RocksdbLog::open(options);
 }
 
 int run(const ServerConfig& config) {
@@ -94,28 +136,42 @@ int run(const ServerConfig& config) {
     log(LogLevel::kError, chosen.message());
     return EXIT_FAILURE;
   }
-  const sigset_t signals = ending_signals();
-  // Before any other thread starts, so that all of them leave these signals to this one.
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  const absl::StatusOr<std::unique_ptr<Server>> server = Server::start(config);
-  if (!server.ok()) {
-    log(LogLevel::kError, server.status().message());
+  EndingSignals& signals = EndingSignals::hear();
+  // Outlives the server, which writes to it to its last moment.
+  const absl::StatusOr<std::unique_ptr<UpdateLog>> kept = open_log(config);
+  if (!kept.ok()) {
+    log(LogLevel::kError, kept.status().message());
     return EXIT_FAILURE;
+  }
+  const absl::StatusOr<std::unique_ptr<Server>> server = Server::start(config, kept->get(), signals.came());
+  if (!server.ok()) {
+    const bool told = signals.came().load() && absl::IsCancelled(server.status());
+    log(told ? LogLevel::kInfo : LogLevel::kError, server.status().message());
+    return told ? EXIT_SUCCESS : EXIT_FAILURE;
   }
   if (!write_port_file(config.http_port_file, (*server)->http_port()) ||
       !write_port_file(config.port_file, (*server)->port()))
     return EXIT_FAILURE;
   capture_library_logs(LogLevel::kWarning);
   log_start(**server, config);
-  const int signal = wait_for_signal(signals);
+  const int signal = signals.wait();
   log(LogLevel::kInfo, "draining", {{"signal", strsignal(signal)}, {"grace_s", absl::StrCat(config.drain_grace_s)}});
-  std::thread([signals] {
-    wait_for_signal(signals);
-    std::_Exit(kEndedAtOnce);
-  }).detach();
   (*server)->drain(std::chrono::seconds(config.drain_grace_s));
   log(LogLevel::kInfo, "ended");
   return EXIT_SUCCESS;
+}
+
+// Prints what there is to say; 0 where all is sound.
+int check(const std::string& directory) {
+  StorageOptions options;
+  options.path = directory;
+  const absl::StatusOr<DirectoryReport> report = check_directory(options);
+  if (!report.ok()) {
+    std::fprintf(stderr, "locusd: %s\n", std::string(report.status().message()).c_str());
+    return EXIT_FAILURE;
+  }
+  std::fputs(to_text(*report).c_str(), stdout);
+  return report->sound() ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
 }  // namespace
@@ -129,6 +185,7 @@ int main(int argc, char** argv) {
     locus::server::allow_many_files();
     return locus::server::run(*invocation.config);
   }
+  if (invocation.check) return locus::server::check(*invocation.check);
   std::fputs(invocation.text.c_str(), invocation.exit_code == 0 ? stdout : stderr);
   return invocation.exit_code;
 }

@@ -43,13 +43,15 @@ inline constexpr uint32_t kMaxNearest = 65536;             // k of a query for w
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;  // clients refuse 4 MiB by default
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
-inline constexpr uint32_t kRecentRevisions = 64;               // kept for `exactly` views ...
-inline constexpr uint64_t kRecentBytes = 2u << 20;             // ... while what they replaced takes at most this much
-inline constexpr uint64_t kPinnedBytes = uint64_t{256} << 20;  // that batches may keep from being freed, per scene ...
-inline constexpr uint32_t kPinnedShare = 4;                    // ... or so often what the scene itself takes
-inline constexpr uint64_t kLeastPinnedBytes = 1u << 20;        // where that is set
-inline constexpr uint32_t kDefaultWaitMs = 1000;               // at_least without a deadline
-inline constexpr uint32_t kTestsBetweenChecks = 4096;          // primitive tests between two looks at the deadline
+inline constexpr uint32_t kRecentRevisions = 64;                // kept for `exactly` views ...
+inline constexpr uint64_t kRecentBytes = 2u << 20;              // ... while what they replaced takes at most this much
+inline constexpr uint64_t kPinnedBytes = uint64_t{256} << 20;   // that batches may keep from being freed, per scene ...
+inline constexpr uint32_t kPinnedShare = 4;                     // ... or so often what the scene itself takes
+inline constexpr uint64_t kLeastPinnedBytes = 1u << 20;         // where that is set
+inline constexpr uint64_t kSnapshotAfterBytes = 64u << 20;      // of a scene's log
+inline constexpr uint64_t kLeastSnapshotAfterBytes = 1u << 16;  // where that is set
+inline constexpr uint32_t kDefaultWaitMs = 1000;                // at_least without a deadline
+inline constexpr uint32_t kTestsBetweenChecks = 4096;           // primitive tests between two looks at the deadline
 
 inline constexpr uint32_t kMaxHistoryTicks = 1u << 14;                 // per scene
 inline constexpr uint64_t kDefaultHistoryBytes = uint64_t{256} << 20;  // per scene that keeps any ...

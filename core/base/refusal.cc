@@ -16,10 +16,10 @@ constexpr absl::string_view kPayloadType = "locus/refusal";
 constexpr char kSeparator = '\x1f';
 constexpr size_t kFieldCount = 7;
 
-constexpr std::array<absl::string_view, 16> kReasonNames = {
-    "UNSPECIFIED",  "NOT_FINITE",      "UNKNOWN_ID", "DUPLICATE_ID", "COLUMN_LENGTH",  "LIMIT",
-    "OUT_OF_RANGE", "SCENE_RESTARTED", "NOT_SERVED", "NOT_FOUND",    "ALREADY_EXISTS", "DRAINING",
-    "MALFORMED",    "BATCH_GAP",       "IN_USE",     "HASH_MISMATCH"};
+constexpr std::array<absl::string_view, 18> kReasonNames = {
+    "UNSPECIFIED",  "NOT_FINITE",      "UNKNOWN_ID", "DUPLICATE_ID",  "COLUMN_LENGTH",  "LIMIT",
+    "OUT_OF_RANGE", "SCENE_RESTARTED", "NOT_SERVED", "NOT_FOUND",     "ALREADY_EXISTS", "DRAINING",
+    "MALFORMED",    "BATCH_GAP",       "IN_USE",     "HASH_MISMATCH", "RECOVERING",     "DAMAGED"};
 
 // Whole numbers without an exponent, as limits are.
 std::string number(double value) {

@@ -31,6 +31,8 @@ enum class Reason : uint8_t {
   kBatchGap = 13,
   kInUse = 14,
   kHashMismatch = 15,
+  kRecovering = 16,
+  kDamaged = 17,
 };
 
 // "NOT_FINITE" and so on: how messages and the command line print a reason.

@@ -150,6 +150,13 @@ std::vector<ScenePtr> Registry::list_scenes(const std::string& after, size_t lim
   return result;
 }
 
+std::vector<Registry::Damaged> Registry::damaged_scenes() const {
+  const MutexLock lock(mutex_);
+  std::vector<Damaged> result;
+  for (const auto& [name, scene] : damaged_scenes_) result.push_back({name, scene.damage});
+  return result;
+}
+
 size_t Registry::scene_count() const {
   const MutexLock lock(mutex_);
   return scenes_.size();

@@ -46,6 +46,12 @@ class Registry {
   absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
   // In name order, after `after` (exclusive), at most `limit`.
   std::vector<ScenePtr> list_scenes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
+  // The damaged ones, in name order.
+  struct Damaged {
+    std::string name;
+    absl::Status damage;
+  };
+  std::vector<Damaged> damaged_scenes() const LOCUS_EXCLUDES(mutex_);
   size_t scene_count() const LOCUS_EXCLUDES(mutex_);
 
   // The mesh of that content under whichever name, or null.

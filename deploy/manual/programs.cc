@@ -1,5 +1,6 @@
 #include "deploy/manual/programs.h"
 
+#include <optional>
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
@@ -35,12 +36,14 @@ std::vector<Page> pages_of_locusd() {
   server::ServerConfig config;
   CLI::App app;
   server::build_parser(app, config);
+  std::optional<std::string> directory;
+  server::add_check(app, directory);
   const cli::CommandWords words = cli::words_of(app);
   Manual manual = {
       .section = "8",
       .version = server::kVersion,
       .exit_statuses = {{"0", "It drained and ended as it was told to, or printed its help or version."},
-                        {"1", "It could not serve; standard error says why."},
+                        {"1", "It could not serve, or the directory is not sound; standard error says why."},
                         {"2", "Its options, environment or file are wrong."},
                         {"130", "A second signal ended it at once."}},
       .variables = {},

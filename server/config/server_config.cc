@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <memory>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -34,6 +35,7 @@ Examples:
   locusd --listen unix:/run/locus/locus.sock  serve this machine over a unix socket
   locusd --listen 127.0.0.1:0 --port-file p   take a free port and write it to the file p
   locusd --data-dir /var/lib/locus            keep scenes, and every acknowledged update
+  locusd check /var/lib/locus                 say whether what is kept there is sound
   locusd --config /etc/locus/locusd.conf --log-format json
 
 Try it: locus health; locus limits; locus scene create demo; locus top
@@ -65,6 +67,13 @@ std::string check_pinned(const std::string& text) {
   return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 1MiB .. 1PiB");
 }
 
+std::string check_snapshot_after(const std::string& text) {
+  uint64_t bytes = 0;
+  const bool good =
+      absl::SimpleAtoi(text, &bytes) && bytes >= limits::kLeastSnapshotAfterBytes && bytes <= limits::kMostMemory;
+  return good ? "" : absl::StrCat(text, " bytes is not in 64KiB .. 1PiB");
+}
+
 // The options as CLI11 sees them, writing to `config`. CLI11 keeps pointers into it.
 void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--listen", config.listen, "Address to listen on: host:port, [v6]:port or unix:/path; repeatable")
@@ -80,6 +89,11 @@ void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--http-port-file", config.http_port_file, "File to write the HTTP port to once it answers")
       ->capture_default_str();
   app.add_option("--data-dir", config.data_dir, "Directory that scenes are kept in; empty = memory only")
+      ->capture_default_str();
+  app.add_option("--snapshot-after", config.snapshot_after,
+                 "Log of a scene after which a snapshot takes its place, such as 16MiB")
+      ->transform(CLI::AsSizeValue(false).description("SIZE"))
+      ->check(CLI::Validator(check_snapshot_after, ""))
       ->capture_default_str();
   app.add_option("--threads", config.threads, "Threads that may work on one batch; 0 = the cores it may use")
       ->check(CLI::Range(0u, limits::kMaxThreads))
@@ -155,6 +169,8 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
   describe(app);
   add_options(app, ignored);
   app.add_option("--config", ignored_file);
+  std::optional<std::string> ignored_directory;
+  add_check(app, ignored_directory);
   parse(app, arguments);
   std::vector<std::string> all = arguments;
   for (const CLI::Option* option : std::as_const(app).get_options()) {
@@ -211,19 +227,30 @@ Invocation parse_all(const std::vector<std::string>& arguments, const Environmen
   ServerConfig config;
   CLI::App app;
   build_parser(app, config);
+  add_check(app, invocation.check);
   parse(app, with_environment(arguments, environment));
+  if (invocation.check) {
+    if (invocation.check->empty()) invocation.check = config.data_dir;
+    return invocation.check->empty() ? mistake("which directory? Name it after the command, or with --data-dir")
+                                     : invocation;
+  }
   if (const absl::Status status = check_config(config); !status.ok()) return mistake(status.message());
   follow_machine(config);
   invocation.config = std::move(config);
   return invocation;
 }
 
-Invocation help() {
+Invocation help(const std::vector<std::string>& arguments) {
   ServerConfig config;
   CLI::App app;
   build_parser(app, config);
   Invocation invocation;
-  invocation.text = app.help();
+  add_check(app, invocation.check);
+  // Of the command that is named, if one is.
+  const CLI::App* asked = &app;
+  for (const CLI::App* command : app.get_subcommands({}))
+    if (std::find(arguments.begin(), arguments.end(), command->get_name()) != arguments.end()) asked = command;
+  invocation.text = asked->help("locusd");
   return invocation;
 }
 
@@ -235,11 +262,24 @@ void build_parser(CLI::App& app, ServerConfig& config) {
   app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
 }
 
+void add_check(CLI::App& app, std::optional<std::string>& directory) {
+  CLI::App& command = *app.add_subcommand(
+      "check",
+      "Say whether everything in a data directory is sound, scene by scene. Changes\nnothing; no daemon may use the "
+      "directory meanwhile. Exits 0 if all is sound.");
+  command.footer("Examples:\n  locusd check /var/lib/locus");
+  command.fallthrough();
+  const auto argument = std::make_shared<std::string>();
+  command.add_option("DIRECTORY", *argument, "The data directory [what --data-dir says]");
+  command.callback([&directory, argument] { directory = *argument; });
+  app.require_subcommand(0, 1);
+}
+
 std::string environment_variable(const std::string& option) {
   return absl::StrCat("LOCUS_", absl::AsciiStrToUpper(absl::StrReplaceAll(option, {{"-", "_"}})));
 }
 
-bool may_be_empty(const std::string& option) { return option == "http-listen"; }
+bool may_be_empty(const std::string& option) { return option == "http-listen" || option == "data-dir"; }
 
 std::optional<std::string> process_environment(const std::string& name) {
   const char* value = std::getenv(name.c_str());
@@ -251,7 +291,7 @@ Invocation read_invocation(const std::vector<std::string>& arguments, const Envi
   try {
     return parse_all(arguments, environment);
   } catch (const CLI::CallForHelp&) {
-    return help();
+    return help(arguments);
   } catch (const CLI::CallForVersion& version) {
     Invocation invocation;
     invocation.text = absl::StrCat(version.what(), "\n");

@@ -44,6 +44,11 @@ struct ServerConfig {
   // update waits for that disk.
   std::string data_dir;
 
+  // Bytes of updates of a scene in the log after which a snapshot of the scene takes their place; for a scene that
+  // takes more than that, as much as it takes. Lower it for a faster start and a smaller directory, raise it where the
+  // disk has little to spare beside the updates.
+  uint64_t snapshot_after = limits::kSnapshotAfterBytes;
+
   // Threads that may work on one query batch, the caller's own included; 0 = the cores this process may use, by its
   // affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
   uint32_t threads = 0;
@@ -101,10 +106,12 @@ using Environment = std::function<std::optional<std::string>(const std::string&)
 // Reads the process's own environment.
 std::optional<std::string> process_environment(const std::string& name);
 
-// What a command line asks for: to run with `config`, or, without one, to print `text` and end with `exit_code` (0
-// after --help and --version, 2 after a mistake, which `text` explains).
+// What a command line asks for: to run with `config`, to say whether the data directory `check` is sound, or, without
+// either, to print `text` and end with `exit_code` (0 after --help and --version, 2 after a mistake, which `text`
+// explains).
 struct Invocation {
   std::optional<ServerConfig> config;
+  std::optional<std::string> check;
   int exit_code = 0;
   std::string text;
 };

@@ -4,6 +4,7 @@
 #define LOCUS_SERVER_CONFIG_SERVER_PARSER_H_
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "server/config/server_config.h"
@@ -13,6 +14,9 @@ namespace locus::server {
 // Adds name, help, every option and the file of --config to `app`, which keeps pointers into `config`. The environment
 // is no matter of the parser: see environment_variable().
 void build_parser(CLI::App& app, ServerConfig& config);
+
+// Adds the command `check`: once a line is parsed that names it, `directory` is its argument, empty where it has none.
+void add_check(CLI::App& app, std::optional<std::string>& directory);
 
 // Whether an empty variable sets the option, to nothing, rather than being as good as none.
 bool may_be_empty(const std::string& option);

@@ -15,6 +15,7 @@ void add_up(const SceneFigures& scene, SceneFigures& sum) {
   sum.history_bytes += scene.history_bytes;
   sum.history_ticks += scene.history_ticks;
   sum.pinned_bytes += scene.pinned_bytes;
+  sum.log_bytes += scene.log_bytes;
   sum.pending_changes += scene.pending_changes;
 }
 
@@ -37,6 +38,8 @@ constexpr Figure kFigures[] = {
     {"locus_scene_history_ticks", "Ticks of the past that queries may ask about.", &SceneFigures::history_ticks},
     {"locus_scene_pinned_bytes", "Memory of older revisions of the scene that are still being read, in bytes.",
      &SceneFigures::pinned_bytes},
+    {"locus_scene_log_bytes", "Updates of the scene in the log since its snapshot, in bytes.",
+     &SceneFigures::log_bytes},
     {"locus_scene_pending_changes", "Changes of the scene's instances that are being built or wait.",
      &SceneFigures::pending_changes},
 };

@@ -26,6 +26,7 @@ struct SceneFigures {
   uint64_t history_bytes = 0;
   uint64_t history_ticks = 0;
   uint64_t pinned_bytes = 0;
+  uint64_t log_bytes = 0;
   uint64_t pending_changes = 0;
 };
 

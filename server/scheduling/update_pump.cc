@@ -19,6 +19,8 @@ constexpr double kFirstGuess = 100;
 constexpr uint64_t kBatchNanoseconds = 5'000;
 constexpr double kForget = 0.1;
 constexpr uint32_t kRetryAfterMs = 5;
+// Logged at once: many times what a sync costs, and soon applied.
+constexpr uint64_t kItemsASync = uint64_t{1} << 15;
 // Between two looks whether a scene's readers have ended, and how long they may take for that.
 constexpr milliseconds kLookAgain{2};
 constexpr milliseconds kReadersMayTake{1000};
@@ -31,16 +33,17 @@ uint64_t items_of(const UpdateBatch& batch) {
   return items;
 }
 
-using Acks = std::vector<absl::StatusOr<UpdateAck>>;
+bool joins(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
 
-absl::StatusOr<Acks> apply_all(Scene& scene, absl::Span<const UpdateBatch* const> batches) {
+// Whether each ack is on the disk first. What waits is then logged together: a sync costs the same for many.
+bool waits_for_disk(const Scene& scene) {
+  return scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
+}
+
+absl::StatusOr<Scene::Acks> apply_all(Scene& scene, absl::Span<const UpdateBatch* const> batches) {
   const auto at_once = steady_clock::time_point::min();
-  if (batches.size() > 1) return scene.apply_joined(batches, at_once);
-  absl::StatusOr<UpdateAck> ack = scene.apply(*batches.front(), at_once);
-  if (!ack.ok()) return ack.status();
-  Acks acks;
-  acks.push_back(std::move(ack));
-  return acks;
+  if (batches.size() > 1 && joins(scene)) return scene.apply_joined(batches, at_once);
+  return scene.apply_each(batches, at_once);
 }
 
 }  // namespace
@@ -85,9 +88,9 @@ absl::Status UpdatePump::refuse(const Mailbox& mailbox, uint64_t items) const {
                      static_cast<double>(mailbox.items + items), retry);
 }
 
-// What looks at every object may take as long as it likes.
-bool UpdatePump::fits_inline(const UpdateBatch& batch, uint64_t items) const {
-  if (batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
+// What looks at every object may take as long as it likes, and so may the disk.
+bool UpdatePump::fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const {
+  if (waits_for_disk(scene) || batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
   const double nanoseconds = static_cast<double>(items) * nanoseconds_an_item_.load(std::memory_order_relaxed);
   return nanoseconds + kBatchNanoseconds < static_cast<double>(options_.inline_nanoseconds);
 }
@@ -98,7 +101,7 @@ absl::StatusOr<Posted> UpdatePump::post(const ScenePtr& scene, PendingUpdate& up
   {
     const MutexLock lock(mutex_);
     Mailbox& mailbox = mailbox_of(scene);
-    if (!mailbox.at_work && mailbox.waiting.empty() && fits_inline(update.batch(), items)) {
+    if (!mailbox.at_work && mailbox.waiting.empty() && fits_inline(*scene, update.batch(), items)) {
       mailbox.at_work = true;
       here = &mailbox;
     } else {
@@ -175,22 +178,24 @@ void UpdatePump::work_on(Mailbox& mailbox) {
   }
   const SteadyTime start = steady_clock::now();
   if (!apply(mailbox, group)) return stall(mailbox, group);
-  learn(items, start);
+  if (!waits_for_disk(*mailbox.scene)) learn(items, start);
   std::unique_ptr<Mailbox> empty;
   const MutexLock lock(mutex_);
   empty = leave(mailbox, group.size());
 }
 
+// Batches that become one revision, or that one sync serves.
 UpdatePump::Group UpdatePump::take_group(Mailbox& mailbox) {
-  const bool joins = mailbox.scene->spec().overload == OverloadPolicy::kLatestWins;
+  const bool joined = joins(*mailbox.scene);
+  const uint64_t most_items = joined ? limits::kMaxUpdateItems : waits_for_disk(*mailbox.scene) ? kItemsASync : 0;
   Group group;
   uint64_t items = 0;
   while (!mailbox.waiting.empty()) {
     PendingUpdate* const update = mailbox.waiting.front();
     const uint64_t more = items_of(update->batch());
-    if (!group.empty() &&
-        (!joins || items + more > limits::kMaxUpdateItems || !may_join(group.front()->batch(), update->batch())))
-      break;
+    const bool fits =
+        group.empty() || (items + more <= most_items && (!joined || may_join(group.front()->batch(), update->batch())));
+    if (!fits) break;
     group.push_back(update);
     items += more;
     mailbox.waiting.pop_front();
@@ -220,7 +225,7 @@ bool UpdatePump::apply(Mailbox& mailbox, Group& group) {
   std::vector<const UpdateBatch*> batches;
   for (const PendingUpdate* update : group) batches.push_back(&update->batch());
   // Without waiting for readers, who may take long.
-  absl::StatusOr<Acks> acks = apply_all(*mailbox.scene, batches);
+  absl::StatusOr<Scene::Acks> acks = apply_all(*mailbox.scene, batches);
   if (acks.status().code() == absl::StatusCode::kDeadlineExceeded) {
     mailbox.late = acks.status();
     return false;
@@ -261,7 +266,7 @@ void UpdatePump::put_back(Mailbox& mailbox, const Group& group) {
 
 std::unique_ptr<UpdatePump::Mailbox> UpdatePump::leave(Mailbox& mailbox, size_t updates) {
   stats_.applied += updates;
-  if (updates > 1) stats_.coalesced += updates - 1;
+  if (updates > 1 && joins(*mailbox.scene)) stats_.coalesced += updates - 1;
   mailbox.at_work = false;
   mailbox.stalled_at = {};
   if (!mailbox.waiting.empty()) {

@@ -1,6 +1,7 @@
 // The way of update batches into scenes: a bounded mailbox for each scene, emptied in the order of arrival by one
 // thread at a time, so that nobody who talks to clients waits for a scene's writer or for its readers. A small batch
-// for a scene that nobody else is writing to is applied by whoever brings it.
+// for a scene that nobody else is writing to is applied by whoever brings it, unless its ack waits for the disk: then
+// all that wait are logged with one sync.
 //
 // Threads: every member may be called from any thread; post() takes a lock that is only held for moments. Invariant: of
 // one scene at most one batch is being applied, and none overtakes another.
@@ -99,7 +100,7 @@ class UpdatePump {
   Mailbox& mailbox_of(const ScenePtr& scene) LOCUS_REQUIRES(mutex_);
   bool full(const Mailbox& mailbox, uint64_t items) const;
   absl::Status refuse(const Mailbox& mailbox, uint64_t items) const;
-  bool fits_inline(const UpdateBatch& batch, uint64_t items) const;
+  bool fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const;
   void apply_here(Mailbox& mailbox, PendingUpdate& update, uint64_t items) LOCUS_EXCLUDES(mutex_);
 
   void run() LOCUS_EXCLUDES(mutex_);

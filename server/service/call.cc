@@ -102,8 +102,13 @@ absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>&
   }
 }
 
+absl::Status check_serving(const Host& host) {
+  if (host.drain.draining()) return draining();
+  return host.recovering.load() ? recovering() : absl::OkStatus();
+}
+
 grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
-                   const std::function<absl::Status(const Caller&)>& body, WhileDraining while_draining) {
+                   const std::function<absl::Status(const Caller&)>& body, WhileClosed while_closed) {
   const SteadyTime arrived = steady_clock::now();
   const Caller caller(host, context);
   const LogScope scope(caller.trace());
@@ -112,8 +117,8 @@ grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
   absl::Status status;
   if (!pass) {
     status = refuse_full("", "calls", host.calls.max(), host.calls.max() + 1.0, kBusyRetryMs);
-  } else if (host.drain.draining() && while_draining == WhileDraining::kRefuse) {
-    status = draining();
+  } else if (absl::Status closed = check_serving(host); !closed.ok() && while_closed == WhileClosed::kRefuse) {
+    status = std::move(closed);
   } else {
     status = body(caller);
   }

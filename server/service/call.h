@@ -1,5 +1,5 @@
 // One call as the services see it: who calls, for how long, and whether it should still be answered. serve() is the
-// frame around every call that is not a stream: admission, the draining check, the error map and the log.
+// frame around every call that is not a stream: admission, whether the server serves, the error map and the log.
 //
 // Threads: a Caller may be asked from any thread for as long as the call lasts.
 #ifndef LOCUS_SERVER_SERVICE_CALL_H_
@@ -72,13 +72,15 @@ absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, Stead
 // now and then, and ends with its status where that is not OK, or, at the call's deadline, with what it waited for.
 absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
 
-enum class WhileDraining { kRefuse, kServe };
+// UNAVAILABLE while the server reads back what it keeps, or drains.
+absl::Status check_serving(const Host& host);
+enum class WhileClosed { kRefuse, kServe };
 
 // Runs `body`, turns what it returns into the call's status, and counts the call. Its lines in the log have its request
 // id, which also goes back to the caller at the end.
 grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
                    const std::function<absl::Status(const Caller&)>& body,
-                   WhileDraining while_draining = WhileDraining::kRefuse);
+                   WhileClosed while_closed = WhileClosed::kRefuse);
 
 // Which refusals of a message are the stream's own end: the caller's end of the call, and the server's.
 bool ends_stream(const Caller& caller, const absl::Status& status);

@@ -18,7 +18,6 @@ v1::SceneSpec to_proto(const SceneSpec& spec) {
   for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
   out.set_history_ticks(spec.history.ticks);
   out.set_history_bytes(spec.history.bytes);
-  out.set_durability(v1::DURABILITY_MEMORY);
   out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
   out.set_overload(spec.overload == OverloadPolicy::kLatestWins ? v1::OVERLOAD_POLICY_LATEST_WINS
                                                                 : v1::OVERLOAD_POLICY_EVERY_BATCH);
@@ -27,7 +26,6 @@ v1::SceneSpec to_proto(const SceneSpec& spec) {
 
 absl::Status check_served(const v1::SceneSpec& spec) {
   if (spec.idle_ttl_s() != 0) return not_served("spec.idle_ttl_s");
-  if (spec.durability() == v1::DURABILITY_LOCAL) return not_served("spec.durability");
   if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
   if (!v1::Winding_IsValid(spec.winding())) return unknown_enum("spec.winding", spec.winding());
   if (!v1::OverloadPolicy_IsValid(spec.overload())) return unknown_enum("spec.overload", spec.overload());
@@ -95,6 +93,7 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   out.labels.insert(spec.labels().begin(), spec.labels().end());
   out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
   if (spec.overload() == v1::OVERLOAD_POLICY_LATEST_WINS) out.overload = OverloadPolicy::kLatestWins;
+  if (spec.durability() == v1::DURABILITY_MEMORY) out.durability = Durability::kMemory;
   return out;
 }
 
@@ -104,6 +103,8 @@ v1::Scene to_proto(const Scene& scene) {
   v1::Scene out;
   out.set_name(scene.name());
   *out.mutable_spec() = to_proto(scene.spec());
+  const bool local = scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
+  out.mutable_spec()->set_durability(local ? v1::DURABILITY_LOCAL : v1::DURABILITY_MEMORY);
   out.set_state(status.pending_changes > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
   out.set_epoch(snapshot->epoch);
   out.set_revision(snapshot->revision);

@@ -3,6 +3,9 @@
 #ifndef LOCUS_SERVER_SERVICE_HOST_H_
 #define LOCUS_SERVER_SERVICE_HOST_H_
 
+#include <algorithm>
+#include <atomic>
+
 #include "core/scene/registry.h"
 #include "core/scene/update_log.h"
 #include "server/config/observability_limits.h"
@@ -16,6 +19,7 @@
 #include "server/scheduling/gate.h"
 #include "server/scheduling/memory_budget.h"
 #include "server/scheduling/query_scheduler.h"
+#include "server/scheduling/snapshot_keeper.h"
 #include "server/scheduling/update_pump.h"
 #include "server/scheduling/worker_pool.h"
 #include "server/service/memory_use.h"
@@ -28,14 +32,16 @@ struct Host {
       : config(with),
         log(with_log),
         slow_queries(with.slow_query_ms),
+        registry(with_log),
         memory(with.memory_limit, process_memory(registry)),
         pool(with.threads),
         scheduler(scheduler_options(with)),
-        updates(pump_options(with)),
+        updates(pump_options(with, with_log)),
         calls(with.max_calls),
         streams(with.max_streams) {}
 
   static constexpr uint32_t kChangeThreads = 2;
+  static constexpr uint32_t kLoggingThreads = 8;
 
   static SchedulerOptions scheduler_options(const ServerConfig& config) {
     SchedulerOptions options;
@@ -44,11 +50,13 @@ struct Host {
     options.clock = &thread_nanoseconds;
     return options;
   }
-  static UpdatePumpOptions pump_options(const ServerConfig& config) {
+  // Threads that wait for a disk need no cores, and one sync serves all of them.
+  static UpdatePumpOptions pump_options(const ServerConfig& config, const UpdateLog* log) {
     UpdatePumpOptions options;
-    options.threads = config.threads;
+    options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
     return options;
   }
+  static SnapshotKeeperOptions keeper_options(const ServerConfig& config);
 
   const ServerConfig config;
   UpdateLog* const log;
@@ -60,12 +68,14 @@ struct Host {
   CostEstimates costs;
   QueryScheduler scheduler;
   UpdatePump updates;
+  SnapshotKeeper snapshots{registry, log, keeper_options(config)};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
   Gate calls;    // in work, streams apart
   Gate streams;  // open
   Gate health_watchers{kMaxHealthWatchers};
   Gate backups{limits::kMaxBackups};
   Drain drain;
+  std::atomic<bool> recovering{false};  // what the log keeps is being read back
 };
 
 }  // namespace locus::server

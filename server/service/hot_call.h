@@ -194,7 +194,7 @@ class HotCall final : private IoLoop::Resident {
     pass_ = gate.enter();
     if (!pass_)
       return refuse_full("", Method::kStream ? "streams" : "calls", gate.max(), gate.max() + 1.0, kRetryAfterMs);
-    if (host.drain.draining()) return draining();
+    if (absl::Status status = check_serving(host); !status.ok()) return status;
     if (Method::kStream) open_.emplace(host.metrics, Method::kRpc);
     return absl::OkStatus();
   }

@@ -1,27 +1,23 @@
 #include "server/service/scene_service.h"
 
-#include <random>
+#include <algorithm>
+#include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "server/observability/log.h"
 #include "server/service/call.h"
 #include "server/service/convert.h"
+#include "server/service/epochs.h"
 #include "server/service/instance_changes.h"
 #include "server/service/mesh_download.h"
 #include "server/service/mesh_upload.h"
 #include "server/service/scene_dump.h"
+#include "server/service/status.h"
 
 namespace locus::server {
 namespace {
-
-// Never 0, and with all but certainty never the same twice, in this run of the server or another.
-uint64_t new_epoch() {
-  std::random_device device;
-  uint64_t epoch = 0;
-  while (epoch == 0) epoch = uint64_t{device()} << 32 | device();
-  return epoch;
-}
 
 absl::StatusOr<size_t> read_page_size(uint32_t asked) {
   if (asked > limits::kMaxPageSize) return refuse_limit("page_size", "page_size", limits::kMaxPageSize, asked);
@@ -43,6 +39,30 @@ bool has_labels(const Scene& scene, const google::protobuf::Map<std::string, std
   return true;
 }
 
+struct Listed {
+  std::string name;
+  ScenePtr scene;  // null for one that is damaged
+  absl::Status damage;
+};
+
+// What labels they have is not known.
+std::vector<Listed> damaged_after(const Host& host, const std::string& after, const v1::ListScenesRequest& request) {
+  std::vector<Listed> result;
+  if (!request.labels().empty()) return result;
+  for (const Registry::Damaged& scene : host.registry.damaged_scenes())
+    if (scene.name > after) result.push_back({scene.name, nullptr, scene.damage});
+  return result;
+}
+
+v1::Scene describe(const Host& host, const Listed& listed) {
+  if (listed.scene != nullptr) return describe(host, *listed.scene);
+  v1::Scene scene;
+  scene.set_name(listed.name);
+  scene.set_state(v1::SCENE_STATE_DAMAGED);
+  scene.set_last_build_error(std::string(listed.damage.message()));
+  return scene;
+}
+
 absl::Status list_scenes(const Host& host, const v1::ListScenesRequest& request, v1::ListScenesResponse* response) {
   const absl::StatusOr<size_t> page_size = read_page_size(request.page_size());
   if (!page_size.ok()) return page_size.status();
@@ -50,20 +70,19 @@ absl::Status list_scenes(const Host& host, const v1::ListScenesRequest& request,
   std::string after = request.page_token();
   if (!after.empty())
     if (absl::Status status = check_page_token(check_scene_name(after, "page_token")); !status.ok()) return status;
-  // One more than the page, to know whether there is another page.
+  std::vector<Listed> all = damaged_after(host, after, request);
   while (true) {
     const std::vector<ScenePtr> scenes = host.registry.list_scenes(after, limits::kMaxPageSize);
     for (const ScenePtr& scene : scenes) {
       after = scene->name();
-      if (!has_labels(*scene, request.labels())) continue;
-      if (static_cast<size_t>(response->scenes_size()) == *page_size) {
-        response->set_next_page_token(response->scenes(response->scenes_size() - 1).name());
-        return absl::OkStatus();
-      }
-      *response->add_scenes() = describe(host, *scene);
+      if (has_labels(*scene, request.labels())) all.push_back({after, scene, absl::OkStatus()});
     }
-    if (scenes.size() < limits::kMaxPageSize) return absl::OkStatus();
+    if (scenes.size() < limits::kMaxPageSize) break;
   }
+  std::sort(all.begin(), all.end(), [](const Listed& a, const Listed& b) { return a.name < b.name; });
+  for (size_t i = 0; i < std::min(all.size(), *page_size); ++i) *response->add_scenes() = describe(host, all[i]);
+  if (all.size() > *page_size) response->set_next_page_token(all[*page_size - 1].name);
+  return absl::OkStatus();
 }
 
 absl::Status list_meshes(const Host& host, const v1::ListMeshesRequest& request, v1::ListMeshesResponse* response) {
@@ -81,10 +100,11 @@ absl::Status list_meshes(const Host& host, const v1::ListMeshesRequest& request,
 absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteSceneRequest& request) {
   const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.name(), "name");
   absl::Status status = scene.status();
-  if (status.ok()) status = host.registry.delete_scene(request.name());
+  // One that is damaged can still be deleted.
+  if (status.ok() || absl::IsDataLoss(status)) status = host.registry.delete_scene(request.name());
   if (status.code() == absl::StatusCode::kNotFound && request.if_present()) return absl::OkStatus();
   if (!status.ok()) return status;
-  host.changes.forget((*scene)->latest()->epoch);
+  if (scene.ok()) host.changes.forget((*scene)->latest()->epoch);
   log(LogLevel::kInfo, "scene deleted", {{"scene", request.name()}});
   return absl::OkStatus();
 }
@@ -97,6 +117,7 @@ absl::Status SceneService::create(const Caller& caller, const v1::CreateSceneReq
   if (absl::Status status = caller.check_scene(request.name()); !status.ok()) return status;
   absl::StatusOr<SceneSpec> spec = to_spec(request.spec());
   if (!spec.ok()) return spec.status();
+  if (request.spec().durability() == v1::DURABILITY_LOCAL && host_.log == nullptr) return not_served("spec.durability");
   spec->pinned_bytes = host_.config.pinned_limit;
   const std::string& static_from = request.spec().static_from();
   if (!static_from.empty())

@@ -25,6 +25,7 @@ SceneFigures figures_of(const Host& host, const Scene& scene) {
   figures.history_bytes = status.history_bytes;
   figures.history_ticks = status.recorded_ticks;
   figures.pinned_bytes = status.pinned_bytes;
+  figures.log_bytes = scene.log_position().bytes;
   figures.pending_changes = std::max(status.pending_changes, host.changes.pending(snapshot->epoch));
   return figures;
 }
@@ -68,6 +69,16 @@ void add_queues(const Host& host, MetricPage& page) {
                MetricKind::kCounter, static_cast<double>(host.slow_queries.count()));
 }
 
+void add_storage(const Host& host, MetricPage& page) {
+  const SnapshotKeeperStats snapshots = host.snapshots.stats();
+  page.add_one("locus_snapshots_total", "Snapshots that took the place of a scene's log.", MetricKind::kCounter,
+               static_cast<double>(snapshots.written));
+  page.add_one("locus_snapshot_failures_total", "Snapshots that could not be written.", MetricKind::kCounter,
+               static_cast<double>(snapshots.failed));
+  page.add_one("locus_scenes_damaged", "Scenes that are not served because what the disk has of them is damaged.",
+               MetricKind::kGauge, static_cast<double>(host.registry.damaged_scenes().size()));
+}
+
 }  // namespace
 
 void Scrape::serving(std::vector<std::string> addresses) {
@@ -77,6 +88,7 @@ void Scrape::serving(std::vector<std::string> addresses) {
 }
 
 HttpReply Scrape::readiness() const {
+  if (host_.recovering.load()) return {.code = 503, .body = "recovering\n"};
   if (!serving_) return {.code = 503, .body = "starting\n"};
   if (host_.drain.draining()) return {.code = 503, .body = "draining\n"};
   return {.body = "ready\n"};
@@ -93,6 +105,7 @@ std::string Scrape::metrics() {
   MetricPage page;
   add_server(host_, readiness().code == 200, page);
   add_queues(host_, page);
+  add_storage(host_, page);
   add_call_figures(host_.metrics.read(), page);
   std::vector<SceneFigures> scenes;
   for (const ScenePtr& scene : host_.registry.list_scenes("", std::numeric_limits<size_t>::max()))

@@ -18,6 +18,7 @@
 #include "server/service/io_threads.h"
 #include "server/service/listening.h"
 #include "server/service/query_service.h"
+#include "server/service/recovery.h"
 #include "server/service/scene_service.h"
 #include "server/service/scrape.h"
 #include "server/service/server_service.h"
@@ -132,12 +133,14 @@ Server::~Server() {
   if (!parts_->ended) drain(milliseconds(0));
 }
 
-absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config, UpdateLog* log) {
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config, UpdateLog* log,
+                                                      const std::atomic<bool>& stop) {
   const absl::StatusOr<std::vector<ListenAddress>> addresses = read_addresses(config);
   if (!addresses.ok()) return addresses.status();
   enable_extras();
   auto parts = std::make_unique<Parts>(config, log);
   if (can_back_up(parts->host)) remove_leftover_backup(parts->host);
+  parts->host.recovering = log != nullptr;
   absl::StatusOr<std::unique_ptr<HttpServer>> http = start_http(config, parts->scrape);
   if (!http.ok()) return http.status();
   parts->http = *std::move(http);
@@ -166,6 +169,10 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
     const bool tcp = (*addresses)[i].kind == ListenAddress::Kind::kTcp;
     if (tcp && server->port_ == 0) server->port_ = port;
   }
+  Host& host = server->parts_->host;
+  if (log != nullptr)
+    if (absl::Status status = recover_all(host, stop); !status.ok()) return status;
+  host.recovering = false;
   server->parts_->health_service.serving();
   server->parts_->scrape.serving(server->addresses_);
   return server;

@@ -5,6 +5,7 @@
 #ifndef LOCUS_SERVER_SERVICE_SERVER_H_
 #define LOCUS_SERVER_SERVICE_SERVER_H_
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -20,8 +21,11 @@ namespace locus::server {
 class Server {
  public:
   // Listens on every address of `config` or on none: an error names the address and the reason. Scenes are kept in
-  // `log`, which outlives the server, or in memory only where there is none.
-  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config, UpdateLog* log = nullptr);
+  // `log`, which outlives the server, or in memory only where there is none. What the log has is read back before this
+  // returns; meanwhile calls are answered with REASON_RECOVERING. CANCELLED soon after `stop` is true, if it is then
+  // still at that.
+  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config, UpdateLog* log = nullptr,
+                                                       const std::atomic<bool>& stop = kNever);
 
   // Ends without grace if drain() was not called.
   ~Server();
@@ -40,6 +44,7 @@ class Server {
   void drain(std::chrono::milliseconds grace);
 
  private:
+  static inline const std::atomic<bool> kNever{false};
   struct Parts;
   explicit Server(std::unique_ptr<Parts> parts);
 

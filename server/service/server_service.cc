@@ -13,6 +13,11 @@
 namespace locus::server {
 namespace {
 
+bool serves(const Host& host, absl::string_view feature) {
+  if (feature == kBackupFeature) return can_back_up(host);
+  return feature != "durability_local" || host.log != nullptr;
+}
+
 struct NamedLimit {
   const char* name;
   double value;
@@ -103,9 +108,9 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
   const auto body = [&](const Caller&) {
     response->set_version(kVersion);
     response->set_instruction_set(std::string(instruction_set()));
-    for (const char* feature : {"as_of", "backup", "balls", "boxes", "download_mesh", "history", "latest_wins",
-                                "lookup", "nearest", "rays", "static_from"})
-      if (can_back_up(host_) || absl::string_view(feature) != kBackupFeature) response->add_features(feature);
+    for (const absl::string_view feature : {"as_of", "backup", "balls", "boxes", "download_mesh", "durability_local",
+                                            "history", "latest_wins", "lookup", "nearest", "rays", "static_from"})
+      if (serves(host_, feature)) response->add_features(std::string(feature));
     for (const NamedLimit& limit : limits_of(host_)) {
       v1::Limit* out = response->add_limits();
       out->set_name(limit.name);
@@ -114,7 +119,7 @@ grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::Ge
     }
     return absl::OkStatus();
   };
-  return serve(host_, *context, Rpc::kGetServer, body, WhileDraining::kServe);
+  return serve(host_, *context, Rpc::kGetServer, body, WhileClosed::kServe);
 }
 
 grpc::Status ServerService::Backup(grpc::ServerContext* context, const v1::BackupRequest*,

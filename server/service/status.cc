@@ -10,7 +10,9 @@ namespace {
 // gRPC metadata is refused by peers beyond 8 KiB in all; the message is in it three times.
 constexpr size_t kMaxText = 1024;
 constexpr uint32_t kDrainRetryMs = 1000;
+constexpr uint32_t kRecoveryRetryMs = 200;
 
+static_assert(static_cast<int>(Reason::kDamaged) == v1::REASON_DAMAGED);
 static_assert(static_cast<int>(Reason::kHashMismatch) == v1::REASON_HASH_MISMATCH);
 static_assert(static_cast<int>(Reason::kMalformed) == v1::REASON_MALFORMED);
 static_assert(static_cast<int>(Reason::kNotServed) == v1::REASON_NOT_SERVED);
@@ -70,6 +72,14 @@ absl::Status draining() {
   refusal.reason = Reason::kDraining;
   refusal.retry_after_ms = kDrainRetryMs;
   return refuse(absl::StatusCode::kUnavailable, "the server is shutting down; try again elsewhere or later", refusal);
+}
+
+absl::Status recovering() {
+  Refusal refusal;
+  refusal.reason = Reason::kRecovering;
+  refusal.retry_after_ms = kRecoveryRetryMs;
+  return refuse(absl::StatusCode::kUnavailable, "the server still reads back what it keeps; try again in a moment",
+                refusal);
 }
 
 }  // namespace locus::server

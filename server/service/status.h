@@ -28,6 +28,9 @@ absl::Status unknown_enum(absl::string_view field, int number);
 // UNAVAILABLE, REASON_DRAINING.
 absl::Status draining();
 
+// UNAVAILABLE, REASON_RECOVERING.
+absl::Status recovering();
+
 }  // namespace locus::server
 
 #endif  // LOCUS_SERVER_SERVICE_STATUS_H_

@@ -215,8 +215,7 @@ absl::StatusOr<Findings> judge(const Database& database, const HighWater* high_w
 }
 
 std::string remedy(const std::string& path) {
-  return absl::StrCat("; `locusd check ", path, "` says more, `locusd repair ", path,
-                      "` keeps what is sound, or restore a backup");
+  return absl::StrCat("; `locusd check ", path, "` says more; restore a backup with `locus restore`");
 }
 
 }  // namespace locus::server

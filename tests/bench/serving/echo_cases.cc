@@ -8,6 +8,7 @@
 #include "tests/bench/serving/processor_time.h"
 #include "tests/bench/serving/query_load.h"
 #include "tests/bench/serving/update_load.h"
+#include "tests/bench/serving/world_messages.h"
 
 namespace locus::bench::serving {
 namespace {
@@ -94,7 +95,7 @@ class EchoCases {
     const std::string name = parsed_name(moves);
     if (!run_.wants(name)) return absl::OkStatus();
     run_.progress(name);
-    std::vector<v1::StreamUpdatesRequest> messages = move_messages(moves.moves, 1);
+    std::vector<v1::StreamUpdatesRequest> messages = move_messages(world_, scene_.name(), moves.moves, 1);
     for (v1::StreamUpdatesRequest& message : messages) {
       message.mutable_batch()->set_writer(kWriter);
       message.mutable_batch()->set_batch(1);
@@ -128,7 +129,8 @@ class EchoCases {
     const std::string name = applied_name(moves);
     if (!run_.wants(name)) return absl::OkStatus();
     run_.progress(name);
-    std::vector<v1::StreamUpdatesRequest> messages = move_messages(moves.moves, run_.options.quick ? 1 : 4);
+    std::vector<v1::StreamUpdatesRequest> messages =
+        move_messages(world_, scene_.name(), moves.moves, run_.options.quick ? 1 : 4);
     std::vector<UpdateBatch> columns;
     size_t count = 0;
     for (const v1::StreamUpdatesRequest& message : messages) {
@@ -150,12 +152,7 @@ class EchoCases {
   }
 
   absl::Status insert_objects() {
-    v1::UpdateBatch batch;
-    v1::Insert* const insert = batch.add_inserts();
-    const dynamic::Objects objects = world_.objects();
-    insert->mutable_ids()->Add(objects.ids.begin(), objects.ids.end());
-    insert->mutable_positions()->Add(objects.positions.begin(), objects.positions.end());
-    insert->mutable_ball()->mutable_radii()->Add(objects.radii.begin(), objects.radii.end());
+    v1::UpdateBatch batch = insert_all(world_);
     batch.set_writer(kWriter);
     batch.set_batch(1);
     return scene_.apply(batch);
@@ -193,25 +190,6 @@ class EchoCases {
   void note_time(const std::string& name, const ProcessorTime& time, const ProcessorTime& plain) const {
     run_.note(
         absl::StrFormat("%s: processor time a message: %s; over plain sockets %s", name, time.text(), plain.text()));
-  }
-
-  // So many ticks, cut into messages of `size`; the last of a tick may be shorter.
-  std::vector<v1::StreamUpdatesRequest> move_messages(size_t size, size_t ticks) {
-    std::vector<v1::StreamUpdatesRequest> messages;
-    for (size_t tick = 0; tick < ticks; ++tick) {
-      world_.step();
-      const dynamic::Moves moves = world_.moves();
-      for (size_t first = 0; first < moves.ids.size(); first += size) {
-        const auto ids = moves.ids.subspan(first, size);
-        const auto positions = moves.positions.subspan(3 * first, 3 * ids.size());
-        v1::StreamUpdatesRequest& message = messages.emplace_back();
-        message.set_scene(scene_.name());
-        v1::Move* const move = message.mutable_batch()->add_moves();
-        move->mutable_ids()->Add(ids.begin(), ids.end());
-        move->mutable_positions()->Add(positions.begin(), positions.end());
-      }
-    }
-    return messages;
   }
 
   // Everything is where it is in process.

@@ -37,6 +37,8 @@ absl::StatusOr<std::unique_ptr<LocalServer>> LocalServer::start(const std::strin
   return server;
 }
 
+std::string LocalServer::log() const { return text_of(folder_.file("log")); }
+
 absl::Status LocalServer::run(const std::string& program, const std::vector<std::string>& options) {
   const std::string path = program_beside(program);
   if (path.empty())

@@ -27,6 +27,8 @@ class LocalServer {
 
   const std::string& address() const { return address_; }
   const Process& process() const { return *process_; }
+  // What it printed so far.
+  std::string log() const;
 
   std::shared_ptr<grpc::Channel> channel() const { return connection_to(address_); }
 

@@ -1,6 +1,7 @@
 #include "tests/bench/serving/serving_suite.h"
 
 #include "tests/bench/serving/crowd_cases.h"
+#include "tests/bench/serving/durable_cases.h"
 #include "tests/bench/serving/echo_cases.h"
 #include "tests/bench/serving/ray_cases.h"
 #include "tests/bench/serving/redis_cases.h"
@@ -16,6 +17,7 @@ absl::Status run_serving_suite(const Options& options, const Progress& progress,
   if (status.ok() && *plain != nullptr) status = run_echo_cases(run, **plain);
   if (status.ok()) status = run_redis_cases(run);
   if (status.ok()) status = run_crowd_cases(run);
+  if (status.ok()) status = run_durable_cases(run);
   return status;
 }
 

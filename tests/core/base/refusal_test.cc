@@ -68,7 +68,8 @@ TEST(RefusalTest, EveryReasonHasItsOwnName) {
   EXPECT_EQ(reason_name(Reason::kNotFinite), "NOT_FINITE");
   EXPECT_EQ(reason_name(Reason::kSceneRestarted), "SCENE_RESTARTED");
   EXPECT_EQ(reason_name(Reason::kHashMismatch), "HASH_MISMATCH");
-  for (int a = 0; a < static_cast<int>(Reason::kHashMismatch); ++a)
+  EXPECT_EQ(reason_name(Reason::kDamaged), "DAMAGED");
+  for (int a = 0; a < static_cast<int>(Reason::kDamaged); ++a)
     EXPECT_NE(reason_name(static_cast<Reason>(a)), reason_name(static_cast<Reason>(a + 1)));
   EXPECT_EQ(reason_name(static_cast<Reason>(200)), "UNKNOWN_REASON");
 }

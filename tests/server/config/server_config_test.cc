@@ -55,6 +55,26 @@ TEST_F(ServerConfigTest, AFlagWinsOverTheEnvironmentWhichWinsOverTheFile) {
   EXPECT_EQ(invocation.config->log_format, LogFormat::kJson);
 }
 
+TEST_F(ServerConfigTest, CheckTakesTheDirectoryFromTheLineOrFromTheOption) {
+  const Invocation check = read({"check", "/data"});
+  EXPECT_EQ(check.check, "/data") << check.text;
+  EXPECT_FALSE(check.config.has_value());
+  environment_ = {{"LOCUS_DATA_DIR", "/kept"}};
+  EXPECT_EQ(read({"check"}).check, "/kept");
+}
+
+TEST_F(ServerConfigTest, CheckWithoutADirectoryIsAMistake) {
+  const Invocation invocation = read({"check"});
+  EXPECT_EQ(invocation.exit_code, 2);
+  EXPECT_THAT(invocation.text, HasSubstr("which directory"));
+}
+
+TEST_F(ServerConfigTest, CheckHasHelpOfItsOwn) {
+  const Invocation invocation = read({"check", "--help"});
+  EXPECT_EQ(invocation.exit_code, 0);
+  EXPECT_THAT(invocation.text, HasSubstr("locusd check /var/lib/locus"));
+}
+
 TEST_F(ServerConfigTest, LargeBatchesGiveWayByNicenessOrOnIdleCoresOnly) {
   EXPECT_EQ(read({}).config->batch_priority, BatchPriority::kNice);
   EXPECT_EQ(read({"--batch-priority", "idle"}).config->batch_priority, BatchPriority::kIdle);

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "core/base/refusal.h"
+#include "core/scene/registry.h"
+#include "tests/support/memory_log.h"
 
 namespace locus::server {
 namespace {
@@ -363,6 +365,55 @@ TEST_F(LatestWinsTest, OneThatWasCancelledMeanwhileIsLeftOut) {
   EXPECT_FALSE(cancelled->wait().ok());
   EXPECT_EQ(x_of(1), 1);
   EXPECT_EQ(x_of(2), 0);
+}
+
+// A scene whose acks wait for a disk that takes its time.
+class LoggedPumpTest : public testing::Test {
+ protected:
+  LoggedPumpTest() {
+    const absl::StatusOr<Registry::CreatedScene> created = registry_.create_scene("arena", {}, 5, "", false);
+    EXPECT_TRUE(created.ok()) << created.status();
+    scene_ = created->scene;
+    log_.take(std::chrono::milliseconds(1));
+  }
+
+  test::MemoryLog log_;
+  Registry registry_{&log_};
+  ScenePtr scene_;
+};
+
+TEST_F(LoggedPumpTest, OneSyncServesAllThatWaitAndEachIsARevisionOfItsOwn) {
+  constexpr uint64_t kBatches = 200;
+  std::vector<std::unique_ptr<Points>> batches;
+  for (uint64_t i = 1; i <= kBatches; ++i) batches.push_back(insert({i}));
+  UpdatePumpOptions options;
+  options.max_updates = kBatches;
+  UpdatePump pump(options);
+  for (const auto& batch : batches) ASSERT_TRUE(pump.post(scene_, *batch, WhenFull::kRefuse).ok());
+  for (uint64_t i = 0; i < kBatches; ++i) {
+    const absl::StatusOr<UpdateAck>& ack = batches[i]->wait();
+    ASSERT_TRUE(ack.ok()) << ack.status();
+    EXPECT_EQ(ack->revision, i + 1);
+  }
+  EXPECT_LT(log_.appends(), kBatches / 4);
+  EXPECT_EQ(scene_->log_position().sequence, kBatches);
+  const UpdatePumpStats stats = pump.stats();
+  EXPECT_EQ(stats.applied_inline, 0u) << "whoever brings a batch must not wait for the disk";
+  EXPECT_EQ(stats.coalesced, 0u);
+}
+
+TEST_F(LoggedPumpTest, AFullDiskRefusesUpdatesUntilThereIsRoom) {
+  UpdatePump pump(UpdatePumpOptions{});
+  log_.fail_with(absl::ResourceExhaustedError("full"));
+  const auto refused = insert({1});
+  ASSERT_TRUE(pump.post(scene_, *refused, WhenFull::kRefuse).ok());
+  EXPECT_EQ(refused->wait().status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(scene_->latest()->revision, 0u);
+  log_.fail_with(absl::OkStatus());
+  const auto applied = insert({1});
+  ASSERT_TRUE(pump.post(scene_, *applied, WhenFull::kRefuse).ok());
+  EXPECT_TRUE(applied->wait().ok());
+  EXPECT_EQ(scene_->latest()->revision, 1u);
 }
 
 }  // namespace

@@ -1,0 +1,100 @@
+#include "server/scheduling/snapshot_keeper.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/limits.h"
+#include "core/scene/state_writer.h"
+#include "server/scheduling/thread_priority.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::steady_clock;
+
+// What an object takes in a snapshot, about.
+constexpr uint64_t kObjectBytes = 80;
+
+}  // namespace
+
+SnapshotKeeper::SnapshotKeeper(const Registry& registry, UpdateLog* log, SnapshotKeeperOptions options)
+    : registry_(registry), log_(log), options_(std::move(options)) {
+  if (log_ != nullptr) thread_ = std::thread([this] { run(); });
+}
+
+SnapshotKeeper::~SnapshotKeeper() {
+  if (log_ == nullptr) return;
+  {
+    const MutexLock lock(mutex_);
+    ended_ = true;
+    end_.notify_all();
+  }
+  thread_.join();
+}
+
+SnapshotKeeperStats SnapshotKeeper::stats() const {
+  const MutexLock lock(mutex_);
+  return stats_;
+}
+
+bool SnapshotKeeper::ended() const {
+  const MutexLock lock(mutex_);
+  return ended_;
+}
+
+bool SnapshotKeeper::wait_for(std::chrono::milliseconds time) {
+  const steady_clock::time_point until = steady_clock::now() + time;
+  const MutexLock lock(mutex_);
+  while (!ended_ && steady_clock::now() < until) end_.wait_until(mutex_, until);
+  return !ended_;
+}
+
+void SnapshotKeeper::run() {
+  take_batch_priority(BatchPriority::kNice);
+  bool good = true;
+  while (wait_for(good ? options_.look_every : options_.retry_after)) good = look_at_all();
+}
+
+bool SnapshotKeeper::look_at_all() {
+  std::string after;
+  while (true) {
+    const std::vector<ScenePtr> scenes = registry_.list_scenes(after, limits::kMaxPageSize);
+    for (const ScenePtr& scene : scenes) {
+      after = scene->name();
+      if (ended()) return true;
+      if (!due(*scene)) continue;
+      const absl::StatusOr<uint64_t> bytes = write(*scene);
+      // A scene that was deleted meanwhile needs none.
+      if (ended() || absl::IsNotFound(bytes.status())) return true;
+      if (options_.tell) options_.tell(*scene, bytes);
+      const MutexLock lock(mutex_);
+      stats_.written += bytes.ok() ? 1 : 0;
+      stats_.bytes += bytes.value_or(0);
+      stats_.failed += bytes.ok() ? 0 : 1;
+      if (!bytes.ok()) return false;
+    }
+    if (scenes.size() < limits::kMaxPageSize) return true;
+  }
+}
+
+bool SnapshotKeeper::due(const Scene& scene) const {
+  if (scene.log_key() == 0) return false;
+  const uint64_t takes = kObjectBytes * scene.latest()->objects.size();
+  return scene.log_position().bytes > std::max(options_.log_bytes, takes);
+}
+
+absl::StatusOr<uint64_t> SnapshotKeeper::write(Scene& scene) {
+  const FrozenScene frozen = scene.freeze();
+  StateWriter writer(frozen);
+  const auto next = [&]() -> absl::StatusOr<std::optional<std::string>> {
+    if (ended()) return absl::CancelledError("the server ends");
+    return writer.next();
+  };
+  if (absl::Status status = log_->write_snapshot(scene.log_key(), frozen.sequence, next); !status.ok()) return status;
+  scene.snapshot_written(frozen.sequence, frozen.log_bytes);
+  return writer.bytes();
+}
+
+}  // namespace locus::server

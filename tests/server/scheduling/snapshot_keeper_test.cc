@@ -1,0 +1,122 @@
+#include "server/scheduling/snapshot_keeper.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/scene/recovery.h"
+#include "tests/support/memory_log.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+class SnapshotKeeperTest : public testing::Test {
+ protected:
+  SnapshotKeeperTest() {
+    const absl::StatusOr<Registry::CreatedScene> created = registry_.create_scene("arena", {}, 5, "", false);
+    EXPECT_TRUE(created.ok()) << created.status();
+    scene_ = created->scene;
+  }
+
+  // One that looks all the time at scenes with more than a few records.
+  SnapshotKeeperOptions eager() {
+    SnapshotKeeperOptions options;
+    options.log_bytes = 2'000;
+    options.look_every = milliseconds(1);
+    options.retry_after = milliseconds(1);
+    options.tell = [this](const Scene&, const absl::StatusOr<uint64_t>& bytes) {
+      if (!bytes.ok()) ++told_failures_;
+    };
+    return options;
+  }
+
+  // So many records of a point each.
+  void apply(uint64_t count) {
+    for (uint64_t i = 0; i < count; ++i) {
+      const std::vector<uint64_t> ids = {++last_id_};
+      const std::vector<float> position = {static_cast<float>(last_id_), 0, 0};
+      UpdateBatch batch;
+      batch.inserts.emplace_back();
+      batch.inserts[0].ids = ids;
+      batch.inserts[0].positions = position;
+      EXPECT_TRUE(scene_->apply(batch).ok());
+    }
+  }
+
+  void wait_for_snapshots(const SnapshotKeeper& keeper, uint64_t count) {
+    while (keeper.stats().written < count) std::this_thread::yield();
+  }
+
+  // The scene as a restart after a crash makes it.
+  ScenePtr recovered() {
+    crashed_ = std::make_unique<test::MemoryLog>(log_.crash());
+    absl::StatusOr<ScenePtr> scene =
+        recover_scene(*crashed_, crashed_->stored_scenes().front(), [](const Sha256&) { return MeshPtr(); });
+    EXPECT_TRUE(scene.ok()) << scene.status();
+    return scene.value_or(nullptr);
+  }
+
+  test::MemoryLog log_;
+  Registry registry_{&log_};
+  ScenePtr scene_;
+  uint64_t last_id_ = 0;
+  std::atomic<uint64_t> told_failures_{0};
+  std::unique_ptr<test::MemoryLog> crashed_;
+};
+
+TEST_F(SnapshotKeeperTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn) {
+  const SnapshotKeeper keeper(registry_, &log_, eager());
+  apply(200);
+  wait_for_snapshots(keeper, 1);
+  EXPECT_GT(keeper.stats().bytes, 0u);
+  const LogPosition position = scene_->log_position();
+  EXPECT_GT(position.snapshot_sequence, 0u);
+  apply(50);
+  const ScenePtr again = recovered();
+  ASSERT_NE(again, nullptr);
+  EXPECT_EQ(again->latest()->revision, scene_->latest()->revision);
+  EXPECT_EQ(again->latest()->objects.size(), 250u);
+}
+
+TEST_F(SnapshotKeeperTest, FewRecordsAreLeftAlone) {
+  apply(3);
+  std::atomic<bool> told{false};
+  SnapshotKeeperOptions options = eager();
+  options.log_bytes = scene_->log_position().bytes;
+  options.tell = [&told](const Scene&, const absl::StatusOr<uint64_t>&) { told = true; };
+  {
+    const SnapshotKeeper keeper(registry_, &log_, options);
+    std::this_thread::sleep_for(milliseconds(20));
+    EXPECT_EQ(keeper.stats().written, 0u);
+    // One more, and it is due: so it did look.
+    apply(1);
+    wait_for_snapshots(keeper, 1);
+  }
+  EXPECT_TRUE(told);
+}
+
+TEST_F(SnapshotKeeperTest, AFullDiskIsToldOfAndTriedAgain) {
+  apply(200);
+  log_.fail_with(absl::ResourceExhaustedError("full"));
+  const SnapshotKeeper keeper(registry_, &log_, eager());
+  while (keeper.stats().failed < 2) std::this_thread::yield();
+  EXPECT_EQ(keeper.stats().written, 0u);
+  EXPECT_GE(told_failures_, 1u);
+  log_.fail_with(absl::OkStatus());
+  wait_for_snapshots(keeper, 1);
+  EXPECT_EQ(recovered()->latest()->objects.size(), 200u);
+}
+
+TEST_F(SnapshotKeeperTest, WithoutALogItDoesNothing) {
+  Registry registry;
+  const SnapshotKeeper keeper(registry, nullptr, eager());
+  EXPECT_EQ(keeper.stats().written, 0u);
+}
+
+}  // namespace
+}  // namespace locus::server
