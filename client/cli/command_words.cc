@@ -1,6 +1,7 @@
 #include "client/cli/command_words.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -9,9 +10,14 @@
 namespace locus::cli {
 namespace {
 
+bool is_path(const std::string& value) {
+  static constexpr absl::string_view kPaths[] = {"FILE", "OUT", "DIRECTORY", "BACKUP", "DATA_DIR"};
+  return std::find(std::begin(kPaths), std::end(kPaths), value) != std::end(kPaths);
+}
+
 ValueKind kind_of(const OptionWords& option, char delimiter) {
   if (!option.choices.empty()) return delimiter == ',' ? ValueKind::kListOfChoices : ValueKind::kChoice;
-  if (option.value == "FILE" || option.value == "OUT") return ValueKind::kFile;
+  if (is_path(option.value)) return ValueKind::kFile;
   if (option.value == "SCENE") return ValueKind::kScene;
   if (option.value == "ADDRESS") return ValueKind::kAddress;
   return ValueKind::kAnything;

@@ -34,7 +34,7 @@ struct CommandWords {
 };
 
 // Everything below `app`, but not what is hidden (of the empty group). Options keep the order in which help shows them.
-// A file is known by a value called FILE or OUT, a scene by SCENE, the server by ADDRESS.
+// A file is known by a value called FILE, OUT, DIRECTORY, BACKUP or DATA_DIR, a scene by SCENE, the server by ADDRESS.
 CommandWords words_of(CLI::App& app);
 
 // The option called `name` among those of the command, or nothing.

@@ -1,4 +1,5 @@
-// How much of a scene goes into one chunk of its state: shared by what writes chunks and what reads them.
+// How much of a scene goes into one chunk of its state: shared by what writes chunks and what reads them. Part of
+// the format: what is written may become less, what is read may not.
 #ifndef LOCUS_CORE_SCENE_STATE_LIMITS_H_
 #define LOCUS_CORE_SCENE_STATE_LIMITS_H_
 

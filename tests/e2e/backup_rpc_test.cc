@@ -94,6 +94,8 @@ TEST_F(BackupRpcTest, ALargeFileComesInPiecesOfAMebibyteOfWhichTheFirstNamesItAn
   }
   EXPECT_TRUE(together == bytes);
   EXPECT_EQ(pieces[4].end().bytes(), bytes.size());
+  EXPECT_EQ(absl::BytesToHexString(pieces[4].end().sha256()),
+            "f8b9b24ce2391e6909784a8c46a8f40469a73c63cc0c3800b92fc37c80f2ef62");
   EXPECT_EQ(pieces[5].path(), "round");
   EXPECT_EQ(pieces[5].data().size(), limits::kBackupPieceBytes);
   EXPECT_TRUE(pieces[5].has_end());

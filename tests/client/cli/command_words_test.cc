@@ -55,6 +55,22 @@ TEST_F(CommandWordsTest, OptionsKeepTheirOrderAndThoseOfAGroupJoinThem) {
   EXPECT_THAT(names, ElementsAre("--help", "--out", "--scene", "--layers", "--fast", "--depth"));
 }
 
+TEST(CommandWordsOfLocusTest, DirectoriesOfBackupsAreCompletedAsPaths) {
+  std::ostringstream nowhere;
+  Context context(nowhere, nowhere, Progress::kSilent);
+  CLI::App app;
+  build_cli(app, context);
+  size_t paths = 0;
+  for (const CommandWords& command : words_of(app).commands) {
+    if (command.path != "locus backup" && command.path != "locus restore") continue;
+    for (const OptionWords& positional : command.positionals) {
+      EXPECT_EQ(positional.kind, ValueKind::kFile) << command.path << " " << positional.value;
+      ++paths;
+    }
+  }
+  EXPECT_EQ(paths, 3u);
+}
+
 TEST_F(CommandWordsTest, AnOptionSaysWhatItTakes) {
   const CommandWords draw = words_of(app_).commands[0];
   const OptionWords& out = *find_option(draw, "-o");
