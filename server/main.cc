@@ -23,7 +23,7 @@
 #include "server/scheduling/semaphore.h"
 #include "server/service/library_logs.h"
 #include "server/service/server.h"
-#include "server/storage/check.h"
+#include "server/storage/report_text.h"
 #include "server/storage/rocksdb_log.h"
 
 namespace locus::server {
@@ -161,17 +161,24 @@ int run(const ServerConfig& config) {
   return EXIT_SUCCESS;
 }
 
-// Prints what there is to say; 0 where all is sound.
-int check(const std::string& directory) {
-  StorageOptions options;
-  options.path = directory;
-  const absl::StatusOr<DirectoryReport> report = check_directory(options);
+template <class Report>
+int print(const absl::StatusOr<Report>& report) {
   if (!report.ok()) {
     std::fprintf(stderr, "locusd: %s\n", std::string(report.status().message()).c_str());
     return EXIT_FAILURE;
   }
   std::fputs(to_text(*report).c_str(), stdout);
-  return report->sound() ? EXIT_SUCCESS : EXIT_FAILURE;
+  return EXIT_SUCCESS;
+}
+
+// check: 0 where all is sound. repair: 0 where the directory can be used afterwards.
+int maintain(const Maintenance& maintenance) {
+  StorageOptions options;
+  options.path = maintenance.directory;
+  if (maintenance.task == Maintenance::Task::kRepair) return print(repair(options));
+  const absl::StatusOr<DirectoryReport> report = check(options);
+  const int printed = print(report);
+  return printed == EXIT_SUCCESS && !report->sound() ? EXIT_FAILURE : printed;
 }
 
 }  // namespace
@@ -185,7 +192,7 @@ int main(int argc, char** argv) {
     locus::server::allow_many_files();
     return locus::server::run(*invocation.config);
   }
-  if (invocation.check) return locus::server::check(*invocation.check);
+  if (invocation.maintenance) return locus::server::maintain(*invocation.maintenance);
   std::fputs(invocation.text.c_str(), invocation.exit_code == 0 ? stdout : stderr);
   return invocation.exit_code;
 }

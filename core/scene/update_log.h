@@ -81,6 +81,8 @@ class UpdateLog {
   // What was there when the log was opened, by name. Changes afterwards are not shown.
   virtual const std::vector<StoredScene>& stored_scenes() const = 0;
   virtual const std::vector<StoredMesh>& stored_meshes() const = 0;
+  // DATA_LOSS where scenes or meshes may be missing from these lists, or stand in them though they were deleted.
+  virtual absl::Status catalogue_damage() const = 0;
   // Whether the process before came to its end in order, so that records of AckLevel::kMemory are all here.
   virtual bool closed_in_order() const = 0;
 
@@ -94,9 +96,10 @@ class UpdateLog {
   virtual absl::Status restart_scene(SceneKey scene, uint64_t epoch) = 0;
 
   // Adds records in order, all or none, with one sync where `level` asks for it; of several scenes that append at a
-  // time one sync may serve all. Returns the number of the last.
+  // time one sync may serve all. They are of the scene's epoch, and together at most kMaxRecordBytes. Returns the
+  // number of the last. FAILED_PRECONDITION for another epoch.
   virtual absl::StatusOr<uint64_t> append(SceneKey scene, absl::Span<const LogEntry> entries, AckLevel level) = 0;
-  // The records from number `from` on, in order, until `sink` fails.
+  // The records from number `from` on, which come after the snapshot's, in order, until `sink` fails.
   virtual absl::Status read(SceneKey scene, uint64_t from, RecordSink sink) const = 0;
   // The number of the last record.
   virtual absl::StatusOr<uint64_t> latest(SceneKey scene) const = 0;

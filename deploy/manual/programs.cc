@@ -36,8 +36,8 @@ std::vector<Page> pages_of_locusd() {
   server::ServerConfig config;
   CLI::App app;
   server::build_parser(app, config);
-  std::optional<std::string> directory;
-  server::add_check(app, directory);
+  std::optional<server::Maintenance> maintenance;
+  server::add_maintenance(app, maintenance);
   const cli::CommandWords words = cli::words_of(app);
   Manual manual = {
       .section = "8",

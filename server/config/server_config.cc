@@ -169,8 +169,8 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
   describe(app);
   add_options(app, ignored);
   app.add_option("--config", ignored_file);
-  std::optional<std::string> ignored_directory;
-  add_check(app, ignored_directory);
+  std::optional<Maintenance> ignored_maintenance;
+  add_maintenance(app, ignored_maintenance);
   parse(app, arguments);
   std::vector<std::string> all = arguments;
   for (const CLI::Option* option : std::as_const(app).get_options()) {
@@ -227,12 +227,12 @@ Invocation parse_all(const std::vector<std::string>& arguments, const Environmen
   ServerConfig config;
   CLI::App app;
   build_parser(app, config);
-  add_check(app, invocation.check);
+  add_maintenance(app, invocation.maintenance);
   parse(app, with_environment(arguments, environment));
-  if (invocation.check) {
-    if (invocation.check->empty()) invocation.check = config.data_dir;
-    return invocation.check->empty() ? mistake("which directory? Name it after the command, or with --data-dir")
-                                     : invocation;
+  if (invocation.maintenance) {
+    std::string& directory = invocation.maintenance->directory;
+    if (directory.empty()) directory = config.data_dir;
+    return directory.empty() ? mistake("which directory? Name it after the command, or with --data-dir") : invocation;
   }
   if (const absl::Status status = check_config(config); !status.ok()) return mistake(status.message());
   follow_machine(config);
@@ -245,7 +245,7 @@ Invocation help(const std::vector<std::string>& arguments) {
   CLI::App app;
   build_parser(app, config);
   Invocation invocation;
-  add_check(app, invocation.check);
+  add_maintenance(app, invocation.maintenance);
   // Of the command that is named, if one is.
   const CLI::App* asked = &app;
   for (const CLI::App* command : app.get_subcommands({}))
@@ -262,16 +262,30 @@ void build_parser(CLI::App& app, ServerConfig& config) {
   app.set_config("--config", "", "File with options, one `name = value` a line, # starts a comment");
 }
 
-void add_check(CLI::App& app, std::optional<std::string>& directory) {
-  CLI::App& command = *app.add_subcommand(
-      "check",
-      "Say whether everything in a data directory is sound, scene by scene. Changes\nnothing; no daemon may use the "
-      "directory meanwhile. Exits 0 if all is sound.");
-  command.footer("Examples:\n  locusd check /var/lib/locus");
-  command.fallthrough();
-  const auto argument = std::make_shared<std::string>();
-  command.add_option("DIRECTORY", *argument, "The data directory [what --data-dir says]");
-  command.callback([&directory, argument] { directory = *argument; });
+void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen) {
+  struct Command {
+    const char* name;
+    Maintenance::Task task;
+    const char* description;
+    const char* footer;
+  };
+  constexpr Command kCommands[] = {
+      {"check", Maintenance::Task::kCheck,
+       "Say whether everything in a data directory is sound, scene by scene. Changes\nnothing; no daemon may use the "
+       "directory meanwhile. Exits 0 if all is sound.",
+       "Examples:\n  locusd check /var/lib/locus"},
+      {"repair", Maintenance::Task::kRepair,
+       "Make a damaged data directory usable again, and say what is lost. Sound scenes\nare left as they are; what is "
+       "changed is kept beside the directory. Where there is\na backup, `locus restore` loses less.",
+       "Examples:\n  locusd check /var/lib/locus\n  locusd repair /var/lib/locus"}};
+  for (const Command& command : kCommands) {
+    CLI::App& added = *app.add_subcommand(command.name, command.description);
+    added.footer(command.footer);
+    added.fallthrough();
+    const auto directory = std::make_shared<std::string>();
+    added.add_option("DIRECTORY", *directory, "The data directory [what --data-dir says]");
+    added.callback([&chosen, directory, task = command.task] { chosen = Maintenance{task, *directory}; });
+  }
   app.require_subcommand(0, 1);
 }
 

@@ -106,12 +106,18 @@ using Environment = std::function<std::optional<std::string>(const std::string&)
 // Reads the process's own environment.
 std::optional<std::string> process_environment(const std::string& name);
 
-// What a command line asks for: to run with `config`, to say whether the data directory `check` is sound, or, without
-// either, to print `text` and end with `exit_code` (0 after --help and --version, 2 after a mistake, which `text`
-// explains).
+// Work on a data directory that no daemon uses meanwhile: `locusd check` and `locusd repair`.
+struct Maintenance {
+  enum class Task : uint8_t { kCheck, kRepair };
+  Task task = Task::kCheck;
+  std::string directory;
+};
+
+// What a command line asks for: to run with `config`, to do `maintenance`, or, without either, to print `text` and end
+// with `exit_code` (0 after --help and --version, 2 after a mistake, which `text` explains).
 struct Invocation {
   std::optional<ServerConfig> config;
-  std::optional<std::string> check;
+  std::optional<Maintenance> maintenance;
   int exit_code = 0;
   std::string text;
 };

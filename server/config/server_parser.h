@@ -15,8 +15,8 @@ namespace locus::server {
 // is no matter of the parser: see environment_variable().
 void build_parser(CLI::App& app, ServerConfig& config);
 
-// Adds the command `check`: once a line is parsed that names it, `directory` is its argument, empty where it has none.
-void add_check(CLI::App& app, std::optional<std::string>& directory);
+// Adds the commands `check` and `repair`. The one that is chosen is in `chosen` once a line is parsed.
+void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen);
 
 // Whether an empty variable sets the option, to nothing, rather than being as good as none.
 bool may_be_empty(const std::string& option);

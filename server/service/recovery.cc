@@ -33,7 +33,7 @@ absl::Status damaged(const char* field, const absl::Status& damage) {
   refusal.reason = Reason::kDamaged;
   refusal.field = field;
   const char* const advice =
-      absl::StrContains(damage.message(), "locusd") ? "" : "; `locusd check` says more; restore a backup";
+      absl::StrContains(damage.message(), "locusd") ? "" : "; see `locusd check`, then `locusd repair` or a backup";
   return refuse(absl::StatusCode::kDataLoss, absl::StrCat(damage.message(), advice), refusal);
 }
 
@@ -45,6 +45,7 @@ class Recovery {
     const std::vector<StoredScene>& scenes = log_.stored_scenes();
     const std::vector<StoredMesh>& meshes = log_.stored_meshes();
     total_ = scenes.size() + meshes.size();
+    if (const absl::Status damage = log_.catalogue_damage(); !damage.ok()) log(LogLevel::kError, damage.message());
     if (total_ == 0) return absl::OkStatus();
     log(LogLevel::kInfo, "recovering",
         {{"scenes", absl::StrCat(scenes.size())}, {"meshes", absl::StrCat(meshes.size())}});

@@ -1,5 +1,5 @@
-// Looks whether a data directory is sound, without changing a byte of it: for `locusd check`. Every record and every
-// chunk is read. Plain data and a free function; any thread.
+// What is wrong with a data directory, if anything: for `locusd check`, and for whoever repairs one. Reads every byte
+// and changes none. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_CHECK_H_
 #define LOCUS_SERVER_STORAGE_CHECK_H_
 
@@ -8,36 +8,47 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/scene/update_log.h"
+#include "server/storage/judge.h"
 #include "server/storage/storage_options.h"
 
 namespace locus::server {
 
-struct CheckedScene {
+struct SceneReport {
+  SceneKey key = 0;
   std::string name;
-  uint64_t snapshot_sequence = 0;  // the snapshot holds all records up to here
-  uint64_t last_sequence = 0;      // of the last record
+  uint64_t epoch = 0;
+  uint64_t snapshot_sequence = 0;
+  uint64_t last_sequence = 0;  // records are there without a gap up to here ...
+  uint64_t promised = 0;       // ... and must be up to here at least
+  uint64_t snapshot_chunks = 0;
+  uint64_t snapshot_bytes = 0;
   uint64_t log_bytes = 0;
   std::string damage;  // empty where it is sound
 };
 
-struct CheckedMesh {
+struct MeshReport {
   std::string name;
+  Sha256 sha256 = {};
+  uint64_t bytes = 0;
   std::string damage;
 };
 
 struct DirectoryReport {
-  std::string damage;  // of the directory as a whole: scenes may be missing below
-  std::vector<CheckedScene> scenes;
-  std::vector<CheckedMesh> meshes;
+  std::string damage;            // nothing can be read, and why
+  std::string catalogue_damage;  // names may be missing below, or were deleted
+  bool closed_in_order = false;
+  std::vector<SceneReport> scenes;  // by name
+  std::vector<MeshReport> meshes;   // by name
 
   bool sound() const;
 };
 
-// FAILED_PRECONDITION where a process has it open, NOT_FOUND where there is none, UNAVAILABLE for what the disk says.
-absl::StatusOr<DirectoryReport> check_directory(const StorageOptions& options);
+// NOT_FOUND where there is no data directory, FAILED_PRECONDITION where a process has it open or another version wrote
+// it, UNAVAILABLE for a disk that fails. Damage is no error.
+absl::StatusOr<DirectoryReport> check(const StorageOptions& options);
 
-// For people, a line each.
-std::string to_text(const DirectoryReport& report);
+DirectoryReport report_of(const Findings& findings);
 
 }  // namespace locus::server
 

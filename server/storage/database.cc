@@ -140,41 +140,49 @@ absl::Status Database::write(rocksdb::WriteBatch& batch, bool sync) {
 }
 
 absl::Status Database::write_now(rocksdb::WriteBatch& batch, bool sync) {
-  if (broken_) {
-    MutexLock lock(mutex_);
-    if (!error_.ok()) return error_;
+  ++writers_;
+  rocksdb::Status status;
+  const bool broken = broken_;
+  if (!broken) {
+    rocksdb::WriteOptions options;
+    options.sync = sync;
+    status = db_->Write(options, &batch);
   }
-  rocksdb::WriteOptions options;
-  options.sync = sync;
-  const rocksdb::Status status = db_->Write(options, &batch);
-  if (status.ok()) return absl::OkStatus();
-  absl::Status error = disk_error("writing the log", status);
-  MutexLock lock(mutex_);
-  error_ = error;
-  broken_ = true;
+  absl::Status error;
+  if (broken || !status.ok()) error = break_with(status);
+  --writers_;
   return error;
 }
 
-absl::Status Database::sync() {
-  const rocksdb::Status status = db_->SyncWAL();
-  if (status.ok()) return absl::OkStatus();
-  absl::Status error = disk_error("syncing the log", status);
+absl::Status Database::break_with(const rocksdb::Status& status) {
   MutexLock lock(mutex_);
-  error_ = error;
+  if (!status.ok()) error_ = disk_error("writing the log", status);
   broken_ = true;
-  return error;
+  return error_;
+}
+
+// SyncWAL() would do, but ends the process where another thread's write has just failed.
+absl::Status Database::sync() {
+  rocksdb::WriteBatch nothing;
+  return write(nothing, true);
 }
 
 bool Database::needs_recovery() const { return broken_ || errors_->seen; }
 
 absl::Status Database::recover() {
+  if (!broken_) break_with(rocksdb::Status::IOError("a table could not be written")).IgnoreError();
+  // RocksDB ends the process at a write to a log that failed before, and between the two steps it would allow one.
+  while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
   errors_->seen = false;
   rocksdb::Status status = db_->Resume();
-  // RocksDB goes on in the log that it could not write where it has nothing in memory, and fails again.
+  // With nothing in memory that took nothing: RocksDB would go on in the log that it could not write. Then this fails,
+  // too, but leaves something in memory, and the next time both succeed.
   if (status.ok()) status = renew();
   if (!status.ok()) {
     errors_->seen = true;
-    return disk_error("going on after an error", status);
+    MutexLock lock(mutex_);
+    error_ = disk_error("going on after an error", status);
+    return error_;
   }
   MutexLock lock(mutex_);
   error_ = absl::OkStatus();

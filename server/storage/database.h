@@ -77,6 +77,8 @@ class Database {
 
   Database(OpenMode mode);
   absl::Status write_now(rocksdb::WriteBatch& batch, bool sync) LOCUS_EXCLUDES(mutex_);
+  // Writes fail from now on; the error they fail with.
+  absl::Status break_with(const rocksdb::Status& status) LOCUS_EXCLUDES(mutex_);
   // Marks in every family, past the log, and all into tables: after this the logs before are not needed.
   rocksdb::Status renew();
 
@@ -86,7 +88,8 @@ class Database {
   std::unique_ptr<rocksdb::DB> db_;
   std::vector<rocksdb::ColumnFamilyHandle*> families_;
   std::atomic<bool> broken_ = false;
-  Mutex lenient_;  // held by every write to a lenient database, which would go on after an error
+  std::atomic<int> writers_ = 0;  // that are at work
+  Mutex lenient_;                 // held by every write to a lenient database, which would go on after an error
   mutable Mutex mutex_;
   absl::Status error_ LOCUS_GUARDED_BY(mutex_);  // of the write that broke it
 };

@@ -45,7 +45,7 @@ std::string encode(const HighWater& high_water) {
   ByteWriter out;
   out.u64(high_water.number).u8(high_water.closed ? 1 : 0).u64(high_water.catalogue).u64(high_water.next_scene);
   out.u64(high_water.mesh_sum).u64(high_water.covered_sequence).string(high_water.manifest);
-  out.u64(high_water.manifest_bytes).string(high_water.mesh_damage);
+  out.u64(high_water.manifest_bytes).string(high_water.catalogue_damage);
   out.u32(static_cast<uint32_t>(high_water.marks.size()));
   for (const Mark& mark : high_water.marks) {
     out.u64(mark.scene).string(mark.name).u64(mark.sequence).u64(mark.chain).u64(mark.row_seal).string(mark.damage);
@@ -64,7 +64,7 @@ std::optional<HighWater> decode_high_water(absl::string_view bytes) {
   found.covered_sequence = in.u64();
   found.manifest = in.string();
   found.manifest_bytes = in.u64();
-  found.mesh_damage = in.string();
+  found.catalogue_damage = in.string();
   const uint32_t count = in.u32();
   for (uint32_t i = 0; i < count && in.ok(); ++i) {
     Mark& mark = found.marks.emplace_back();

@@ -41,7 +41,7 @@ struct HighWater {
   uint64_t covered_sequence = 0;  // of RocksDB: all writes up to here are in what this says
   std::string manifest;           // RocksDB's list of its files ...
   uint64_t manifest_bytes = 0;    // ... and how long it was at least
-  std::string mesh_damage;        // found earlier, of the meshes as a whole
+  std::string catalogue_damage;   // found earlier, of the catalogue as a whole
   std::vector<Mark> marks;
 };
 

@@ -28,9 +28,7 @@ std::string count_of(uint64_t count, absl::string_view thing) {
 }
 
 absl::Status read_meta(const Database& database, Findings& found) {
-  rocksdb::ReadOptions options;
-  options.fill_cache = false;
-  const std::unique_ptr<rocksdb::Iterator> at(database.db().NewIterator(options, database.meta()));
+  const std::unique_ptr<rocksdb::Iterator> at(database.db().NewIterator(reading_options(), database.meta()));
   for (at->SeekToFirst(); at->Valid(); at->Next()) {
     const absl::string_view key = view_of(at->key());
     const std::optional<absl::string_view> bytes = unsealed(key, view_of(at->value()));
@@ -178,17 +176,17 @@ absl::Status find_meshes(const Database& database, Depth depth, Findings& found)
   for (auto row = found.rows.lower_bound(start); row != found.rows.end() && row->first[0] == kMeshTag; ++row) {
     MeshFinding& mesh = found.meshes.emplace_back();
     mesh.name = row->first.substr(1);
-    mesh.damage = found.mesh_damage;
+    mesh.damage = found.catalogue_damage;
     const absl::string_view sha256 = *unsealed(row->first, row->second);
     if (sha256.size() == mesh.sha256.size()) std::copy(sha256.begin(), sha256.end(), mesh.sha256.begin());
     const auto content = found.rows.find(content_key(mesh.sha256));
-    const std::optional<ChunkList> list =
-        content == found.rows.end() ? std::nullopt : decode_chunk_list(*unsealed(content->first, content->second));
+    const std::optional<ContentRow> list =
+        content == found.rows.end() ? std::nullopt : decode_content(*unsealed(content->first, content->second));
     if (list) mesh.content = *list;
     if (!list && mesh.damage.empty()) mesh.damage = "its content is lost";
     if (!mesh.damage.empty() || depth == Depth::kKeys) continue;
-    const absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256), mesh.content,
-                                          [](absl::string_view) { return absl::OkStatus(); });
+    const absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.content.number),
+                                          mesh.content.chunks, [](absl::string_view) { return absl::OkStatus(); });
     mesh.damage = damage_of(read, disk);
   }
   return disk;
@@ -202,11 +200,15 @@ absl::StatusOr<Findings> judge(const Database& database, const HighWater* high_w
   Standing standing;
   if (high_water != nullptr) standing = compare(found, *high_water);
   if (high_water == nullptr) {
-    found.mesh_damage = std::string(kNoHighWater);
-  } else if (!high_water->mesh_damage.empty()) {
-    found.mesh_damage = high_water->mesh_damage;
+    found.catalogue_damage = std::string(kNoHighWater);
+  } else if (!high_water->catalogue_damage.empty()) {
+    found.catalogue_damage = high_water->catalogue_damage;
   } else if (!standing.meshes) {
-    found.mesh_damage = "the catalogue of meshes is not the one that was written: names may be missing, or be back";
+    found.catalogue_damage =
+        "the catalogue of meshes is not the one that was written: names may be missing, or be back";
+  } else if (standing.later && !standing.whole) {
+    found.catalogue_damage =
+        "the catalogue of scenes is not the one that was written: names may be missing, or be back";
   }
   absl::Status disk = find_scenes(high_water, standing, database, depth, found);
   if (disk.ok()) disk = find_meshes(database, depth, found);
@@ -215,7 +217,8 @@ absl::StatusOr<Findings> judge(const Database& database, const HighWater* high_w
 }
 
 std::string remedy(const std::string& path) {
-  return absl::StrCat("; `locusd check ", path, "` says more; restore a backup with `locus restore`");
+  return absl::StrCat("; `locusd check ", path, "` says more, `locusd repair ", path,
+                      "` keeps what is sound, or restore a backup");
 }
 
 }  // namespace locus::server

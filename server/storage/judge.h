@@ -31,7 +31,7 @@ struct SceneFinding {
 struct MeshFinding {
   std::string name;
   Sha256 sha256 = {};
-  ChunkList content;
+  ContentRow content;
   std::string damage;
 };
 
@@ -41,7 +41,7 @@ struct Findings {
   std::optional<CatalogueRow> catalogue;
   std::vector<SceneFinding> scenes;  // those that are there and those that must be, by key
   std::vector<MeshFinding> meshes;   // by name
-  std::string mesh_damage;           // of the meshes as a whole
+  std::string catalogue_damage;      // names may be missing, or be back; then no mesh is believed
   std::vector<std::string> pending;  // keys of chunks whose snapshot or mesh was not finished
 };
 

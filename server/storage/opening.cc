@@ -16,7 +16,6 @@
 namespace locus::server {
 namespace {
 
-constexpr absl::string_view kLockName = "IN_USE";
 constexpr uint64_t kMostReserve = uint64_t{64} << 20;
 constexpr uint64_t kReserveShare = 20;
 constexpr uint64_t kBufferShare = 16;
@@ -102,7 +101,7 @@ void remember(const Findings& findings, HighWater& high_water) {
     high_water.next_scene = std::max(high_water.next_scene, scene.key + 1);
   }
   high_water.marks = std::move(marks);
-  high_water.mesh_damage = findings.mesh_damage;
+  high_water.catalogue_damage = findings.catalogue_damage;
   if (findings.catalogue) {
     high_water.next_scene = std::max(high_water.next_scene, findings.catalogue->next_scene);
     high_water.catalogue = std::max(high_water.catalogue, findings.catalogue->generation);
@@ -111,8 +110,9 @@ void remember(const Findings& findings, HighWater& high_water) {
 }
 
 bool is_sound(const Findings& findings) {
-  return findings.mesh_damage.empty() && std::all_of(findings.scenes.begin(), findings.scenes.end(),
-                                                     [](const SceneFinding& scene) { return scene.damage.empty(); });
+  return findings.catalogue_damage.empty() &&
+         std::all_of(findings.scenes.begin(), findings.scenes.end(),
+                     [](const SceneFinding& scene) { return scene.damage.empty(); });
 }
 
 // Judges, and writes down what is damaged before anything else happens.
@@ -148,10 +148,11 @@ absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& 
 
 absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::take(rocksdb::Env& env, const std::string& path) {
   rocksdb::FileLock* lock = nullptr;
-  const rocksdb::Status status = env.LockFile(absl::StrCat(path, "/", kLockName), &lock);
+  const rocksdb::Status status = env.LockFile(absl::StrCat(path, "/", kName), &lock);
   if (status.ok()) return std::unique_ptr<DirectoryLock>(new DirectoryLock(env, lock));
   const std::string what = status.ToString();
-  if (absl::StrContains(what, "lock")) {
+  // In another process, or in this one.
+  if (absl::StrContains(what, "Resource temporarily unavailable") || absl::StrContains(what, "lock hold")) {
     Refusal refusal;
     refusal.reason = Reason::kInUse;
     return refuse(absl::StatusCode::kFailedPrecondition,
@@ -166,8 +167,11 @@ DirectoryLock::~DirectoryLock() { env_.UnlockFile(lock_).PermitUncheckedError();
 
 StorageOptions settled(StorageOptions options) {
   if (options.env == nullptr) options.env = rocksdb::Env::Default();
+  // Of the disk that it will be on, where it is yet to be made.
   std::error_code failed;
-  const std::filesystem::space_info space = std::filesystem::space(options.path, failed);
+  std::filesystem::path place = std::filesystem::absolute(options.path, failed);
+  while (!std::filesystem::exists(place, failed) && place.has_relative_path()) place = place.parent_path();
+  const std::filesystem::space_info space = std::filesystem::space(place, failed);
   const uint64_t capacity = failed ? ~uint64_t{0} : uint64_t{space.capacity};
   if (!options.reserve_bytes) options.reserve_bytes = std::min(kMostReserve, capacity / kReserveShare);
   options.log_buffer_bytes = std::max(kLeastBuffer, std::min(options.log_buffer_bytes, capacity / kBufferShare));

@@ -19,6 +19,8 @@ namespace locus::server {
 // Held by whoever has the data directory open; released with it.
 class DirectoryLock {
  public:
+  static constexpr absl::string_view kName = "IN_USE";
+
   // FAILED_PRECONDITION where another process, or this one, has it.
   static absl::StatusOr<std::unique_ptr<DirectoryLock>> take(rocksdb::Env& env, const std::string& path);
   ~DirectoryLock();

@@ -16,8 +16,7 @@ class Walk {
  public:
   Walk(const Database& database, rocksdb::ColumnFamilyHandle* family, const std::string& from, std::string end)
       : end_(std::move(end)), end_slice_(end_) {
-    rocksdb::ReadOptions options;
-    options.fill_cache = false;
+    rocksdb::ReadOptions options = reading_options();
     options.readahead_size = kReadAhead;
     options.iterate_upper_bound = &end_slice_;
     iterator_.reset(database.db().NewIterator(options, family));
@@ -41,6 +40,13 @@ uint64_t sequence_of(absl::string_view log_key) { return ByteReader(log_key.subs
 absl::Status damaged(absl::string_view what) { return absl::DataLossError(what); }
 
 }  // namespace
+
+rocksdb::ReadOptions reading_options() {
+  rocksdb::ReadOptions options;
+  options.fill_cache = false;
+  options.ignore_range_deletions = true;
+  return options;
+}
 
 RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t sequence, uint64_t& chain_at) {
   RecordScan found;

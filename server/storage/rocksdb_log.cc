@@ -19,11 +19,6 @@ constexpr uint64_t kBatchOverhead = 128;                       // of RocksDB, a 
 constexpr uint64_t kBytesBetweenLooks = uint64_t{8} << 20;
 constexpr uint64_t kRoomToRecover = uint64_t{1} << 20;
 
-// What stands after the last record that counts, from appends that failed.
-void drop_records_from(rocksdb::WriteBatch& batch, const Database& database, SceneKey scene, uint64_t sequence) {
-  LOCUS_CHECK(batch.DeleteRange(database.log(), log_key(scene, sequence), end_of(scene_prefix(scene))).ok());
-}
-
 absl::Status too_large(uint64_t bytes) {
   return refuse_limit("entries", "record_bytes", static_cast<double>(UpdateLog::kMaxRecordBytes),
                       static_cast<double>(bytes));
@@ -91,6 +86,9 @@ void RocksdbLog::list_stored() {
   }
   std::sort(stored_scenes_.begin(), stored_scenes_.end(),
             [](const StoredScene& a, const StoredScene& b) { return a.name < b.name; });
+  if (!findings_.catalogue_damage.empty())
+    catalogue_damage_ = absl::DataLossError(
+        absl::StrCat(options_.path, " is damaged: ", findings_.catalogue_damage, remedy(options_.path)));
   for (const MeshFinding& found : findings_.meshes) {
     StoredMesh& stored = stored_meshes_.emplace_back();
     stored.name = found.name;
@@ -112,17 +110,12 @@ absl::Status RocksdbLog::begin() {
     next_scene_ = catalogue_.totals().next_scene;
     rocksdb::WriteBatch batch;
     for (const std::string& key : findings_.pending) {
-      ByteReader in(absl::string_view(key).substr(1));
-      if (key[0] == kPendingMeshTag && !catalogue_.find(absl::StrCat(std::string(1, kContentTag), in.rest()))) {
-        LOCUS_CHECK(batch.DeleteRange(database_->mesh(), std::string(in.rest()), end_of(std::string(in.rest()))).ok());
-      } else if (key[0] == kPendingSnapshotTag) {
-        const std::string prefix(in.rest());
-        const SceneKey scene = in.big_u64();
-        const absl::StatusOr<SceneRow> row = row_of(scene);
-        if (!row.ok() || snapshot_prefix(scene, row->snapshot_number) != prefix)
-          LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), prefix, end_of(prefix)).ok());
-        next_scene_ = std::max(next_scene_, scene + 1);
+      if (!in_use(key)) {
+        rocksdb::ColumnFamilyHandle* family = key[0] == kPendingMeshTag ? database_->mesh() : database_->snapshot();
+        LOCUS_CHECK(batch.DeleteRange(family, key.substr(1), end_of(key.substr(1))).ok());
       }
+      if (key[0] == kPendingSnapshotTag)
+        next_scene_ = std::max(next_scene_, ByteReader(absl::string_view(key).substr(1)).big_u64() + 1);
       LOCUS_CHECK(batch.Delete(database_->meta(), key).ok());
     }
     const bool whole = said.generation == catalogue_.totals().generation &&
@@ -156,7 +149,6 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
   if (!start.ok()) return start.status();
   rocksdb::WriteBatch batch(bytes + entries.size() * kBatchOverhead);
   Position at = start->written;
-  if (start->doubtful_end) drop_records_from(batch, *database_, key, at.sequence + 1);
   for (const LogEntry& entry : entries) {
     LOCUS_CHECK_EQ(entry.epoch, entries.front().epoch);
     const std::string record_key = log_key(key, ++at.sequence);
@@ -167,9 +159,11 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
     const rocksdb::Slice parts[] = {head, slice_of(entry.bytes), seal};
     LOCUS_CHECK(batch.Put(database_->log(), rocksdb::SliceParts(&key_part, 1), rocksdb::SliceParts(parts, 3)).ok());
   }
+  for (uint64_t doubtful = at.sequence + 1; doubtful <= start->doubtful_end; ++doubtful)
+    LOCUS_CHECK(batch.Delete(database_->log(), log_key(key, doubtful)).ok());
   const bool synced = level == AckLevel::kLocal;
   if (absl::Status status = database_->write(batch, synced && options_.sync); !status.ok()) {
-    scenes_.fail_append(scene);
+    scenes_.fail_append(scene, at.sequence);
     return status;
   }
   written_bytes_ += bytes;
@@ -206,7 +200,7 @@ absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequ
   if (sequence == row.snapshot_sequence) return row.chain;
   rocksdb::PinnableSlice value;
   const rocksdb::Status status =
-      database_->db().Get(rocksdb::ReadOptions(), database_->log(), log_key(row.key, sequence), &value);
+      database_->db().Get(reading_options(), database_->log(), log_key(row.key, sequence), &value);
   if (status.ok() && value.size() >= kRecordOverhead) return seal_of(view_of(value));
   if (status.ok() || status.IsNotFound())
     return absl::DataLossError(
@@ -237,7 +231,7 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   }
   {
     MutexLock high_water_lock(high_water_mutex_);
-    high_water.mesh_damage = high_water_.mesh_damage;
+    high_water.catalogue_damage = high_water_.catalogue_damage;
   }
   rocksdb::Status status = env.CreateDir(unfinished);
   rocksdb::Checkpoint* made = nullptr;

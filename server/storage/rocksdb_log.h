@@ -38,6 +38,7 @@ class RocksdbLog final : public UpdateLog {
 
   const std::vector<StoredScene>& stored_scenes() const override { return stored_scenes_; }
   const std::vector<StoredMesh>& stored_meshes() const override { return stored_meshes_; }
+  absl::Status catalogue_damage() const override { return catalogue_damage_; }
   bool closed_in_order() const override { return closed_in_order_; }
 
   absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
@@ -78,8 +79,11 @@ class RocksdbLog final : public UpdateLog {
   absl::StatusOr<SceneRow> row_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   uint64_t seal_of_row(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<uint64_t> chain_of(const SceneRow& row, uint64_t sequence) const;
-  absl::Status put_snapshot(const ScenePlace& place, uint64_t number, uint64_t sequence, const ChunkList& chunks)
+  // `before` is the number of the snapshot it replaces.
+  absl::Status put_snapshot(const ScenePlace& place, uint64_t before, uint64_t sequence, const ContentRow& snapshot)
       LOCUS_EXCLUDES(catalogue_mutex_);
+  // Whether the chunks of a pending key are those of a snapshot or mesh by now.
+  bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
   bool content_in_use(const Sha256& sha256, absl::string_view but) const LOCUS_REQUIRES(catalogue_mutex_);
 
   absl::Status room_for(absl::string_view what, uint64_t bytes);
@@ -98,6 +102,7 @@ class RocksdbLog final : public UpdateLog {
   Findings findings_;  // until begin() is done
   std::vector<StoredScene> stored_scenes_;
   std::vector<StoredMesh> stored_meshes_;
+  absl::Status catalogue_damage_;
   const bool closed_in_order_;
 
   SceneTable scenes_;

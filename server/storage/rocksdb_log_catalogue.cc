@@ -1,10 +1,12 @@
 // RocksdbLog: what changes the catalogue, and the chunks of snapshots and meshes.
+#include <random>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "server/storage/bytes.h"
 #include "server/storage/errors.h"
 #include "server/storage/reading.h"
 #include "server/storage/rocksdb_log.h"
@@ -28,6 +30,12 @@ absl::Status not_there(absl::string_view what) {
   Refusal refusal;
   refusal.reason = Reason::kNotFound;
   return refuse(absl::StatusCode::kNotFound, what, refusal);
+}
+
+// Of a snapshot or mesh: never the same again.
+uint64_t new_number() {
+  std::random_device random;
+  return uint64_t{random()} << 32 | random();
 }
 
 CatalogueChange change_of(const SceneRow& row) { return {{{scene_key(row.key), encode(row)}}, 0}; }
@@ -62,7 +70,6 @@ absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* fa
   ChunkList list;
   rocksdb::WriteBatch batch;
   LOCUS_CHECK(batch.Put(database_->meta(), pending, sealed(pending, "")).ok());
-  LOCUS_CHECK(batch.DeleteRange(family, prefix, end_of(prefix)).ok());
   absl::Status status;
   while (status.ok()) {
     const absl::StatusOr<std::optional<std::string>> chunk = source();
@@ -110,7 +117,7 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
   row.name = std::string(name);
   row.spec = std::string(spec);
   row.epoch = epoch;
-  row.snapshot_number = 1;
+  row.snapshot_number = new_number();
   row.chain = checksum(scene_key(row.key));
   const std::string pending = pending_snapshot_key(row.key, row.snapshot_number);
   const std::string prefix = snapshot_prefix(row.key, row.snapshot_number);
@@ -179,7 +186,7 @@ absl::Status RocksdbLog::restart_scene(SceneKey key, uint64_t epoch) {
 absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSource state) {
   const absl::StatusOr<ScenePlace> place = scenes_.find(key);
   if (!place.ok()) return place.status();
-  uint64_t number = 0;
+  uint64_t before = 0;
   {
     MutexLock lock(catalogue_mutex_);
     const absl::StatusOr<SceneRow> row = row_of(key);
@@ -189,13 +196,14 @@ absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSo
       return refuse_argument(Reason::kOutOfRange, "sequence", std::nullopt,
                              absl::StrCat("a snapshot may hold the records up to one from ", row->snapshot_sequence,
                                           " to ", last, ", not ", sequence));
-    number = row->snapshot_number + 1;
+    before = row->snapshot_number;
   }
+  const uint64_t number = new_number();
   const std::string pending = pending_snapshot_key(key, number);
   const std::string prefix = snapshot_prefix(key, number);
   const absl::StatusOr<ChunkList> chunks = put_chunks(database_->snapshot(), pending, prefix, state);
   if (!chunks.ok()) return chunks.status();
-  absl::Status status = put_snapshot(*place, number, sequence, *chunks);
+  absl::Status status = put_snapshot(*place, before, sequence, {number, *chunks});
   if (!status.ok()) {
     drop_chunks(database_->snapshot(), pending, prefix);
     return status;
@@ -204,24 +212,24 @@ absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSo
   return absl::OkStatus();
 }
 
-absl::Status RocksdbLog::put_snapshot(const ScenePlace& place, uint64_t number, uint64_t sequence,
-                                      const ChunkList& chunks) {
+absl::Status RocksdbLog::put_snapshot(const ScenePlace& place, uint64_t before, uint64_t sequence,
+                                      const ContentRow& snapshot) {
   MutexLock lock(catalogue_mutex_);
   const SceneKey key = place->key;
   absl::StatusOr<SceneRow> row = row_of(key);
   if (!row.ok()) return row.status();
-  if (row->snapshot_number + 1 != number)
+  if (row->snapshot_number != before)
     return absl::AbortedError(absl::StrCat("another snapshot of scene '", row->name, "' was written meanwhile"));
   const absl::StatusOr<uint64_t> chain = chain_of(*row, sequence);
   if (!chain.ok()) return chain.status();
-  const std::string before = snapshot_prefix(key, row->snapshot_number);
-  row->snapshot_number = number;
+  const std::string dropped = snapshot_prefix(key, before);
+  row->snapshot_number = snapshot.number;
   row->snapshot_sequence = sequence;
   row->chain = *chain;
-  row->snapshot = chunks;
+  row->snapshot = snapshot.chunks;
   rocksdb::WriteBatch batch;
-  LOCUS_CHECK(batch.Delete(database_->meta(), pending_snapshot_key(key, number)).ok());
-  LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), before, end_of(before)).ok());
+  LOCUS_CHECK(batch.Delete(database_->meta(), pending_snapshot_key(key, snapshot.number)).ok());
+  LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), dropped, end_of(dropped)).ok());
   LOCUS_CHECK(batch.DeleteRange(database_->log(), scene_prefix(key), log_key(key, sequence + 1)).ok());
   if (absl::Status status = commit(change_of(*row), batch); !status.ok()) return status;
   scenes_.set_row(*place, *row, seal_of_row(key), catalogue_.totals());
@@ -243,6 +251,18 @@ absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(
       absl::StrCat("scene '", row->name, "' is damaged: its snapshot: ", status.message(), remedy(options_.path)));
+}
+
+bool RocksdbLog::in_use(absl::string_view pending) const {
+  ByteReader in(pending.substr(1));
+  if (pending[0] == kPendingSnapshotTag) {
+    const absl::StatusOr<SceneRow> row = row_of(in.big_u64());
+    return row.ok() && row->snapshot_number == in.big_u64();
+  }
+  const absl::string_view sha256 = in.bytes(Sha256().size());
+  const std::optional<absl::string_view> bytes = catalogue_.find(absl::StrCat(std::string(1, kContentTag), sha256));
+  const std::optional<ContentRow> row = bytes ? decode_content(*bytes) : std::nullopt;
+  return row && row->number == in.big_u64();
 }
 
 bool RocksdbLog::content_in_use(const Sha256& sha256, absl::string_view but) const {
@@ -272,16 +292,18 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
   }
   CatalogueChange change{{{mesh_key(name), std::string(hash)}}, 0};
   rocksdb::WriteBatch batch;
-  const std::string pending = pending_mesh_key(sha256);
+  const uint64_t number = new_number();
+  const std::string pending = pending_mesh_key(sha256, number);
+  const std::string prefix = mesh_prefix(sha256, number);
   if (!known) {
-    const absl::StatusOr<ChunkList> chunks = put_chunks(database_->mesh(), pending, mesh_prefix(sha256), content);
+    const absl::StatusOr<ChunkList> chunks = put_chunks(database_->mesh(), pending, prefix, content);
     if (!chunks.ok()) return chunks.status();
-    change.rows.push_back({content_key(sha256), encode(*chunks)});
+    change.rows.push_back({content_key(sha256), encode(ContentRow{number, *chunks})});
     LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
   }
   MutexLock lock(catalogue_mutex_);
   if (absl::Status status = commit(change, batch); !status.ok()) {
-    if (!known) drop_chunks(database_->mesh(), pending, mesh_prefix(sha256));
+    if (!known) drop_chunks(database_->mesh(), pending, prefix);
     return status;
   }
   scenes_.set_catalogue(catalogue_.totals());
@@ -300,7 +322,8 @@ absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
   rocksdb::WriteBatch batch;
   if (!content_in_use(sha256, name)) {
     change.rows.push_back({content_key(sha256), std::nullopt});
-    LOCUS_CHECK(batch.DeleteRange(database_->mesh(), mesh_prefix(sha256), end_of(mesh_prefix(sha256))).ok());
+    const std::string all = content_key(sha256).substr(1);
+    LOCUS_CHECK(batch.DeleteRange(database_->mesh(), all, end_of(all)).ok());
   }
   if (absl::Status status = commit(change, batch); !status.ok()) return status;
   scenes_.set_catalogue(catalogue_.totals());
@@ -309,14 +332,14 @@ absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
 }
 
 absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
-  std::optional<ChunkList> list;
+  std::optional<ContentRow> row;
   {
     MutexLock lock(catalogue_mutex_);
     const std::optional<absl::string_view> bytes = catalogue_.find(content_key(sha256));
-    if (bytes) list = decode_chunk_list(*bytes);
+    if (bytes) row = decode_content(*bytes);
   }
-  if (!list) return not_there("the log has no mesh of this content");
-  absl::Status status = read_chunks(*database_, database_->mesh(), mesh_prefix(sha256), *list, sink);
+  if (!row) return not_there("the log has no mesh of this content");
+  absl::Status status = read_chunks(*database_, database_->mesh(), mesh_prefix(sha256, row->number), row->chunks, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(absl::StrCat("a mesh is damaged: ", status.message(), remedy(options_.path)));
 }

@@ -34,7 +34,9 @@ std::string content_key(const Sha256& sha256) { return tagged(kContentTag, view_
 std::string pending_snapshot_key(SceneKey scene, uint64_t number) {
   return ByteWriter().u8(kPendingSnapshotTag).big_u64(scene).big_u64(number).take();
 }
-std::string pending_mesh_key(const Sha256& sha256) { return tagged(kPendingMeshTag, view_of(sha256)); }
+std::string pending_mesh_key(const Sha256& sha256, uint64_t number) {
+  return ByteWriter().u8(kPendingMeshTag).bytes(view_of(sha256)).big_u64(number).take();
+}
 std::string log_key(SceneKey scene, uint64_t sequence) { return ByteWriter().big_u64(scene).big_u64(sequence).take(); }
 
 std::string end_of(std::string prefix) {
@@ -47,7 +49,9 @@ std::string scene_prefix(SceneKey scene) { return ByteWriter().big_u64(scene).ta
 std::string snapshot_prefix(SceneKey scene, uint64_t number) {
   return ByteWriter().big_u64(scene).big_u64(number).take();
 }
-std::string mesh_prefix(const Sha256& sha256) { return std::string(view_of(sha256)); }
+std::string mesh_prefix(const Sha256& sha256, uint64_t number) {
+  return ByteWriter().bytes(view_of(sha256)).big_u64(number).take();
+}
 std::string chunk_key(absl::string_view prefix, uint32_t index) {
   return ByteWriter().bytes(prefix).big_u32(index).take();
 }
@@ -70,24 +74,27 @@ uint64_t seal_of(absl::string_view value) {
   return value.size() < kSealBytes ? 0 : ByteReader(value.substr(value.size() - kSealBytes)).u64();
 }
 
-std::string encode(const ChunkList& row) { return ByteWriter().u64(row.chunks).u64(row.bytes).u64(row.digest).take(); }
+std::string encode(const ContentRow& row) {
+  return ByteWriter().u64(row.number).u64(row.chunks.chunks).u64(row.chunks.bytes).u64(row.chunks.digest).take();
+}
 
 std::string encode(const SceneRow& row) {
   ByteWriter out;
   out.u64(row.key).string(row.name).string(row.spec).u64(row.epoch).u64(row.snapshot_sequence).u64(row.chain);
-  return out.u64(row.snapshot_number).bytes(encode(row.snapshot)).take();
+  return out.bytes(encode(ContentRow{row.snapshot_number, row.snapshot})).take();
 }
 
 std::string encode(const CatalogueRow& row) {
   return ByteWriter().u64(row.generation).u64(row.next_scene).u64(row.scene_sum).u64(row.mesh_sum).take();
 }
 
-std::optional<ChunkList> decode_chunk_list(absl::string_view bytes) {
+std::optional<ContentRow> decode_content(absl::string_view bytes) {
   ByteReader in(bytes);
-  ChunkList row;
-  row.chunks = in.u64();
-  row.bytes = in.u64();
-  row.digest = in.u64();
+  ContentRow row;
+  row.number = in.u64();
+  row.chunks.chunks = in.u64();
+  row.chunks.bytes = in.u64();
+  row.chunks.digest = in.u64();
   return in.ended() ? std::optional(row) : std::nullopt;
 }
 
@@ -100,10 +107,10 @@ std::optional<SceneRow> decode_scene(absl::string_view bytes) {
   row.epoch = in.u64();
   row.snapshot_sequence = in.u64();
   row.chain = in.u64();
-  row.snapshot_number = in.u64();
-  const std::optional<ChunkList> snapshot = decode_chunk_list(in.rest());
+  const std::optional<ContentRow> snapshot = decode_content(in.rest());
   if (!in.ok() || !snapshot) return std::nullopt;
-  row.snapshot = *snapshot;
+  row.snapshot_number = snapshot->number;
+  row.snapshot = snapshot->chunks;
   return row;
 }
 

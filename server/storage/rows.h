@@ -2,12 +2,14 @@
 // and value, so that one in a wrong place is noticed. Free functions on plain data; any thread.
 //
 // meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene number
-//           and 'q' sha256: chunks on their way into a snapshot or mesh
+//           and 'q' sha256 number: chunks on their way into a snapshot or mesh
 // log       scene sequence: a record. Each checksum takes in the one before, from the scene's first record on: none can
 //           be left out, taken from another scene or come back from an earlier time without breaking this chain.
 // snapshot  scene number index: a chunk
-// mesh      sha256 index: a chunk
-// and in each, under the key "\0", which sorts before all others, a mark that makes every family show up in some table.
+// mesh      sha256 number index: a chunk
+// Numbers of snapshots and meshes are random and never used again: what was deleted is not looked at in reading, so
+// that nothing may stand where something else was. and in each, under the key "\0", which sorts before all others, a
+// mark that makes every family show up in some table.
 #ifndef LOCUS_SERVER_STORAGE_ROWS_H_
 #define LOCUS_SERVER_STORAGE_ROWS_H_
 
@@ -45,6 +47,12 @@ struct ChunkList {
   bool operator==(const ChunkList&) const = default;
 };
 
+// A mesh's content.
+struct ContentRow {
+  uint64_t number = 0;
+  ChunkList chunks;
+};
+
 struct SceneRow {
   SceneKey key = 0;
   std::string name;
@@ -69,13 +77,13 @@ std::string scene_key(SceneKey scene);
 std::string mesh_key(absl::string_view name);
 std::string content_key(const Sha256& sha256);
 std::string pending_snapshot_key(SceneKey scene, uint64_t number);
-std::string pending_mesh_key(const Sha256& sha256);
+std::string pending_mesh_key(const Sha256& sha256, uint64_t number);
 std::string log_key(SceneKey scene, uint64_t sequence);
 // The first key that does not begin with `prefix`: the end of a range.
 std::string end_of(std::string prefix);
 std::string scene_prefix(SceneKey scene);
 std::string snapshot_prefix(SceneKey scene, uint64_t number);
-std::string mesh_prefix(const Sha256& sha256);
+std::string mesh_prefix(const Sha256& sha256, uint64_t number);
 // Of a chunk of the snapshot or mesh whose keys begin with `prefix`.
 std::string chunk_key(absl::string_view prefix, uint32_t index);
 
@@ -88,10 +96,10 @@ uint64_t seal_of(absl::string_view value);
 
 std::string encode(const SceneRow& row);
 std::string encode(const CatalogueRow& row);
-std::string encode(const ChunkList& row);
+std::string encode(const ContentRow& row);
 std::optional<SceneRow> decode_scene(absl::string_view bytes);
 std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes);
-std::optional<ChunkList> decode_chunk_list(absl::string_view bytes);
+std::optional<ContentRow> decode_content(absl::string_view bytes);
 
 // A record's value is head, bytes, checksum; the three are made apart, so that the bytes are copied once.
 inline constexpr size_t kRecordHeadBytes = 1 + 8 + 8 + 8 + 4;

@@ -70,14 +70,14 @@ void SceneTable::end_append(SceneState& scene, Position written, bool synced) {
   MutexLock lock(mutex_);
   scene.begun_at.reset();
   scene.written = written;
-  scene.doubtful_end = false;
+  scene.doubtful_end = 0;
   if (synced) scene.synced = written;
 }
 
-void SceneTable::fail_append(SceneState& scene) {
+void SceneTable::fail_append(SceneState& scene, uint64_t last) {
   MutexLock lock(mutex_);
   scene.begun_at.reset();
-  scene.doubtful_end = true;
+  scene.doubtful_end = std::max(scene.doubtful_end, last);
 }
 
 std::vector<std::pair<ScenePlace, Position>> SceneTable::written() const {

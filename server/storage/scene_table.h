@@ -37,8 +37,8 @@ struct SceneState {
   uint64_t row_seal = 0;
   Position written;
   Position synced;
-  // An append failed, and its records may turn up after these: the next one deletes what stands beyond.
-  bool doubtful_end = false;
+  // Records up to here failed to be appended, and may turn up: the next append deletes those that it does not replace.
+  uint64_t doubtful_end = 0;
   // An append is at work; RocksDB's number of the last write before it.
   std::optional<uint64_t> begun_at;
   bool deleted = false;
@@ -51,7 +51,7 @@ class SceneTable {
  public:
   struct Start {
     Position written;
-    bool doubtful_end = false;
+    uint64_t doubtful_end = 0;
   };
 
   void add(ScenePlace scene) LOCUS_EXCLUDES(mutex_);
@@ -67,7 +67,7 @@ class SceneTable {
   absl::StatusOr<Start> begin_append(SceneState& scene, uint64_t epoch, uint64_t database_sequence)
       LOCUS_EXCLUDES(mutex_);
   void end_append(SceneState& scene, Position written, bool synced) LOCUS_EXCLUDES(mutex_);
-  void fail_append(SceneState& scene) LOCUS_EXCLUDES(mutex_);
+  void fail_append(SceneState& scene, uint64_t last) LOCUS_EXCLUDES(mutex_);
 
   // Where all scenes have been written to; after the disk has it, on_disk() takes the same list.
   std::vector<std::pair<ScenePlace, Position>> written() const LOCUS_EXCLUDES(mutex_);

@@ -21,6 +21,7 @@ class FakeLog final : public UpdateLog {
  public:
   const std::vector<StoredScene>& stored_scenes() const override { return scenes_; }
   const std::vector<StoredMesh>& stored_meshes() const override { return meshes_; }
+  absl::Status catalogue_damage() const override { return absl::OkStatus(); }
   bool closed_in_order() const override { return true; }
 
   absl::StatusOr<SceneKey> create_scene(absl::string_view, absl::string_view, uint64_t, ChunkSource) override {

@@ -50,9 +50,9 @@ class KeptDaemon {
   }
   Stubs& stubs() { return *stubs_; }
 
-  // `locusd check`: its exit code; what it printed is in printed().
-  int check() const {
-    DaemonProcess process({"check", directory()}, folder_.file("second"));
+  // `locusd check` or `repair`: its exit code; what it printed is in printed().
+  int maintain(const std::string& task) const {
+    DaemonProcess process({task, directory()}, folder_.file("second"));
     return process.wait();
   }
   std::string printed() const { return text_of(folder_.file("second")); }

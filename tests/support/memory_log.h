@@ -87,6 +87,7 @@ class MemoryLog : public UpdateLog {
 
   const std::vector<StoredScene>& stored_scenes() const override { return stored_scenes_; }
   const std::vector<StoredMesh>& stored_meshes() const override { return stored_meshes_; }
+  absl::Status catalogue_damage() const override { return absl::OkStatus(); }
   bool closed_in_order() const override { return false; }
 
   absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,

@@ -56,8 +56,8 @@ TEST(ProgramsTest, LocusdAndItsCommandsHavePagesWithAllOptionsAndVariables) {
   server::ServerConfig config;
   CLI::App app;
   server::build_parser(app, config);
-  std::optional<std::string> directory;
-  server::add_check(app, directory);
+  std::optional<server::Maintenance> maintenance;
+  server::add_maintenance(app, maintenance);
   std::map<std::string, std::string> pages = by_file(pages_of_locusd());
   expect_pages(cli::words_of(app), "8", pages);
   EXPECT_THAT(pages["locusd.8"], HasSubstr("LOCUS_DRAIN_GRACE_S"));

@@ -55,16 +55,22 @@ TEST_F(ServerConfigTest, AFlagWinsOverTheEnvironmentWhichWinsOverTheFile) {
   EXPECT_EQ(invocation.config->log_format, LogFormat::kJson);
 }
 
-TEST_F(ServerConfigTest, CheckTakesTheDirectoryFromTheLineOrFromTheOption) {
+TEST_F(ServerConfigTest, CheckAndRepairTakeTheDirectoryFromTheLineOrFromTheOption) {
   const Invocation check = read({"check", "/data"});
-  EXPECT_EQ(check.check, "/data") << check.text;
+  ASSERT_TRUE(check.maintenance.has_value()) << check.text;
+  EXPECT_EQ(check.maintenance->task, Maintenance::Task::kCheck);
+  EXPECT_EQ(check.maintenance->directory, "/data");
   EXPECT_FALSE(check.config.has_value());
   environment_ = {{"LOCUS_DATA_DIR", "/kept"}};
-  EXPECT_EQ(read({"check"}).check, "/kept");
+  const Invocation repair = read({"repair"});
+  ASSERT_TRUE(repair.maintenance.has_value()) << repair.text;
+  EXPECT_EQ(repair.maintenance->task, Maintenance::Task::kRepair);
+  EXPECT_EQ(repair.maintenance->directory, "/kept");
 }
 
 TEST_F(ServerConfigTest, CheckWithoutADirectoryIsAMistake) {
   const Invocation invocation = read({"check"});
+  EXPECT_FALSE(invocation.maintenance.has_value());
   EXPECT_EQ(invocation.exit_code, 2);
   EXPECT_THAT(invocation.text, HasSubstr("which directory"));
 }

@@ -1,0 +1,236 @@
+// Damage to a small data directory, one place at a time: whatever is flipped, cut or removed, each scene is refused or
+// is what was written, and a second opening comes to the same verdict as the first.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "server/storage/rocksdb_log.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/stored_log.h"
+#include "tests/support/stored_model.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::server {
+namespace {
+
+using test::FaultyFiles;
+using test::Random;
+using test::StoredModel;
+
+// By their paths below the data directory.
+using Files = std::map<std::string, std::string>;
+
+// How the sample's last process ended.
+enum class Ending : uint8_t { kInOrder, kKilled };
+
+struct Sample {
+  Files files;
+  StoredModel model;
+};
+
+// What one opening says.
+struct Verdict {
+  std::string opening;                        // the error, if it did not open
+  std::map<std::string, std::string> damage;  // by scene; also of the catalogue, under ""
+  std::string difference;                     // from what was promised
+  size_t served = 0;
+
+  bool operator==(const Verdict&) const = default;
+};
+
+Files files_below(const std::string& folder) {
+  Files files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file())
+      files[entry.path().string().substr(folder.size() + 1)] = test::file_bytes(entry.path().string());
+  }
+  return files;
+}
+
+void write_files(const Files& files, const std::string& folder) {
+  std::filesystem::create_directories(folder + "/rocksdb");
+  for (const auto& [name, bytes] : files) test::write_file_bytes(folder + "/" + name, bytes);
+}
+
+StorageOptions small_options(const std::string& path, rocksdb::Env* env) {
+  StorageOptions options;
+  options.path = path;
+  options.env = env;
+  options.reserve_bytes = 0;
+  options.high_water_delay = std::chrono::milliseconds(1);
+  options.memory_sync_delay = std::chrono::milliseconds(1);
+  return options;
+}
+
+// Whether the log takes anything.
+bool write_mesh(UpdateLog& log) {
+  const test::ChunksFrom content({"content"});
+  return log.add_mesh("probe", test::hash_of(99), content).ok() && log.delete_mesh("probe").ok();
+}
+
+// A few scenes with snapshots and records, in tables and in the log, and meshes.
+Sample make_sample(Ending ending) {
+  Sample sample;
+  const test::TemporaryFolder folder("sample");
+  const auto faulty = std::make_shared<FaultyFiles>(folder.path(), folder.file("graves"));
+  const std::unique_ptr<rocksdb::Env> env = rocksdb::NewCompositeEnv(faulty);
+  const StorageOptions options = small_options(folder.file("data"), env.get());
+  Random random(3);
+  for (int life = 0; life < 3; ++life) {
+    auto log = RocksdbLog::open(options);
+    LOCUS_CHECK(log.ok());
+    const int steps = life == 2 ? 30 : 60;
+    for (int step = 0; step < steps; ++step) {
+      // Getting over an error writes tables.
+      if (life < 2 && step == 40) faulty->fail_syncs(1);
+      sample.model.step(**log, random);
+      while (life < 2 && step == 40 && !write_mesh(**log)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    if (life < 2 || ending == Ending::kInOrder) continue;
+    // HIGH_WATER has caught up; what is in the files now is what a killed process leaves.
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    sample.files = files_below(options.path);
+  }
+  if (ending == Ending::kInOrder) sample.files = files_below(options.path);
+  return sample;
+}
+
+Verdict open_once(const std::string& path, rocksdb::Env* env, const StoredModel& model) {
+  Verdict verdict;
+  const auto log = RocksdbLog::open(small_options(path, env));
+  if (!log.ok()) {
+    verdict.opening = log.status().ToString();
+    if (!absl::IsDataLoss(log.status())) verdict.difference = "refused as if it were no damage: " + verdict.opening;
+    return verdict;
+  }
+  for (const StoredScene& scene : (*log)->stored_scenes()) {
+    if (scene.damage.ok()) {
+      ++verdict.served;
+    } else {
+      verdict.damage[scene.name] = std::string(scene.damage.message());
+    }
+  }
+  if (!(*log)->catalogue_damage().ok()) verdict.damage[""] = std::string((*log)->catalogue_damage().message());
+  verdict.difference = model.difference(**log, test::Refusals::kAllowed);
+  return verdict;
+}
+
+// Opens the damaged files twice.
+std::vector<Verdict> judge_damage(const Files& files, const StoredModel& model) {
+  const test::TemporaryFolder folder("damaged");
+  write_files(files, folder.file("data"));
+  const auto faulty = std::make_shared<FaultyFiles>(folder.path(), folder.file("graves"));
+  const std::unique_ptr<rocksdb::Env> env = rocksdb::NewCompositeEnv(faulty);
+  std::vector<Verdict> verdicts;
+  for (int time = 0; time < 2; ++time) verdicts.push_back(open_once(folder.file("data"), env.get(), model));
+  return verdicts;
+}
+
+// LOCUS_FAULT_RUNS=all asks for every byte and length.
+uint64_t stride(uint64_t bytes, uint64_t trials) {
+  const char* asked = std::getenv("LOCUS_FAULT_RUNS");
+  if (asked != nullptr) return 1;
+  return std::max<uint64_t>(1, bytes / test::scaled_count(trials));
+}
+
+bool holds_data(const std::string& name) {
+  return !absl::StartsWith(name, "rocksdb/LOG") && !absl::StartsWith(name, "rocksdb/OPTIONS");
+}
+
+class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
+ protected:
+  static const Sample& sample() {
+    static const Sample in_order = make_sample(Ending::kInOrder);
+    static const Sample killed = make_sample(Ending::kKilled);
+    return GetParam() == Ending::kInOrder ? in_order : killed;
+  }
+
+  void expect_no_silent_loss(const Files& files, const std::string& what) {
+    const std::vector<Verdict> verdicts = judge_damage(files, sample().model);
+    EXPECT_EQ(verdicts[0].difference, "") << what;
+    EXPECT_EQ(verdicts[1].difference, "") << what << ", opened again";
+    EXPECT_EQ(verdicts[0].opening, verdicts[1].opening) << what;
+    EXPECT_EQ(verdicts[0].damage, verdicts[1].damage) << what;
+    noticed_ += !verdicts[0].opening.empty() || !verdicts[0].damage.empty();
+    served_beside_ += !verdicts[0].damage.empty() && verdicts[0].served > 0;
+  }
+
+  uint64_t noticed_ = 0;
+  uint64_t served_beside_ = 0;
+};
+
+TEST_P(RocksdbLogDamageTest, SampleIsSound) {
+  const std::vector<Verdict> verdicts = judge_damage(sample().files, sample().model);
+  for (const Verdict& verdict : verdicts) {
+    EXPECT_EQ(verdict.opening, "");
+    EXPECT_TRUE(verdict.damage.empty());
+    EXPECT_EQ(verdict.difference, "");
+    EXPECT_GT(verdict.served, 2u);
+  }
+  int tables = 0;
+  for (const auto& [name, bytes] : sample().files) tables += absl::EndsWith(name, ".sst");
+  EXPECT_GT(tables, 3);
+}
+
+TEST_P(RocksdbLogDamageTest, FlippedByteLosesNothingSilently) {
+  for (const auto& [name, bytes] : sample().files) {
+    if (!holds_data(name)) continue;
+    const uint64_t step = stride(bytes.size(), 60);
+    for (uint64_t at = 0; at < bytes.size(); at += step) {
+      const uint64_t place = step == 1 ? at : at + Random(at).below(std::min(step, bytes.size() - at));
+      Files files = sample().files;
+      files[name][place] = static_cast<char>(files[name][place] ^ (1 << place % 8));
+      expect_no_silent_loss(files, absl::StrCat(name, " flipped at ", place, " of ", bytes.size()));
+    }
+  }
+  EXPECT_GT(noticed_, 10u);
+  EXPECT_GT(served_beside_, 0u);
+}
+
+TEST_P(RocksdbLogDamageTest, CutFileLosesNothingSilently) {
+  for (const auto& [name, bytes] : sample().files) {
+    if (!holds_data(name)) continue;
+    const uint64_t step = stride(bytes.size(), 25);
+    for (uint64_t at = 0; at < bytes.size(); at += step) {
+      Files files = sample().files;
+      files[name].resize(at);
+      expect_no_silent_loss(files, absl::StrCat(name, " cut to ", at, " of ", bytes.size()));
+    }
+  }
+  EXPECT_GT(noticed_, 10u);
+}
+
+TEST_P(RocksdbLogDamageTest, MissingFileLosesNothingSilently) {
+  for (const auto& [name, bytes] : sample().files) {
+    Files files = sample().files;
+    files.erase(name);
+    expect_no_silent_loss(files, name + " removed");
+  }
+  EXPECT_GT(noticed_, 3u);
+}
+
+TEST_P(RocksdbLogDamageTest, ZeroedPageLosesNothingSilently) {
+  constexpr size_t kPage = 512;
+  for (const auto& [name, bytes] : sample().files) {
+    if (!holds_data(name)) continue;
+    const uint64_t pages = (bytes.size() + kPage - 1) / kPage;
+    const uint64_t step = stride(pages, 12);
+    for (uint64_t page = 0; page < pages; page += step) {
+      Files files = sample().files;
+      std::string& cut = files[name];
+      std::fill(cut.begin() + page * kPage, cut.begin() + std::min(cut.size(), (page + 1) * kPage), '\0');
+      expect_no_silent_loss(files, absl::StrCat(name, " zeroed from ", page * kPage));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Endings, RocksdbLogDamageTest, ::testing::Values(Ending::kInOrder, Ending::kKilled),
+                         [](const auto& each) { return each.param == Ending::kInOrder ? "InOrder" : "Killed"; });
+
+}  // namespace
+}  // namespace locus::server

@@ -1,0 +1,256 @@
+// A disk that fails for a while: syncs and writes that fail, and no room. Nothing is acknowledged that is not there,
+// and writing comes back by itself.
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/refusal.h"
+#include "server/storage/rocksdb_log.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/stored_log.h"
+
+namespace locus::server {
+namespace {
+
+using test::append_records;
+using test::create_scene;
+using test::FaultyFiles;
+using test::record_difference;
+using test::write_snapshot;
+
+// Tries until it is over; false where it is not after a minute. The bound is for a slow machine: nothing here is timed.
+template <class Try>
+bool succeeds_soon(const Try& once) {
+  for (int i = 0; i < 6000; ++i) {
+    if (once().ok()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+class RocksdbLogFaultTest : public ::testing::Test {
+ protected:
+  RocksdbLogFaultTest() : folder_("fault") {
+    std::filesystem::create_directories(folder_.file("disk"));
+    files_ = std::make_shared<FaultyFiles>(folder_.file("disk"), folder_.file("graves"));
+    env_ = rocksdb::NewCompositeEnv(files_);
+    options_.path = folder_.file("disk/data");
+    options_.env = env_.get();
+    options_.reserve_bytes = 0;
+    open();
+  }
+
+  void open() {
+    log_ = nullptr;
+    auto log = RocksdbLog::open(options_);
+    ASSERT_TRUE(log.ok()) << log.status();
+    log_ = *std::move(log);
+  }
+  void expect_records(SceneKey scene, uint64_t last) {
+    uint64_t found = 0;
+    EXPECT_EQ(record_difference(*log_, scene, 1, found), "");
+    EXPECT_EQ(found, last);
+  }
+
+  test::TemporaryFolder folder_;
+  std::shared_ptr<FaultyFiles> files_;
+  std::unique_ptr<rocksdb::Env> env_;
+  StorageOptions options_;
+  std::unique_ptr<RocksdbLog> log_;
+};
+
+TEST_F(RocksdbLogFaultTest, FailedSyncAcknowledgesNothingAndPasses) {
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  ASSERT_EQ(append_records(*log_, scene, 7, 5), absl::OkStatus());
+  files_->fail_syncs(1);
+  EXPECT_EQ(append_records(*log_, scene, 7, 1).code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(log_->latest(scene).value(), 5u);
+  EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1); }));
+  expect_records(scene, 6);
+  open();
+  EXPECT_EQ(test::find_stored(*log_, "a")->damage, absl::OkStatus());
+  expect_records(scene, 6);
+}
+
+// With nothing in memory RocksDB would go on in the very log that failed.
+TEST_F(RocksdbLogFaultTest, FailedWriteRightAfterOpeningPasses) {
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  for (int times = 0; times < 3; ++times) {
+    files_->fail_writes(1);
+    EXPECT_EQ(append_records(*log_, scene, 7, 1).code(), absl::StatusCode::kUnavailable);
+    EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1); }));
+    open();
+  }
+  expect_records(scene, 3);
+}
+
+TEST_F(RocksdbLogFaultTest, RefusedRecordsDoNotComeBackBehindOthers) {
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  ASSERT_EQ(append_records(*log_, scene, 7, 2), absl::OkStatus());
+  std::vector<LogEntry> refused(3, test::entry_of(7, 99, "refused"));
+  files_->fail_syncs(1);
+  EXPECT_FALSE(log_->append(scene, refused, AckLevel::kLocal).ok());
+  EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1); }));
+  // The process is killed, and with it the power goes: what the disk has is what counts.
+  test::Random random(1);
+  files_->stop_before(0);
+  log_ = nullptr;
+  files_->lose_power(folder_.file("after"), random, false);
+  options_.path = folder_.file("after/data");
+  options_.env = nullptr;
+  open();
+  expect_records(scene, 3);
+}
+
+TEST_F(RocksdbLogFaultTest, FailedSyncOfManyAppendersAcknowledgesNothingThatIsLost) {
+  constexpr SceneKey kScenes = 6;
+  for (SceneKey scene = 1; scene <= kScenes; ++scene)
+    ASSERT_EQ(create_scene(*log_, absl::StrCat("s", scene), scene).value(), scene);
+  std::vector<std::thread> threads;
+  std::vector<uint64_t> acknowledged(kScenes + 1);
+  for (SceneKey scene = 1; scene <= kScenes; ++scene) {
+    threads.emplace_back([&, scene] {
+      for (int i = 0; i < 60; ++i) {
+        if (append_records(*log_, scene, 7, 1).ok()) {
+          acknowledged[scene] = log_->latest(scene).value();
+        } else {
+          std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        }
+      }
+    });
+  }
+  for (int i = 0; i < 5; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    files_->fail_syncs(1);
+  }
+  for (std::thread& thread : threads) thread.join();
+  files_->fail_syncs(0);
+  test::Random random(2);
+  files_->stop_before(0);
+  log_ = nullptr;
+  files_->lose_power(folder_.file("after"), random, true);
+  options_.path = folder_.file("after/data");
+  options_.env = nullptr;
+  open();
+  for (const StoredScene& stored : log_->stored_scenes()) {
+    EXPECT_EQ(stored.damage, absl::OkStatus());
+    EXPECT_GE(stored.last_sequence, acknowledged[stored.key]);
+    uint64_t found = 0;
+    EXPECT_EQ(record_difference(*log_, stored.key, 1, found), "");
+  }
+  EXPECT_EQ(log_->stored_scenes().size(), kScenes);
+}
+
+TEST_F(RocksdbLogFaultTest, FullDiskRefusesByNameAndPasses) {
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  ASSERT_EQ(append_records(*log_, scene, 7, 5), absl::OkStatus());
+  files_->fill(true);
+  absl::Status status;
+  while (status.ok()) status = append_records(*log_, scene, 7, 1);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  ASSERT_TRUE(refusal_of(status).has_value());
+  EXPECT_EQ(refusal_of(status)->limit, "disk_bytes");
+  EXPECT_GT(refusal_of(status)->retry_after_ms, 0u);
+  const uint64_t last = log_->latest(scene).value();
+  expect_records(scene, last);
+  EXPECT_FALSE(write_snapshot(*log_, scene, last).ok());
+  files_->fill(false);
+  EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1); }));
+  EXPECT_TRUE(succeeds_soon([&] { return write_snapshot(*log_, scene, 3); }));
+  open();
+  EXPECT_EQ(test::find_stored(*log_, "a")->last_sequence, last + 1);
+  EXPECT_EQ(test::find_stored(*log_, "a")->snapshot_sequence, 3u);
+}
+
+// A file system of its own, which goes with this.
+class Mount {
+ public:
+  Mount(std::string path, const char* size) : path_(std::move(path)) {
+    std::filesystem::create_directories(path_);
+    mounted_ = mount("locus-test", path_.c_str(), "tmpfs", 0, size) == 0;
+  }
+  ~Mount() {
+    if (mounted_) umount2(path_.c_str(), MNT_DETACH);
+  }
+  Mount(const Mount&) = delete;
+  Mount& operator=(const Mount&) = delete;
+
+  bool mounted() const { return mounted_; }
+  bool make_read_only() { return mount("", path_.c_str(), "", MS_REMOUNT | MS_RDONLY, "") == 0; }
+
+ private:
+  const std::string path_;
+  bool mounted_ = false;
+};
+
+TEST_F(RocksdbLogFaultTest, SmallDiskFillsUpAndComesBack) {
+  const Mount disk(folder_.file("small"), "size=48m");
+  if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
+  options_ = StorageOptions();
+  options_.path = folder_.file("small/data");
+  open();
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  const std::string ballast = folder_.file("small/ballast");
+  test::write_file_bytes(ballast, std::string(size_t{20} << 20, 'x'));
+  absl::Status status;
+  while (status.ok()) status = append_records(*log_, scene, 7, 1, AckLevel::kLocal, 300'000);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  const uint64_t last = log_->latest(scene).value();
+  uint64_t found = 0;
+  EXPECT_EQ(record_difference(*log_, scene, 1, found, 300'000), "");
+  EXPECT_EQ(found, last);
+  std::filesystem::remove(ballast);
+  EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1, AckLevel::kLocal, 300'000); }));
+  open();
+  EXPECT_EQ(record_difference(*log_, scene, 1, found, 300'000), "");
+  EXPECT_EQ(found, last + 1);
+}
+
+TEST_F(RocksdbLogFaultTest, DiskThatIsFullInEarnestLosesNothing) {
+  const Mount disk(folder_.file("small"), "size=48m");
+  if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
+  options_ = StorageOptions();
+  options_.path = folder_.file("small/data");
+  options_.reserve_bytes = 0;
+  open();
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  const std::string ballast = folder_.file("small/ballast");
+  test::write_file_bytes(ballast, std::string(size_t{30} << 20, 'x'));
+  for (int times = 0; times < 2; ++times) {
+    absl::Status status;
+    while (status.ok()) status = append_records(*log_, scene, 7, 1, AckLevel::kLocal, 300'000);
+    EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+    uint64_t found = 0;
+    EXPECT_EQ(record_difference(*log_, scene, 1, found, 300'000), "");
+    EXPECT_EQ(found, log_->latest(scene).value());
+    std::filesystem::resize_file(ballast, times == 0 ? size_t{25} << 20 : 0);
+    EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1, AckLevel::kLocal, 300'000); }));
+  }
+  const uint64_t last = log_->latest(scene).value();
+  open();
+  uint64_t found = 0;
+  EXPECT_EQ(record_difference(*log_, scene, 1, found, 300'000), "");
+  EXPECT_EQ(found, last);
+}
+
+TEST_F(RocksdbLogFaultTest, ReadOnlyDirectoryIsRefusedWithAReason) {
+  Mount disk(folder_.file("small"), "size=48m");
+  if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
+  options_ = StorageOptions();
+  options_.path = folder_.file("small/data");
+  open();
+  create_scene(*log_, "a", 1).value();
+  log_ = nullptr;
+  ASSERT_TRUE(disk.make_read_only());
+  const auto log = RocksdbLog::open(options_);
+  EXPECT_EQ(log.status().code(), absl::StatusCode::kUnavailable) << log.status();
+  EXPECT_NE(log.status().message().find("Read-only"), std::string::npos) << log.status();
+}
+
+}  // namespace
+}  // namespace locus::server

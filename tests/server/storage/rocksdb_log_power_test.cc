@@ -1,0 +1,87 @@
+// Power losses at random moments, by a file system that drops what was not synced.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <memory>
+
+#include "server/storage/rocksdb_log.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/stored_log.h"
+#include "tests/support/stored_model.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::server {
+namespace {
+
+using test::FaultyFiles;
+using test::Random;
+using test::StoredModel;
+
+// LOCUS_FAULT_RUNS=1000 asks for more.
+uint64_t fault_runs(uint64_t usual) {
+  const char* asked = std::getenv("LOCUS_FAULT_RUNS");
+  return asked != nullptr ? std::strtoull(asked, nullptr, 10) : test::scaled_count(usual);
+}
+
+enum class Syncing : uint8_t { kAsPromised, kNever };
+
+struct Outcome {
+  std::string difference;
+  uint64_t acknowledged = 0;
+};
+
+// Works on a log until the power goes, perhaps after the process was killed and started again; the difference between
+// what was promised and what is there after that.
+Outcome lose_power_once(uint64_t seed, Syncing syncing) {
+  Random random(seed);
+  const test::TemporaryFolder folder("power");
+  std::filesystem::create_directories(folder.file("disk"));
+  auto files = std::make_shared<FaultyFiles>(folder.file("disk"), folder.file("graves"));
+  const std::unique_ptr<rocksdb::Env> env = rocksdb::NewCompositeEnv(files);
+  StorageOptions options;
+  options.path = folder.file("disk/data");
+  options.env = env.get();
+  options.reserve_bytes = 0;
+  options.log_buffer_bytes = 0;  // the least: tables are written all the time
+  options.high_water_delay = std::chrono::milliseconds(1);
+  options.memory_sync_delay = std::chrono::milliseconds(2);
+  options.sync = syncing == Syncing::kAsPromised;
+  StoredModel model;
+  const uint64_t lives = 1 + random.below(3);
+  for (uint64_t life = 0; life < lives; ++life) {
+    files->go_on();
+    auto log = RocksdbLog::open(options);
+    if (!log.ok()) return {"a killed process leaves what does not open: " + log.status().ToString()};
+    if (std::string difference = model.difference(**log, test::Refusals::kNone); !difference.empty())
+      return {"after a kill: " + difference};
+    files->stop_before(random.below(400));
+    while (!files->stopped()) model.step(**log, random);
+  }
+  files->lose_power(folder.file("after"), random, random.chance(0.5));
+  const auto later = std::make_shared<FaultyFiles>(folder.file("after"), folder.file("later graves"));
+  const std::unique_ptr<rocksdb::Env> later_env = rocksdb::NewCompositeEnv(later);
+  options.path = folder.file("after/data");
+  options.env = later_env.get();
+  const auto log = RocksdbLog::open(options);
+  if (!log.ok()) return {log.status().ToString(), model.acknowledged()};
+  return {model.difference(**log, test::Refusals::kNone), model.acknowledged()};
+}
+
+TEST(RocksdbLogPowerTest, PowerLossTakesNothingThatWasAcknowledged) {
+  uint64_t acknowledged = 0;
+  for (uint64_t seed = 1; seed <= fault_runs(20); ++seed) {
+    const Outcome outcome = lose_power_once(seed, Syncing::kAsPromised);
+    EXPECT_EQ(outcome.difference, "") << "seed " << seed;
+    acknowledged += outcome.acknowledged;
+  }
+  EXPECT_GT(acknowledged, 0u);
+}
+
+TEST(RocksdbLogPowerTest, TestSeesTheLossWhereNothingIsSynced) {
+  uint64_t seen = 0;
+  for (uint64_t seed = 1; seed <= 5; ++seed) seen += !lose_power_once(seed, Syncing::kNever).difference.empty();
+  EXPECT_GT(seen, 0u);
+}
+
+}  // namespace
+}  // namespace locus::server
