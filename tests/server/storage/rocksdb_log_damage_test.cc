@@ -180,7 +180,7 @@ TEST_P(RocksdbLogDamageTest, SampleIsSound) {
 TEST_P(RocksdbLogDamageTest, FlippedByteLosesNothingSilently) {
   for (const auto& [name, bytes] : sample().files) {
     if (!holds_data(name)) continue;
-    const uint64_t step = stride(bytes.size(), 60);
+    const uint64_t step = stride(bytes.size(), 8);
     for (uint64_t at = 0; at < bytes.size(); at += step) {
       const uint64_t place = step == 1 ? at : at + Random(at).below(std::min(step, bytes.size() - at));
       Files files = sample().files;
@@ -195,7 +195,7 @@ TEST_P(RocksdbLogDamageTest, FlippedByteLosesNothingSilently) {
 TEST_P(RocksdbLogDamageTest, CutFileLosesNothingSilently) {
   for (const auto& [name, bytes] : sample().files) {
     if (!holds_data(name)) continue;
-    const uint64_t step = stride(bytes.size(), 25);
+    const uint64_t step = stride(bytes.size(), 4);
     for (uint64_t at = 0; at < bytes.size(); at += step) {
       Files files = sample().files;
       files[name].resize(at);
@@ -219,7 +219,7 @@ TEST_P(RocksdbLogDamageTest, ZeroedPageLosesNothingSilently) {
   for (const auto& [name, bytes] : sample().files) {
     if (!holds_data(name)) continue;
     const uint64_t pages = (bytes.size() + kPage - 1) / kPage;
-    const uint64_t step = stride(pages, 12);
+    const uint64_t step = stride(pages, 3);
     for (uint64_t page = 0; page < pages; page += step) {
       Files files = sample().files;
       std::string& cut = files[name];
