@@ -34,6 +34,11 @@ absl::Status disk_error(absl::string_view doing, const rocksdb::Status& status) 
   return absl::UnavailableError(message);
 }
 
+absl::Status read_error(absl::string_view doing, const rocksdb::Status& status) {
+  if (status.IsPathNotFound()) return absl::DataLossError(absl::StrCat(doing, ": ", status.ToString()));
+  return disk_error(doing, status);
+}
+
 absl::Status refuse_full_disk(absl::string_view what, uint64_t reserve_bytes, uint64_t free_bytes) {
   return full_disk(absl::StrCat(what, ": the disk has ", free_bytes, " bytes left, and the last ", reserve_bytes,
                                 " are for snapshots and recovery; free some, and writing goes on within seconds"),

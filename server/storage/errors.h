@@ -16,6 +16,9 @@ namespace locus::server {
 // the disk. `doing` says what was tried.
 absl::Status disk_error(absl::string_view doing, const rocksdb::Status& status);
 
+// The same for what RocksDB reads from its own files: one that is missing is damage, too.
+absl::Status read_error(absl::string_view doing, const rocksdb::Status& status);
+
 // RESOURCE_EXHAUSTED: `free_bytes` are left of the disk, of which `reserve_bytes` are not for this.
 absl::Status refuse_full_disk(absl::string_view what, uint64_t reserve_bytes, uint64_t free_bytes);
 

@@ -50,7 +50,7 @@ absl::Status read_meta(const Database& database, Findings& found) {
   }
   // What follows a place that cannot be read is as good as lost, and missed below.
   if (at->status().ok() || says_damage(at->status())) return absl::OkStatus();
-  return disk_error("reading the catalogue", at->status());
+  return read_error("reading the catalogue", at->status());
 }
 
 Standing compare(const Findings& found, const HighWater& must) {

@@ -72,7 +72,7 @@ RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t 
     if (at == sequence) chain_at = found.chain;
   }
   if (!walk.status().ok())
-    found.error = disk_error(absl::StrCat("reading the record after ", found.last), walk.status());
+    found.error = read_error(absl::StrCat("reading the record after ", found.last), walk.status());
   return found;
 }
 
@@ -92,7 +92,7 @@ absl::Status read_records(const Database& database, SceneKey scene, uint64_t fro
     record.entry = *entry;
     if (absl::Status status = sink(record); !status.ok()) return status;
   }
-  if (!walk.status().ok()) return disk_error(absl::StrCat("reading record ", record.sequence), walk.status());
+  if (!walk.status().ok()) return read_error(absl::StrCat("reading record ", record.sequence), walk.status());
   if (record.sequence > last) return absl::OkStatus();
   return damaged(absl::StrCat("record ", record.sequence, " is missing"));
 }
@@ -109,7 +109,7 @@ absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* 
     found.add(walk.value());
     if (absl::Status status = sink(*bytes); !status.ok()) return status;
   }
-  if (!walk.status().ok()) return disk_error(absl::StrCat("reading chunk ", found.chunks), walk.status());
+  if (!walk.status().ok()) return read_error(absl::StrCat("reading chunk ", found.chunks), walk.status());
   if (found == list) return absl::OkStatus();
   return damaged(
       absl::StrCat("there are ", found.chunks, " of ", list.chunks, " chunks, and not those that were written"));

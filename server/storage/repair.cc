@@ -154,7 +154,8 @@ absl::Status make_copy(const Database& source, const Findings& findings, const H
   DatabaseOptions wanted = database_options_of(options);
   wanted.folder = absl::StrCat(folder, "/", kDatabaseFolder);
   std::unique_ptr<Database> target;
-  const rocksdb::Status opened = Database::open(wanted, OpenMode::kCreate, target);
+  rocksdb::Status opened = options.env->CreateDirIfMissing(folder);
+  if (opened.ok()) opened = Database::open(wanted, OpenMode::kCreate, target);
   if (!opened.ok()) return disk_error("making the repaired database", opened);
   Copy copy(*target);
   Result result;

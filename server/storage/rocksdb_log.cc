@@ -205,7 +205,7 @@ absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequ
   if (status.ok() || status.IsNotFound())
     return absl::DataLossError(
         absl::StrCat("scene '", row.name, "' is damaged: record ", sequence, " is missing", remedy(options_.path)));
-  return disk_error(absl::StrCat("reading record ", sequence, " of scene '", row.name, "'"), status);
+  return read_error(absl::StrCat("reading record ", sequence, " of scene '", row.name, "'"), status);
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::latest(SceneKey key) const {
