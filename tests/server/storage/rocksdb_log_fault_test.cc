@@ -92,7 +92,8 @@ TEST_F(RocksdbLogFaultTest, FailedWriteRightAfterOpeningPasses) {
 TEST_F(RocksdbLogFaultTest, RefusedRecordsDoNotComeBackBehindOthers) {
   const SceneKey scene = create_scene(*log_, "a", 1).value();
   ASSERT_EQ(append_records(*log_, scene, 7, 2), absl::OkStatus());
-  std::vector<LogEntry> refused(3, test::entry_of(7, 99, "refused"));
+  const std::string bytes = "refused";
+  const std::vector<LogEntry> refused(3, test::entry_of(7, 99, bytes));
   files_->fail_syncs(1);
   EXPECT_FALSE(log_->append(scene, refused, AckLevel::kLocal).ok());
   EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1); }));
