@@ -41,6 +41,7 @@ SERVING |= {(f"{case}/{size}", peer) for size in (256, 4096)
 SERVING |= {("mixed_p50/16", "idle"), ("mixed_p99/16", "idle"), ("overload/10x/as_told", "peak"),
             ("overload/10x/at_once", "peak"), ("silent_reader/1", "idle"), ("silent_reader/8", "idle"),
             ("churn/50", "idle"), ("deadline/1ms", "whole_job"), ("cancel/1000", "whole_job")}
+SERVING |= {("durable/256", "memory_acks"), ("durable_queries/256", "beside_memory_acks"), ("restart/1M", "bar")}
 REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
 HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
 
