@@ -80,8 +80,9 @@ class RecoveryLockstep {
     const bool full = random_.chance(0.05);
     if (full) log_->fail_with(absl::ResourceExhaustedError("the disk is full"));
     std::string what = change_scene();
-    if (full) log_->fail_with(absl::OkStatus());
-    return what;
+    if (!full) return what;
+    log_->fail_with(absl::OkStatus());
+    return what.empty() && random_.chance(0.3) ? crash() : what;
   }
 
   std::string change_scene() {

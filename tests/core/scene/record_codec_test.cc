@@ -182,7 +182,8 @@ TEST_F(RecordCodecTest, DamagedBytesNeverHarm) {
     } else {
       encode_batch(updates.draw(columns, 5), bytes);
     }
-    absl::StatusOr<Record> record = Record::decode(damaged(bytes, random));
+    const std::string wrong = damaged(bytes, random);
+    absl::StatusOr<Record> record = Record::decode(wrong);
     ++(record.ok() ? taken : refused);
     if (!record.ok()) {
       EXPECT_EQ(record.status().code(), absl::StatusCode::kDataLoss) << record.status();
