@@ -134,7 +134,7 @@ void UpdatePump::apply_here(Mailbox& mailbox, PendingUpdate& update, uint64_t it
   std::unique_ptr<Mailbox> empty;
   const MutexLock lock(mutex_);
   ++stats_.applied_inline;
-  empty = leave(mailbox, group.size());
+  empty = leave(mailbox);
 }
 
 void UpdatePump::run() {
@@ -181,7 +181,7 @@ void UpdatePump::work_on(Mailbox& mailbox) {
   if (!waits_for_disk(*mailbox.scene)) learn(items, start);
   std::unique_ptr<Mailbox> empty;
   const MutexLock lock(mutex_);
-  empty = leave(mailbox, group.size());
+  empty = leave(mailbox);
 }
 
 // Batches that become one revision, or that one sync serves.
@@ -230,8 +230,16 @@ bool UpdatePump::apply(Mailbox& mailbox, Group& group) {
     mailbox.late = acks.status();
     return false;
   }
+  count(*mailbox.scene, group.size());
   for (size_t i = 0; i < group.size(); ++i) group[i]->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
   return true;
+}
+
+// Before those who wait are told, so that who was told finds itself counted.
+void UpdatePump::count(const Scene& scene, size_t updates) {
+  const MutexLock lock(mutex_);
+  stats_.applied += updates;
+  if (updates > 1 && joins(scene)) stats_.coalesced += updates - 1;
 }
 
 // Readers that were told to end hold too much memory. Their scene waits, other scenes do not.
@@ -264,9 +272,7 @@ void UpdatePump::put_back(Mailbox& mailbox, const Group& group) {
   }
 }
 
-std::unique_ptr<UpdatePump::Mailbox> UpdatePump::leave(Mailbox& mailbox, size_t updates) {
-  stats_.applied += updates;
-  if (updates > 1 && joins(*mailbox.scene)) stats_.coalesced += updates - 1;
+std::unique_ptr<UpdatePump::Mailbox> UpdatePump::leave(Mailbox& mailbox) {
   mailbox.at_work = false;
   mailbox.stalled_at = {};
   if (!mailbox.waiting.empty()) {

@@ -109,11 +109,12 @@ class UpdatePump {
   Group take_group(Mailbox& mailbox) LOCUS_REQUIRES(mutex_);
   void put_back(Mailbox& mailbox, const Group& group) LOCUS_REQUIRES(mutex_);
   // Applies and reports. False where the scene's readers hold it up; then `group` has those that still wait.
-  static bool apply(Mailbox& mailbox, Group& group);
+  bool apply(Mailbox& mailbox, Group& group) LOCUS_EXCLUDES(mutex_);
+  void count(const Scene& scene, size_t updates) LOCUS_EXCLUDES(mutex_);
   static void drop_stopped(const Mailbox& mailbox, Group& group);
   void stall(Mailbox& mailbox, const Group& group) LOCUS_EXCLUDES(mutex_);
   // The mailbox where it is empty: to be freed without the lock, since a deleted scene may go with it.
-  std::unique_ptr<Mailbox> leave(Mailbox& mailbox, size_t updates) LOCUS_REQUIRES(mutex_);
+  std::unique_ptr<Mailbox> leave(Mailbox& mailbox) LOCUS_REQUIRES(mutex_);
   void learn(uint64_t items, SteadyTime start);
 
   const UpdatePumpOptions options_;
