@@ -42,6 +42,8 @@ SERVING |= {("mixed_p50/16", "idle"), ("mixed_p99/16", "idle"), ("overload/10x/a
             ("overload/10x/at_once", "peak"), ("silent_reader/1", "idle"), ("silent_reader/8", "idle"),
             ("churn/50", "idle"), ("deadline/1ms", "whole_job"), ("cancel/1000", "whole_job")}
 SERVING |= {("durable/256", "memory_acks"), ("durable_queries/256", "beside_memory_acks"), ("restart/1M", "bar")}
+LOG = {(f"commit/{size}", peer) for size in (16, 256, 4096) for peer in ("append", "overwrite")}
+LOG |= {(f"writers/8/{size}", "one_writer") for size in (16, 256, 4096)}
 REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
 HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
 
@@ -145,68 +147,67 @@ class BenchTest(unittest.TestCase):
         self.assertIn("locus-bench static --quick", answer.stdout)
 
 
-class DynamicTest(unittest.TestCase):
+class SuiteRun:
+    """One quick run of SUITE, whose cells are those of expected()."""
+
     @classmethod
     def setUpClass(cls):
         with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "dynamic.json")
-            cls.answer = run("dynamic", "--quick", "--json", path)
+            path = os.path.join(folder, "cells.json")
+            cls.answer = run(cls.SUITE, "--quick", "--json", path)
             with open(path, encoding="utf-8") as file:
                 cls.cells = json.load(file)
 
-    def test_everything_agrees_and_gives_the_check_values(self):
+    def test_everything_agrees(self):
         self.assertEqual(self.answer.returncode, 0, self.answer.stdout + self.answer.stderr)
         self.assertNotIn("DISAGREEMENT", self.answer.stdout)
 
     def test_every_expected_cell_is_there_once(self):
         found = [(cell["case"], cell["peer_name"]) for cell in self.cells]
         self.assertEqual(len(found), len(set(found)))
-        self.assertEqual(set(found), expected_dynamic_cells())
+        self.assertEqual(set(found), self.expected())
 
     def test_cells_have_every_field_and_figures_above_zero(self):
         for cell in self.cells:
             self.assertEqual({name: type(value) for name, value in cell.items()}, FIELDS)
-            self.assertEqual(cell["suite"], "dynamic")
+            self.assertEqual(cell["suite"], self.SUITE)
             for field in ("ours", "peer", "ratio"):
                 self.assertTrue(math.isfinite(cell[field]) and cell[field] > 0, cell)
             self.assertRegex(cell["results_hash"], "^[0-9a-f]{16}$")
+
+
+class DynamicTest(SuiteRun, unittest.TestCase):
+    SUITE = "dynamic"
+
+    def expected(self):
+        return expected_dynamic_cells()
 
     def test_missing_peers_are_said(self):
         said = self.answer.stdout.count("a peer is missing")
         self.assertEqual(said, 3 - len(PEERS & {"bullet", "boost", "nanoflann"}))
 
 
-class ServingTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "serving.json")
-            cls.answer = run("serving", "--quick", "--json", path)
-            with open(path, encoding="utf-8") as file:
-                cls.cells = json.load(file)
+class ServingTest(SuiteRun, unittest.TestCase):
+    SUITE = "serving"
 
-    def test_the_server_answers_as_this_process_does(self):
-        self.assertEqual(self.answer.returncode, 0, self.answer.stdout + self.answer.stderr)
-        self.assertNotIn("DISAGREEMENT", self.answer.stdout)
-
-    def test_every_expected_cell_is_there_once(self):
-        found = [(cell["case"], cell["peer_name"]) for cell in self.cells]
-        self.assertEqual(len(found), len(set(found)))
-        self.assertEqual(set(found), SERVING | (REDIS if HAS_REDIS else set()))
-
-    def test_cells_have_every_field_and_figures_above_zero(self):
-        for cell in self.cells:
-            self.assertEqual({name: type(value) for name, value in cell.items()}, FIELDS)
-            self.assertEqual(cell["suite"], "serving")
-            for field in ("ours", "peer", "ratio"):
-                self.assertTrue(math.isfinite(cell[field]) and cell[field] > 0, cell)
-            self.assertRegex(cell["results_hash"], "^[0-9a-f]{16}$")
+    def expected(self):
+        return SERVING | (REDIS if HAS_REDIS else set())
 
     def test_a_missing_redis_is_said(self):
         self.assertEqual("a peer is missing: redis" in self.answer.stdout, not HAS_REDIS)
 
     def test_what_has_to_be_shown_is_said_beside_what_was_found(self):
         self.assertRegex(self.answer.stdout, r"note: rays/90ns/1024 beside in_process: .* to be shown .*c/\(c\+45\)")
+
+
+class LogTest(SuiteRun, unittest.TestCase):
+    SUITE = "log"
+
+    def expected(self):
+        return LOG
+
+    def test_what_has_to_be_shown_is_said_beside_what_was_found(self):
+        self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* to be shown 0\.800")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/report.h"
 #include "tests/bench/frame/suite.h"
+#include "tests/bench/log/log_suite.h"
 #include "tests/bench/serving/serving_suite.h"
 #include "tests/bench/static/static_suite.h"
 
@@ -28,6 +29,7 @@ std::vector<Suite> suites() {
        dynamic::run_dynamic_suite},
       {"serving", "a server and its client on the loopback, beside the same work in process, plain sockets and Redis",
        serving::run_serving_suite},
+      {"log", "update batches on their way to the disk, beside appending them to a file", log::run_log_suite},
   };
 }
 
@@ -39,6 +41,7 @@ constexpr char kExamples[] = R"(Examples:
   locus-bench static --filter '^(build|memory)/' --rounds 9
   locus-bench dynamic --filter '^(move|ball)/(uniform|far)/100k'
   locus-bench serving --filter '^rays/' --rounds 9
+  TMPDIR=/mnt/disk locus-bench log
 
 A MESH is a file that `locus import` reads (FILE, or FILE#ENTRY for a level in a .pk3), or a made-up one: KIND:TRIANGLES
 or KIND:TRIANGLES:SEED, where KIND is city, terrain or blob. Levels of Debian packages: tests/bench/fetch_levels.sh.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "tests/bench/dynamic/world.h"
+#include "tests/bench/frame/temporary_folder.h"
 #include "tests/bench/serving/daemon.h"
 #include "tests/bench/serving/query_load.h"
 #include "tests/bench/serving/twin_scene.h"
@@ -79,7 +80,7 @@ class DurableCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(kMovesName, "ns/move", hash_of_number(compare(kMovesName))), run_.report);
     constexpr double kBar = 0.5;
-    judge(run_, kBar);
+    judge(run_.report, kBar);
     const double micros = 1e-3 * static_cast<double>(kMovesAMessage);
     run_.note(absl::StrFormat("%s: %.0f us a message durable, %.0f with memory acks", kMovesName,
                               micros * median(times[0]), micros * median(times[1])));
@@ -119,7 +120,7 @@ class DurableCases {
     add_cells(contestants, times, cell_of(kQueriesName, "ns/ball", hash_of_number(server.hashes().front())),
               run_.report);
     constexpr double kBar = 0.9;
-    judge(run_, kBar);
+    judge(run_.report, kBar);
     for (const absl::Status& failure : failures) status.Update(failure);
     status.Update(server.status());
     return status;
@@ -189,7 +190,7 @@ class RestartCase {
       bar.push_back(1);
     }
     add_cell(run_, cell_of(kRestartName, "s", hash_of_number(hash)), "bar", seconds, bar, Better::kLess);
-    judge(run_, 1);
+    judge(run_.report, 1);
     return absl::OkStatus();
   }
 

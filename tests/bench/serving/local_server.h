@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "grpcpp/channel.h"
+#include "tests/bench/frame/temporary_folder.h"
 #include "tests/bench/serving/process.h"
 
 namespace locus::bench::serving {

@@ -50,15 +50,6 @@ int64_t entries_in(const std::string& folder) {
 
 void sleep_seconds(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-TemporaryFolder::TemporaryFolder() : path_("/tmp/locus-bench-XXXXXX") {
-  if (mkdtemp(path_.data()) == nullptr) path_.clear();
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
-}
-
 absl::StatusOr<std::unique_ptr<Process>> Process::start(const std::string& path,
                                                         const std::vector<std::string>& arguments,
                                                         const std::string& log) {

@@ -15,20 +15,6 @@
 
 namespace locus::bench::serving {
 
-// A folder under /tmp, removed with what is in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
 // That all threads of a process have computed, to the nanosecond; 0 if there is no such process.
 double cpu_seconds_of(pid_t pid);
 

@@ -3,8 +3,9 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include <filesystem>
 #include <fstream>
+
+#include "tests/bench/frame/temporary_folder.h"
 
 namespace locus::bench::serving {
 namespace {
@@ -52,17 +53,6 @@ TEST(ProcessTest, ItsMemoryFilesAndThreadsAreCounted) {
   EXPECT_GT(process->resident_bytes(), 0);
   EXPECT_GT(process->open_files(), 0);
   EXPECT_EQ(process->threads(), 1);
-}
-
-TEST(TemporaryFolderTest, IsRemovedWithWhatIsInIt) {
-  std::string file;
-  {
-    const TemporaryFolder folder;
-    file = folder.file("file");
-    std::ofstream(file) << "text";
-    ASSERT_TRUE(std::filesystem::exists(file));
-  }
-  EXPECT_FALSE(std::filesystem::exists(std::filesystem::path(file).parent_path()));
 }
 
 TEST(ProgramTest, IsFoundInThePathOrNotAtAll) {

@@ -77,7 +77,7 @@ class RayCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/ray", hash_of_all(hashes)), run_.report);
     constexpr double kBar = 0.9;
-    judge(run_, kBar);
+    judge(run_.report, kBar);
     absl::Status status = one.status();
     status.Update(two.status());
     return status;
@@ -96,7 +96,7 @@ class RayCases {
   // `cost`: nanoseconds that a ray takes one core in process.
   void judge_overhead(const Work& work, const Size& size, double cost) const {
     constexpr double kNameHolds = 0.2;
-    judge(run_, size.share * cost / (cost + size.overhead),
+    judge(run_.report, size.share * cost / (cost + size.overhead),
           absl::StrFormat(" = %.2f c/(c+%.0f) at c = %.0f ns in process", size.share, size.overhead, cost));
     if (!run_.options.quick && std::abs(cost / work.nanoseconds - 1) > kNameHolds)
       run_.note(absl::StrFormat("%s: on this machine now %.0f ns", work.name, cost));

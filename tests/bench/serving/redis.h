@@ -10,6 +10,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "tests/bench/frame/temporary_folder.h"
 #include "tests/bench/serving/process.h"
 #include "tests/bench/serving/socket_load.h"
 

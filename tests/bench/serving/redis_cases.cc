@@ -125,7 +125,7 @@ class RedisCases {
     const Hits hits = search_all(flat, scene, name);
     add_cells(contestants, times, cell_of(name, "ns/move", hash_of_number(hits.ours)), run_.report);
     constexpr double kBar = 4;
-    judge(run_, kBar);
+    judge(run_.report, kBar);
     return server.status();
   }
 
@@ -143,7 +143,7 @@ class RedisCases {
         {"redis", [&](size_t) { redis_.run(theirs, 1, kSearchWindow); }, static_cast<double>(theirs.size()), {}}};
     const auto times = race(contestants, 1, run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/ball", hash_of_number(hits.ours)), run_.report);
-    judge(run_, bar);
+    judge(run_.report, bar);
     return server.status();
   }
 

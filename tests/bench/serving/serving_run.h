@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/cell.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/results_hash.h"
@@ -47,13 +48,6 @@ inline void add_cell(const ServingRun& run, Cell cell, const std::string& peer, 
   cell.ratio = median(ratios);
   cell.spread = spread(ratios);
   run.report.add(std::move(cell));
-}
-
-// Says beside the cell just added what has to be shown of its ratio, and whether it is.
-inline void judge(const ServingRun& run, double bar, const std::string& how = "") {
-  const Cell& cell = run.report.cells.back();
-  run.note(absl::StrFormat("%s beside %s: %.3f, to be shown %.3f%s: %s", cell.case_name, cell.peer_name, cell.ratio,
-                           bar, how, cell.ratio >= bar ? "shown" : "MISSED"));
 }
 
 // How many passes make a chunk that starting threads and filling windows is nothing beside: after one that warms up.

@@ -1,0 +1,21 @@
+// What has to be shown of a ratio, said beside it. For suites that have such bars.
+#ifndef LOCUS_TESTS_BENCH_FRAME_BAR_H_
+#define LOCUS_TESTS_BENCH_FRAME_BAR_H_
+
+#include <string>
+
+#include "absl/strings/str_format.h"
+#include "tests/bench/frame/cell.h"
+
+namespace locus::bench {
+
+// Of the cell just added; `how` explains the bar.
+inline void judge(Report& report, double bar, const std::string& how = "") {
+  const Cell& cell = report.cells.back();
+  report.notes.push_back(absl::StrFormat("%s beside %s: %.3f, to be shown %.3f%s: %s", cell.case_name, cell.peer_name,
+                                         cell.ratio, bar, how, cell.ratio >= bar ? "shown" : "MISSED"));
+}
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_FRAME_BAR_H_

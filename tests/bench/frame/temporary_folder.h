@@ -1,0 +1,36 @@
+// A folder of a benchmark's own under TMPDIR, or /tmp, removed with what is in it. For suites that write files. One
+// thread at a time.
+#ifndef LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_
+#define LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <system_error>
+
+namespace locus::bench {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::error_code ignored;
+    const std::filesystem::path parent = std::filesystem::temp_directory_path(ignored);
+    path_ = ((ignored ? "/tmp" : parent) / "locus-bench-XXXXXX").string();
+    if (mkdtemp(path_.data()) == nullptr) path_.clear();
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::string file(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+}  // namespace locus::bench
+
+#endif  // LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_

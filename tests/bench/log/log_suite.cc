@@ -1,0 +1,229 @@
+#include "tests/bench/log/log_suite.h"
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "core/scene/record_codec.h"
+#include "server/storage/rocksdb_log.h"
+#include "tests/bench/dynamic/world.h"
+#include "tests/bench/frame/bar.h"
+#include "tests/bench/frame/race.h"
+#include "tests/bench/frame/results_hash.h"
+#include "tests/bench/frame/statistics.h"
+#include "tests/bench/frame/temporary_folder.h"
+#include "tests/bench/log/raw_file.h"
+
+namespace locus::bench::log {
+namespace {
+
+constexpr uint32_t kObjects = 100'000;
+constexpr uint64_t kEpoch = 1;
+constexpr size_t kWriters = 8;
+
+struct Size {
+  size_t moves;
+  size_t commits;  // in a chunk
+  double bar;
+};
+constexpr Size kSizes[] = {{16, 400, 0.8}, {256, 400, 0.8}, {4096, 100, 0.6}};
+
+struct LogRun {
+  const Options& options;
+  const Progress& progress;
+  Report& report;
+
+  size_t chunks() const { return options.quick ? 1 : 4; }
+  size_t commits(const Size& size) const { return options.quick ? size.commits / 20 : size.commits; }
+  // In all rounds, the one to warm up too.
+  size_t commits_of_all(const Size& size) const {
+    return commits(size) * chunks() * static_cast<size_t>(options.rounds + 1);
+  }
+};
+
+// Records as a scene writes them, of objects that move.
+std::vector<std::string> records_of(size_t moves, size_t count) {
+  dynamic::World world(dynamic::Kind::kUniform, kObjects);
+  std::vector<std::string> records(count);
+  size_t first = kObjects;
+  for (std::string& record : records) {
+    if (first + moves > kObjects) {
+      world.step();
+      first = 0;
+    }
+    MoveColumns columns;
+    columns.ids = world.moves().ids.subspan(first, moves);
+    columns.positions = world.moves().positions.subspan(3 * first, 3 * moves);
+    UpdateBatch batch;
+    batch.moves.push_back(columns);
+    encode_batch(batch, record);
+    first += moves;
+  }
+  return records;
+}
+
+uint64_t hash_of(absl::string_view bytes, ResultsHash& hash) {
+  for (const char byte : bytes) hash.add(static_cast<uint8_t>(byte));
+  return hash.value();
+}
+
+// A data directory with empty scenes, as the daemon has it.
+class OurLog {
+ public:
+  static absl::StatusOr<OurLog> create(const std::string& path, size_t scenes) {
+    StorageOptions options;
+    options.path = path;
+    auto log = server::RocksdbLog::open(options);
+    if (!log.ok()) return log.status();
+    OurLog ours;
+    ours.log_ = *std::move(log);
+    for (size_t i = 0; i < scenes; ++i) {
+      const auto nothing = []() -> absl::StatusOr<std::optional<std::string>> { return std::nullopt; };
+      const auto key = ours.log_->create_scene(absl::StrCat("scene-", i), "", kEpoch, nothing);
+      if (!key.ok()) return key.status();
+      ours.keys_.push_back(*key);
+    }
+    return ours;
+  }
+
+  absl::Status append(size_t scene, const std::string& record) {
+    LogEntry entry;
+    entry.epoch = kEpoch;
+    entry.bytes = record;
+    return log_->append(keys_[scene], {&entry, 1}, AckLevel::kLocal).status();
+  }
+
+  absl::StatusOr<std::string> read_all(size_t scene) const {
+    std::string all;
+    const auto sink = [&all](const LogRecord& record) {
+      absl::StrAppend(&all, record.entry.bytes);
+      return absl::OkStatus();
+    };
+    if (absl::Status status = log_->read(keys_[scene], 1, sink); !status.ok()) return status;
+    return all;
+  }
+
+ private:
+  using StorageOptions = server::StorageOptions;
+
+  OurLog() = default;
+
+  std::unique_ptr<UpdateLog> log_;
+  std::vector<SceneKey> keys_;
+};
+
+Cell cell_of(const std::string& case_name, const ResultsHash& hash) {
+  Cell cell;
+  cell.suite = "log";
+  cell.case_name = case_name;
+  cell.metric = "ns/commit";
+  cell.results_hash = hash.text();
+  return cell;
+}
+
+// One writer, each commit on the disk before the next.
+absl::Status measure_commits(const LogRun& run, const Size& size) {
+  const std::string name = absl::StrCat("commit/", size.moves);
+  if (!run.options.filter.wants(name)) return absl::OkStatus();
+  run.progress(name);
+  const std::vector<std::string> records = records_of(size.moves, run.commits(size));
+  const TemporaryFolder folder;
+  auto ours = OurLog::create(folder.file("data"), 1);
+  if (!ours.ok()) return ours.status();
+  const uint64_t reserved = run.commits_of_all(size) * records.front().size();
+  auto plain = RawFile::create(folder.file("plain"), 0);
+  auto overwritten = RawFile::create(folder.file("overwritten"), reserved);
+  if (!plain.ok()) return plain.status();
+  if (!overwritten.ok()) return overwritten.status();
+
+  absl::Status status;
+  const auto through = [&](auto append) {
+    return [&status, &records, append](size_t) {
+      for (const std::string& record : records) status.Update(append(record));
+    };
+  };
+  const auto count = static_cast<double>(records.size() * run.chunks());
+  const std::vector<Contestant> contestants = {
+      {"locus", through([&](const std::string& record) { return ours->append(0, record); }), count, {}},
+      {"append", through([&](const std::string& record) { return (*plain)->append(record); }), count, {}},
+      {"overwrite", through([&](const std::string& record) { return (*overwritten)->append(record); }), count, {}}};
+  const auto times = race(contestants, run.chunks(), run.options.rounds, wall_seconds);
+  if (!status.ok()) return status;
+
+  const auto logged = ours->read_all(0);
+  const auto appended = (*plain)->read_all();
+  if (!logged.ok()) return logged.status();
+  if (!appended.ok()) return appended.status();
+  if (*logged != *appended) run.report.disagreements.push_back(absl::StrCat(name, ": not what was written"));
+  ResultsHash hash;
+  hash_of(*logged, hash);
+  Report cells;
+  add_cells(contestants, times, cell_of(name, hash), cells);
+  for (Cell& cell : cells.cells) {
+    const bool judged = cell.peer_name == "append";
+    run.report.add(std::move(cell));
+    if (judged) judge(run.report, size.bar);
+  }
+  run.report.notes.push_back(
+      absl::StrFormat("%s: %.0f commits a second of %d bytes", name, 1e9 / median(times[0]), records.front().size()));
+  return status;
+}
+
+// Several scenes, each with a writer of its own: a sync may serve all.
+absl::Status measure_writers(const LogRun& run, const Size& size) {
+  const std::string name = absl::StrCat("writers/", kWriters, "/", size.moves);
+  if (!run.options.filter.wants(name)) return absl::OkStatus();
+  run.progress(name);
+  const std::vector<std::string> records = records_of(size.moves, std::max<size_t>(1, run.commits(size) / kWriters));
+  const TemporaryFolder folder;
+  auto ours = OurLog::create(folder.file("data"), kWriters + 1);
+  if (!ours.ok()) return ours.status();
+  std::vector<absl::Status> statuses(kWriters + 1);
+  const auto write = [&](size_t scene) {
+    for (const std::string& record : records) statuses[scene].Update(ours->append(scene, record));
+  };
+  const auto together = [&](size_t) {
+    std::vector<std::thread> writers;
+    for (size_t scene = 0; scene < kWriters; ++scene) writers.emplace_back(write, scene);
+    for (std::thread& writer : writers) writer.join();
+  };
+  const auto alone = [&](size_t) {
+    for (size_t i = 0; i < kWriters; ++i) write(kWriters);
+  };
+  const auto count = static_cast<double>(kWriters * records.size() * run.chunks());
+  const std::vector<Contestant> contestants = {{"together", together, count, {}}, {"one_writer", alone, count, {}}};
+  const auto times = race(contestants, run.chunks(), run.options.rounds, wall_seconds);
+  for (const absl::Status& status : statuses)
+    if (!status.ok()) return status;
+
+  ResultsHash hash;
+  const auto first = ours->read_all(0);
+  if (!first.ok()) return first.status();
+  hash_of(*first, hash);
+  for (size_t scene = 1; scene < kWriters; ++scene) {
+    const auto other = ours->read_all(scene);
+    if (!other.ok()) return other.status();
+    if (*other != *first) run.report.disagreements.push_back(absl::StrCat(name, ": scenes differ"));
+  }
+  add_cells(contestants, times, cell_of(name, hash), run.report);
+  constexpr double kBar = 2;
+  if (size.moves == 256) judge(run.report, kBar);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status run_log_suite(const Options& options, const Progress& progress, Report& report) {
+  const LogRun run{options, progress, report};
+  for (const Size& size : kSizes)
+    if (absl::Status status = measure_commits(run, size); !status.ok()) return status;
+  for (const Size& size : kSizes)
+    if (absl::Status status = measure_writers(run, size); !status.ok()) return status;
+  return absl::OkStatus();
+}
+
+}  // namespace locus::bench::log

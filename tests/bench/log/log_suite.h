@@ -1,0 +1,14 @@
+// The suite `log`: what it costs to bring update batches to the disk. README.md in this folder lists the cases.
+#ifndef LOCUS_TESTS_BENCH_LOG_LOG_SUITE_H_
+#define LOCUS_TESTS_BENCH_LOG_LOG_SUITE_H_
+
+#include "tests/bench/frame/suite.h"
+
+namespace locus::bench::log {
+
+// UNAVAILABLE where files cannot be written.
+absl::Status run_log_suite(const Options& options, const Progress& progress, Report& report);
+
+}  // namespace locus::bench::log
+
+#endif  // LOCUS_TESTS_BENCH_LOG_LOG_SUITE_H_
