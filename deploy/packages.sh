@@ -27,10 +27,11 @@ build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev p
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev
   prometheus-cpp-dev libcivetweb-dev libcurl4-openssl-dev librocksdb-dev libxxhash-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
-# binutils gives nm to the house test; prometheus-client and yaml read what is made for Prometheus; zsh and fish run the
-# completions; groff and mandoc read the manual.
-test_packages="libgtest-dev libgmock-dev clang-format git python3 binutils python3-numpy
-  python3-prometheus-client python3-yaml zsh fish mandoc groff-base"
+# ccache keeps what was compiled for the next build; binutils gives nm to the house test; prometheus-client and yaml read
+# what is made for Prometheus; zsh and fish run the completions; groff and mandoc read the manual; haproxy stands between
+# a client and the daemon.
+test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutils python3-numpy
+  python3-prometheus-client python3-yaml zsh fish mandoc groff-base haproxy"
 # redis-tools holds the server too, without the service that redis-server would start.
 bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev libnanoflann-dev redis-tools"
 lint_packages="clang-tidy mypy"

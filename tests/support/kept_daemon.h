@@ -37,7 +37,8 @@ class KeptDaemon {
                                     "--data-dir",  directory()};
     all.insert(all.end(), options_.begin(), options_.end());
     process_ = std::make_unique<DaemonProcess>(all, folder_.file("log"));
-    stubs_ = std::make_unique<Stubs>("127.0.0.1:" + std::to_string(DaemonProcess::wait_for_port(folder_.file("port"))));
+    port_ = DaemonProcess::wait_for_port(folder_.file("port"));
+    stubs_ = std::make_unique<Stubs>("127.0.0.1:" + std::to_string(port_));
   }
   // Its exit code.
   int stop() {
@@ -49,6 +50,7 @@ class KeptDaemon {
     process_->wait();
   }
   Stubs& stubs() { return *stubs_; }
+  int port() const { return port_; }  // of the latest start
 
   // `locusd check` or `repair`: its exit code; what it printed is in printed().
   int maintain(const std::string& task) const {
@@ -61,6 +63,7 @@ class KeptDaemon {
   TemporaryFolder folder_;
   const std::vector<std::string> options_;
   std::unique_ptr<DaemonProcess> process_;
+  int port_ = 0;
   std::unique_ptr<Stubs> stubs_;
 };
 

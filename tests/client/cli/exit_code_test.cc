@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tests/client/lib/fake_server.h"
+#include "tests/support/built_program.h"
 
 namespace locus::cli {
 namespace {
@@ -21,7 +22,7 @@ struct Exit {
 };
 
 Exit run_program(const std::string& environment, const std::string& arguments) {
-  const std::string line = environment + " " + LOCUS_PROGRAM + " " + arguments + " 2>&1";
+  const std::string line = environment + " " + test::built_program("locus") + " " + arguments + " 2>&1";
   FILE* const pipe = popen(line.c_str(), "r");
   Exit exit;
   std::array<char, 4096> part{};
