@@ -31,14 +31,14 @@ class KeptDaemon {
 
   // Until it serves.
   void start() {
-    std::remove(folder_.file("port").c_str());
-    std::vector<std::string> all = {"--listen",    "127.0.0.1:0",        "--http-listen", "",
-                                    "--port-file", folder_.file("port"), "--threads",     "2",
-                                    "--data-dir",  directory()};
-    all.insert(all.end(), options_.begin(), options_.end());
-    process_ = std::make_unique<DaemonProcess>(all, folder_.file("log"));
+    launch();
     port_ = DaemonProcess::wait_for_port(folder_.file("port"));
     stubs_ = std::make_unique<Stubs>("127.0.0.1:" + std::to_string(port_));
+  }
+  // Of one that does not come so far.
+  int exit_code_of_start() {
+    launch();
+    return process_->wait();
   }
   // Its exit code.
   int stop() {
@@ -60,6 +60,15 @@ class KeptDaemon {
   std::string printed() const { return text_of(folder_.file("second")); }
 
  private:
+  void launch() {
+    std::remove(folder_.file("port").c_str());
+    std::vector<std::string> all = {"--listen",    "127.0.0.1:0",        "--http-listen", "",
+                                    "--port-file", folder_.file("port"), "--threads",     "2",
+                                    "--data-dir",  directory()};
+    all.insert(all.end(), options_.begin(), options_.end());
+    process_ = std::make_unique<DaemonProcess>(all, folder_.file("log"));
+  }
+
   TemporaryFolder folder_;
   const std::vector<std::string> options_;
   std::unique_ptr<DaemonProcess> process_;

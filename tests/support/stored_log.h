@@ -17,29 +17,9 @@
 #include "core/base/check.h"
 #include "server/storage/rocksdb_log.h"
 #include "tests/support/random.h"
+#include "tests/support/temporary_folder.h"
 
 namespace locus::test {
-
-// A folder below the system's temporary one that goes with this.
-class TemporaryFolder {
- public:
-  explicit TemporaryFolder(const std::string& name)
-      : path_((std::filesystem::temp_directory_path() / absl::StrCat("locus-", name, "-XXXXXX")).string()) {
-    LOCUS_CHECK(mkdtemp(path_.data()) != nullptr);
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const std::string& path() const { return path_; }
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 // Bytes that follow from a seed; every length up to `most` occurs.
 inline std::string bytes_of(uint64_t seed, size_t most) {

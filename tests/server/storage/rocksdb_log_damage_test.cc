@@ -2,7 +2,7 @@
 // is what was written, and a second opening comes to the same verdict as the first.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
+#include <iostream>
 #include <map>
 #include <memory>
 #include <thread>
@@ -76,7 +76,7 @@ bool write_mesh(UpdateLog& log) {
 // A few scenes with snapshots and records, in tables and in the log, and meshes.
 Sample make_sample(Ending ending) {
   Sample sample;
-  const test::TemporaryFolder folder("sample");
+  const test::TemporaryFolder folder;
   const auto faulty = std::make_shared<FaultyFiles>(folder.path(), folder.file("graves"));
   const std::unique_ptr<rocksdb::Env> env = rocksdb::NewCompositeEnv(faulty);
   const StorageOptions options = small_options(folder.file("data"), env.get());
@@ -122,7 +122,7 @@ Verdict open_once(const std::string& path, rocksdb::Env* env, const StoredModel&
 
 // Opens the damaged files twice.
 std::vector<Verdict> judge_damage(const Files& files, const StoredModel& model) {
-  const test::TemporaryFolder folder("damaged");
+  const test::TemporaryFolder folder;
   write_files(files, folder.file("data"));
   const auto faulty = std::make_shared<FaultyFiles>(folder.path(), folder.file("graves"));
   const std::unique_ptr<rocksdb::Env> env = rocksdb::NewCompositeEnv(faulty);
@@ -131,11 +131,10 @@ std::vector<Verdict> judge_damage(const Files& files, const StoredModel& model) 
   return verdicts;
 }
 
-// LOCUS_FAULT_RUNS=all asks for every byte and length.
-uint64_t stride(uint64_t bytes, uint64_t trials) {
-  const char* asked = std::getenv("LOCUS_FAULT_RUNS");
-  if (asked != nullptr) return 1;
-  return std::max<uint64_t>(1, bytes / test::scaled_count(trials));
+enum class Trials : uint8_t { kFew, kEvery };
+
+uint64_t stride(Trials trials, uint64_t places, uint64_t few) {
+  return trials == Trials::kEvery ? 1 : std::max<uint64_t>(1, places / test::scaled_count(few));
 }
 
 bool holds_data(const std::string& name) {
@@ -152,6 +151,7 @@ class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
 
   void expect_no_silent_loss(const Files& files, const std::string& what) {
     const std::vector<Verdict> verdicts = judge_damage(files, sample().model);
+    ++tried_;
     EXPECT_EQ(verdicts[0].difference, "") << what;
     EXPECT_EQ(verdicts[1].difference, "") << what << ", opened again";
     EXPECT_EQ(verdicts[0].opening, verdicts[1].opening) << what;
@@ -160,8 +160,63 @@ class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
     served_beside_ += !verdicts[0].damage.empty() && verdicts[0].served > 0;
   }
 
+  void flip_bytes(Trials trials) {
+    for (const auto& [name, bytes] : sample().files) {
+      if (!holds_data(name)) continue;
+      const uint64_t step = stride(trials, bytes.size(), 8);
+      for (uint64_t at = 0; at < bytes.size(); at += step) {
+        const uint64_t place = step == 1 ? at : at + Random(at).below(std::min(step, bytes.size() - at));
+        Files files = sample().files;
+        files[name][place] = static_cast<char>(files[name][place] ^ (1 << place % 8));
+        expect_no_silent_loss(files, absl::StrCat(name, " flipped at ", place, " of ", bytes.size()));
+      }
+    }
+    EXPECT_GT(noticed_, 5u);
+    EXPECT_GT(served_beside_, 0u);
+  }
+
+  void cut_files(Trials trials) {
+    for (const auto& [name, bytes] : sample().files) {
+      if (!holds_data(name)) continue;
+      const uint64_t step = stride(trials, bytes.size(), 4);
+      for (uint64_t at = 0; at < bytes.size(); at += step) {
+        Files files = sample().files;
+        files[name].resize(at);
+        expect_no_silent_loss(files, absl::StrCat(name, " cut to ", at, " of ", bytes.size()));
+      }
+    }
+    EXPECT_GT(noticed_, 5u);
+  }
+
+  void zero_pages(Trials trials) {
+    constexpr size_t kPage = 512;
+    for (const auto& [name, bytes] : sample().files) {
+      if (!holds_data(name)) continue;
+      const uint64_t pages = (bytes.size() + kPage - 1) / kPage;
+      const uint64_t step = stride(trials, pages, 3);
+      for (uint64_t page = 0; page < pages; page += step) {
+        Files files = sample().files;
+        std::string& cut = files[name];
+        std::fill(cut.begin() + page * kPage, cut.begin() + std::min(cut.size(), (page + 1) * kPage), '\0');
+        expect_no_silent_loss(files, absl::StrCat(name, " zeroed from ", page * kPage));
+      }
+    }
+    EXPECT_GT(noticed_, 3u);
+  }
+
+  void report() const {
+    std::cout << "proof: " << tried_ << " damaged directories, " << noticed_ << " noticed, in " << served_beside_
+              << " other scenes served" << std::endl;
+  }
+
+  uint64_t tried_ = 0;
   uint64_t noticed_ = 0;
   uint64_t served_beside_ = 0;
+};
+
+class LongRocksdbLogDamageTest : public RocksdbLogDamageTest {
+ protected:
+  void TearDown() override { report(); }
 };
 
 TEST_P(RocksdbLogDamageTest, SampleIsSound) {
@@ -177,33 +232,9 @@ TEST_P(RocksdbLogDamageTest, SampleIsSound) {
   EXPECT_GT(tables, 3);
 }
 
-TEST_P(RocksdbLogDamageTest, FlippedByteLosesNothingSilently) {
-  for (const auto& [name, bytes] : sample().files) {
-    if (!holds_data(name)) continue;
-    const uint64_t step = stride(bytes.size(), 8);
-    for (uint64_t at = 0; at < bytes.size(); at += step) {
-      const uint64_t place = step == 1 ? at : at + Random(at).below(std::min(step, bytes.size() - at));
-      Files files = sample().files;
-      files[name][place] = static_cast<char>(files[name][place] ^ (1 << place % 8));
-      expect_no_silent_loss(files, absl::StrCat(name, " flipped at ", place, " of ", bytes.size()));
-    }
-  }
-  EXPECT_GT(noticed_, 5u);
-  EXPECT_GT(served_beside_, 0u);
-}
+TEST_P(RocksdbLogDamageTest, FlippedByteLosesNothingSilently) { flip_bytes(Trials::kFew); }
 
-TEST_P(RocksdbLogDamageTest, CutFileLosesNothingSilently) {
-  for (const auto& [name, bytes] : sample().files) {
-    if (!holds_data(name)) continue;
-    const uint64_t step = stride(bytes.size(), 4);
-    for (uint64_t at = 0; at < bytes.size(); at += step) {
-      Files files = sample().files;
-      files[name].resize(at);
-      expect_no_silent_loss(files, absl::StrCat(name, " cut to ", at, " of ", bytes.size()));
-    }
-  }
-  EXPECT_GT(noticed_, 5u);
-}
+TEST_P(RocksdbLogDamageTest, CutFileLosesNothingSilently) { cut_files(Trials::kFew); }
 
 TEST_P(RocksdbLogDamageTest, MissingFileLosesNothingSilently) {
   for (const auto& [name, bytes] : sample().files) {
@@ -214,23 +245,20 @@ TEST_P(RocksdbLogDamageTest, MissingFileLosesNothingSilently) {
   EXPECT_GT(noticed_, 3u);
 }
 
-TEST_P(RocksdbLogDamageTest, ZeroedPageLosesNothingSilently) {
-  constexpr size_t kPage = 512;
-  for (const auto& [name, bytes] : sample().files) {
-    if (!holds_data(name)) continue;
-    const uint64_t pages = (bytes.size() + kPage - 1) / kPage;
-    const uint64_t step = stride(pages, 3);
-    for (uint64_t page = 0; page < pages; page += step) {
-      Files files = sample().files;
-      std::string& cut = files[name];
-      std::fill(cut.begin() + page * kPage, cut.begin() + std::min(cut.size(), (page + 1) * kPage), '\0');
-      expect_no_silent_loss(files, absl::StrCat(name, " zeroed from ", page * kPage));
-    }
-  }
-}
+TEST_P(RocksdbLogDamageTest, ZeroedPageLosesNothingSilently) { zero_pages(Trials::kFew); }
 
-INSTANTIATE_TEST_SUITE_P(Endings, RocksdbLogDamageTest, ::testing::Values(Ending::kInOrder, Ending::kKilled),
-                         [](const auto& each) { return each.param == Ending::kInOrder ? "InOrder" : "Killed"; });
+TEST_P(LongRocksdbLogDamageTest, EveryFlippedByteLosesNothingSilently) { flip_bytes(Trials::kEvery); }
+
+TEST_P(LongRocksdbLogDamageTest, EveryLengthLosesNothingSilently) { cut_files(Trials::kEvery); }
+
+TEST_P(LongRocksdbLogDamageTest, EveryZeroedPageLosesNothingSilently) { zero_pages(Trials::kEvery); }
+
+std::string name_of(const testing::TestParamInfo<Ending>& ending) {
+  return ending.param == Ending::kInOrder ? "InOrder" : "Killed";
+}
+INSTANTIATE_TEST_SUITE_P(Endings, RocksdbLogDamageTest, ::testing::Values(Ending::kInOrder, Ending::kKilled), name_of);
+INSTANTIATE_TEST_SUITE_P(Endings, LongRocksdbLogDamageTest, ::testing::Values(Ending::kInOrder, Ending::kKilled),
+                         name_of);
 
 }  // namespace
 }  // namespace locus::server

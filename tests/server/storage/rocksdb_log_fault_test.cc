@@ -1,7 +1,6 @@
 // A disk that fails for a while: syncs and writes that fail, and no room. Nothing is acknowledged that is not there,
 // and writing comes back by itself.
 #include <gtest/gtest.h>
-#include <sys/mount.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -12,6 +11,7 @@
 #include "core/base/refusal.h"
 #include "server/storage/rocksdb_log.h"
 #include "tests/support/faulty_files.h"
+#include "tests/support/small_disk.h"
 #include "tests/support/stored_log.h"
 
 namespace locus::server {
@@ -21,6 +21,7 @@ using test::append_records;
 using test::create_scene;
 using test::FaultyFiles;
 using test::record_difference;
+using test::SmallDisk;
 using test::write_snapshot;
 
 // Tries until it is over; false where it is not after a minute. The bound is for a slow machine: nothing here is timed.
@@ -35,7 +36,7 @@ bool succeeds_soon(const Try& once) {
 
 class RocksdbLogFaultTest : public ::testing::Test {
  protected:
-  RocksdbLogFaultTest() : folder_("fault") {
+  RocksdbLogFaultTest() {
     std::filesystem::create_directories(folder_.file("disk"));
     files_ = std::make_shared<FaultyFiles>(folder_.file("disk"), folder_.file("graves"));
     env_ = rocksdb::NewCompositeEnv(files_);
@@ -168,29 +169,8 @@ TEST_F(RocksdbLogFaultTest, FullDiskRefusesByNameAndPasses) {
   EXPECT_EQ(test::find_stored(*log_, "a")->snapshot_sequence, 3u);
 }
 
-// A file system of its own, which goes with this.
-class Mount {
- public:
-  Mount(std::string path, const char* size) : path_(std::move(path)) {
-    std::filesystem::create_directories(path_);
-    mounted_ = mount("locus-test", path_.c_str(), "tmpfs", 0, size) == 0;
-  }
-  ~Mount() {
-    if (mounted_) umount2(path_.c_str(), MNT_DETACH);
-  }
-  Mount(const Mount&) = delete;
-  Mount& operator=(const Mount&) = delete;
-
-  bool mounted() const { return mounted_; }
-  bool make_read_only() { return mount("", path_.c_str(), "", MS_REMOUNT | MS_RDONLY, "") == 0; }
-
- private:
-  const std::string path_;
-  bool mounted_ = false;
-};
-
 TEST_F(RocksdbLogFaultTest, SmallDiskFillsUpAndComesBack) {
-  const Mount disk(folder_.file("small"), "size=48m");
+  const SmallDisk disk(folder_.file("small"), 48);
   if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
   options_ = StorageOptions();
   options_.path = folder_.file("small/data");
@@ -213,7 +193,7 @@ TEST_F(RocksdbLogFaultTest, SmallDiskFillsUpAndComesBack) {
 }
 
 TEST_F(RocksdbLogFaultTest, DiskThatIsFullInEarnestLosesNothing) {
-  const Mount disk(folder_.file("small"), "size=48m");
+  const SmallDisk disk(folder_.file("small"), 48);
   if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
   options_ = StorageOptions();
   options_.path = folder_.file("small/data");
@@ -240,7 +220,7 @@ TEST_F(RocksdbLogFaultTest, DiskThatIsFullInEarnestLosesNothing) {
 }
 
 TEST_F(RocksdbLogFaultTest, ReadOnlyDirectoryIsRefusedWithAReason) {
-  Mount disk(folder_.file("small"), "size=48m");
+  SmallDisk disk(folder_.file("small"), 48);
   if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
   options_ = StorageOptions();
   options_.path = folder_.file("small/data");

@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 
 class RocksdbLogTest : public ::testing::Test {
  protected:
-  RocksdbLogTest() : folder_("log") {
+  RocksdbLogTest() {
     options_.path = folder_.file("data");
     options_.reserve_bytes = 0;
     open();

@@ -1,0 +1,193 @@
+// Data directories of every format that was ever shipped stay readable: tests/golden/data/ has one of each, made by a
+// daemon that was killed, and in words what it holds.
+//
+// With LOCUS_WRITE_SAMPLE=FOLDER the second test writes such a sample there: a new format's first commit brings one.
+#include <google/protobuf/text_format.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "absl/strings/str_split.h"
+#include "tests/support/kept_daemon.h"
+#include "tests/support/rpc_test.h"
+
+namespace locus::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr uint64_t kWriter = 7;
+constexpr uint64_t kBatches = 3;  // numbered ones
+
+class DataFormatTest : public ::testing::Test {
+ protected:
+  static std::filesystem::path samples() { return LOCUS_SOURCE_DIR "/tests/golden/data"; }
+
+  template <class Service, class Request, class Response>
+  Response call(Service& stub, grpc::Status (Service::*method)(grpc::ClientContext*, const Request&, Response*),
+                const Request& request) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    Response response;
+    const grpc::Status status = (stub.*method)(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response;
+  }
+
+  // A batch as protobuf's text says it.
+  v1::UpdateAck apply(const std::string& scene, const std::string& batch) {
+    v1::ApplyUpdatesRequest request;
+    request.set_scene(scene);
+    EXPECT_TRUE(google::protobuf::TextFormat::ParseFromString(batch, request.mutable_batch())) << batch;
+    return call(*daemon_.stubs().updates, &v1::UpdateService::Stub::ApplyUpdates, request).ack();
+  }
+
+  void upload_cube() {
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::UploadMeshResponse uploaded;
+    const auto upload = daemon_.stubs().scenes->UploadMesh(&context, &uploaded);
+    ASSERT_TRUE(upload->Write(whole_mesh("cube")));
+    upload->WritesDone();
+    ASSERT_TRUE(upload->Finish().ok());
+  }
+
+  void change_instances(const std::string& change) {
+    v1::ChangeInstancesRequest request;
+    EXPECT_TRUE(google::protobuf::TextFormat::ParseFromString(change, &request)) << change;
+    call(*daemon_.stubs().scenes, &v1::SceneService::Stub::ChangeInstances, request);
+  }
+
+  void create(const std::string& name, const std::string& spec) {
+    v1::SceneSpec parsed;
+    EXPECT_TRUE(google::protobuf::TextFormat::ParseFromString(spec, &parsed)) << spec;
+    create_scene(daemon_.stubs(), name, parsed);
+  }
+
+  // So many that a snapshot is due, and without them again.
+  void make_a_snapshot_due(const std::string& scene) {
+    std::string ids;
+    for (int id = 1000; id < 6000; ++id) absl::StrAppend(&ids, id == 1000 ? "" : ",", id);
+    apply(scene, absl::StrCat("inserts { ids: [", ids, "] positions: [1, 2, 3] point {} }"));
+    apply(scene, absl::StrCat("remove_ids: [", ids, "]"));
+    for (int i = 0; i < 1000 && !absl::StrContains(daemon_.log(), "snapshot written"); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_THAT(daemon_.log(), HasSubstr("snapshot written"));
+  }
+
+  // Everything that a directory may hold, before and after a snapshot.
+  void fill() {
+    upload_cube();
+    create("arena", R"(labels { key: "level" value: "7" } history_ticks: 4 winding: WINDING_CLOCKWISE)");
+    change_instances(R"(scene: "arena" place { mesh: "cube" translations: [5, 0, 0, 9, 0.25, 0] layers: [1, 6] })");
+    apply("arena", R"(writer: 7 batch: 1 tick: 3
+                      inserts { ids: [1, 2] positions_f64: [0.1, 2, 3, 4, 5, 6] point {} tags: [11, 12] }
+                      inserts { ids: [3] positions: [1, 1, 1] ball { radii: 0.5 } groups: 9 }
+                      inserts { ids: [4, 5] positions: [2, 0, 0, 3, 0, 0] box { half_extents: [1, 2, 3] }
+                                rotations: [0, 0.6, 0, 0.8] layers: [2, 3] })");
+    make_a_snapshot_due("arena");
+    create("twin", R"(static_from: "arena" overload: OVERLOAD_POLICY_LATEST_WINS)");
+    create("quick", R"(durability: DURABILITY_MEMORY)");
+    create("gone", "");
+    v1::DeleteSceneRequest gone;
+    gone.set_name("gone");
+    call(*daemon_.stubs().scenes, &v1::SceneService::Stub::DeleteScene, gone);
+    change_instances(R"(scene: "arena" remove_ids: [)" + first_instance() + R"(]
+                        place { mesh: "cube" translations: [0, 7, 0] rotations: [0, 0, 0.6, 0.8] tags: 5 })");
+    apply("arena", R"(writer: 7 batch: 2 tick: 4
+                      moves { ids: [1, 3] positions: [1.5, 0, 0, 2.5, 0, 0] }
+                      relabels { ids: 2 tags: 99 groups: 4 layers: 8 }
+                      inserts { ids: [6] positions: [8, 8, 8] capsule { radii: 0.25 half_axes: [0, 1, 0] } })");
+    apply("arena", R"(writer: 7 batch: 3 tick: 5 frame { x: 1000 }
+                      moves { ids: 4 positions: [0.5, 0, 0] teleport: true } remove_ids: [5])");
+    apply("twin", R"(inserts { ids: [1] positions: [1, 2, 3] ball { radii: 2 } })");
+    apply("quick", R"(inserts { ids: [1, 2] positions: [1, 2, 3, 4, 5, 6] point {} })");
+  }
+
+  std::string first_instance() {
+    const std::string dump = dump_of(daemon_.stubs(), "arena");
+    const size_t at = dump.find("ids: ", dump.find("instances {"));
+    return dump.substr(at + 5, dump.find('\n', at) - at - 5);
+  }
+
+  // Everything a client can see of it; the scene "quick" and epochs may differ from daemon to daemon.
+  std::string words() {
+    std::string words;
+    v1::ListScenesResponse scenes =
+        call(*daemon_.stubs().scenes, &v1::SceneService::Stub::ListScenes, v1::ListScenesRequest());
+    for (const v1::Scene& scene : scenes.scenes()) {
+      absl::StrAppend(&words, "scene ", scene.name(), " revision ", scene.revision(), " tick ", scene.tick(), "\n",
+                      scene.spec().DebugString(), dump_of(daemon_.stubs(), scene.name()));
+    }
+    const v1::ListMeshesResponse meshes =
+        call(*daemon_.stubs().scenes, &v1::SceneService::Stub::ListMeshes, v1::ListMeshesRequest());
+    for (const v1::Mesh& mesh : meshes.meshes())
+      absl::StrAppend(&words, "mesh ", mesh.name(), " triangles ", mesh.triangles(), "\n");
+    return words;
+  }
+
+  static std::string without_epochs(const std::string& words) {
+    std::string rest;
+    for (const absl::string_view line : absl::StrSplit(words, '\n'))
+      if (!absl::StartsWith(line, "epoch: ")) absl::StrAppend(&rest, line, "\n");
+    return rest;
+  }
+
+  // What RocksDB says to people is no part of a sample.
+  static void copy_sample(const std::filesystem::path& from, const std::filesystem::path& to) {
+    std::filesystem::create_directories(to.parent_path());
+    std::filesystem::copy(from, to, std::filesystem::copy_options::recursive);
+    std::vector<std::filesystem::path> logs;
+    for (const auto& entry : std::filesystem::directory_iterator(to / "rocksdb"))
+      if (absl::StartsWith(entry.path().filename().string(), "LOG")) logs.push_back(entry.path());
+    for (const std::filesystem::path& log : logs) std::filesystem::remove(log);
+  }
+
+  KeptDaemon daemon_{{"--snapshot-after", "64KiB"}};
+};
+
+TEST_F(DataFormatTest, EveryFormatIsRead) {
+  size_t formats = 0;
+  for (const auto& sample : std::filesystem::directory_iterator(samples())) {
+    SCOPED_TRACE(sample.path().filename().string());
+    ++formats;
+    std::filesystem::remove_all(daemon_.directory());
+    copy_sample(sample.path() / "data", daemon_.directory());
+    EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();
+    daemon_.start();
+    const std::string expected = text_of((sample.path() / "holds.txt").string());
+    EXPECT_EQ(without_epochs(words()), without_epochs(expected));
+    // Nothing was lost, so epochs are what they were, but where acks did not wait for the disk.
+    for (const char* scene : {"arena", "twin"})
+      EXPECT_THAT(expected, HasSubstr(absl::StrCat("epoch: ", get_scene(daemon_.stubs(), scene).epoch(), "\n")));
+    // Writers are remembered, and writing goes on.
+    EXPECT_TRUE(apply("arena", absl::StrCat("writer: ", kWriter, " batch: ", kBatches)).duplicate());
+    EXPECT_FALSE(apply("arena", absl::StrCat("writer: ", kWriter, " batch: ", kBatches + 1)).duplicate());
+    EXPECT_EQ(daemon_.stop(), 0);
+    daemon_.start();
+    EXPECT_TRUE(apply("arena", absl::StrCat("writer: ", kWriter, " batch: ", kBatches + 1)).duplicate());
+    EXPECT_EQ(daemon_.stop(), 0);
+  }
+  EXPECT_GT(formats, 0u);
+}
+
+TEST_F(DataFormatTest, TheSampleOfThisFormatHoldsWhatIsWrittenIntoANewDirectory) {
+  daemon_.start();
+  fill();
+  const std::string holds = words();
+  daemon_.kill();
+  if (const char* folder = std::getenv("LOCUS_WRITE_SAMPLE"); folder != nullptr) {
+    copy_sample(daemon_.directory(), std::filesystem::path(folder) / "data");
+    std::ofstream(std::filesystem::path(folder) / "holds.txt") << holds;
+  } else {
+    EXPECT_EQ(without_epochs(holds), without_epochs(text_of((samples() / "format-1" / "holds.txt").string())));
+  }
+}
+
+}  // namespace
+}  // namespace locus::test
