@@ -158,7 +158,10 @@ class Recovery {
 
 void log_snapshot(const Scene& scene, const absl::StatusOr<uint64_t>& bytes) {
   if (bytes.ok())
-    log(LogLevel::kInfo, "snapshot written", {{"scene", scene.name()}, {"bytes", absl::StrCat(*bytes)}});
+    log(LogLevel::kInfo, "snapshot written",
+        {{"scene", scene.name()},
+         {"bytes", absl::StrCat(*bytes)},
+         {"sequence", absl::StrCat(scene.log_position().snapshot_sequence)}});
   else
     log(LogLevel::kWarning, "no snapshot could be written; the log goes on and grows",
         {{"scene", scene.name()}, {"why", std::string(bytes.status().message())}});

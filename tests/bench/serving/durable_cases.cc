@@ -4,9 +4,9 @@
 
 #include <atomic>
 #include <chrono>
-#include <fstream>
+#include <cstdlib>
+#include <limits>
 #include <memory>
-#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -205,22 +205,14 @@ class RestartCase {
     status.Update((*daemon)->client().apply("arena", insert_all(world_)).status());
     // Until the log outweighs the scene and a snapshot takes its place.
     const size_t ticks = run_.options.quick ? 40 : 4;
-    for (size_t tick = 0; status.ok() && tick < ticks && !has_snapshot(**daemon); ++tick) {
-      std::vector<v1::StreamUpdatesRequest> messages = move_messages(world_, "arena", kMovesARecord, 1);
-      UpdateLoad load(**daemon, messages, kWindow, UpdateLoad::Expect::kApplied);
-      load.run(1);
-      status.Update(load.status());
+    uint64_t written = 1, kept = 0;
+    for (size_t tick = 0; status.ok() && tick < ticks && kept == 0; ++tick) {
+      status.Update(move(**daemon, std::numeric_limits<size_t>::max(), written));
       sleep_seconds(0.5);
+      kept = last_of_snapshot(**daemon);
     }
-    if (status.ok() && !has_snapshot(**daemon)) return absl::DataLossError("no snapshot was written");
-    for (size_t sent = 0; status.ok() && sent < kRecords;) {
-      std::vector<v1::StreamUpdatesRequest> messages = move_messages(world_, "arena", kMovesARecord, 1);
-      messages.resize(std::min(messages.size(), kRecords - sent));
-      sent += messages.size();
-      UpdateLoad load(**daemon, messages, kWindow, UpdateLoad::Expect::kApplied);
-      load.run(1);
-      status.Update(load.status());
-    }
+    if (status.ok() && kept == 0) return absl::DataLossError("no snapshot was written");
+    while (status.ok() && written < kept + kRecords) status.Update(move(**daemon, kept + kRecords - written, written));
     if (!status.ok()) return status;
     const auto result = (*daemon)->client().query("arena", balls_around(world_, 1000));
     if (!result.ok()) return result.status();
@@ -229,7 +221,23 @@ class RestartCase {
     return status;
   }
 
-  bool has_snapshot(const Daemon& daemon) const { return daemon.log().find("snapshot written") != std::string::npos; }
+  // A tick, or the first records of one.
+  absl::Status move(const Daemon& daemon, size_t most, uint64_t& written) {
+    std::vector<v1::StreamUpdatesRequest> messages = move_messages(world_, "arena", kMovesARecord, 1);
+    messages.resize(std::min(messages.size(), most));
+    written += messages.size();
+    UpdateLoad load(daemon, messages, kWindow, UpdateLoad::Expect::kApplied);
+    load.run(1);
+    return load.status();
+  }
+
+  // The number of the last record that it holds; 0 while there is none.
+  static uint64_t last_of_snapshot(const Daemon& daemon) {
+    const std::string log = daemon.log();
+    const size_t line = log.rfind("snapshot written");
+    const size_t number = line == std::string::npos ? line : log.find("sequence=", line);
+    return number == std::string::npos ? 0 : std::strtoull(log.c_str() + number + 9, nullptr, 10);
+  }
 
   const ServingRun& run_;
   TemporaryFolder folder_;
