@@ -57,6 +57,7 @@ struct StoredScene {
   uint64_t snapshot_sequence = 0;  // the snapshot holds all records up to here
   uint64_t last_sequence = 0;      // of the last record
   uint64_t log_bytes = 0;          // of the records after the snapshot
+  bool copied = false;             // by back_up(), from a log that went on: restart_scene() it before it goes on here
   absl::Status damage;             // DATA_LOSS: nothing of it may be believed or served
 };
 
@@ -92,7 +93,7 @@ class UpdateLog {
                                                 ChunkSource state) = 0;
   // Also of a damaged scene.
   virtual absl::Status delete_scene(SceneKey scene) = 0;
-  // From now on the scene's records carry another epoch: something of it was lost.
+  // From now on the scene's records carry another epoch: something of it was lost, or goes on elsewhere.
   virtual absl::Status restart_scene(SceneKey scene, uint64_t epoch) = 0;
 
   // Adds records in order, all or none, with one sync where `level` asks for it; of several scenes that append at a

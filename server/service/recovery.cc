@@ -110,13 +110,13 @@ class Recovery {
     return recover_mesh(log_, stored, options);
   }
 
-  // Where acks did not wait for the disk, something acknowledged may be missing after a crash: then it is another count
-  // of revisions.
+  // Where acks did not wait for the disk, something acknowledged may be missing after a crash, and what was copied may
+  // have gone on where it came from: then it is another count of revisions.
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
     const absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
     if (!spec.ok()) return spec.status();
-    if (spec->durability == Durability::kMemory && !log_.closed_in_order()) {
+    if (stored.copied || (spec->durability == Durability::kMemory && !log_.closed_in_order())) {
       stored.epoch = new_epoch();
       if (absl::Status status = log_.restart_scene(stored.key, stored.epoch); !status.ok()) return status;
     }

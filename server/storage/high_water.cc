@@ -48,7 +48,8 @@ std::string encode(const HighWater& high_water) {
   out.u64(high_water.manifest_bytes).string(high_water.catalogue_damage);
   out.u32(static_cast<uint32_t>(high_water.marks.size()));
   for (const Mark& mark : high_water.marks) {
-    out.u64(mark.scene).string(mark.name).u64(mark.sequence).u64(mark.chain).u64(mark.row_seal).string(mark.damage);
+    out.u64(mark.scene).string(mark.name).u64(mark.sequence).u64(mark.chain).u64(mark.row_seal);
+    out.u8(mark.copied ? 1 : 0).string(mark.damage);
   }
   return out.take();
 }
@@ -73,6 +74,7 @@ std::optional<HighWater> decode_high_water(absl::string_view bytes) {
     mark.sequence = in.u64();
     mark.chain = in.u64();
     mark.row_seal = in.u64();
+    mark.copied = in.u8() != 0;
     mark.damage = in.string();
   }
   return in.ended() ? std::optional(std::move(found)) : std::nullopt;

@@ -29,6 +29,7 @@ struct Mark {
   uint64_t sequence = 0;  // at least up to here there are records
   uint64_t chain = 0;     // the checksum of that record, or of the snapshot's last
   uint64_t row_seal = 0;  // of its row in the catalogue, exactly
+  bool copied = false;    // by back_up(), and not restarted since
   std::string damage;     // found earlier; stays until the scene is deleted or repaired
 };
 

@@ -123,6 +123,7 @@ absl::Status judge_scene(SceneFinding& scene, const Mark* mark, const HighWater*
                          const Database& database, Depth depth) {
   absl::Status disk;
   if (mark != nullptr) scene.promised = mark->sequence;
+  scene.copied = mark != nullptr && mark->copied;
   scene.damage = mark != nullptr ? mark->damage : "";
   std::string more = must == nullptr ? std::string(kNoHighWater) : row_damage(scene, mark, standing);
   // The numbers are wanted of a damaged scene, too.

@@ -25,6 +25,7 @@ struct SceneFinding {
   uint64_t chain = 0;
   uint64_t log_bytes = 0;
   uint64_t promised = 0;  // ... and how far they must go at least
+  bool copied = false;    // as of Mark
   std::string damage;     // what is wrong, empty where nothing is
 };
 

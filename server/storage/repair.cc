@@ -117,7 +117,8 @@ absl::Status copy_scene(const Database& source, const SceneFinding& found, const
     const std::string key = scene_key(row.key);
     const std::string value = sealed(key, encode(row));
     keep_row(key, value, result, copy);
-    result.high_water.marks.push_back({row.key, row.name, last.sequence, last.chain, seal_of(value), ""});
+    result.high_water.marks.push_back(
+        {row.key, row.name, last.sequence, last.chain, seal_of(value), found.copied && !damaged, ""});
     repaired.epoch = row.epoch;
     repaired.kept_to = last.sequence;
   }

@@ -78,6 +78,7 @@ void RocksdbLog::list_stored() {
       place->damage_found = found.damage;
     }
     place->row_seal = found.row_seal;
+    place->copied = stored.copied = found.copied;
     place->written = {found.last, found.chain};
     place->synced = place->written;  // all that is there was synced before it was read
     // What must be there stays what it was where it is not.
@@ -228,6 +229,8 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
     if (absl::Status status = database_->sync(); !status.ok()) return status;
     scenes_.on_disk(written);
     scenes_.describe(0, high_water);
+    // Here the scenes go on: what follows in the copy is another history.
+    for (Mark& mark : high_water.marks) mark.copied = true;
   }
   {
     MutexLock high_water_lock(high_water_mutex_);

@@ -102,6 +102,7 @@ void SceneTable::set_catalogue(const CatalogueRow& totals) {
 
 void SceneTable::set_row(SceneState& scene, const SceneRow& row, uint64_t row_seal, const CatalogueRow& totals) {
   MutexLock lock(mutex_);
+  if (scene.epoch != row.epoch) scene.copied = false;
   scene.epoch = row.epoch;
   scene.row_seal = row_seal;
   // The snapshot holds these records, and is on the disk.
@@ -136,6 +137,7 @@ void SceneTable::describe(uint64_t database_sequence, HighWater& high_water) con
     mark.sequence = scene->synced.sequence;
     mark.chain = scene->synced.chain;
     mark.row_seal = scene->row_seal;
+    mark.copied = scene->copied;
     mark.damage = scene->damage_found;
   }
   if (all_synced) high_water.covered_sequence = database_sequence;

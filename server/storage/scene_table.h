@@ -35,6 +35,7 @@ struct SceneState {
   std::string damage_found;  // the same for HIGH_WATER
   uint64_t epoch = 0;
   uint64_t row_seal = 0;
+  bool copied = false;
   Position written;
   Position synced;
   // Records up to here failed to be appended, and may turn up: the next append deletes those that it does not replace.

@@ -245,6 +245,25 @@ TEST_F(RocksdbLogTest, BackupIsALogOfItsOwn) {
   append(scene, 1);
 }
 
+TEST_F(RocksdbLogTest, CopiedScenesSayThatTheyAreUntilTheyAreRestarted) {
+  create("a", 1);
+  create("b", 2);
+  const std::string copy = folder_.file("copy");
+  ASSERT_EQ(log_->back_up(copy), absl::OkStatus());
+  open();
+  EXPECT_FALSE(find_stored(*log_, "a")->copied) << "the one that was copied goes on as it was";
+  options_.path = copy;
+  for (int time = 0; time < 2; ++time) {
+    open();
+    EXPECT_TRUE(find_stored(*log_, "a")->copied);
+  }
+  ASSERT_EQ(log_->restart_scene(1, 8), absl::OkStatus());
+  open();
+  EXPECT_FALSE(find_stored(*log_, "a")->copied);
+  EXPECT_EQ(find_stored(*log_, "a")->epoch, 8u);
+  EXPECT_TRUE(find_stored(*log_, "b")->copied);
+}
+
 TEST_F(RocksdbLogTest, PrunedLogLeavesTheDisk) {
   options_.log_buffer_bytes = uint64_t{1} << 20;
   open();
