@@ -86,6 +86,8 @@ run_suite() {
   local suite=$1 wrapper=() labels=(-LE long)
   if [ "$suite" = tsan ]; then wrapper=(${steady_addresses[@]+"${steady_addresses[@]}"}); fi
   local options=(-DLOCUS_TESTS=ON -DLOCUS_PYTHON=ON)
+  # clang-tidy asks for each file by itself.
+  if [ "$long" = no ]; then options+=(-DLOCUS_UNITY=ON); else options+=(-DLOCUS_UNITY=OFF); fi
   if [ "$suite" = release ] && [ "$long" = yes ]; then labels=(); fi
   # The command line costs AddressSanitizer half an hour of compiling: its readers of files are judged always, all of it
   # in the long run.

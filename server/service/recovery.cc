@@ -114,8 +114,11 @@ class Recovery {
   // have gone on where it came from: then it is another count of revisions.
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
-    const absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
+    absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
     if (!spec.ok()) return spec.status();
+    // What readers may hold is for this daemon's options to say, not for those of the one that made the scene.
+    spec->pinned_bytes = host_.config.pinned_limit;
+    stored.spec = encode_spec(*spec);
     if (stored.copied || (spec->durability == Durability::kMemory && !log_.closed_in_order())) {
       stored.epoch = new_epoch();
       if (absl::Status status = log_.restart_scene(stored.key, stored.epoch); !status.ok()) return status;

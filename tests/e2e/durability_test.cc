@@ -169,6 +169,17 @@ TEST_F(DurabilityTest, ASceneWhoseAcksDoNotWaitSurvivesAnOrderlyEndAndGetsAnothe
   EXPECT_GE(points_of(stubs(), "arena").size(), 1u);
 }
 
+TEST_F(DurabilityTest, WhatReadersMayHoldFollowsTheOptionsOfNow) {
+  daemon_.set_options({"--pinned-limit", "64MiB"});
+  daemon_.start();
+  create_scene(daemon_.stubs(), "arena");
+  EXPECT_EQ(get_scene(daemon_.stubs(), "arena").max_pinned_bytes(), uint64_t{64} << 20);
+  EXPECT_EQ(daemon_.stop(), 0);
+  daemon_.set_options({"--pinned-limit", "96MiB"});
+  daemon_.start();
+  EXPECT_EQ(get_scene(daemon_.stubs(), "arena").max_pinned_bytes(), uint64_t{96} << 20);
+}
+
 TEST_F(DurabilityTest, ASecondDaemonOnTheDirectoryIsRefused) {
   daemon_.start();
   EXPECT_EQ(daemon_.maintain("check"), 1);

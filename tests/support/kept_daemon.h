@@ -26,6 +26,9 @@ class KeptDaemon {
     std::filesystem::remove_all(directory());
   }
 
+  // From the next start on.
+  void set_options(std::vector<std::string> options) { options_ = std::move(options); }
+
   std::string directory() const { return folder_.file("data"); }
   std::string log() const { return text_of(folder_.file("log")); }
 
@@ -70,7 +73,7 @@ class KeptDaemon {
   }
 
   TemporaryFolder folder_;
-  const std::vector<std::string> options_;
+  std::vector<std::string> options_;
   std::unique_ptr<DaemonProcess> process_;
   int port_ = 0;
   std::unique_ptr<Stubs> stubs_;

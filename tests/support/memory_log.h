@@ -266,7 +266,7 @@ class MemoryLog : public UpdateLog {
       uint64_t bytes = 0;
       for (const Record& record : scene.records) bytes += record.bytes->size();
       stored_scenes_.push_back(
-          {key, scene.name, scene.spec, scene.epoch, scene.snapshot_sequence, scene.last(), bytes, {}});
+          {key, scene.name, scene.spec, scene.epoch, scene.snapshot_sequence, scene.last(), bytes, false, {}});
     }
     for (const auto& [name, sha256] : kept.meshes) stored_meshes_.push_back({name, sha256, {}});
   }
