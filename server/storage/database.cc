@@ -95,6 +95,7 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   found.stats_dump_period_sec = 0;
   found.stats_persist_period_sec = 0;
   found.skip_stats_update_on_db_open = true;
+  found.max_file_opening_threads = 1;  // the default starts sixty-four threads to open what are a few files
   if (read_only(mode)) found.info_log = std::make_shared<NoLogger>();
   return found;
 }
