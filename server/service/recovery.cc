@@ -72,7 +72,13 @@ class Recovery {
 
   void recover(const std::vector<const StoredMesh*>& names) {
     if (!goes_on()) return;
+    const steady_clock::time_point start = steady_clock::now();
     const absl::StatusOr<MeshPtr> mesh = recover_sound(*names.front());
+    if (mesh.ok())
+      log(LogLevel::kInfo, "mesh recovered",
+          {{"mesh", names.front()->name},
+           {"triangles", absl::StrCat((*mesh)->triangle_count())},
+           {"milliseconds", milliseconds_since(start)}});
     for (const StoredMesh* name : names) {
       if (mesh.ok()) {
         host_.registry.restore_mesh(name->name, *mesh);
