@@ -9,6 +9,7 @@
 #include "rocksdb/table.h"
 #include "server/storage/errors.h"
 #include "server/storage/rows.h"
+#include "server/storage/table_guard.h"
 
 namespace locus::server {
 namespace {
@@ -77,7 +78,6 @@ class Database::ErrorWatch final : public rocksdb::EventListener {
 
 rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mode) {
   rocksdb::DBOptions found;
-  found.env = options.env;
   found.create_if_missing = mode == OpenMode::kCreate;
   found.create_missing_column_families = mode == OpenMode::kCreate;
   found.paranoid_checks = !lenient(mode);
@@ -114,6 +114,8 @@ Database::Database(OpenMode mode)
 rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, std::unique_ptr<Database>& result) {
   std::unique_ptr<Database> database(new Database(mode));
   rocksdb::DBOptions wanted = database_options(options, mode);
+  database->env_ = rocksdb::NewCompositeEnv(std::make_shared<TableGuard>(options.env->GetFileSystem()));
+  wanted.env = database->env_.get();
   wanted.wal_filter = &database->wal_watch_;
   wanted.listeners = {database->errors_};
   rocksdb::DB* db = nullptr;

@@ -85,6 +85,7 @@ class Database {
   const OpenMode mode_;
   WalWatch wal_watch_;
   std::shared_ptr<ErrorWatch> errors_;
+  std::unique_ptr<rocksdb::Env> env_;  // before what uses it
   std::unique_ptr<rocksdb::DB> db_;
   std::vector<rocksdb::ColumnFamilyHandle*> families_;
   std::atomic<bool> broken_ = false;
