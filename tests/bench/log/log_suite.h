@@ -1,4 +1,4 @@
-// The suite `log`: what it costs to bring update batches to the disk. README.md in this folder lists the cases.
+// The suite `log`: what it costs to bring update batches to the disk. The cases are listed in tests/bench/README.md.
 #ifndef LOCUS_TESTS_BENCH_LOG_LOG_SUITE_H_
 #define LOCUS_TESTS_BENCH_LOG_LOG_SUITE_H_
 
