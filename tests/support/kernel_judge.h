@@ -64,7 +64,11 @@ inline KernelRay kernel_ray(const KernelQuestion& question) {
 class KernelTrial {
  public:
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions)
-      : name_(std::move(name)), tree_(*TriangleBvh::build(triangles)) {
+      : KernelTrial(std::move(name), triangles, questions, *TriangleBvh::build(triangles)) {}
+  // Asks `tree`, which is of those triangles.
+  KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions,
+              TriangleBvh tree)
+      : name_(std::move(name)), tree_(std::move(tree)) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     for (KernelQuestion question : questions) {
       const KernelAnswer answer = answer_of_list(triangles, question);

@@ -20,10 +20,9 @@ class RegionTrial {
  public:
   RegionTrial(std::string name, const std::vector<Triangle>& triangles, std::vector<Ballf> balls,
               std::vector<Obbf> boxes)
-      : name_(std::move(name)),
-        tree_(*TriangleBvh::build(triangles)),
-        balls_(std::move(balls)),
-        boxes_(std::move(boxes)) {
+      : RegionTrial(std::move(name), *TriangleBvh::build(triangles), std::move(balls), std::move(boxes)) {}
+  RegionTrial(std::string name, TriangleBvh tree, std::vector<Ballf> balls, std::vector<Obbf> boxes)
+      : name_(std::move(name)), tree_(std::move(tree)), balls_(std::move(balls)), boxes_(std::move(boxes)) {
     for (const Ballf& ball : balls_)
       answers_.push_back(answer([&](const Triangle& triangle) { return ball_overlaps(ball, triangle); }));
     for (const Obbf& box : boxes_)
@@ -69,9 +68,9 @@ class RegionTrial {
   std::vector<std::vector<uint32_t>> answers_;  // to the balls, then to the boxes
 };
 
-// Every kind of region, `count` of each.
-inline RegionTrial random_region_trial(std::string name, const std::vector<Triangle>& mesh, size_t count,
-                                       uint64_t seed) {
+// Every kind of region, `count` of each, to a tree of that mesh.
+inline RegionTrial random_region_trial(std::string name, const std::vector<Triangle>& mesh, TriangleBvh tree,
+                                       size_t count, uint64_t seed) {
   RandomRegions regions(mesh, seed);
   std::vector<Ballf> balls;
   std::vector<Obbf> boxes;
@@ -80,7 +79,12 @@ inline RegionTrial random_region_trial(std::string name, const std::vector<Trian
     boxes.insert(boxes.end(),
                  {regions.box(false), regions.box(true), regions.touching_box(false), regions.touching_box(true)});
   }
-  return RegionTrial(std::move(name), mesh, std::move(balls), std::move(boxes));
+  return RegionTrial(std::move(name), std::move(tree), std::move(balls), std::move(boxes));
+}
+
+inline RegionTrial random_region_trial(std::string name, const std::vector<Triangle>& mesh, size_t count,
+                                       uint64_t seed) {
+  return random_region_trial(std::move(name), mesh, *TriangleBvh::build(mesh), count, seed);
 }
 
 inline std::vector<RegionTrial> ordinary_region_trials() {

@@ -14,6 +14,10 @@
 
 namespace locus {
 
+// Of the trees that are built for the same input. Raised with every change that makes other ones, so that what was
+// kept of the trees before (tree_outline.h) is not taken for the best that can be had.
+inline constexpr uint32_t kBvhBuilderVersion = 1;
+
 struct BvhOptions {
   // Split candidates an axis plus one, 2 to limits::kMaxBvhBins. More bins find slightly better trees and take longer;
   // answers do not depend on them.

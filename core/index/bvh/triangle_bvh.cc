@@ -56,11 +56,29 @@ absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triang
   if (!tree.ok()) return tree.status();
   built.arrays_ = TriangleWriter(triangles, *tree, options).write();
   if (cancelled(options)) return cancelled_build();
-  built.bounds_ = tree->root().bounds;
-  built.magnitude_ = magnitude(built.bounds_);
+  built.set_bounds(tree->root().bounds);
   LOCUS_CHECK_EQ(built.size(), triangles.size());
   LOCUS_CHECK_LE(built.depth(), limits::kMaxBvhDepth);
   return built;
+}
+
+absl::StatusOr<TriangleBvh> TriangleBvh::restore(const TreeOutline& outline, uint32_t triangle_count,
+                                                 absl::FunctionRef<Triangle(uint32_t)> triangle,
+                                                 const BvhOptions& options) {
+  absl::StatusOr<TriangleArrays> arrays = restore_arrays(outline, triangle_count, triangle, options);
+  if (!arrays.ok()) return arrays.status();
+  TriangleBvh restored;
+  restored.arrays_ = *std::move(arrays);
+  const TriangleNode& root = restored.arrays_.nodes[0];
+  Aabbf bounds;
+  for (int slot = 0; slot < kTreeWidth && root.child[slot] != kNoChild; ++slot) bounds = merge(bounds, box(root, slot));
+  restored.set_bounds(bounds);
+  return restored;
+}
+
+void TriangleBvh::set_bounds(const Aabbf& bounds) {
+  bounds_ = bounds;
+  magnitude_ = magnitude(bounds);
 }
 
 Triangle TriangleBvh::at(size_t position) const {

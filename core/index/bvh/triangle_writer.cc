@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 #include <utility>
+
+#include "core/index/bvh/triangle_parts.h"
 
 namespace locus {
 
@@ -14,53 +14,6 @@ namespace {
 
 // What lies below a node of up to so many triangles is written in one go. A constant, though nothing depends on it.
 constexpr uint32_t kPieceTriangles = 8192;
-
-// Coordinates of a box that no slab test meets.
-constexpr float kNowhere = 1e30f;
-
-using Orders = std::array<uint32_t, 8>;  // one for each octant of directions
-
-// How far each octant meets a box along its diagonal. A quarter of each coordinate, so that sums stay finite.
-std::array<float, 8> corners_toward(const Aabbf& box) {
-  std::array<float, 8> result;
-  for (uint32_t octant = 0; octant < 8; ++octant) {
-    float sum = 0;
-    for (int axis = 0; axis < 3; ++axis) sum += 0.25f * ((octant >> axis & 1u) != 0 ? -box.max[axis] : box.min[axis]);
-    result[octant] = sum;
-  }
-  return result;
-}
-
-// Slots from far to near along the diagonal of each octant, equal ones by number, behind those without a child. A
-// slot's place is the number of slots that stand before it: all octants are ranked at once, without a branch.
-Orders orders_of(const WideChildren<float>& children) {
-  std::array<std::array<float, 8>, kTreeWidth> corners;
-  std::array<Orders, kTreeWidth> places{};
-  const uint32_t used = children.size();
-  for (uint32_t slot = 0; slot < used; ++slot) {
-    corners[slot] = corners_toward(children[slot].bounds);
-    for (uint32_t before = 0; before < slot; ++before) {
-      for (size_t octant = 0; octant < 8; ++octant) {
-        const uint32_t farther = corners[slot][octant] > corners[before][octant] ? 1 : 0;
-        places[before][octant] += farther;
-        places[slot][octant] += 1 - farther;
-      }
-    }
-  }
-  Orders orders{};
-  for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
-    const uint32_t empty = kTreeWidth - used;
-    for (size_t octant = 0; octant < 8; ++octant) {
-      const uint32_t place = slot < used ? empty + places[slot][octant] : slot - used;
-      orders[octant] |= slot << (3 * place);
-    }
-  }
-  return orders;
-}
-
-float rounded_up_extent(const Aabbf& box) {
-  return std::nextafter(max_component(box.extent()), std::numeric_limits<float>::infinity());
-}
 
 WideChildren<float> children_by_area(const BinaryNode<float>& root) {
   WideChildren<float> children(root);
@@ -186,32 +139,21 @@ void TriangleWriter::write_whole(const Piece& piece) {
 // All but the numbers of its children.
 void TriangleWriter::write_node(const WideChildren<float>& children, NodeRange range, uint32_t number) {
   arrays_.ranges[number] = range;
+  std::array<Aabbf, kTreeWidth> boxes;
+  for (uint32_t slot = 0; slot < children.size(); ++slot) boxes[slot] = children[slot].bounds;
   TriangleNode& node = arrays_.nodes[number];
-  for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
-    const bool used = slot < children.size();
-    node.child[slot] = kNoChild;
-    for (int axis = 0; axis < 3; ++axis) {
-      node.bounds[axis][slot] = used ? children[slot].bounds.min[axis] : kNowhere;
-      node.bounds[3 + axis][slot] = used ? children[slot].bounds.max[axis] : -kNowhere;
-    }
-  }
-  const Orders orders = orders_of(children);
-  std::copy(orders.begin(), orders.end(), node.order);
+  std::fill(std::begin(node.child), std::end(node.child), kNoChild);
+  fill_boxes(absl::MakeConstSpan(boxes).first(children.size()), node);
 }
 
 void TriangleWriter::write_block(const BinaryNode<float>& leaf, const Place& place) {
-  TriangleBlock& block = arrays_.blocks[place.block];
-  block.first = place.position;
-  block.count = leaf.count;
-  block.extent = rounded_up_extent(leaf.bounds);
-  std::fill(std::begin(block.unused), std::end(block.unused), 0);
-  for (uint32_t lane = 0; lane < kTreeWidth; ++lane) {
-    const Triangle& triangle = triangles_[tree_.index(leaf.first + std::min(lane, leaf.count - 1))];
-    int row = 0;
-    for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
-      for (int axis = 0; axis < 3; ++axis) block.vertices[row++][lane] = vertex[axis];
-    if (lane < leaf.count) arrays_.numbers[place.position + lane] = triangle.number;
+  std::array<Triangle, kTreeWidth> triangles;
+  for (uint32_t lane = 0; lane < leaf.count; ++lane) {
+    triangles[lane] = triangles_[tree_.index(leaf.first + lane)];
+    arrays_.numbers[place.position + lane] = triangles[lane].number;
   }
+  fill_block(absl::MakeConstSpan(triangles).first(leaf.count), leaf.bounds, place.position,
+             arrays_.blocks[place.block]);
 }
 
 }  // namespace locus

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstring>
 #include <unordered_set>
 
 #include "core/base/refusal.h"
 #include "core/geometry/ray_triangle.h"
 #include "core/index/bvh/triangle_bvh.h"
 #include "core/index/index_queries.h"
+#include "tests/support/equal_trees.h"
 #include "tests/support/generated_meshes.h"
 #include "tests/support/test_scale.h"
 #include "tests/support/threads.h"
@@ -23,31 +23,6 @@ TriangleBvh build(const std::vector<Triangle>& triangles, const BvhOptions& opti
   absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles, options);
   EXPECT_TRUE(tree.ok()) << tree.status();
   return tree.ok() ? *std::move(tree) : TriangleBvh();
-}
-
-template <class T>
-bool equal_bytes(const T* a, const T* b, size_t count) {
-  return std::memcmp(a, b, count * sizeof(T)) == 0;
-}
-
-size_t block_count(const TriangleBvh& built) {
-  const TriangleTree tree = built.tree();
-  size_t blocks = 0;
-  for (size_t number = 0; number < built.node_count(); ++number)
-    for (const uint32_t child : tree.nodes[number].child)
-      blocks += child != kNoChild && (child & kBlockBit) != 0 ? 1 : 0;
-  return blocks;
-}
-
-void expect_equal_bytes(const TriangleBvh& a, const TriangleBvh& b) {
-  ASSERT_EQ(a.node_count(), b.node_count());
-  ASSERT_EQ(block_count(a), block_count(b));
-  EXPECT_EQ(a.depth(), b.depth());
-  EXPECT_EQ(a.bounds(), b.bounds());
-  EXPECT_TRUE(equal_bytes(a.tree().nodes, b.tree().nodes, a.node_count()));
-  EXPECT_TRUE(equal_bytes(a.tree().ranges, b.tree().ranges, a.node_count()));
-  EXPECT_TRUE(equal_bytes(a.tree().blocks, b.tree().blocks, block_count(a)));
-  EXPECT_TRUE(equal_bytes(a.tree().numbers, b.tree().numbers, a.size()));
 }
 
 // Large enough for many pieces of work.
@@ -119,7 +94,7 @@ TEST(TriangleBvhBuildTest, ALargeTriangleTakesNoSmallOnesIntoItsBlockToSaveOne) 
   triangles.push_back({{-900, -1000, 0}, {1100, -1000, 0}, {100, 1000, 0}});
   number_in_order(triangles);
   const TriangleBvh built = build(triangles);
-  ASSERT_EQ(block_count(built), 3u);
+  ASSERT_EQ(built.block_count(), 3u);
   const TriangleTree tree = built.tree();
   for (size_t block = 0; block < 3; ++block)
     EXPECT_EQ(tree.blocks[block].count == 1, tree.numbers[tree.blocks[block].first] == 15);
@@ -153,7 +128,7 @@ struct TreeCost {
 TreeCost cost_of(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
   const TriangleBvh tree = build(triangles, options);
   std::unordered_set<uint32_t> first_of_block;
-  for (size_t block = 0; block < block_count(tree); ++block)
+  for (size_t block = 0; block < tree.block_count(); ++block)
     first_of_block.insert(tree.tree().numbers[tree.tree().blocks[block].first]);
   constexpr int kRays = 2'000;
   Random random(17);

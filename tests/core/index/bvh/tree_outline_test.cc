@@ -1,0 +1,201 @@
+// What is restored from an outline: the very tree that was built where it is its own, and from any other one a tree
+// that answers as right.
+#include "core/index/bvh/tree_outline.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "core/base/limits.h"
+#include "core/index/bvh/kernels/dispatch.h"
+#include "core/index/bvh/triangle_bvh.h"
+#include "tests/support/equal_trees.h"
+#include "tests/support/generated_meshes.h"
+#include "tests/support/kernel_trials.h"
+#include "tests/support/random_outline.h"
+#include "tests/support/region_trials.h"
+#include "tests/support/scene_search.h"
+#include "tests/support/threads.h"
+
+namespace locus::test {
+namespace {
+
+std::vector<Triangle> renumbered(std::vector<Triangle> triangles) {
+  number_in_order(triangles);
+  return triangles;
+}
+
+// With `triangles` in the order of their numbers.
+absl::StatusOr<TriangleBvh> restore(const TreeOutline& outline, const std::vector<Triangle>& triangles,
+                                    const BvhOptions& options = {}) {
+  const auto triangle = [&](uint32_t number) { return triangles[number]; };
+  return TriangleBvh::restore(outline, static_cast<uint32_t>(triangles.size()), triangle, options);
+}
+
+TEST(TreeOutlineTest, ATreeComesBackByteForByteOnAnyThreads) {
+  for (const std::vector<Triangle>& triangles : {bumpy_sphere(130, 0.05, 6), box_city(9, 1), bumpy_sphere(2, 0.1, 1)}) {
+    const TriangleBvh built = *TriangleBvh::build(triangles);
+    for (const ParallelFor& parallel_for : {on_threads(1), on_threads(3), backwards()}) {
+      BvhOptions options;
+      options.parallel_for = parallel_for;
+      const absl::StatusOr<TriangleBvh> restored = restore(built.outline(), triangles, options);
+      ASSERT_TRUE(restored.ok()) << restored.status();
+      expect_equal_bytes(*restored, built);
+    }
+  }
+}
+
+TEST(TreeOutlineTest, ATreeOfEverySmallSizeComesBack) {
+  const std::vector<Triangle> all = bumpy_sphere(6, 0.1, 2);
+  for (size_t count = 1; count <= all.size(); ++count) {
+    const std::vector<Triangle> some(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
+    const TriangleBvh built = *TriangleBvh::build(some);
+    const absl::StatusOr<TriangleBvh> restored = restore(built.outline(), some);
+    ASSERT_TRUE(restored.ok()) << restored.status();
+    expect_equal_bytes(*restored, built);
+  }
+}
+
+// The promise that makes it safe to keep them.
+std::string difference_of_any_outline(const TestScene<Triangle>& scene) {
+  if (scene.values.empty()) return "";
+  TestScene<Triangle> numbered = scene;
+  numbered.values = renumbered(scene.values);
+  Random random(scene.values.size());
+  const RandomOutline made(static_cast<uint32_t>(scene.values.size()), random);
+  const absl::StatusOr<TriangleBvh> tree = restore(made.outline(), numbered.values);
+  if (!tree.ok()) return tree.status().ToString();
+  const ListIndex<Triangle> oracle = make_list(numbered.values);
+  return IndexJudge<TriangleBvh>(*tree, oracle).difference(numbered);
+}
+
+TEST(TreeOutlineTest, AnyOutlineThatFitsAnswersAsTheListDoes) {
+  EXPECT_EQ(search_all_scenes<Triangle>(scaled_count(1'000), scaled_count(300), difference_of_any_outline), "");
+}
+
+TEST(TreeOutlineTest, KernelsAnswerRightInATreeOfAnyOutline) {
+  const std::vector<Triangle> triangles = bumpy_sphere(14, 0.1, 1);
+  for (const std::string& name : instruction_sets()) {
+    ASSERT_TRUE(use_instruction_set(name).ok());
+    const RayKernels* const kernels = active_ray_kernels();
+    const RegionKernels* const region_kernels = active_region_kernels();
+    if (kernels == nullptr) continue;  // the portable way has none
+    for (uint64_t seed = 0; seed < 4; ++seed) {
+      Random random(seed);
+      const RandomOutline made(static_cast<uint32_t>(triangles.size()), random);
+      absl::StatusOr<TriangleBvh> tree = restore(made.outline(), triangles);
+      ASSERT_TRUE(tree.ok()) << tree.status();
+      const KernelTrial trial(absl::StrCat("outline ", seed), triangles,
+                              random_questions(triangles, scaled_count(500), seed), *std::move(tree));
+      EXPECT_EQ(trial.difference(*kernels), "") << name;
+      tree = restore(made.outline(), triangles);
+      const RegionTrial regions = random_region_trial("regions", triangles, *std::move(tree), scaled_count(100), seed);
+      EXPECT_EQ(regions.difference(*region_kernels), "") << name;
+    }
+  }
+  ASSERT_TRUE(use_instruction_set("").ok());
+}
+
+class WrongOutlineTest : public ::testing::Test {
+ protected:
+  WrongOutlineTest() : built_(*TriangleBvh::build(triangles_)), wrong_(built_.outline()) {
+    numbers_.assign(wrong_.numbers.begin(), wrong_.numbers.end());
+    wrong_.numbers = numbers_;
+  }
+  std::string refused() { return std::string(restore(wrong_, triangles_).status().message()); }
+
+  const std::vector<Triangle> triangles_ = box_city(3, 1);
+  const TriangleBvh built_;
+  std::vector<uint32_t> numbers_;
+  TreeOutline wrong_;
+};
+
+TEST_F(WrongOutlineTest, TheOneOfTheTreeFits) { EXPECT_EQ(refused(), ""); }
+
+TEST_F(WrongOutlineTest, OneOfOtherTrianglesIsRefused) {
+  numbers_[5] = numbers_[4];
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: a triangle is missing");
+  numbers_[5] = static_cast<uint32_t>(numbers_.size());
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: a triangle is missing");
+  wrong_.numbers.remove_suffix(1);
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: other triangles");
+}
+
+TEST_F(WrongOutlineTest, BlocksThatDoNotAddUpAreRefused) {
+  const std::vector<uint8_t> sizes = wrong_.block_sizes;
+  for (const int size : {0, 9, 255}) {
+    wrong_.block_sizes[1] = static_cast<uint8_t>(size);
+    EXPECT_EQ(refused(), "the outline of the tree does not fit: the size of a block");
+  }
+  wrong_.block_sizes = sizes;
+  wrong_.block_sizes.pop_back();
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: blocks of other triangles");
+}
+
+TEST_F(WrongOutlineTest, NodesThatDoNotHoldTogetherAreRefused) {
+  const std::vector<NodeOutline> nodes = wrong_.nodes;
+  wrong_.nodes.clear();
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: nodes or blocks without triangles");
+  wrong_.nodes = nodes;
+  wrong_.nodes.pop_back();
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: nodes are missing");
+  wrong_.nodes = nodes;
+  wrong_.nodes.push_back({1, 0});
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: nodes too many");
+  for (const NodeOutline children : {NodeOutline{0, 0}, NodeOutline{1, 1}, NodeOutline{2, 0}, NodeOutline{4, 1}}) {
+    wrong_.nodes = nodes;
+    wrong_.nodes.back() = children;
+    EXPECT_EQ(refused(), "the outline of the tree does not fit: the children of a node");
+  }
+  wrong_.nodes = nodes;
+  const auto has_room = [](const NodeOutline& node) { return node.nodes == 0 && node.blocks < 0x7F; };
+  std::find_if(wrong_.nodes.rbegin(), wrong_.nodes.rend(), has_room)->blocks = 0xFF;
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: blocks are missing");
+  wrong_.nodes = nodes;
+  wrong_.nodes.back() = {1, 0};
+  EXPECT_EQ(refused(), "the outline of the tree does not fit: blocks too many");
+}
+
+// Whoever walks a tree has a stack for so many levels.
+TEST_F(WrongOutlineTest, OneThatIsTooDeepIsRefused) {
+  for (const uint32_t levels : {limits::kMaxBvhDepth, limits::kMaxBvhDepth + 1}) {
+    const std::vector<Triangle> many = bumpy_sphere(8, 0.1, 1);
+    TreeOutline chain;
+    numbers_.resize(many.size());
+    for (uint32_t number = 0; number < many.size(); ++number) numbers_[number] = number;
+    chain.numbers = numbers_;
+    chain.block_sizes.assign(many.size() / kTreeWidth, kTreeWidth);
+    ASSERT_EQ(many.size() % kTreeWidth, 0u);
+    chain.nodes.assign(levels, NodeOutline{0, 1});
+    ASSERT_LE(chain.block_sizes.size(), 7 * levels);
+    // From the root down each takes up to seven blocks beside the node below it.
+    size_t left = chain.block_sizes.size();
+    for (size_t level = 0; level < levels; ++level) {
+      const bool last = level + 1 == levels;
+      const size_t blocks = last ? left : std::min<size_t>(left - 1, 7);
+      left -= blocks;
+      chain.nodes[level].blocks = static_cast<uint8_t>((1u << blocks) - 1);
+      chain.nodes[level].nodes = static_cast<uint8_t>(last ? 0 : 1u << blocks);
+    }
+    const absl::StatusOr<TriangleBvh> tree = restore(chain, many);
+    if (levels == limits::kMaxBvhDepth) {
+      ASSERT_TRUE(tree.ok()) << tree.status();
+      EXPECT_EQ(tree->depth(), levels);
+    } else {
+      EXPECT_EQ(tree.status().message(), "the outline of the tree does not fit: too deep");
+    }
+  }
+}
+
+TEST(TreeOutlineTest, CancelledItMakesNone) {
+  const std::vector<Triangle> triangles = box_city(3, 1);
+  const TriangleBvh built = *TriangleBvh::build(triangles);
+  const std::atomic<bool> cancel = true;
+  BvhOptions options;
+  options.cancel = &cancel;
+  EXPECT_EQ(restore(built.outline(), triangles, options).status().code(), absl::StatusCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace locus::test

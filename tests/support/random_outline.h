@@ -1,0 +1,66 @@
+// Outlines of trees that no builder makes, of given many triangles: any triangles share a block, any blocks a node.
+// What a data directory could hold that is wrong and fits all the same.
+#ifndef LOCUS_TESTS_SUPPORT_RANDOM_OUTLINE_H_
+#define LOCUS_TESTS_SUPPORT_RANDOM_OUTLINE_H_
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "core/index/bvh/tree_outline.h"
+#include "tests/support/random.h"
+
+namespace locus::test {
+
+class RandomOutline {
+ public:
+  // At least one triangle.
+  RandomOutline(uint32_t triangles, Random& random) : numbers_(triangles) {
+    std::iota(numbers_.begin(), numbers_.end(), 0);
+    random.shuffle(numbers_);
+    for (uint32_t left = triangles; left > 0; left -= outline_.block_sizes.back())
+      outline_.block_sizes.push_back(static_cast<uint8_t>(1 + random.below(std::min<uint32_t>(left, kTreeWidth))));
+    outline_.numbers = numbers_;
+    add_node(static_cast<uint32_t>(outline_.block_sizes.size()), random);
+  }
+  RandomOutline(const RandomOutline&) = delete;
+  RandomOutline& operator=(const RandomOutline&) = delete;
+
+  const TreeOutline& outline() const { return outline_; }
+
+ private:
+  // A node with so many blocks below it, and all that is below it. Half of them at most go to one child, so that the
+  // tree stays shallow.
+  void add_node(uint32_t blocks, Random& random) {
+    const uint32_t most = std::min<uint32_t>(blocks, kTreeWidth);
+    const uint32_t children = blocks == 1 ? 1 : 2 + static_cast<uint32_t>(random.below(most - 1));
+    std::vector<uint32_t> shares(children, 1);
+    const uint32_t largest = blocks <= children ? 1 : (blocks + 1) / 2;
+    for (uint32_t left = blocks - children; left > 0;) {
+      uint32_t& share = shares[random.below(children)];
+      const uint32_t more = std::min(left, largest - std::min(largest, share));
+      const uint32_t taken = more == 0 ? 0 : 1 + static_cast<uint32_t>(random.below(more));
+      share += taken;
+      left -= taken;
+    }
+    const size_t number = outline_.nodes.size();
+    outline_.nodes.emplace_back();
+    std::vector<uint32_t> below;
+    for (uint32_t slot = 0; slot < children; ++slot) {
+      // A node of a single block is legal, too.
+      const bool is_block = shares[slot] == 1 && (blocks == 1 || random.chance(0.9));
+      NodeOutline& node = outline_.nodes[number];
+      uint8_t& kind = is_block ? node.blocks : node.nodes;
+      kind = static_cast<uint8_t>(kind | 1u << slot);
+      if (!is_block) below.push_back(shares[slot]);
+    }
+    for (const uint32_t share : below) add_node(share, random);
+  }
+
+  std::vector<uint32_t> numbers_;
+  TreeOutline outline_;
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_RANDOM_OUTLINE_H_
