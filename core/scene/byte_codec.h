@@ -176,6 +176,7 @@ enum class BytesKind : uint32_t {
   kMeshVertices = 0x564d'534c,
   kMeshIndices = 0x494d'534c,
   kMeshParts = 0x504d'534c,
+  kTreeOutline = 0x5254'534c,
 };
 inline constexpr uint32_t kBytesVersion = 1;
 

@@ -1,5 +1,5 @@
-// A mesh's columns as chunks for the log, and the mesh again from them. The tree is not kept: it is built again. One
-// thread at a time.
+// A mesh's columns as chunks for the log, and the mesh again from them. The tree is not among them: what saves building
+// it again is tree_codec.h. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_MESH_CODEC_H_
 

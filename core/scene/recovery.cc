@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 #include <variant>
@@ -14,6 +15,7 @@
 #include "core/scene/mesh_codec.h"
 #include "core/scene/record_codec.h"
 #include "core/scene/spec_codec.h"
+#include "core/scene/tree_codec.h"
 
 namespace locus {
 namespace {
@@ -171,6 +173,18 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
   return std::make_shared<Scene>(stored.name, *std::move(spec), *std::move(writer), on);
 }
 
+// Null where the log has no outline that fits, whatever the reason: the tree is built then.
+MeshPtr restore_mesh(const UpdateLog& log, const StoredMesh& stored, const TriangleMesh& columns,
+                     const BvhOptions& options) {
+  const std::optional<std::string> kept = log.read_outline(stored.sha256);
+  if (!kept) return nullptr;
+  const AlignedBytes bytes(*kept);
+  const absl::StatusOr<TreeOutline> outline = decode_outline(bytes);
+  if (!outline.ok()) return nullptr;
+  absl::StatusOr<MeshPtr> mesh = StaticMesh::restore(stored.name, stored.sha256, columns, *outline, options);
+  return mesh.ok() ? *std::move(mesh) : nullptr;
+}
+
 }  // namespace
 
 absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
@@ -180,7 +194,7 @@ absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored
   return scene;
 }
 
-absl::StatusOr<MeshPtr> recover_mesh(const UpdateLog& log, const StoredMesh& stored, const BvhOptions& options) {
+absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options) {
   const std::string name = absl::StrCat("mesh ", stored.name);
   if (!stored.damage.ok()) return named(name, stored.damage);
   MeshReader reader;
@@ -188,9 +202,12 @@ absl::StatusOr<MeshPtr> recover_mesh(const UpdateLog& log, const StoredMesh& sto
   if (!status.ok()) return named(name, status);
   absl::StatusOr<TriangleMesh> columns = std::move(reader).finish();
   if (!columns.ok()) return named(name, columns.status());
+  if (MeshPtr restored = restore_mesh(log, stored, *columns, options); restored != nullptr)
+    return RecoveredMesh{std::move(restored), false};
   absl::StatusOr<MeshPtr> mesh = StaticMesh::build(stored.name, stored.sha256, *std::move(columns), options);
   if (!mesh.ok()) return named(name, mesh.status());
-  return mesh;
+  log.keep_outline(stored.sha256, encode_outline((*mesh)->tree().outline()));
+  return RecoveredMesh{*std::move(mesh), true};
 }
 
 }  // namespace locus

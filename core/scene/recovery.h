@@ -27,8 +27,13 @@ using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
 absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
                                        const RecoveryProgress& progress = nullptr);
 
-// Builds the tree anew.
-absl::StatusOr<MeshPtr> recover_mesh(const UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
+struct RecoveredMesh {
+  MeshPtr mesh;
+  bool built = false;  // its tree; otherwise it was restored from the outline that the log kept
+};
+
+// Where the tree is built, the log is given its outline for the next time.
+absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
 
 }  // namespace locus
 

@@ -11,6 +11,7 @@
 #include "core/scene/mesh_codec.h"
 #include "core/scene/spec_codec.h"
 #include "core/scene/state_writer.h"
+#include "core/scene/tree_codec.h"
 
 namespace locus {
 namespace {
@@ -208,6 +209,7 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
       return content->next();
     };
     if (absl::Status status = log_->add_mesh(name, mesh->sha256(), next); !status.ok()) return status;
+    if (content) log_->keep_outline(mesh->sha256(), encode_outline(mesh->tree().outline()));
   }
   const MutexLock lock(mutex_);
   meshes_.emplace(name, mesh);

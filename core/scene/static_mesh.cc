@@ -27,6 +27,20 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::build(std::string 
   return built;
 }
 
+absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::restore(std::string name, const Sha256& sha256,
+                                                                      const TriangleMesh& mesh,
+                                                                      const TreeOutline& outline,
+                                                                      const BvhOptions& options) {
+  const std::shared_ptr<StaticMesh> restored(new StaticMesh(std::move(name), sha256));
+  const auto triangle = [&mesh](uint32_t number) { return mesh.triangle(number); };
+  absl::StatusOr<TriangleBvh> tree = TriangleBvh::restore(outline, mesh.triangle_count(), triangle, options);
+  if (!tree.ok()) return tree.status();
+  restored->tree_ = *std::move(tree);
+  restored->keep_columns(mesh);
+  restored->number_blocks();
+  return restored;
+}
+
 void StaticMesh::keep_columns(const TriangleMesh& mesh) {
   vertex_count_ = static_cast<uint32_t>(mesh.vertices().size() / 3);
   zero_area_count_ = mesh.zero_area_count();

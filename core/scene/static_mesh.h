@@ -24,6 +24,11 @@ class StaticMesh {
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> build(std::string name, const Sha256& sha256,
                                                                  TriangleMesh mesh, const BvhOptions& options = {});
 
+  // The same from the outline of the tree of that very mesh. Errors: as TriangleBvh::restore().
+  static absl::StatusOr<std::shared_ptr<const StaticMesh>> restore(std::string name, const Sha256& sha256,
+                                                                   const TriangleMesh& mesh, const TreeOutline& outline,
+                                                                   const BvhOptions& options = {});
+
   const std::string& name() const { return name_; }
   const Sha256& sha256() const { return sha256_; }
   // Its storage order is the order of TRIANGLES rows.

@@ -115,6 +115,11 @@ class UpdateLog {
   virtual absl::Status delete_mesh(absl::string_view name) = 0;
   virtual absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const = 0;
 
+  // Beside the mesh of this content what saves time when it is recovered (core/scene/tree_codec.h). A cache: bytes come
+  // back as they were kept or not at all, and what cannot be kept is not. Gone with the mesh; not in a copy.
+  virtual void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
+  virtual std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const = 0;
+
   // A copy of everything as it is at one moment, in the new directory `path`, while all goes on.
   virtual absl::Status back_up(const std::string& path) = 0;
 };

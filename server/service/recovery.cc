@@ -73,15 +73,16 @@ class Recovery {
   void recover(const std::vector<const StoredMesh*>& names) {
     if (!goes_on()) return;
     const steady_clock::time_point start = steady_clock::now();
-    const absl::StatusOr<MeshPtr> mesh = recover_sound(*names.front());
+    const absl::StatusOr<RecoveredMesh> mesh = recover_sound(*names.front());
     if (mesh.ok())
       log(LogLevel::kInfo, "mesh recovered",
           {{"mesh", names.front()->name},
-           {"triangles", absl::StrCat((*mesh)->triangle_count())},
+           {"triangles", absl::StrCat(mesh->mesh->triangle_count())},
+           {"tree", mesh->built ? "built" : "restored"},
            {"milliseconds", milliseconds_since(start)}});
     for (const StoredMesh* name : names) {
       if (mesh.ok()) {
-        host_.registry.restore_mesh(name->name, *mesh);
+        host_.registry.restore_mesh(name->name, mesh->mesh);
       } else if (take_damage("mesh", name->name, mesh.status())) {
         host_.registry.restore_damaged_mesh(name->name, damaged("mesh", mesh.status()));
       }
@@ -106,7 +107,7 @@ class Recovery {
     count();
   }
 
-  absl::StatusOr<MeshPtr> recover_sound(const StoredMesh& stored) {
+  absl::StatusOr<RecoveredMesh> recover_sound(const StoredMesh& stored) {
     if (!stored.damage.ok()) return stored.damage;
     BvhOptions options;
     options.cancel = &stop_;

@@ -41,6 +41,7 @@ RocksdbLog::RocksdbLog(const StorageOptions& options, OpenedDirectory opened)
       database_(std::move(opened.database)),
       findings_(std::move(opened.findings)),
       closed_in_order_(opened.high_water.closed),
+      outlines_(*options.env, options.path),
       high_water_file_(std::move(opened.high_water_file)),
       high_water_(std::move(opened.high_water)) {}
 
@@ -125,6 +126,7 @@ absl::Status RocksdbLog::begin() {
       if (absl::Status status = commit(CatalogueChange(), batch); !status.ok()) return status;
     }
     scenes_.set_catalogue(catalogue_.totals());
+    outlines_.drop_all_but(contents());
   }
   findings_ = Findings();
   look_at_the_disk();
@@ -133,6 +135,18 @@ absl::Status RocksdbLog::begin() {
     return absl::UnavailableError(absl::StrCat("writing ", options_.path, "/", HighWaterFile::kName));
   keeper_ = std::thread([this] { keep(); });
   return absl::OkStatus();
+}
+
+std::set<Sha256> RocksdbLog::contents() const {
+  std::set<Sha256> contents;
+  const std::string start(1, kContentTag);
+  for (auto row = catalogue_.rows().lower_bound(start); row != catalogue_.rows().end(); ++row) {
+    Sha256 sha256 = {};
+    if (row->first[0] != kContentTag || row->first.size() != 1 + sha256.size()) break;
+    std::copy_n(row->first.begin() + 1, sha256.size(), sha256.begin());
+    contents.insert(sha256);
+  }
+  return contents;
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel level) {

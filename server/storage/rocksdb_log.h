@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "core/scene/update_log.h"
 #include "server/storage/catalogue.h"
 #include "server/storage/opening.h"
+#include "server/storage/outline_files.h"
 #include "server/storage/scene_table.h"
 #include "server/storage/storage_options.h"
 
@@ -59,6 +61,8 @@ class RocksdbLog final : public UpdateLog {
   absl::Status delete_mesh(absl::string_view name) override LOCUS_EXCLUDES(catalogue_mutex_, adding_mesh_);
   absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const override
       LOCUS_EXCLUDES(catalogue_mutex_);
+  void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override;
+  std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const override;
 
   absl::Status back_up(const std::string& path) override LOCUS_EXCLUDES(catalogue_mutex_);
 
@@ -84,6 +88,7 @@ class RocksdbLog final : public UpdateLog {
       LOCUS_EXCLUDES(catalogue_mutex_);
   // Whether the chunks of a pending key are those of a snapshot or mesh by now.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
+  std::set<Sha256> contents() const LOCUS_REQUIRES(catalogue_mutex_);
   bool content_in_use(const Sha256& sha256, absl::string_view but) const LOCUS_REQUIRES(catalogue_mutex_);
 
   absl::Status room_for(absl::string_view what, uint64_t bytes);
@@ -105,6 +110,7 @@ class RocksdbLog final : public UpdateLog {
   absl::Status catalogue_damage_;
   const bool closed_in_order_;
 
+  OutlineFiles outlines_;
   SceneTable scenes_;
   mutable Mutex catalogue_mutex_;  // held while a change of the catalogue is written; before the two below
   Catalogue catalogue_ LOCUS_GUARDED_BY(catalogue_mutex_);

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -37,6 +38,8 @@ class FakeLog final : public UpdateLog {
   absl::Status add_mesh(absl::string_view, const std::array<uint8_t, 32>&, ChunkSource) override { return refusal(); }
   absl::Status delete_mesh(absl::string_view) override { return refusal(); }
   absl::Status read_mesh(const std::array<uint8_t, 32>&, ChunkSink) const override { return refusal(); }
+  void keep_outline(const std::array<uint8_t, 32>&, absl::string_view) override {}
+  std::optional<std::string> read_outline(const std::array<uint8_t, 32>&) const override { return std::nullopt; }
 
   // Writes `files` below the new directory, then does what the test has planned.
   absl::Status back_up(const std::string& path) override {

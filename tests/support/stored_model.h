@@ -140,6 +140,7 @@ class StoredModel {
       ChunksFrom content({bytes_of(number, 400)});
       const bool known = log.add_mesh(name, hash_of(number), content).ok();
       meshes_[name] = {number, known ? kThere : kUnknown};
+      if (known) log.keep_outline(hash_of(number), outline_bytes(number));
     } else if (found->second.second == kThere) {
       if (log.delete_mesh(name).ok()) {
         meshes_.erase(found);
@@ -148,6 +149,8 @@ class StoredModel {
       }
     }
   }
+
+  static std::string outline_bytes(uint8_t number) { return bytes_of(100u + number, 60); }
 
   static std::string scene_difference(const UpdateLog& log, const std::string& name, const Scene& scene) {
     const StoredScene* stored = find_stored(log, name);
@@ -186,6 +189,9 @@ class StoredModel {
       if (known == meshes_.end()) return absl::StrCat("mesh ", mesh.name, " is back");
       if (mesh.sha256 != hash_of(known->second.first)) return absl::StrCat("mesh ", mesh.name, " is another");
       const auto chunks = read_mesh(log, mesh.sha256);
+      const std::optional<std::string> outline = log.read_outline(mesh.sha256);
+      if (outline && *outline != outline_bytes(known->second.first))
+        return absl::StrCat("mesh ", mesh.name, " has another outline");
       if (absl::IsDataLoss(chunks.status()) && refusals == Refusals::kAllowed) continue;
       if (!chunks.ok()) return std::string(chunks.status().message());
       if (*chunks != std::vector<std::string>{bytes_of(known->second.first, 400)})

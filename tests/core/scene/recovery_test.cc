@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "core/scene/tree_codec.h"
 #include "tests/support/recovery_lockstep.h"
 #include "tests/support/scene_fixture.h"
 #include "tests/support/test_scale.h"
@@ -104,6 +105,33 @@ TEST_F(RecoverTest, WhatTheLogFoundDamagedIsNotLookedAt) {
   StoredMesh mesh = again.stored_meshes().front();
   mesh.damage = absl::DataLossError("a file is gone");
   EXPECT_EQ(recover_mesh(again, mesh).status(), absl::DataLossError("mesh m: a file is gone"));
+}
+
+// One that was kept by another builder, that is damaged, of another mesh or gone: the tree is built and kept again.
+TEST_F(RecoverTest, AnOutlineThatDoesNotFitIsMadeAnew) {
+  const MemoryLog::Kept kept = log_.crash();
+  ASSERT_EQ(kept.outlines.size(), 1u);
+  const std::string right = kept.outlines.at(mesh_->sha256());
+  std::string of_another_builder = right, of_another_mesh = right;
+  of_another_builder[8] = static_cast<char>(kBvhBuilderVersion + 1);
+  of_another_mesh = encode_outline(make_mesh("other", 9)->tree().outline());
+  of_another_mesh[24] = static_cast<char>(99);  // the first triangle's number
+  for (const std::string& wrong : {of_another_builder, of_another_mesh, right.substr(0, 20), std::string()}) {
+    MemoryLog again(kept);
+    again.keep_outline(mesh_->sha256(), wrong);
+    for (const bool built : {true, false}) {
+      const absl::StatusOr<RecoveredMesh> mesh = recover_mesh(again, again.stored_meshes().front());
+      ASSERT_TRUE(mesh.ok()) << mesh.status();
+      EXPECT_EQ(mesh->built, built);
+      EXPECT_EQ(mesh->mesh->vertices(), mesh_->vertices());
+    }
+    EXPECT_EQ(again.read_outline(mesh_->sha256()), right);
+  }
+  MemoryLog::Kept without = kept;
+  without.outlines.clear();
+  MemoryLog again(without);
+  EXPECT_TRUE(recover_mesh(again, again.stored_meshes().front())->built);
+  EXPECT_EQ(again.read_outline(mesh_->sha256()), right);
 }
 
 TEST_F(RecoverTest, ASceneOfWhichSomethingWasLostGoesOnInAnotherEpoch) {

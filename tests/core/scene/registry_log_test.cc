@@ -35,9 +35,10 @@ class RegistryLogTest : public SceneFixture {
     registry_ = std::make_unique<Registry>(log.get());
     log_ = std::move(log);
     for (const StoredMesh& stored : log_->stored_meshes()) {
-      const absl::StatusOr<MeshPtr> mesh = recover_mesh(*log_, stored);
+      const absl::StatusOr<RecoveredMesh> mesh = recover_mesh(*log_, stored);
       ASSERT_TRUE(mesh.ok()) << mesh.status();
-      registry_->restore_mesh(stored.name, *mesh);
+      EXPECT_FALSE(mesh->built) << "the outline was kept with the mesh";
+      registry_->restore_mesh(stored.name, mesh->mesh);
     }
     for (const StoredScene& stored : log_->stored_scenes()) {
       const absl::StatusOr<ScenePtr> scene =

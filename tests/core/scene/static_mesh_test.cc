@@ -108,6 +108,32 @@ TEST(StaticMeshTest, CountsWhatItKeepsBesideTheTree) {
   EXPECT_GE(rich->bytes(), lean->bytes() + 16 + sizeof(MeshPart) + 200);
 }
 
+TEST(StaticMeshTest, RestoredFromItsOutlineItIsTheSameToTheLastByteItGives) {
+  const Columns columns = welded(box_city(9, 3));
+  const std::vector<MeshPart> parts = {{"a", 0}, {"b", 7}};
+  const auto built = build(columns.vertices, columns.indices, parts);
+  const absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create(columns.vertices, columns.indices, parts);
+  const auto restored = StaticMesh::restore("mesh", {}, *mesh, built->tree().outline());
+  ASSERT_TRUE(restored.ok()) << restored.status();
+  EXPECT_EQ((*restored)->name(), "mesh");
+  EXPECT_EQ((*restored)->vertices(), columns.vertices);
+  EXPECT_EQ(uploaded_indices(**restored), columns.indices);
+  EXPECT_EQ((*restored)->bounds(), built->bounds());
+  EXPECT_EQ((*restored)->zero_area_count(), built->zero_area_count());
+  EXPECT_EQ((*restored)->parts().size(), 2u);
+  EXPECT_EQ((*restored)->bytes(), built->bytes());
+  for (uint32_t number = 0; number < built->triangle_count(); ++number)
+    ASSERT_EQ((*restored)->triangle(number), built->triangle(number));
+}
+
+TEST(StaticMeshTest, TheOutlineOfAnotherMeshMakesNone) {
+  const Columns columns = welded(box_city(3, 3));
+  const auto other = build({0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2});
+  const absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create(columns.vertices, columns.indices, {});
+  EXPECT_EQ(StaticMesh::restore("mesh", {}, *mesh, other->tree().outline()).status().code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
 TEST(StaticMeshTest, ACancelledBuildMakesNone) {
   const std::atomic<bool> cancel = true;
   BvhOptions options;

@@ -54,8 +54,11 @@ Files files_below(const std::string& folder) {
 }
 
 void write_files(const Files& files, const std::string& folder) {
-  std::filesystem::create_directories(folder + "/rocksdb");
-  for (const auto& [name, bytes] : files) test::write_file_bytes(folder + "/" + name, bytes);
+  for (const auto& [name, bytes] : files) {
+    const std::string path = folder + "/" + name;
+    std::filesystem::create_directories(std::filesystem::path(path).parent_path());
+    test::write_file_bytes(path, bytes);
+  }
 }
 
 StorageOptions small_options(const std::string& path, rocksdb::Env* env) {
@@ -254,9 +257,13 @@ TEST_P(RocksdbLogDamageTest, SampleIsSound) {
     EXPECT_EQ(verdict.difference, "");
     EXPECT_GT(verdict.served, 2u);
   }
-  int tables = 0;
-  for (const auto& [name, bytes] : sample().files) tables += absl::EndsWith(name, ".sst");
+  int tables = 0, outlines = 0;
+  for (const auto& [name, bytes] : sample().files) {
+    tables += absl::EndsWith(name, ".sst");
+    outlines += absl::StartsWith(name, "outlines/");
+  }
   EXPECT_GT(tables, 3);
+  EXPECT_GT(outlines, 0);
 }
 
 TEST_P(RocksdbLogDamageTest, FlippedByteLosesNothingSilently) { flip_bytes(Trials::kFew); }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/base/refusal.h"
+#include "tests/support/faulty_files.h"
 #include "tests/support/stored_log.h"
 #include "tests/support/test_scale.h"
 
@@ -220,6 +221,39 @@ TEST_F(RocksdbLogTest, MeshIsKeptOnceAndGoesWithItsLastName) {
   EXPECT_EQ(read_mesh(*log_, hash_of(1)).value(), content);
   ASSERT_EQ(log_->delete_mesh("b"), absl::OkStatus());
   EXPECT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(RocksdbLogTest, OutlineIsKeptBesideTheMeshAndGoesWithIt) {
+  ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
+  EXPECT_EQ(log_->read_outline(hash_of(1)), std::nullopt);
+  log_->keep_outline(hash_of(1), "outline");
+  EXPECT_EQ(log_->read_outline(hash_of(1)), "outline");
+  log_->keep_outline(hash_of(1), "another");
+  open();
+  EXPECT_EQ(log_->read_outline(hash_of(1)), "another");
+  EXPECT_EQ(log_->read_outline(hash_of(2)), std::nullopt);
+  ASSERT_EQ(log_->delete_mesh("a"), absl::OkStatus());
+  EXPECT_EQ(log_->read_outline(hash_of(1)), std::nullopt);
+}
+
+TEST_F(RocksdbLogTest, OutlinesOfNoMeshAndUnfinishedOnesGoWhenItOpens) {
+  ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
+  log_->keep_outline(hash_of(1), "outline");
+  log_->keep_outline(hash_of(2), "of no mesh");
+  const std::filesystem::path outlines = std::filesystem::path(options_.path) / "outlines";
+  ASSERT_EQ(std::distance(std::filesystem::directory_iterator(outlines), {}), 2);
+  test::write_file_bytes((outlines / "0102.new").string(), "half of one");
+  open();
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(outlines), {}), 1);
+  EXPECT_EQ(log_->read_outline(hash_of(1)), "outline");
+}
+
+TEST_F(RocksdbLogTest, NoOutlineIsKeptWhereTheReserveIsAllThereIs) {
+  ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
+  options_.reserve_bytes = ~uint64_t{0} / 2;
+  open();
+  log_->keep_outline(hash_of(1), "outline");
+  EXPECT_EQ(log_->read_outline(hash_of(1)), std::nullopt);
 }
 
 TEST_F(RocksdbLogTest, SecondOpenerIsRefused) {
