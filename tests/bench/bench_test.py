@@ -44,6 +44,7 @@ SERVING |= {("mixed_p50/16", "idle"), ("mixed_p99/16", "idle"), ("overload/10x/a
 SERVING |= {("durable/256", "memory_acks"), ("durable_queries/256", "beside_memory_acks"), ("restart/1M", "bar")}
 LOG = {(f"commit/{size}", peer) for size in (16, 256, 4096) for peer in ("append", "overwrite")}
 LOG |= {(f"writers/8/{size}", "one_writer") for size in (16, 256, 4096)}
+LOG |= {("mesh/2M", "built")}
 REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
 HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
 

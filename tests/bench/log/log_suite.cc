@@ -13,9 +13,10 @@
 #include "tests/bench/dynamic/world.h"
 #include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/race.h"
-#include "tests/bench/frame/results_hash.h"
 #include "tests/bench/frame/statistics.h"
 #include "tests/bench/frame/temporary_folder.h"
+#include "tests/bench/log/log_run.h"
+#include "tests/bench/log/mesh_case.h"
 #include "tests/bench/log/raw_file.h"
 
 namespace locus::bench::log {
@@ -32,18 +33,11 @@ struct Size {
 };
 constexpr Size kSizes[] = {{16, 400, 0.8}, {256, 400, 0.8}, {4096, 100, 0.6}};
 
-struct LogRun {
-  const Options& options;
-  const Progress& progress;
-  Report& report;
-
-  size_t chunks() const { return options.quick ? 1 : 4; }
-  size_t commits(const Size& size) const { return options.quick ? size.commits / 20 : size.commits; }
-  // In all rounds, the one to warm up too.
-  size_t commits_of_all(const Size& size) const {
-    return commits(size) * chunks() * static_cast<size_t>(options.rounds + 1);
-  }
-};
+size_t commits_of(const LogRun& run, const Size& size) { return run.options.quick ? size.commits / 20 : size.commits; }
+// In all rounds, the one to warm up too.
+size_t commits_of_all(const LogRun& run, const Size& size) {
+  return commits_of(run, size) * run.chunks() * static_cast<size_t>(run.options.rounds + 1);
+}
 
 // Records as a scene writes them, of objects that move.
 std::vector<std::string> records_of(size_t moves, size_t count) {
@@ -115,25 +109,18 @@ class OurLog {
   std::vector<SceneKey> keys_;
 };
 
-Cell cell_of(const std::string& case_name, const ResultsHash& hash) {
-  Cell cell;
-  cell.suite = "log";
-  cell.case_name = case_name;
-  cell.metric = "ns/commit";
-  cell.results_hash = hash.text();
-  return cell;
-}
+constexpr const char* kMetric = "ns/commit";
 
 // One writer, each commit on the disk before the next.
 absl::Status measure_commits(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("commit/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();
   run.progress(name);
-  const std::vector<std::string> records = records_of(size.moves, run.commits(size));
+  const std::vector<std::string> records = records_of(size.moves, commits_of(run, size));
   const TemporaryFolder folder;
   auto ours = OurLog::create(folder.file("data"), 1);
   if (!ours.ok()) return ours.status();
-  const uint64_t reserved = run.commits_of_all(size) * records.front().size();
+  const uint64_t reserved = commits_of_all(run, size) * records.front().size();
   auto plain = RawFile::create(folder.file("plain"), 0);
   auto overwritten = RawFile::create(folder.file("overwritten"), reserved);
   if (!plain.ok()) return plain.status();
@@ -161,7 +148,7 @@ absl::Status measure_commits(const LogRun& run, const Size& size) {
   ResultsHash hash;
   hash_of(*logged, hash);
   Report cells;
-  add_cells(contestants, times, cell_of(name, hash), cells);
+  add_cells(contestants, times, cell_of(name, kMetric, hash), cells);
   for (Cell& cell : cells.cells) {
     const bool judged = cell.peer_name == "append";
     run.report.add(std::move(cell));
@@ -177,7 +164,8 @@ absl::Status measure_writers(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("writers/", kWriters, "/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();
   run.progress(name);
-  const std::vector<std::string> records = records_of(size.moves, std::max<size_t>(1, run.commits(size) / kWriters));
+  const std::vector<std::string> records =
+      records_of(size.moves, std::max<size_t>(1, commits_of(run, size) / kWriters));
   const TemporaryFolder folder;
   auto ours = OurLog::create(folder.file("data"), kWriters + 1);
   if (!ours.ok()) return ours.status();
@@ -209,7 +197,7 @@ absl::Status measure_writers(const LogRun& run, const Size& size) {
     if (!logged.ok()) return logged.status();
     if (*logged != sent) run.report.disagreements.push_back(absl::StrCat(name, ": not what was written"));
   }
-  add_cells(contestants, times, cell_of(name, hash), run.report);
+  add_cells(contestants, times, cell_of(name, kMetric, hash), run.report);
   constexpr double kBar = 2;
   if (size.moves == 256) judge(run.report, kBar);
   return absl::OkStatus();
@@ -223,7 +211,7 @@ absl::Status run_log_suite(const Options& options, const Progress& progress, Rep
     if (absl::Status status = measure_commits(run, size); !status.ok()) return status;
   for (const Size& size : kSizes)
     if (absl::Status status = measure_writers(run, size); !status.ok()) return status;
-  return absl::OkStatus();
+  return measure_mesh(run);
 }
 
 }  // namespace locus::bench::log
