@@ -54,7 +54,8 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
   void go_on() { changes_left_ = kForEver; }
   bool stopped() const { return changes_left_ == 0; }
   uint64_t changes() const { return changes_; }
-  // From now on so many syncs fail, as many as there are for a negative number.
+  // From now on so many syncs fail, or writes: of RocksDB's logs, since what else is written meanwhile would take some
+  // of them at random. For a negative number all, of any file.
   void fail_syncs(int64_t count) { failing_syncs_ = count; }
   void fail_writes(int64_t count) { failing_writes_ = count; }
   // Every write fails for want of room, and there is none.
@@ -155,7 +156,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
 
     Status Append(const rocksdb::Slice& data, const rocksdb::IOOptions& options,
                   rocksdb::IODebugContext* debug) override {
-      Status status = files_.write();
+      Status status = files_.write(*state_);
       if (status.ok()) return FSWritableFileOwnerWrapper::Append(data, options, debug);
       // As a disk does that becomes full: some of it is there.
       if (!files_.stopped())
@@ -195,7 +196,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
 
     Status Write(uint64_t offset, const rocksdb::Slice& data, const rocksdb::IOOptions& options,
                  rocksdb::IODebugContext* debug) override {
-      if (Status status = files_.write(); !status.ok()) return status;
+      if (Status status = files_.write(*state_); !status.ok()) return status;
       {
         const std::lock_guard lock(files_.mutex_);
         if (!state_->held) state_->held = file_bytes(state_->place).substr(0, state_->synced);
@@ -234,20 +235,21 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
     ++changes_;
     return Status::OK();
   }
-  static bool take(std::atomic<int64_t>& count) {
+  static bool take(std::atomic<int64_t>& count, const std::string& path) {
     int64_t left = count;
+    if (left > 0 && !path.ends_with(".log")) return false;
     while (left > 0 && !count.compare_exchange_weak(left, left - 1)) {
     }
     return left != 0;
   }
-  Status write() {
+  Status write(const File& file) {
     if (Status status = change(); !status.ok()) return status;
     if (full_) return Status::NoSpace("the disk is full");
-    return take(failing_writes_) ? Status::IOError("a write failed") : Status::OK();
+    return take(failing_writes_, file.place) ? Status::IOError("a write failed") : Status::OK();
   }
   Status sync(File& file) {
     if (Status status = change(); !status.ok()) return status;
-    if (take(failing_syncs_)) return Status::IOError("a sync failed");
+    if (take(failing_syncs_, file.place)) return Status::IOError("a sync failed");
     const std::lock_guard lock(mutex_);
     std::error_code failed;
     const uint64_t size = std::filesystem::file_size(file.place, failed);
@@ -257,7 +259,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
   }
   Status sync_folder(const std::string& path) {
     if (Status status = change(); !status.ok()) return status;
-    if (take(failing_syncs_)) return Status::IOError("a sync failed");
+    if (take(failing_syncs_, path)) return Status::IOError("a sync failed");
     const std::lock_guard lock(mutex_);
     const auto here = [&](const std::string& file) { return std::filesystem::path(file).parent_path() == path; };
     std::erase_if(durable_, [&](const auto& entry) { return here(entry.first); });
