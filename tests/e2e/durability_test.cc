@@ -135,6 +135,27 @@ TEST_F(DurabilityTest, ARestartLeavesEverythingAsItWas) {
   EXPECT_EQ(ack.revision(), before.revision() + 1);
 }
 
+TEST_F(DurabilityTest, TreesAreRestoredFromTheirOutlinesAndBuiltWhereThoseAreDamagedOrGone) {
+  daemon_.start();
+  create_scene(stubs(), "arena");
+  place_cube("arena");
+  const std::string answer = answer_to_a_ray("arena");
+  const std::filesystem::path outlines = std::filesystem::path(daemon_.directory()) / "outlines";
+  const auto expect_tree = [&](const std::string& how) {
+    daemon_.kill();
+    daemon_.start();
+    EXPECT_THAT(daemon_.log(), HasSubstr("tree=" + how));
+    EXPECT_EQ(answer_to_a_ray("arena"), answer);
+  };
+  expect_tree("restored");
+  for (const auto& entry : std::filesystem::directory_iterator(outlines)) std::ofstream(entry.path()) << "damaged";
+  expect_tree("built");
+  expect_tree("restored");
+  std::filesystem::remove_all(outlines);
+  expect_tree("built");
+  expect_tree("restored");
+}
+
 TEST_F(DurabilityTest, WhatWasDeletedStaysAway) {
   daemon_.start();
   create_scene(stubs(), "arena");
