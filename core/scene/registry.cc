@@ -199,7 +199,7 @@ absl::StatusOr<MeshPtr> Registry::begin_mesh(const std::string& name, MeshPtr& m
 
 absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh) {
   if (absl::Status status = check_mesh_name(name, "mesh"); !status.ok()) return status;
-  const MutexLock change(changes_mutex_);
+  const MutexLock change(mesh_changes_mutex_);
   absl::StatusOr<MeshPtr> known = begin_mesh(name, mesh);
   if (!known.ok() || *known != nullptr) return known;
   if (log_ != nullptr) {
@@ -250,6 +250,7 @@ absl::StatusOr<MeshPtr> Registry::take_mesh(const std::string& name) {
 
 // The name goes first, so that no scene begins to use the mesh while the log forgets it, and comes back if it cannot.
 absl::Status Registry::delete_mesh(const std::string& name) {
+  const MutexLock mesh_change(mesh_changes_mutex_);
   const MutexLock change(changes_mutex_);
   absl::StatusOr<MeshPtr> taken = take_mesh(name);
   if (!taken.ok()) return taken.status();

@@ -1,9 +1,11 @@
 // What a server hosts: scenes by name, and meshes by name and by content. Scenes keep the meshes they use alive. With a
 // log, what is created is there once it is logged, and what is deleted is gone once that is.
 //
-// Threads: every member may be called from any thread. Those that change something are serialised and wait for the log,
-// delete_scene() for a batch at work, too; all others wait for nothing. changes_mutex_ is taken before a scene's locks,
-// mutex_ only to look something up or to put it in, before a scene's lock for readers.
+// Threads: every member may be called from any thread. Those that change scenes are serialised and wait for the log,
+// and so are those that change meshes, which may take seconds to be written; delete_scene() waits for a batch at work,
+// too, delete_mesh() for changes of both kinds; all others wait for nothing. mesh_changes_mutex_ is taken before
+// changes_mutex_, that before a scene's locks, mutex_ only to look something up or to put it in, before a scene's lock
+// for readers.
 #ifndef LOCUS_CORE_SCENE_REGISTRY_H_
 #define LOCUS_CORE_SCENE_REGISTRY_H_
 
@@ -59,9 +61,9 @@ class Registry {
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
   // Puts `mesh` under `name`, or the mesh of the same content that is there under any name, so that equal content is
   // held once; returns the one that counts. Other content under a known name is ALREADY_EXISTS.
-  absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(changes_mutex_, mutex_);
+  absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
   // FAILED_PRECONDITION IN_USE with the count while instances of any scene use it, or are about to.
-  absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
+  absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
   struct NamedMesh {
     std::string name;
     MeshPtr mesh;
@@ -108,7 +110,8 @@ class Registry {
   MeshPtr content(const Sha256& sha256) const LOCUS_REQUIRES(mutex_);
 
   UpdateLog* const log_;
-  Mutex changes_mutex_;  // one change at a time
+  Mutex mesh_changes_mutex_;  // one change of meshes at a time
+  Mutex changes_mutex_;       // one change of scenes at a time, while no mesh is deleted
   mutable Mutex mutex_;
   std::map<std::string, ScenePtr> scenes_ LOCUS_GUARDED_BY(mutex_);
   std::map<std::string, DamagedScene> damaged_scenes_ LOCUS_GUARDED_BY(mutex_);

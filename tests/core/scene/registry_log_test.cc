@@ -1,6 +1,8 @@
 // A registry with a log: what is there after a restart is what was acknowledged.
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <semaphore>
 #include <thread>
 
 #include "core/scene/recovery.h"
@@ -169,6 +171,36 @@ TEST_F(RegistryLogTest, ADamagedMeshAnswersWithItsDamageUntilItIsDeleted) {
   EXPECT_TRUE(registry_->delete_mesh("m").ok());
   EXPECT_THAT(log_->crash().meshes, IsEmpty());
   EXPECT_TRUE(registry_->add_mesh("m", mesh_).ok());
+}
+
+// Writes meshes only when it is told to.
+class SlowMeshLog : public MemoryLog {
+ public:
+  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content) override {
+    begun.release();
+    go_on.acquire();
+    return MemoryLog::add_mesh(name, sha256, content);
+  }
+  std::binary_semaphore begun{0}, go_on{0};
+};
+
+TEST_F(RegistryLogTest, ScenesComeAndGoWhileALargeMeshIsWrittenAndItsDeletionWaits) {
+  SlowMeshLog log;
+  Registry registry(&log);
+  std::thread uploader([&] { EXPECT_TRUE(registry.add_mesh("m", mesh_).ok()); });
+  log.begun.acquire();
+  EXPECT_TRUE(registry.create_scene("a", {}, 1, "", false).ok());
+  EXPECT_TRUE(registry.create_scene("b", {}, 2, "a", false).ok());
+  EXPECT_TRUE(registry.delete_scene("a").ok());
+  EXPECT_EQ(registry.find_content(mesh_->sha256()), nullptr) << "not before it is written";
+  std::thread deleter([&] { EXPECT_TRUE(registry.delete_mesh("m").ok()) << "it waits for the upload"; });
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  log.go_on.release();
+  uploader.join();
+  deleter.join();
+  EXPECT_EQ(registry.find_content(mesh_->sha256()), nullptr);
+  EXPECT_EQ(log.crash().meshes.size(), 0u);
+  EXPECT_EQ(log.crash().scenes.size(), 1u);
 }
 
 }  // namespace
