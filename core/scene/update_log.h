@@ -116,7 +116,8 @@ class UpdateLog {
   virtual absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const = 0;
 
   // Beside the mesh of this content what saves time when it is recovered (core/scene/tree_codec.h). A cache: bytes come
-  // back as they were kept or not at all, and what cannot be kept is not. Gone with the mesh; not in a copy.
+  // back as they were kept or not at all, and what cannot be kept is not. Gone with the mesh; not in a copy. Of one
+  // content by one thread at a time.
   virtual void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
   virtual std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const = 0;
 

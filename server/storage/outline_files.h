@@ -1,6 +1,6 @@
 // The folder `outlines` of a data directory: a file for each mesh's outline, named by the mesh's content, which may be
 // taken away at any time. Nothing here fails: what cannot be written is not kept, and what is not as it was written is
-// not read. So files are not synced either.
+// not read. So files are not synced either. Files of other names are left alone.
 //
 // Threads: any, of one content one at a time.
 #ifndef LOCUS_SERVER_STORAGE_OUTLINE_FILES_H_

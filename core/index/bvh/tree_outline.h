@@ -1,7 +1,7 @@
 // What a build has found out about a mesh, without one coordinate: which triangles share a block, and which blocks and
-// nodes a node. Five bytes a triangle that give the same tree again in a fraction of the time, and that can be wrong
-// without harm: boxes are made from the triangles themselves, so whatever an outline says, a tree that is restored from
-// it answers right. A bad one only makes it slow.
+// nodes a node. Five bytes a triangle that give the same tree again in a fraction of the time, to the byte but for the
+// signs of zeros in boxes, and that can be wrong without harm: boxes are made from the triangles themselves, so
+// whatever an outline says, a tree that is restored from it answers right. A bad one only makes it slow.
 //
 // Plain data; free functions, any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_TREE_OUTLINE_H_

@@ -39,7 +39,8 @@ class TriangleBvh {
                                              const BvhOptions& options = {});
 
   size_t size() const { return arrays_.triangle_count; }
-  // The triangle at a position of the storage order, which input and options fix. Position below size().
+  // The triangle at a position of the storage order, which input and options fix, or the outline. Position below
+  // size().
   Triangle at(size_t position) const;
   // Of all triangles; empty for none.
   const Aabbf& bounds() const { return bounds_; }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/index/bvh/triangle_bvh.h"
 #include "tests/support/damaged_bytes.h"
 #include "tests/support/generated_meshes.h"
@@ -42,29 +44,48 @@ TEST(TreeCodecTest, TheOutlineOfAnotherBuilderIsRefused) {
   EXPECT_EQ(restore(bytes, box_city(1, 1)).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-// Whether it is refused or not: no answer is wrong.
-TEST(TreeCodecTest, DamagedBytesNeverHarm) {
-  Random random(3);
-  uint64_t refused = 0, slower = 0;
-  const TestScene<Triangle> scene = make_scene<Triangle>(random_scene(random), random);
-  std::vector<Triangle> triangles = scene.values;
-  number_in_order(triangles);
-  ASSERT_GT(triangles.size(), 20u);
-  TestScene<Triangle> numbered = scene;
-  numbered.values = triangles;
-  const ListIndex<Triangle> oracle = make_list(triangles);
-  const std::string bytes = encoded(triangles);
-  for (uint64_t i = 0; i < scaled_count(20'000); ++i) {
-    const absl::StatusOr<TriangleBvh> tree = restore(damaged(bytes, random), triangles);
-    if (!tree.ok()) {
-      ++refused;
-    } else {
-      ++slower;
-      ASSERT_EQ(IndexJudge<TriangleBvh>(*tree, oracle).difference(numbered), "");
-    }
+class DamagedOutlineTest : public ::testing::Test {
+ protected:
+  DamagedOutlineTest() : scene_(make_scene<Triangle>(random_scene(random_), random_)) {
+    number_in_order(scene_.values);
+    oracle_ = make_list(scene_.values);
+    bytes_ = encoded(scene_.values);
   }
-  EXPECT_GT(refused, 100u);
-  EXPECT_GT(slower, 100u);
+
+  // Whether a tree comes of them; if so, one that answers right.
+  bool is_taken(const std::string& bytes) {
+    const absl::StatusOr<TriangleBvh> tree = restore(bytes, scene_.values);
+    if (!tree.ok()) return false;
+    EXPECT_EQ(IndexJudge<TriangleBvh>(*tree, oracle_).difference(scene_), "");
+    return true;
+  }
+
+  Random random_{3};
+  TestScene<Triangle> scene_;
+  ListIndex<Triangle> oracle_;
+  std::string bytes_;
+};
+
+// Kind, builder and count, then the numbers.
+TEST_F(DamagedOutlineTest, NumbersThatChangedPlacesAreTakenAndAnswersStayRight) {
+  constexpr size_t kNumbers = 24;
+  ASSERT_GT(scene_.values.size(), 20u);
+  for (uint64_t i = 0; i < scaled_count(300); ++i) {
+    std::string wrong = bytes_;
+    for (size_t swaps = 1 + random_.below(9); swaps > 0; --swaps) {
+      const size_t one = random_.below(scene_.values.size()), other = random_.below(scene_.values.size());
+      if (one == other) continue;
+      char* const numbers = &wrong[kNumbers];
+      std::swap_ranges(numbers + 4 * one, numbers + 4 * one + 4, numbers + 4 * other);
+    }
+    ASSERT_TRUE(is_taken(wrong));
+  }
+}
+
+TEST_F(DamagedOutlineTest, AnyBytesAreRefusedOrAnswersStayRight) {
+  uint64_t refused = 0;
+  for (uint64_t i = 0; i < scaled_count(20'000); ++i) refused += is_taken(damaged(bytes_, random_)) ? 0 : 1;
+  EXPECT_GT(refused, scaled_count(10'000));
 }
 
 // If this fails, the builder makes other trees than it did: raise kBvhBuilderVersion and put the new number here, so

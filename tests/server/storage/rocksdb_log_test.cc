@@ -242,9 +242,11 @@ TEST_F(RocksdbLogTest, OutlinesOfNoMeshAndUnfinishedOnesGoWhenItOpens) {
   log_->keep_outline(hash_of(2), "of no mesh");
   const std::filesystem::path outlines = std::filesystem::path(options_.path) / "outlines";
   ASSERT_EQ(std::distance(std::filesystem::directory_iterator(outlines), {}), 2);
-  test::write_file_bytes((outlines / "0102.new").string(), "half of one");
+  test::write_file_bytes((outlines / (std::string(64, 'a') + ".new")).string(), "half of one");
+  test::write_file_bytes((outlines / "of-somebody.svg").string(), "not ours");
   open();
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(outlines), {}), 1);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(outlines), {}), 2);
+  EXPECT_TRUE(std::filesystem::exists(outlines / "of-somebody.svg"));
   EXPECT_EQ(log_->read_outline(hash_of(1)), "outline");
 }
 

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <numeric>
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/bvh/triangle_bvh.h"
@@ -157,35 +159,64 @@ TEST_F(WrongOutlineTest, NodesThatDoNotHoldTogetherAreRefused) {
   EXPECT_EQ(refused(), "the outline of the tree does not fit: blocks too many");
 }
 
-// Whoever walks a tree has a stack for so many levels.
-TEST_F(WrongOutlineTest, OneThatIsTooDeepIsRefused) {
-  for (const uint32_t levels : {limits::kMaxBvhDepth, limits::kMaxBvhDepth + 1}) {
-    const std::vector<Triangle> many = bumpy_sphere(8, 0.1, 1);
-    TreeOutline chain;
-    numbers_.resize(many.size());
-    for (uint32_t number = 0; number < many.size(); ++number) numbers_[number] = number;
-    chain.numbers = numbers_;
-    chain.block_sizes.assign(many.size() / kTreeWidth, kTreeWidth);
-    ASSERT_EQ(many.size() % kTreeWidth, 0u);
-    chain.nodes.assign(levels, NodeOutline{0, 1});
-    ASSERT_LE(chain.block_sizes.size(), 7 * levels);
-    // From the root down each takes up to seven blocks beside the node below it.
-    size_t left = chain.block_sizes.size();
-    for (size_t level = 0; level < levels; ++level) {
-      const bool last = level + 1 == levels;
-      const size_t blocks = last ? left : std::min<size_t>(left - 1, 7);
-      left -= blocks;
-      chain.nodes[level].blocks = static_cast<uint8_t>((1u << blocks) - 1);
-      chain.nodes[level].nodes = static_cast<uint8_t>(last ? 0 : 1u << blocks);
-    }
-    const absl::StatusOr<TriangleBvh> tree = restore(chain, many);
-    if (levels == limits::kMaxBvhDepth) {
-      ASSERT_TRUE(tree.ok()) << tree.status();
-      EXPECT_EQ(tree->depth(), levels);
-    } else {
-      EXPECT_EQ(tree.status().message(), "the outline of the tree does not fit: too deep");
-    }
+// A chain of nodes: each has as many blocks as it can beside the next, and all of them are spread over the mesh, so
+// that who walks it finds everything near and has as much waiting as may ever wait.
+class Chain {
+ public:
+  explicit Chain(uint32_t levels) : triangles_(bumpy_sphere(31, 0.1, 1)) {
+    const uint32_t blocks = (levels - 1) * (kTreeWidth - 1) + kTreeWidth;
+    LOCUS_CHECK_LE(blocks * kTreeWidth, triangles_.size());
+    triangles_.resize(blocks * kTreeWidth);
+    numbers_.resize(triangles_.size());
+    std::iota(numbers_.begin(), numbers_.end(), 0);
+    Random random(1);
+    random.shuffle(numbers_);
+    outline_.numbers = numbers_;
+    outline_.block_sizes.assign(blocks, kTreeWidth);
+    outline_.nodes.assign(levels - 1, NodeOutline{0x7F, 0x80});
+    outline_.nodes.push_back({0xFF, 0});
   }
+  Chain(const Chain&) = delete;
+  Chain& operator=(const Chain&) = delete;
+
+  const std::vector<Triangle>& triangles() const { return triangles_; }
+  absl::StatusOr<TriangleBvh> tree() const { return restore(outline_, triangles_); }
+
+ private:
+  std::vector<Triangle> triangles_;
+  std::vector<uint32_t> numbers_;
+  TreeOutline outline_;
+};
+
+TEST(TreeOutlineTest, TheDeepestTreeThatIsLetInIsWalkedToItsEnd) {
+  const Chain chain(limits::kMaxBvhDepth);
+  absl::StatusOr<TriangleBvh> tree = chain.tree();
+  ASSERT_TRUE(tree.ok()) << tree.status();
+  EXPECT_EQ(tree->depth(), limits::kMaxBvhDepth);
+  const ListIndex<Triangle> oracle = make_list(chain.triangles());
+  const IndexJudge<TriangleBvh> judge(*tree, oracle);
+  Random random(2);
+  for (size_t i = 0; i < scaled_count(40); ++i) {
+    const Vec3d direction = random.unit_vector();
+    EXPECT_EQ(judge.ray_difference(TriangleRay({0, 0, 0}, direction), i), "");
+    EXPECT_EQ(judge.point_difference(direction * random.unit()), "");
+    EXPECT_EQ(judge.ball_difference({to_float(direction), random.float_between(0, 2)}), "");
+  }
+  const std::vector<KernelQuestion> questions = random_questions(chain.triangles(), scaled_count(300), 3);
+  const KernelTrial trial("chain", chain.triangles(), questions, *std::move(tree));
+  const RegionTrial regions = random_region_trial("chain", chain.triangles(), *chain.tree(), scaled_count(40), 4);
+  for (const std::string& name : instruction_sets()) {
+    ASSERT_TRUE(use_instruction_set(name).ok());
+    if (active_ray_kernels() == nullptr) continue;  // the portable way has none
+    EXPECT_EQ(trial.difference(*active_ray_kernels()), "") << name;
+    EXPECT_EQ(regions.difference(*active_region_kernels()), "") << name;
+  }
+  ASSERT_TRUE(use_instruction_set("").ok());
+}
+
+TEST(TreeOutlineTest, OneThatIsDeeperIsRefused) {
+  EXPECT_EQ(Chain(limits::kMaxBvhDepth + 1).tree().status().message(),
+            "the outline of the tree does not fit: too deep");
 }
 
 TEST(TreeOutlineTest, CancelledItMakesNone) {
