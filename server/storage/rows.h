@@ -8,8 +8,8 @@
 // snapshot  scene number index: a chunk
 // mesh      sha256 number index: a chunk
 // Numbers of snapshots and meshes are random and never used again: what was deleted is not looked at in reading, so
-// that nothing may stand where something else was. and in each, under the key "\0", which sorts before all others, a
-// mark that makes every family show up in some table.
+// that nothing may stand where something else was. In each family, under the key "\0", which sorts before all others,
+// stands a mark that makes it show up in some table.
 #ifndef LOCUS_SERVER_STORAGE_ROWS_H_
 #define LOCUS_SERVER_STORAGE_ROWS_H_
 

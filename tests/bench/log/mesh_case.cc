@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* kName = "mesh/2M";
 
-// All that a tree answers follows from its triangles in storage order.
+// Its triangles in storage order: that trees from outlines answer right is for the tests to say.
 uint64_t hash_of(const StaticMesh& mesh) {
   ResultsHash hash;
   mesh.tree().for_each([&hash](const Triangle& triangle) { hash.add(triangle.number); });
@@ -31,9 +31,7 @@ uint64_t hash_of(const StaticMesh& mesh) {
 class MeshCase {
  public:
   MeshCase() {
-    server::StorageOptions options;
-    options.path = folder_.file("data");
-    options_ = options;
+    options_.path = folder_.file("data");
     bvh_options_.parallel_for = [this](size_t count, const std::function<void(size_t)>& work) {
       pool_.parallel_for(count, work);
     };

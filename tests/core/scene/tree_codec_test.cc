@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/base/instruction_set.h"
 #include "core/index/bvh/triangle_bvh.h"
 #include "tests/support/damaged_bytes.h"
 #include "tests/support/generated_meshes.h"
@@ -42,6 +43,16 @@ TEST(TreeCodecTest, TheOutlineOfAnotherBuilderIsRefused) {
   std::string bytes = encoded(box_city(1, 1));
   ++bytes[8];
   EXPECT_EQ(restore(bytes, box_city(1, 1)).status().code(), absl::StatusCode::kFailedPrecondition);
+}
+
+// Why an outline does not say on which one it was made.
+TEST(TreeCodecTest, EveryInstructionSetMakesTheSameOutline) {
+  const std::string bytes = encoded(bumpy_sphere(40, 0.05, 6));
+  for (const std::string& name : instruction_sets()) {
+    ASSERT_TRUE(use_instruction_set(name).ok());
+    EXPECT_EQ(encoded(bumpy_sphere(40, 0.05, 6)), bytes) << name;
+  }
+  ASSERT_TRUE(use_instruction_set("").ok());
 }
 
 class DamagedOutlineTest : public ::testing::Test {
