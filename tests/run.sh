@@ -99,7 +99,7 @@ run_suite() {
   say "$suite: test"
   rm -f "build/$suite/results.xml"
   ${wrapper[@]+"${wrapper[@]}"} ctest --preset "$suite" ${labels[@]+"${labels[@]}"} --parallel "$jobs" --no-tests=error \
-    --output-junit "$PWD/build/$suite/results.xml" || echo "run.sh: ctest of $suite exited with $?"
+    --test-output-size-passed 65536 --output-junit "$PWD/build/$suite/results.xml" || echo "run.sh: ctest of $suite exited with $?"
   # What the proofs found, in a line each.
   grep -h '^proof: ' "build/$suite/Testing/Temporary/LastTest.log" || true
   count_results "$suite"

@@ -1,8 +1,9 @@
 """Prints one line a test of a JUnit file written by ctest: its outcome (passed, failed, skipped) and its name.
 
 ctest files a test whose program is missing, or whose fixture failed, under "not run", like one that skipped itself. Here
-only the second kind is a skip.
+only the second kind is a skip. What Python's unittest skipped within a test that passed gets a line, too.
 """
+import re
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -16,9 +17,15 @@ def outcome(case):
     return "skipped" if skipped_itself or status == "disabled" else "failed"
 
 
+def skipped_within(case):
+    return re.findall(r"^(\w+) \(.*\) \.\.\. skipped ", case.findtext("system-out") or "", re.MULTILINE)
+
+
 def main(path):
     for case in ElementTree.parse(path).getroot().iter("testcase"):
         print(outcome(case), case.get("name"))
+        for name in skipped_within(case):
+            print("skipped", case.get("name") + "." + name)
 
 
 if __name__ == "__main__":
