@@ -20,10 +20,10 @@
 #include "server/config/server_config.h"
 #include "server/config/version.h"
 #include "server/observability/log.h"
+#include "server/rpc/library_logs.h"
 #include "server/scheduling/semaphore.h"
-#include "server/service/library_logs.h"
-#include "server/service/server.h"
-#include "server/storage/report_text.h"
+#include "server/services/server.h"
+#include "server/storage/integrity/report_text.h"
 #include "server/storage/rocksdb_log.h"
 
 namespace locus::server {

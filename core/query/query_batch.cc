@@ -8,7 +8,7 @@
 #include "core/base/column.h"
 #include "core/base/refusal.h"
 #include "core/geometry/rotation.h"
-#include "core/query/rows.h"
+#include "core/query/columns.h"
 
 namespace locus {
 namespace {
@@ -66,7 +66,7 @@ class BlockCheck {
 
   absl::Status check_columns_of_kind() const {
     const ColumnSet served = served_columns(block_);
-    for (int number = 1; number <= static_cast<int>(Column::kPose); ++number)
+    for (int number = 1; number <= static_cast<int>(kLastColumn); ++number)
       if (const auto column = static_cast<Column>(number); block_.columns.has(column) && !served.has(column))
         return refuse_argument(Reason::kMalformed, name("columns"), {},
                                absl::StrCat(column_name(column), " is not a column of this kind of query"));

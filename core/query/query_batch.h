@@ -34,6 +34,7 @@ enum class Column : uint8_t {
   kLayers = 9,
   kPose = 10,
 };
+inline constexpr Column kLastColumn = Column::kPose;
 
 class ColumnSet {
  public:

@@ -12,10 +12,10 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
-#include "core/scene/mesh_codec.h"
-#include "core/scene/record_codec.h"
+#include "core/scene/log/mesh_codec.h"
+#include "core/scene/log/record_codec.h"
+#include "core/scene/log/tree_codec.h"
 #include "core/scene/spec_codec.h"
-#include "core/scene/tree_codec.h"
 
 namespace locus {
 namespace {

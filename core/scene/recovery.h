@@ -12,9 +12,9 @@
 
 #include "absl/status/statusor.h"
 #include "core/index/bvh/bvh_build.h"
+#include "core/scene/log/state_reader.h"
+#include "core/scene/log/update_log.h"
 #include "core/scene/registry.h"
-#include "core/scene/state_reader.h"
-#include "core/scene/update_log.h"
 
 namespace locus {
 

@@ -8,10 +8,10 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
-#include "core/scene/mesh_codec.h"
+#include "core/scene/log/mesh_codec.h"
+#include "core/scene/log/state_writer.h"
+#include "core/scene/log/tree_codec.h"
 #include "core/scene/spec_codec.h"
-#include "core/scene/state_writer.h"
-#include "core/scene/tree_codec.h"
 
 namespace locus {
 namespace {

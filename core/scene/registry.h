@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
+#include "core/scene/log/update_log.h"
 #include "core/scene/scene.h"
-#include "core/scene/update_log.h"
 
 namespace locus {
 

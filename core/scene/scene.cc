@@ -9,7 +9,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
-#include "core/scene/snapshot_bytes.h"
+#include "core/scene/snapshot/snapshot_bytes.h"
 
 namespace locus {
 namespace {

@@ -18,12 +18,12 @@
 #include <string>
 
 #include "core/base/mutex.h"
-#include "core/scene/pin_ledger.h"
-#include "core/scene/scene_journal.h"
-#include "core/scene/scene_snapshot.h"
-#include "core/scene/scene_state.h"
+#include "core/scene/log/scene_journal.h"
+#include "core/scene/log/scene_state.h"
+#include "core/scene/readers/pin_ledger.h"
 #include "core/scene/scene_writer.h"
-#include "core/scene/update_batch.h"
+#include "core/scene/snapshot/scene_snapshot.h"
+#include "core/scene/updates/update_batch.h"
 
 namespace locus {
 

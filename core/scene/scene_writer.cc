@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "core/base/planted_bug.h"
-#include "core/scene/batch_application.h"
+#include "core/scene/updates/batch_application.h"
 
 namespace locus {
 

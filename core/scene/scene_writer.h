@@ -9,14 +9,14 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/limits.h"
-#include "core/scene/batch_application.h"
-#include "core/scene/move_application.h"
-#include "core/scene/object_store.h"
-#include "core/scene/pending_moves.h"
-#include "core/scene/scene_snapshot.h"
-#include "core/scene/scene_state.h"
-#include "core/scene/update_batch.h"
-#include "core/scene/writer_table.h"
+#include "core/scene/log/scene_state.h"
+#include "core/scene/objects/object_store.h"
+#include "core/scene/snapshot/scene_snapshot.h"
+#include "core/scene/updates/batch_application.h"
+#include "core/scene/updates/move_application.h"
+#include "core/scene/updates/pending_moves.h"
+#include "core/scene/updates/update_batch.h"
+#include "core/scene/updates/writer_table.h"
 
 namespace locus {
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "core/base/limits.h"
-#include "core/scene/byte_codec.h"
+#include "core/scene/log/byte_codec.h"
 
 namespace locus {
 namespace {

@@ -18,7 +18,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
-#include "core/query/progress.h"
+#include "core/query/run/progress.h"
 #include "server/config/server_config.h"
 #include "server/scheduling/fair_queue.h"
 #include "server/scheduling/semaphore.h"

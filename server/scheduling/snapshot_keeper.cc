@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/limits.h"
-#include "core/scene/state_writer.h"
+#include "core/scene/log/state_writer.h"
 #include "server/scheduling/thread_priority.h"
 
 namespace locus::server {

@@ -14,8 +14,8 @@
 
 #include "core/base/limits.h"
 #include "core/base/mutex.h"
+#include "core/scene/log/update_log.h"
 #include "core/scene/registry.h"
-#include "core/scene/update_log.h"
 
 namespace locus::server {
 

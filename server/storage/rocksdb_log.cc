@@ -7,9 +7,9 @@
 #include "core/base/check.h"
 #include "core/base/refusal.h"
 #include "rocksdb/utilities/checkpoint.h"
-#include "server/storage/bytes.h"
-#include "server/storage/errors.h"
-#include "server/storage/reading.h"
+#include "server/storage/rocksdb/bytes.h"
+#include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/reading.h"
 
 namespace locus::server {
 namespace {

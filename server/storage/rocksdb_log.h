@@ -18,12 +18,12 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
-#include "core/scene/update_log.h"
-#include "server/storage/catalogue.h"
-#include "server/storage/opening.h"
-#include "server/storage/outline_files.h"
-#include "server/storage/scene_table.h"
-#include "server/storage/storage_options.h"
+#include "core/scene/log/update_log.h"
+#include "server/storage/integrity/opening.h"
+#include "server/storage/integrity/scene_table.h"
+#include "server/storage/rocksdb/catalogue.h"
+#include "server/storage/rocksdb/outline_files.h"
+#include "server/storage/rocksdb/storage_options.h"
 
 namespace locus::server {
 

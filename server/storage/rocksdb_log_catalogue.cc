@@ -6,9 +6,9 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
-#include "server/storage/bytes.h"
-#include "server/storage/errors.h"
-#include "server/storage/reading.h"
+#include "server/storage/rocksdb/bytes.h"
+#include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/reading.h"
 #include "server/storage/rocksdb_log.h"
 
 namespace locus::server {

@@ -1,4 +1,4 @@
-#include "server/service/memory_use.h"
+#include "server/host/memory_use.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {

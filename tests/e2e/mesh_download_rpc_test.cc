@@ -1,6 +1,6 @@
 #include "core/base/limits.h"
-#include "server/service/convert.h"
-#include "server/service/mesh_upload.h"
+#include "server/convert/convert.h"
+#include "server/services/mesh_upload.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {

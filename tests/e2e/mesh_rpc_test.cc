@@ -2,7 +2,7 @@
 #include <limits>
 
 #include "core/base/limits.h"
-#include "server/service/mesh_upload.h"
+#include "server/services/mesh_upload.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {

@@ -47,12 +47,12 @@ GOOD_EXAMPLE = {
     **core("core/index/list/list_index.h", '"core/index/spatial_index.h"'),
     **core("core/scene/scene.h", "<chrono>", '"core/index/list/list_index.h"'),
     **server("server/config/server_config.h", '"CLI/CLI.hpp"', '"core/base/mutex.h"'),
-    **server("server/service/query_service.h", "<grpcpp/server_context.h>", '"locus/v1/query_service.pb.h"',
+    **server("server/services/query_service.h", "<grpcpp/server_context.h>", '"locus/v1/query_service.pb.h"',
              '"core/scene/scene.h"'),
     "core/geometry/vec3.cc": '#include "core/geometry/vec3.h"\n\nnamespace locus {\n\n'
                              'Vec3::Vec3(double x) : x_{x}, braces_("{{{") {\n  if (x > 0) {\n    grow({1, 2});\n  }\n}\n\n'
                              "}  // namespace locus\n",
-    "server/main.cc": '#include "server/service/query_service.h"\n\nint main() { return 0; }\n',
+    "server/main.cc": '#include "server/services/query_service.h"\n\nint main() { return 0; }\n',
     "tests/core/geometry/vec3_test.cc": '#include "core/geometry/vec3.h"\n\nnamespace locus {\n}  // namespace locus\n',
     MODULE: '"""Things."""\n\n\nclass Thing:\n    """A thing."""\n\n    def grow(self, by: int = 1) -> None:\n'
             '        """Makes it larger."""\n\n    def _grown(self) -> int:\n        return 1\n',
@@ -84,8 +84,8 @@ BAD_EXAMPLES = {
         core("core/geometry/vec3.h", '"core/index/spatial_index.h"'),
         core("core/mesh/mesh.h", '"core/scene/scene.h"'),
         core("core/index/spatial_index.h", '"core/index/list/list_index.h"'),
-        core("core/scene/scene.h", '"core/query/run_batch.h"'),
-        server("server/scheduling/pool.h", '"server/service/query_service.h"'),
+        core("core/scene/scene.h", '"core/query/run/run_batch.h"'),
+        server("server/scheduling/pool.h", '"server/services/query_service.h"'),
         server("server/config/server_config.h", '"core/scene/scene.h"'),
         {"client/lib/client.h": header("client/lib/client.h", "locus::client", '"core/geometry/vec3.h"')},
         {"client/cli/run.cc": '#include "server/config/server_config.h"\n'},
@@ -101,7 +101,7 @@ BAD_EXAMPLES = {
     ],
     "CoreReadsNoClock": [core("core/query/options.h", "<chrono>"), core("core/scene/scene_writer.h", "<chrono>")],
     "LibrariesStayInTheirRooms": [
-        server("server/service/log.h", '"spdlog/spdlog.h"'), server("server/scheduling/call.h", "<grpcpp/grpcpp.h>"),
+        server("server/services/log.h", '"spdlog/spdlog.h"'), server("server/scheduling/call.h", "<grpcpp/grpcpp.h>"),
         core("core/base/option.h", '"CLI/CLI.hpp"'), server("server/scheduling/tree.h", "<boost/geometry.hpp>"),
         {"client/lib/json.h": header("client/lib/json.h", "locus::client", "<nlohmann/json.hpp>")},
     ],

@@ -4,7 +4,6 @@ import re
 
 from source_tree import includes, quoted_includes
 
-CORE_ROOMS = ("core/base", "core/geometry", "core/mesh", "core/index", "core/scene", "core/query")
 INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid")
 
 # A folder's sources may include their own folder and these. A name without a final "/*" means that folder alone, with it
@@ -14,31 +13,51 @@ ALLOWED = {
     "core/geometry": ["core/base"],
     "core/mesh": ["core/geometry", "core/base"],
     "core/index": ["core/geometry", "core/base"],
-    "core/scene": ["core/index/*", "core/mesh", "core/geometry", "core/base"],
-    "core/query": ["core/scene", "core/index/*", "core/geometry", "core/base"],
+    # From the bottom up: what is there, how it changes, what readers see, what is written to the log, and the scene.
+    "core/scene/objects": ["core/index/*", "core/geometry", "core/base"],
+    "core/scene/statics": ["core/index/*", "core/mesh", "core/geometry", "core/base"],
+    "core/scene/updates": ["core/scene/objects", "core/scene/statics", "core/index/*", "core/geometry", "core/base"],
+    "core/scene/snapshot": ["core/scene/objects", "core/scene/statics", "core/index/*", "core/geometry", "core/base"],
+    "core/scene/readers": ["core/scene/snapshot", "core/base"],
+    "core/scene/log": ["core/scene/objects", "core/scene/statics", "core/scene/updates", "core/scene/snapshot",
+                       "core/index/*", "core/mesh", "core/geometry", "core/base"],
+    "core/scene": ["core/scene/*", "core/index/*", "core/mesh", "core/geometry", "core/base"],
+    "core/query": ["core/scene/*", "core/index/*", "core/geometry", "core/base"],
+    "core/query/kinds": ["core/query", "core/scene/*", "core/index/*", "core/geometry", "core/base"],
+    "core/query/run": ["core/query", "core/query/kinds", "core/scene/*", "core/index/*", "core/geometry", "core/base"],
     "server": ["server/*", "core/*"],
-    "server/service": ["server/scheduling", "server/storage", "server/security", "server/observability", "server/config",
-                       "core/*", "proto"],
+    "server/config": ["core/base"],
     "server/scheduling": ["core/*", "server/config"],
-    "server/storage": ["core/*"],
+    "server/storage/rocksdb": ["core/*"],
+    "server/storage/integrity": ["server/storage/rocksdb", "core/*"],
+    "server/storage": ["server/storage/*", "core/*"],
     "server/security": ["server/config", "core/base"],
     "server/observability": ["server/config", "core/index", "core/base"],
-    "server/config": ["core/base"],
+    "server/host": ["server/scheduling", "server/observability", "server/config", "core/*"],
+    "server/convert": ["core/*", "proto"],
+    "server/rpc": ["server/host", "server/convert", "server/scheduling", "server/observability", "server/config", "core/*",
+                   "proto"],
+    "server/services": ["server/rpc", "server/host", "server/convert", "server/scheduling", "server/storage",
+                        "server/security", "server/observability", "server/config", "core/*", "proto"],
     "client/lib": ["proto"],
-    "client/cli": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
+    "client/cli": ["client/lib", "core/base"],
+    "client/cli/commands": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
+    "client/cli/rows": ["client/cli", "client/cli/rows/bulk", "client/lib", "core/base"],
+    "client/cli/rows/bulk": ["core/base"],
+    "client/cli/levels": ["client/cli", "client/cli/levels/import", "client/lib", "core/base"],
+    "client/cli/levels/import": ["client/cli/levels/import/*", "core/geometry", "core/base"],
+    "client/cli/levels/import/quake": ["client/cli/levels/import", "core/geometry", "core/base"],
+    "client/cli/levels/generate": ["client/cli/levels/import", "core/geometry", "core/base"],
+    "client/cli/levels/export": ["client/cli", "client/cli/rows", "client/cli/levels/import", "client/lib", "core/geometry",
+                                 "core/base"],
+    "client/cli/extras/demo": ["client/cli", "client/cli/levels/*", "client/lib", "core/geometry", "core/base"],
+    "client/cli/extras/completion": ["client/cli"],
+    "client/cli/extras/top": ["client/cli"],
+    "client/cli/extras/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
     "client/cli/backup": ["client/cli", "client/lib", "core/base"],
-    "client/cli/demo": ["client/cli", "client/cli/generate", "client/cli/import", "client/lib", "core/geometry", "core/base"],
-    "client/cli/completion": ["client/cli"],
-    "client/cli/top": ["client/cli"],
     "client/cli/config": ["client/cli", "server/config"],
-    "client/cli/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
+    "client/cli/script": ["client/cli", "client/cli/rows"],
     "deploy/manual": ["client/cli", "server/config"],
-    "client/cli/export": ["client/cli", "client/cli/import", "client/lib", "core/geometry", "core/base"],
-    "client/cli/script": ["client/cli"],
-    "client/cli/import": ["client/cli/import/*", "core/geometry", "core/base"],
-    "client/cli/import/quake": ["client/cli/import", "core/geometry", "core/base"],
-    "client/cli/bulk": ["core/base"],
-    "client/cli/generate": ["client/cli/import", "core/geometry", "core/base"],
 }
 # The kernels are compiled for processors that the rest may not run on: only plain data of the tree goes in.
 ALLOWED["core/index/bvh/kernels"] = ["core/index/bvh", "core/base"]
@@ -48,20 +67,20 @@ ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 
 # Third-party headers by the start of their names, and the folders (with those below) that may see them. Tests may see all.
 THIRD_PARTY = {
-    "grpc": ["server/service", "server/observability", "client/lib"],
-    "google/protobuf/": ["server/service", "client/lib"],
+    "grpc": ["server/rpc", "server/services", "server/convert", "server/observability", "client/lib"],
+    "google/protobuf/": ["server/rpc", "server/services", "server/convert", "client/lib"],
     "spdlog/": ["server/observability"],
     "prometheus/": ["server/observability"],
     "civetweb.h": ["server/observability"],
     "rocksdb/": ["server/storage"],
     "xxhash.h": ["server/storage"],
-    "curl/": ["client/cli/top"],
+    "curl/": ["client/cli/extras/top"],
     "CLI/": ["server/config", "client/cli", "deploy/manual"],
     "nlohmann/": ["client/cli"],
-    "assimp/": ["client/cli/import"],
-    "zip.h": ["client/cli/import"],
-    "openssl/": ["server/service", "server/security", "client/lib", "client/cli/render"],
-    "png.h": ["client/cli/render"],
+    "assimp/": ["client/cli/levels/import"],
+    "zip.h": ["client/cli/levels/import"],
+    "openssl/": ["server/services", "server/security", "client/lib", "client/cli/extras/render"],
+    "png.h": ["client/cli/extras/render"],
     "embree3/": ["tests/bench"],
     "btBulletCollisionCommon.h": ["tests/bench"],
     "BulletCollision/": ["tests/bench"],
@@ -74,10 +93,10 @@ INTRINSICS = "immintrin.h"
 KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
 # How an array asks for large pages: advice that changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
-CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|pin_ledger)\.(h|cc)")
+CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/pin_ledger)\.(h|cc)")
 
 # A folder and the folder that holds it, where both are one room that was divided for its size only.
-ONE_ROOM = {"client/cli/import/quake": "client/cli/import"}
+ONE_ROOM = {"client/cli/levels/import/quake": "client/cli/levels/import"}
 
 
 def room_of_include(target):
@@ -138,7 +157,7 @@ def core_stands_alone(tree):
 
 
 def core_reads_no_clock(tree):
-    return [f"{path}: <chrono> is for core/base/mutex.h, core/scene/scene.* and core/scene/pin_ledger.* only"
+    return [f"{path}: <chrono> is for core/base/mutex.h, core/scene/scene.* and core/scene/readers/pin_ledger.* only"
             for path in tree.code("core") if not CLOCK_FILES.fullmatch(path)
             for _, target in includes(tree.files[path]) if target == "chrono"]
 

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <thread>
 
-#include "core/query/rows.h"
+#include "core/query/columns.h"
 #include "tests/support/random_query.h"
 #include "tests/support/test_scale.h"
 

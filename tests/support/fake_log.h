@@ -14,7 +14,7 @@
 #include <system_error>
 #include <vector>
 
-#include "core/scene/update_log.h"
+#include "core/scene/log/update_log.h"
 
 namespace locus::test {
 

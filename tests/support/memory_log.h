@@ -16,7 +16,7 @@
 
 #include "core/base/check.h"
 #include "core/base/mutex.h"
-#include "core/scene/update_log.h"
+#include "core/scene/log/update_log.h"
 
 namespace locus::test {
 

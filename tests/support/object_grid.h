@@ -3,7 +3,7 @@
 #ifndef LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
 #define LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
 
-#include "core/scene/object_store.h"
+#include "core/scene/objects/object_store.h"
 
 namespace locus::test {
 

@@ -10,8 +10,8 @@
 #include <tuple>
 #include <vector>
 
-#include "core/query/placed_triangle.h"
-#include "core/query/run_batch.h"
+#include "core/query/kinds/placed_triangle.h"
+#include "core/query/run/run_batch.h"
 
 namespace locus::test {
 

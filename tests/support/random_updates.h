@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "core/scene/update_batch.h"
+#include "core/scene/updates/update_batch.h"
 #include "tests/support/columns.h"
 #include "tests/support/random.h"
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/scene/log/state_writer.h"
 #include "core/scene/recovery.h"
-#include "core/scene/state_writer.h"
 #include "tests/support/memory_log.h"
 #include "tests/support/random_updates.h"
 #include "tests/support/scene_difference.h"

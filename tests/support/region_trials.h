@@ -9,7 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/index/bvh/kernels/region_kernels.h"
-#include "core/query/triangle_search.h"
+#include "core/query/kinds/triangle_search.h"
 #include "tests/support/random_region.h"
 #include "tests/support/test_scale.h"
 

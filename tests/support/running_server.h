@@ -18,8 +18,8 @@
 #include "locus/v1/server_service.grpc.pb.h"
 #include "locus/v1/update_service.grpc.pb.h"
 #include "server/observability/log.h"
-#include "server/service/library_logs.h"
-#include "server/service/server.h"
+#include "server/rpc/library_logs.h"
+#include "server/services/server.h"
 
 namespace locus::test {
 

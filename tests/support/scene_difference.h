@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/index/index_queries.h"
-#include "core/scene/moment.h"
 #include "core/scene/scene.h"
+#include "core/scene/snapshot/moment.h"
 #include "tests/support/random.h"
 
 namespace locus::test {

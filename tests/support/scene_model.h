@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/scene/object.h"
-#include "core/scene/update_batch.h"
+#include "core/scene/objects/object.h"
+#include "core/scene/updates/update_batch.h"
 
 namespace locus::test {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/scene/object.h"
+#include "core/scene/objects/object.h"
 #include "tests/support/random.h"
 
 namespace locus::test {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/query/run_batch.h"
+#include "core/query/run/run_batch.h"
 #include "tests/support/owned_block.h"
 #include "tests/support/random.h"
 #include "tests/support/scene_schedule.h"

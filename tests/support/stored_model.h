@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "core/scene/update_log.h"
+#include "core/scene/log/update_log.h"
 #include "tests/support/random.h"
 #include "tests/support/stored_log.h"
 

@@ -8,12 +8,12 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "client/cli/failure.h"
+#include "client/cli/rows/update_report.h"
 #include "client/cli/run.h"
 #include "client/cli/script/cursor.h"
 #include "client/cli/script/expectation.h"
 #include "client/cli/script/expression.h"
 #include "client/cli/unknown_values.h"
-#include "client/cli/update_report.h"
 
 namespace locus::cli {
 namespace {

@@ -1,6 +1,6 @@
 #include "tests/bench/dynamic/insert_cases.h"
 
-#include "client/cli/generate/splitmix64.h"
+#include "client/cli/levels/generate/splitmix64.h"
 #include "tests/bench/dynamic/query_cases.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/results_hash.h"

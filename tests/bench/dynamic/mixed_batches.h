@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "core/query/run_batch.h"
+#include "core/query/run/run_batch.h"
 #include "tests/bench/dynamic/world.h"
 
 namespace locus::bench::dynamic {

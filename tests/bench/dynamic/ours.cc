@@ -6,7 +6,7 @@
 #include "core/geometry/point_shape.h"
 #include "core/index/hash_grid/region_walk.h"
 #include "core/index/regions.h"
-#include "core/query/run_batch.h"
+#include "core/query/run/run_batch.h"
 
 namespace locus::bench::dynamic {
 namespace {

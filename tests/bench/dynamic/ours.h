@@ -6,8 +6,8 @@
 #include <memory>
 #include <optional>
 
-#include "core/scene/moment.h"
 #include "core/scene/scene.h"
+#include "core/scene/snapshot/moment.h"
 #include "tests/bench/dynamic/contender.h"
 
 namespace locus::bench::dynamic {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/generate/splitmix64.h"
+#include "client/cli/levels/generate/splitmix64.h"
 
 namespace locus::bench::dynamic {
 namespace {

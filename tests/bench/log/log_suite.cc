@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "core/scene/record_codec.h"
+#include "core/scene/log/record_codec.h"
 #include "server/storage/rocksdb_log.h"
 #include "tests/bench/dynamic/world.h"
 #include "tests/bench/frame/bar.h"

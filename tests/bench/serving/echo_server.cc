@@ -15,7 +15,7 @@
 #include "absl/strings/str_cat.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "server/config/server_config.h"
-#include "server/service/hot_call.h"
+#include "server/rpc/hot_call.h"
 #include "tests/bench/serving/echo_answer.h"
 
 namespace locus::bench::serving {

@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/types/span.h"
 #include "core/query/query_batch.h"
-#include "core/query/run_batch.h"
+#include "core/query/run/run_batch.h"
 #include "core/scene/scene.h"
 #include "locus/v1/query_service.pb.h"
 #include "locus/v1/update_service.pb.h"

@@ -6,10 +6,10 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "client/cli/generate/blob.h"
-#include "client/cli/generate/city.h"
-#include "client/cli/generate/terrain.h"
-#include "client/cli/import/import_file.h"
+#include "client/cli/levels/generate/blob.h"
+#include "client/cli/levels/generate/city.h"
+#include "client/cli/levels/generate/terrain.h"
+#include "client/cli/levels/import/import_file.h"
 #include "core/mesh/triangle_mesh.h"
 
 namespace locus::bench {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "client/cli/import/imported_mesh.h"
+#include "client/cli/levels/import/imported_mesh.h"
 #include "core/geometry/triangle.h"
 
 namespace locus::bench {

@@ -10,7 +10,7 @@
 #include "core/base/check.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/index_queries.h"
-#include "core/query/triangle_search.h"
+#include "core/query/kinds/triangle_search.h"
 #include "tests/bench/frame/results_hash.h"
 
 namespace locus::bench {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "core/scene/static_mesh.h"
+#include "core/scene/statics/static_mesh.h"
 #include "tests/bench/static/peer.h"
 
 namespace locus::bench {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "client/cli/generate/splitmix64.h"
+#include "client/cli/levels/generate/splitmix64.h"
 
 namespace locus::bench {
 namespace {

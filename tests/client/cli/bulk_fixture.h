@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "client/cli/run.h"
-#include "tests/client/cli/bulk/test_input.h"
+#include "tests/client/cli/rows/bulk/test_input.h"
 #include "tests/support/daemon_process.h"
 
 namespace locus::cli {

@@ -5,7 +5,7 @@
 
 #include "core/index/bvh/bvh.h"
 #include "core/index/list/list_index.h"
-#include "core/scene/object.h"
+#include "core/scene/objects/object.h"
 #include "tests/support/random.h"
 
 namespace locus::test {

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "core/scene/tree_codec.h"
+#include "core/scene/log/tree_codec.h"
 #include "tests/support/recovery_lockstep.h"
 #include "tests/support/scene_fixture.h"
 #include "tests/support/test_scale.h"

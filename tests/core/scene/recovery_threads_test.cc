@@ -5,8 +5,8 @@
 #include <atomic>
 #include <thread>
 
+#include "core/scene/log/state_writer.h"
 #include "core/scene/recovery.h"
-#include "core/scene/state_writer.h"
 #include "tests/support/memory_log.h"
 #include "tests/support/scene_difference.h"
 #include "tests/support/scene_fixture.h"

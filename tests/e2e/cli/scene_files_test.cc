@@ -4,9 +4,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "client/cli/import/import_file.h"
+#include "client/cli/levels/import/import_file.h"
 #include "client/cli/run.h"
-#include "tests/client/cli/export/glb_file.h"
+#include "tests/client/cli/levels/export/glb_file.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/generate/blob.h"
+#include "client/cli/levels/generate/blob.h"
 #include "tests/support/generated_meshes.h"
 
 namespace locus::test {

@@ -1,8 +1,8 @@
 // What the kernels of every instruction set offer: all triangles of one mesh's tree that a ball or a box meets, eight
 // boxes or triangles at a time. They decide in float where float is certain by a written bound, and ask the caller's
 // judge, the predicates of core/geometry/triangle_overlap.h, for the rest, so that their answers are its answers bit
-// for bit. A subtree that lies wholly inside is emitted as it stands. core/query/triangle_search.h is the way to use
-// them. Plain data; functions without state, safe from any thread.
+// for bit. A subtree that lies wholly inside is emitted as it stands. core/query/kinds/triangle_search.h is the way to
+// use them. Plain data; functions without state, safe from any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 

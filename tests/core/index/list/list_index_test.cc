@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/scene/object.h"
+#include "core/scene/objects/object.h"
 #include "tests/support/random.h"
 
 namespace locus::test {

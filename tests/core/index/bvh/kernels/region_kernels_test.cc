@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/index/bvh/kernels/dispatch.h"
-#include "core/query/triangle_search.h"
+#include "core/query/kinds/triangle_search.h"
 #include "tests/support/random_region.h"
 #include "tests/support/test_scale.h"
 

@@ -1,0 +1,60 @@
+// Writes the answers to bulk queries as they come in, as one report. For bulk_query.cc. Not thread-safe.
+#ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_ANSWERS_H_
+#define LOCUS_CLIENT_CLI_COMMANDS_BULK_ANSWERS_H_
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "client/cli/context.h"
+#include "client/cli/report_stream.h"
+#include "client/cli/rows/bulk/sent_rows.h"
+#include "client/cli/rows/query_report.h"
+#include "client/lib/client.h"
+#include "client/lib/values.h"
+
+namespace locus::cli {
+
+struct BulkQuery;
+
+class BulkAnswers {
+ public:
+  // Borrows all. With `follow` answers may be of several revisions; the facts of the report then tell first and last.
+  BulkAnswers(const BulkQuery& query, bool follow, Context& context);
+
+  // Appends the answer to `sent`, whose blocks have these frames. DATA_LOSS for an answer that does not fit the
+  // question, UNKNOWN when the output takes no more.
+  absl::Status write(const v1::QueryResult& result, const SentRows& sent, const std::vector<client::Double3>& frames);
+
+  // Completes the report, if anything was answered.
+  void end();
+
+  // Of the answer written last.
+  std::optional<client::Revision> revision() const { return revision_; }
+  // Rows of the input that are answered.
+  uint64_t rows() const { return rows_; }
+
+ private:
+  absl::Status write_block(const v1::BlockResult& block, size_t rows, RowLayout layout);
+  void note(const v1::QueryResult& result);
+  Json tail() const;
+
+  const BulkQuery& query_;
+  const bool follow_;
+  Context& context_;
+  ReportStream report_;
+  std::optional<client::Revision> revision_;
+  uint64_t first_revision_ = 0;
+  uint64_t tick_ = 0;
+  uint64_t rows_ = 0;
+  uint64_t truncated_ = 0;
+  size_t clamped_ = 0;
+  Json truncated_rows_ = Json::array();  // the first of them
+  v1::Work work_;
+  bool has_work_ = false;
+};
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_COMMANDS_BULK_ANSWERS_H_

@@ -1,0 +1,214 @@
+#include "client/cli/commands/bulk_query.h"
+
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <future>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/commands/bulk_answers.h"
+#include "client/cli/failure.h"
+#include "core/base/check.h"
+#include "core/base/limits.h"
+
+namespace locus::cli {
+namespace {
+
+constexpr double kFrameGrid = 16384;
+
+bool is_float(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
+
+std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const client::Double3& frame) {
+  std::vector<float> offsets;
+  offsets.reserve(3 * (rows.end - rows.begin));
+  for (size_t row = rows.begin; row < rows.end; ++row) {
+    offsets.push_back(static_cast<float>(positions.numbers[3 * row] - frame.x));
+    offsets.push_back(static_cast<float>(positions.numbers[3 * row + 1] - frame.y));
+    offsets.push_back(static_cast<float>(positions.numbers[3 * row + 2] - frame.z));
+  }
+  return offsets;
+}
+
+client::Double3 frame_of_row(const RowColumn& positions, size_t row) {
+  return frame_of(positions.numbers[3 * row], positions.numbers[3 * row + 1], positions.numbers[3 * row + 2]);
+}
+
+bool same(const client::Double3& a, const client::Double3& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+class BulkQueryRun {
+ public:
+  BulkQueryRun(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk, Context& context)
+      : query_(query), options_(options), bulk_(bulk), context_(context), answers_(query, bulk.follow, context) {}
+
+  absl::Status run() {
+    // An input is there when the line runs, perhaps not before, and a pipe can be read only once.
+    if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
+    const absl::StatusOr<std::unique_ptr<RowReader>> reader = open_rows(bulk_, query_.schema);
+    if (!reader.ok()) return reader.status();
+    const absl::StatusOr<client::Client*> client = context_.connect();
+    if (!client.ok()) return client.status();
+    reader_ = reader->get();
+    stream_ =
+        (*client)->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
+    absl::Status status = ask_all();
+    // What was sent before a wrong row is answered all the same; after a refusal nothing more is waited for.
+    while (!refused_ && !in_flight_.empty()) status.Update(write_front());
+    answers_.end();
+    hide_rows(context_);
+    if (status.ok()) return stream_->close();
+    if (answers_.rows() == 0) return status;
+    return in_words(status, absl::StrCat(status.message(), "; ", answers_.rows(), " rows before it were answered"));
+  }
+
+ private:
+  struct InFlight {
+    SentRows sent;
+    std::future<absl::StatusOr<v1::QueryResult>> answer;
+    std::vector<client::Double3> frames;  // one a block
+  };
+
+  absl::Status ask_all() {
+    RowBatch batch;
+    bool asked = false;
+    while (true) {
+      const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
+      const absl::StatusOr<BatchEnd> end = reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch);
+      if (!end.ok()) return end.status();
+      // An input without rows asks an empty batch: it finds out whether the scene is there, and its revision.
+      if (batch.rows() > 0 || (*end == BatchEnd::kEnd && !asked)) {
+        asked = true;
+        if (const absl::Status sent = send(batch); !sent.ok()) return sent;
+      }
+      if (const absl::Status written = write_answers(*end); !written.ok()) return written;
+      if (*end == BatchEnd::kEnd) return absl::OkStatus();
+    }
+  }
+
+  // In as many messages as their blocks need.
+  absl::Status send(const RowBatch& batch) {
+    size_t begin = 0;
+    do {
+      while (in_flight_.size() >= kBulkWindow || (!in_flight_.empty() && !answers_.revision() && !bulk_.follow)) {
+        if (const absl::Status written = write_front(); !written.ok()) return written;
+      }
+      InFlight& next = in_flight_.emplace_back();
+      LOCUS_CHECK_LE(in_flight_.size(), kBulkWindow);
+      client::QueryBuilder builder;
+      apply_to_batch(options_, context_, builder);
+      set_view(builder);
+      builder.max_reply_bytes(limits::kMaxReplyBytes);
+      begin = add_blocks(batch, begin, next, builder);
+      next.answer = stream_->send(builder.build());
+    } while (begin < batch.rows());
+    return absl::OkStatus();
+  }
+
+  void set_view(client::QueryBuilder& builder) const {
+    if (!answers_.revision()) return;
+    if (bulk_.follow) {
+      builder.at_least(*answers_.revision());
+    } else {
+      builder.exactly(*answers_.revision());
+    }
+  }
+
+  // Returns the first row that did not fit.
+  size_t add_blocks(const RowBatch& batch, size_t begin, InFlight& message, client::QueryBuilder& builder) const {
+    message.sent.first_row = batch.first_row + begin;
+    const size_t first = begin;
+    while (begin < batch.rows() && message.frames.size() < limits::kMaxBlocks) {
+      const client::Double3 frame = frame_of_row(batch.columns[0], begin);
+      size_t end = begin + 1;
+      while (end < batch.rows() && same(frame_of_row(batch.columns[0], end), frame)) ++end;
+      const RowSpan rows = {begin, end};
+      query_.add_block({batch, rows, frame, offsets_of(batch.columns[0], rows, frame)}, builder);
+      message.frames.push_back(frame);
+      message.sent.list_starts.push_back(begin - first);
+      begin = end;
+    }
+    const auto lines = batch.lines.begin();
+    message.sent.lines.assign(lines + static_cast<std::ptrdiff_t>(first), lines + static_cast<std::ptrdiff_t>(begin));
+    return begin;
+  }
+
+  // Those that are there; all, where nothing is left to be read for now.
+  absl::Status write_answers(BatchEnd end) {
+    while (!in_flight_.empty()) {
+      if (end == BatchEnd::kFull &&
+          in_flight_.front().answer.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+        return absl::OkStatus();
+      }
+      if (const absl::Status written = write_front(); !written.ok()) return written;
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status write_front() {
+    InFlight front = std::move(in_flight_.front());
+    in_flight_.pop_front();
+    const double seconds = context_.options().timeout_seconds.value_or(kBulkAnswerSeconds);
+    if (front.answer.wait_for(std::chrono::duration<double>(seconds)) != std::future_status::ready) {
+      refused_ = true;
+      return absl::DeadlineExceededError(
+          absl::StrCat(reader_->name(), ":", front.sent.line_range(), ": no answer within ", seconds, " s"));
+    }
+    const absl::StatusOr<v1::QueryResult> result = front.answer.get();
+    absl::Status status =
+        result.ok() ? answers_.write(*result, front.sent, front.frames) : explained(result.status(), front.sent);
+    refused_ = !status.ok();
+    show_rows(context_, "rows answered", answers_.rows());
+    return status;
+  }
+
+  absl::Status explained(const absl::Status& status, const SentRows& sent) const {
+    const absl::Status refusal = refused_rows(status, reader_->name(), sent);
+    if (!absl::IsOutOfRange(status) || !answers_.revision()) return refusal;
+    return in_words(refusal,
+                    absl::StrCat(refusal.message(), " (the first rows were answered at revision ",
+                                 answers_.revision()->revision, "; --follow lets later ones see newer revisions)"));
+  }
+
+  const BulkQuery& query_;
+  const QueryOptions& options_;
+  const BulkOptions& bulk_;
+  Context& context_;
+  BulkAnswers answers_;
+  RowReader* reader_ = nullptr;
+  std::unique_ptr<client::QueryStream> stream_;
+  std::deque<InFlight> in_flight_;
+  bool refused_ = false;
+};
+
+}  // namespace
+
+client::Double3 frame_of(double x, double y, double z) {
+  if (is_float(x) && is_float(y) && is_float(z)) return {};
+  return {std::round(x / kFrameGrid) * kFrameGrid, std::round(y / kFrameGrid) * kFrameGrid,
+          std::round(z / kFrameGrid) * kFrameGrid};
+}
+
+void add_filter_fields(const QueryOptions& options, RowSchema& schema) {
+  schema.push_back(column_or_option({.name = "mask", .kind = FieldKind::kBits}, options.masks, "--mask"));
+  schema.push_back(
+      column_or_option({.name = "ignore_group", .kind = FieldKind::kId}, options.ignore_groups, "--ignore-group"));
+}
+
+absl::Status check(const QueryOptions& options, const BulkOptions& bulk) {
+  absl::Status status = check(options);
+  status.Update(check(bulk));
+  status.Update(at_most_one(options.masks, "--mask"));
+  status.Update(at_most_one(options.ignore_groups, "--ignore-group"));
+  status.Update(at_most_one(options.past.as_of, "--as-of"));
+  if (status.ok() && options.after_id.value != 0)
+    return usage_error("--after-id goes on after one cut answer, not beside an input of many");
+  if (status.ok() && bulk.follow && options.exactly) return usage_error("give --exactly or --follow, not both");
+  return status;
+}
+
+absl::Status run_bulk_query(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk,
+                            Context& context) {
+  return BulkQueryRun(query, options, bulk, context).run();
+}
+
+}  // namespace locus::cli

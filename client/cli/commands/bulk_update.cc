@@ -1,0 +1,190 @@
+#include "client/cli/commands/bulk_update.h"
+
+#include <chrono>
+#include <deque>
+#include <future>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include "client/cli/failure.h"
+#include "client/cli/report_stream.h"
+#include "core/base/check.h"
+
+namespace locus::cli {
+namespace {
+
+std::vector<size_t> list_starts_of(const v1::UpdateBatch& batch) {
+  std::vector<size_t> starts;
+  size_t rows = 0;
+  const auto add = [&](int size) {
+    starts.push_back(rows);
+    rows += static_cast<size_t>(size);
+  };
+  if (batch.remove_ids_size() > 0) add(batch.remove_ids_size());
+  for (const v1::Insert& insert : batch.inserts()) add(insert.ids_size());
+  for (const v1::Move& move : batch.moves()) add(move.ids_size());
+  return starts;
+}
+
+class BulkUpdateRun {
+ public:
+  BulkUpdateRun(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk, Context& context)
+      : update_(update), scene_(scene), bulk_(bulk), context_(context) {}
+
+  absl::Status run() {
+    // An input is there when the line runs, perhaps not before, and a pipe can be read only once.
+    if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
+    const absl::StatusOr<std::unique_ptr<RowReader>> reader = open_rows(bulk_, update_.schema);
+    if (!reader.ok()) return reader.status();
+    const absl::StatusOr<client::Client*> client = context_.connect();
+    if (!client.ok()) return client.status();
+    reader_ = reader->get();
+    client::UpdateStreamOptions options;
+    options.max_in_flight = static_cast<int>(kBulkWindow);
+    stream_ = (*client)->update_stream(scene_, options);
+    absl::Status status = send_all();
+    // Whatever went wrong, each batch that was sent has an outcome, and the report counts it.
+    while (!silent_ && !in_flight_.empty()) status.Update(take_front());
+    write_totals();
+    if (!status.ok()) return in_words(status, absl::StrCat(status.message(), "; ", what_was_done()));
+    status = stream_->close();
+    return status.ok() ? refusal() : status;
+  }
+
+ private:
+  struct InFlight {
+    SentRows sent;
+    std::future<absl::StatusOr<v1::UpdateAck>> ack;
+  };
+
+  absl::Status send_all() {
+    RowBatch batch;
+    while (true) {
+      const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
+      const absl::StatusOr<BatchEnd> end = reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch);
+      if (!end.ok()) return end.status();
+      // An input without rows sends an empty batch: it finds out whether the scene is there, and its revision.
+      if (batch.rows() > 0 || (*end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty())) {
+        if (const absl::Status sent = send(batch); !sent.ok()) return sent;
+      }
+      while (!in_flight_.empty() && (*end != BatchEnd::kFull || is_there(in_flight_.front()))) {
+        if (const absl::Status taken = take_front(); !taken.ok()) return taken;
+      }
+      if (*end == BatchEnd::kEnd) return absl::OkStatus();
+    }
+  }
+
+  absl::Status send(const RowBatch& batch) {
+    for (size_t row = 0; update_.check_row && row < batch.rows(); ++row) {
+      const absl::Status checked = update_.check_row(batch, row);
+      if (!checked.ok()) {
+        return in_words(checked, absl::StrCat(reader_->name(), ":", batch.lines[row], ": ", checked.message()));
+      }
+    }
+    while (in_flight_.size() >= kBulkWindow) {
+      if (const absl::Status taken = take_front(); !taken.ok()) return taken;
+    }
+    v1::UpdateBatch message = update_.batch_of(batch);
+    InFlight& next = in_flight_.emplace_back();
+    LOCUS_CHECK_LE(in_flight_.size(), kBulkWindow);
+    next.sent = {.first_row = batch.first_row, .lines = batch.lines, .list_starts = list_starts_of(message)};
+    next.ack = stream_->send(std::move(message));
+    return absl::OkStatus();
+  }
+
+  std::string what_was_done() const {
+    if (batches_ == 0) return "nothing was applied";
+    return absl::StrCat("of the rows sent ", applied_, " were applied and ", refused_, " refused");
+  }
+
+  static bool is_there(const InFlight& message) {
+    return message.ack.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  }
+
+  absl::Status take_front() {
+    InFlight front = std::move(in_flight_.front());
+    in_flight_.pop_front();
+    const double seconds = context_.options().timeout_seconds.value_or(kBulkAnswerSeconds);
+    if (front.ack.wait_for(std::chrono::duration<double>(seconds)) != std::future_status::ready) {
+      silent_ = true;
+      return absl::DeadlineExceededError(
+          absl::StrCat(reader_->name(), ":", front.sent.line_range(), ": no answer within ", seconds, " s"));
+    }
+    const absl::StatusOr<v1::UpdateAck> ack = front.ack.get();
+    if (!ack.ok()) return refused_rows(ack.status(), reader_->name(), front.sent);
+    count(*ack);
+    hide_rows(context_);
+    for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent);
+    context_.out().flush();
+    show_rows(context_, "rows applied", applied_);
+    return context_.out() ? absl::OkStatus() : absl::UnknownError("the output takes no more");
+  }
+
+  void count(const v1::UpdateAck& ack) {
+    context_.remember_own(scene_, {ack.epoch(), ack.revision()});
+    ++batches_;
+    applied_ += ack.applied();
+    refused_ += ack.refused();
+    last_ = ack;
+    last_.clear_errors();
+  }
+
+  void write_refused(const v1::ItemError& item, const SentRows& sent) {
+    const std::optional<uint64_t> line = sent.line_of(item.field(), item.index());
+    const std::string reason(absl::StripPrefix(v1::Reason_Name(item.reason()), "REASON_"));
+    if (!errors_) {
+      errors_.emplace(context_.out(), context_.options().format,
+                      ReportShape{.rows_name = "errors", .keys = {"line", "id", "reason"}, .width_rows = 1000});
+      errors_->begin(Json::object());
+      first_refused_ = absl::StrCat(reader_->name(), ":", line.value_or(0), ", id ", item.id(), ": ", reason);
+    }
+    all_unknown_ &= item.reason() == v1::REASON_UNKNOWN_ID;
+    errors_->add({{"line", line ? Json(*line) : Json()}, {"id", id_json(item.id())}, {"reason", reason}});
+  }
+
+  void write_totals() {
+    hide_rows(context_);
+    if (batches_ == 0) return;
+    Report report;
+    report.head = {{"applied", applied_},          {"refused", refused_},  {"batches", batches_},
+                   {"revision", last_.revision()}, {"tick", last_.tick()}, {"epoch", id_json(last_.epoch())}};
+    if (errors_) {
+      errors_->end(report.head);
+    } else {
+      context_.write(report);
+    }
+  }
+
+  absl::Status refusal() const {
+    if (refused_ == 0) return absl::OkStatus();
+    const std::string message =
+        absl::StrCat(refused_, " of ", refused_ + applied_, " rows refused; the first is ", first_refused_);
+    return all_unknown_ ? absl::NotFoundError(message) : absl::FailedPreconditionError(message);
+  }
+
+  const BulkUpdate& update_;
+  const std::string& scene_;
+  const BulkOptions& bulk_;
+  Context& context_;
+  RowReader* reader_ = nullptr;
+  std::unique_ptr<client::UpdateStream> stream_;
+  std::deque<InFlight> in_flight_;
+  bool silent_ = false;  // nothing more is waited for
+  std::optional<ReportStream> errors_;
+  std::string first_refused_;
+  bool all_unknown_ = true;
+  uint64_t batches_ = 0, applied_ = 0, refused_ = 0;
+  v1::UpdateAck last_;
+};
+
+}  // namespace
+
+absl::Status run_bulk_update(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk,
+                             Context& context) {
+  return BulkUpdateRun(update, scene, bulk, context).run();
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,238 @@
+// `locus demo`: a level, ten thousand moving objects, clients that ask meanwhile, and every kind of answer checked.
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client/cli/commands.h"
+#include "client/cli/extras/demo/demo_level.h"
+#include "client/cli/extras/demo/demo_load.h"
+#include "client/cli/extras/demo/edge_rays.h"
+#include "client/cli/levels/generate/city.h"
+#include "client/cli/levels/import/import_file.h"
+#include "client/lib/query_builder.h"
+#include "client/lib/result_rows.h"
+
+namespace locus::cli {
+namespace {
+
+constexpr size_t kEdgeRaysABatch = 8192;
+
+struct DemoOptions {
+  std::string file;
+  ImportOptions import;
+  std::string scene = "demo";
+  uint32_t objects = 10'000;
+  double seconds = 5;
+  double rate = 30;
+  uint64_t checks = 1'000;
+  uint64_t edge_rays = 100'000;
+  uint64_t seed = 1;
+  uint64_t city_triangles = 50'000;
+  std::string compare;
+};
+
+// The table of the demo and whether all of it is as promised.
+class DemoTable {
+ public:
+  void add(const std::string& what, Json rest) {
+    Json row = {{"what", what}};
+    row.update(rest);
+    report_.rows.push_back(std::move(row));
+  }
+  void add_load(const std::string& what, const LoadFigures& figures, double seconds) {
+    add(what, {{"rate_per_s", static_cast<uint64_t>(static_cast<double>(figures.items) / seconds)},
+               {"p50_ms", rounded(figures.percentile(0.50))},
+               {"p99_ms", rounded(figures.percentile(0.99))},
+               {"found", figures.found},
+               {"checked", checked_},
+               {"wrong", wrong_}});
+    checked_ = wrong_ = 0;
+  }
+  void count(uint64_t checked, uint64_t wrong) {
+    checked_ += checked;
+    wrong_ += wrong;
+    all_wrong_ += wrong;
+  }
+  // A row that is nothing but a check.
+  void add_check(const std::string& what, uint64_t checked, uint64_t wrong) {
+    all_wrong_ += wrong;
+    add(what, {{"rate_per_s", nullptr},
+               {"p50_ms", nullptr},
+               {"p99_ms", nullptr},
+               {"found", nullptr},
+               {"checked", checked},
+               {"wrong", wrong}});
+  }
+  uint64_t all_wrong() const { return all_wrong_; }
+  Report& report() { return report_; }
+
+ private:
+  static Json rounded(double milliseconds) { return Json::parse(absl::StrFormat("%.2f", milliseconds)); }
+
+  Report report_{.head = Json::object(), .rows_name = "rows", .rows = {}};
+  uint64_t checked_ = 0, wrong_ = 0, all_wrong_ = 0;
+};
+
+absl::StatusOr<ImportedLevel> load_level(const DemoOptions& options) {
+  if (!options.file.empty()) return import_file(options.file, options.import);
+  ImportedLevel level;
+  level.meshes.push_back(generate_city(options.city_triangles, options.seed));
+  level.source_format = "generated city";
+  return level;
+}
+
+void check_samples(const DemoOptions& options, const DemoLevel& level, const DemoWorld& world, LoadResult& load,
+                   DemoTable& table) {
+  DemoChecker checker(level.instances, world);
+  for (const DemoKind kind : kDemoKinds) {
+    LoadFigures& figures = load.queries[static_cast<size_t>(kind)];
+    const uint64_t each = figures.samples.empty() ? 0 : options.checks / figures.samples.size() + 1;
+    for (const Sample& sample : figures.samples) {
+      const DemoChecker::Outcome outcome = checker.check(kind, sample.batch, sample.result, static_cast<int>(each));
+      table.count(outcome.checked, outcome.differences);
+    }
+    table.add_load(name_of(kind), figures, load.seconds);
+  }
+}
+
+absl::StatusOr<uint64_t> count_leaks(const client::Client& client, const std::string& scene, const EdgeRays& rays,
+                                     const Transform& transform) {
+  uint64_t leaks = 0;
+  for (size_t begin = 0; begin < rays.size(); begin += kEdgeRaysABatch) {
+    const size_t count = std::min(kEdgeRaysABatch, rays.size() - begin);
+    const absl::Span<const float> origins(&rays.origins[3 * begin], 3 * count);
+    const absl::Span<const float> directions(&rays.directions[3 * begin], 3 * count);
+    client::QueryBuilder builder;
+    builder.rays()
+        .frame({transform.translation.x, transform.translation.y, transform.translation.z})
+        .source(v1::SOURCE_STATIC)
+        .rays(origins, directions);
+    const absl::StatusOr<v1::QueryResult> result = client.query(scene, builder.build());
+    if (!result.ok()) return result.status();
+    const absl::StatusOr<client::RayHits> hits = client::RayHits::of(result->blocks(0));
+    if (!hits.ok()) return hits.status();
+    if (hits->size() != count) return absl::DataLossError("an answer does not hold one row a ray");
+    for (size_t i = 0; i < count; ++i)
+      if (!(hits->t(i) <= 1 + kEdgeAllowance)) ++leaks;
+  }
+  return leaks;
+}
+
+absl::Status check_leaks(const client::Client& client, const DemoOptions& options, const DemoLevel& level,
+                         DemoTable& table) {
+  uint64_t rays = 0, leaks = 0;
+  const size_t each = options.edge_rays / level.instances.size();
+  for (const CheckedInstance& instance : level.instances) {
+    const EdgeRays aimed = aim_at_edges(instance.triangles, each, options.seed);
+    const absl::StatusOr<uint64_t> found = count_leaks(client, options.scene, aimed, instance.transform);
+    if (!found.ok()) return found.status();
+    rays += aimed.size();
+    leaks += *found;
+  }
+  table.add_check("rays at shared edges: leaks", rays, leaks);
+  return absl::OkStatus();
+}
+
+// Four kinds in one batch, large enough to be split.
+v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
+  DemoRandom random(seed);
+  v1::QueryBatch mixed;
+  for (const DemoKind kind : kDemoKinds) *mixed.add_blocks() = demo_batch(kind, world, random, 2048).blocks(0);
+  return mixed;
+}
+
+// The same scene on a second server, at the same tick, must answer with the same bytes.
+absl::Status check_other(const client::Client& client, const DemoOptions& options, const ImportedLevel& level,
+                         const DemoWorld& world, uint64_t tick, DemoTable& table) {
+  const absl::StatusOr<std::unique_ptr<client::Client>> other = client::Client::connect(options.compare);
+  if (!other.ok()) return other.status();
+  if (absl::Status status = create_level(**other, options.scene, level); !status.ok()) return status;
+  for (const v1::UpdateBatch& batch : {world.inserts(), world.moves(tick)})
+    if (absl::Status status = (*other)->apply(options.scene, batch).status(); !status.ok()) return status;
+  const v1::QueryBatch batch = mixed_batch(world, options.seed + 77);
+  const absl::StatusOr<v1::QueryResult> here = client.query(options.scene, batch);
+  const absl::StatusOr<v1::QueryResult> there = (*other)->query(options.scene, batch);
+  if (!here.ok()) return here.status();
+  if (!there.ok()) return there.status();
+  uint64_t different = 0;
+  for (int i = 0; i < here->blocks_size(); ++i)
+    if (here->blocks(i).SerializeAsString() != there->blocks(i).SerializeAsString()) ++different;
+  table.add_check("same batch on the other server: different blocks", static_cast<uint64_t>(here->blocks_size()),
+                  different);
+  return absl::OkStatus();
+}
+
+void describe(const DemoOptions& options, const ImportedLevel& level, const DemoLevel& placed, const LoadResult& load,
+              DemoTable& table) {
+  const std::string name = level.meshes.front().name;
+  table.report().head = {{"level", options.file.empty() ? "generated city" : name},
+                         {"triangles", placed.triangles},
+                         {"objects", options.objects},
+                         {"seconds", Json::parse(absl::StrFormat("%.1f", load.seconds))},
+                         {"revisions", load.last_revision - load.first_revision + 1},
+                         {"last_revision", load.last_revision},
+                         {"wrong", table.all_wrong()}};
+}
+
+absl::Status demo(const DemoOptions& options, Context& context) {
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const absl::StatusOr<ImportedLevel> level = load_level(options);
+  if (!level.ok()) return level.status();
+  if (level->meshes.empty()) return absl::InvalidArgumentError("the level holds no mesh");
+  const DemoLevel placed = place_level(*level);
+  context.err() << "level: " << level->meshes.front().name << ", " << placed.triangles << " triangles\n";
+  if (absl::Status status = create_level(**client, options.scene, *level); !status.ok()) return status;
+
+  const DemoWorld world(placed.bounds, options.objects, options.seed);
+  if (absl::Status status = (*client)->apply(options.scene, world.inserts()).status(); !status.ok()) return status;
+  context.err() << "moving " << options.objects << " objects " << options.rate << " times a second for "
+                << options.seconds << " s while clients ask ...\n";
+  const LoadOptions load_options{options.scene, static_cast<uint64_t>(options.seconds * options.rate), options.rate,
+                                 options.seed};
+  absl::StatusOr<LoadResult> load = run_load(**client, world, load_options);
+  if (!load.ok()) return load.status();
+
+  context.err() << "checking answers by brute force ...\n";
+  DemoTable table;
+  table.add_load("moves", load->moves, load->seconds);
+  check_samples(options, placed, world, *load, table);
+  if (absl::Status status = check_leaks(**client, options, placed, table); !status.ok()) return status;
+  if (!options.compare.empty())
+    if (absl::Status s = check_other(**client, options, *level, world, load->last_tick, table); !s.ok()) return s;
+  describe(options, *level, placed, *load, table);
+  context.write(table.report());
+  if (table.all_wrong() == 0) return absl::OkStatus();
+  return absl::InternalError(absl::StrCat(table.all_wrong(), " answers were wrong; please report this with the table"));
+}
+
+}  // namespace
+
+void add_demo_command(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<DemoOptions>();
+  CLI::App& command = *parent.add_subcommand(
+      "demo", "Load a level, move objects through it, ask meanwhile, and check the answers by brute force");
+  command.footer(
+      "Every answer kept for checking is compared bit for bit with the state of its own tick. Exits 1 on any "
+      "difference.\nExamples:\n  locus demo\n  locus demo pak1-maps.pk3 --entry maps/delta.bsp --seconds 10\n"
+      "  locus demo level.glb --objects 50000 --compare 127.0.0.1:7777");
+  command.add_option("FILE", options->file, "Level to import [a generated city]")->check(CLI::ExistingFile);
+  command.add_option("--entry", options->import.entry, "Level inside a .pk3");
+  command.add_option("--scene", options->scene, "Scene to make anew")->capture_default_str();
+  command.add_option("--objects", options->objects, "Moving objects")->check(CLI::Range(1, 1'000'000));
+  command.add_option("--seconds", options->seconds, "How long to move them")->check(CLI::Range(0.1, 3600.0));
+  command.add_option("--rate", options->rate, "Ticks a second")->check(CLI::Range(1.0, 1000.0));
+  command.add_option("--checks", options->checks, "Answers of each kind to check")->check(CLI::Range(1, 1'000'000));
+  command.add_option("--edge-rays", options->edge_rays, "Rays to aim at shared edges")
+      ->check(CLI::Range(1, 10'000'000));
+  command.add_option("--triangles", options->city_triangles, "Of the generated city")
+      ->check(CLI::Range(12, 10'000'000));
+  command.add_option("--seed", options->seed, "Of all that is random");
+  command.add_option("--compare", options->compare, "A second server that must answer with the same bytes");
+  run_when_chosen(command, options, context, demo);
+}
+
+}  // namespace locus::cli

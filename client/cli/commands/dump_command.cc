@@ -1,0 +1,74 @@
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "client/cli/commands.h"
+#include "client/cli/commands/view_options.h"
+#include "client/cli/default_scene.h"
+#include "client/cli/report_stream.h"
+#include "client/cli/rows/scene_rows.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+namespace {
+
+constexpr char kRowsName[] = "things";
+constexpr size_t kWidthRows = 1000;  // rows of a table that decide how wide its columns are
+
+struct DumpOptions {
+  std::string scene;
+  ViewOptions view;
+};
+
+// Whatever a line in a script may want to look at is held; else rows go out as they come in.
+absl::Status dump(const DumpOptions& options, Context& context) {
+  if (absl::Status checked = check(options.view); !checked.ok()) return checked;
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const Things things = things_of(options.view);
+  constexpr char kNoRows[] = "an empty scene";
+  Report kept;
+  kept.rows_name = kRowsName;
+  kept.no_rows = kNoRows;
+  kept.keys = thing_keys(things);
+  ReportStream stream(
+      context.out(), context.options().format,
+      {.rows_name = kRowsName, .keys = thing_keys(things), .no_rows = kNoRows, .width_rows = kWidthRows});
+  bool begun = false;
+  const auto take = [&](const v1::DumpSceneResponse& piece) {
+    const Json head = {{"scene", options.scene}, {"epoch", id_json(piece.epoch())}, {"revision", piece.revision()}};
+    if (!begun && !context.keeps_reports()) stream.begin(head);
+    begun = true;
+    kept.head = head;
+    return for_each_thing(piece, [&](const SceneThing& thing) {
+      if (!is_among(things, thing.kind)) return absl::OkStatus();
+      if (context.keeps_reports()) {
+        kept.rows.push_back(thing_row(thing, things));
+      } else {
+        stream.add(thing_row(thing, things));
+      }
+      return absl::OkStatus();
+    });
+  };
+  const absl::Status dumped = (*client)->dump(dump_request(options.scene, options.view, context), take);
+  if (context.keeps_reports() && dumped.ok()) context.write(kept);
+  if (!context.keeps_reports() && begun) stream.end();
+  return dumped;
+}
+
+}  // namespace
+
+void add_dump_command(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<DumpOptions>();
+  CLI::App& command =
+      *parent.add_subcommand("dump", "Write everything in a scene at one revision, objects and instances, by id");
+  command.footer(R"(Examples:
+  locus dump arena
+  locus -o ndjson dump arena --objects | locus insert copy mixed --from-ndjson -
+  locus -o json dump arena --exactly 12 --epoch 0x5f3a)");
+  add_scene_argument(command, options->scene);
+  add_view_options(command, options->view);
+  run_when_chosen(command, options, context, dump);
+}
+
+}  // namespace locus::cli

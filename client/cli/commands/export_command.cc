@@ -1,0 +1,118 @@
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "client/cli/choices.h"
+#include "client/cli/commands.h"
+#include "client/cli/commands/view_options.h"
+#include "client/cli/default_scene.h"
+#include "client/cli/failure.h"
+#include "client/cli/levels/export/scene_export.h"
+#include "client/cli/levels/mesh_fetch.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+namespace {
+
+struct ExportOptions {
+  std::string scene;
+  std::string out;
+  UpAxis up = UpAxis::kY;
+  ViewOptions view;
+};
+
+absl::Status check(const ExportOptions& options) {
+  if (!absl::EndsWith(absl::AsciiStrToLower(options.out), ".glb"))
+    return usage_error(absl::StrCat("cannot tell what to write to ", options.out, ": give a path that ends in .glb"));
+  return check(options.view);
+}
+
+// From the scene as it is now. The dump may be of another revision, so this is a choice of where to stand, no promise.
+absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
+  const absl::StatusOr<v1::Scene> scene = client.get_scene(options.scene);
+  if (!scene.ok()) return scene.status();
+  if (!scene->has_min() || !scene->has_max()) return std::array<double, 3>{};
+  return recentre_of({scene->min().x(), scene->min().y(), scene->min().z()},
+                     {scene->max().x(), scene->max().y(), scene->max().z()});
+}
+
+// Nodes for everything that is wanted. What the answer says about the scene.
+absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file, client::Client& client,
+                                Context& context) {
+  Json head = {{"file", options.out}, {"scene", options.scene}};
+  const auto take = [&](const v1::DumpSceneResponse& piece) {
+    head["epoch"] = id_json(piece.epoch());
+    head["revision"] = piece.revision();
+    absl::Status taken = for_each_thing(piece, [&](const SceneThing& thing) {
+      return is_among(things_of(options.view), thing.kind) ? file.add(thing) : absl::OkStatus();
+    });
+    if (context.progress() == Progress::kLive)
+      context.err() << "\r\x1b[Kreading " << options.scene << ": " << file.things() << " things" << std::flush;
+    return taken;
+  };
+  const absl::Status read = client.dump(dump_request(options.scene, options.view, context), take);
+  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
+  if (!read.ok()) return read;
+  if (file.things() == 0)
+    return absl::FailedPreconditionError(absl::StrCat("scene ", options.scene, " has nothing to export"));
+  return head;
+}
+
+absl::Status export_scene(const ExportOptions& options, Context& context) {
+  if (absl::Status checked = check(options); !checked.ok()) return checked;
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  const absl::StatusOr<std::array<double, 3>> recentre = find_recentre(options, **client);
+  if (!recentre.ok()) return recentre.status();
+  SceneExport file(options.scene, options.up, *recentre);
+  absl::StatusOr<Json> head = read_scene(options, file, **client, context);
+  if (!head.ok()) return head.status();
+  uint64_t triangles = 0;
+  for (const std::string& name : file.meshes()) {
+    const absl::StatusOr<ImportedMesh> mesh = fetch_mesh(name, context);
+    if (!mesh.ok()) return mesh.status();
+    triangles += mesh->indices.size() / 3;
+    if (absl::Status set = file.set_mesh(name, *mesh); !set.ok()) return set;
+  }
+  const absl::StatusOr<uint64_t> bytes = file.writer().write(options.out);
+  if (!bytes.ok()) return bytes.status();
+  if (*recentre != std::array<double, 3>{}) {
+    context.err() << "note: the file's coordinates are 32-bit floats: everything was moved by " << -(*recentre)[0]
+                  << "," << -(*recentre)[1] << "," << -(*recentre)[2] << " to the origin\n";
+    (*head)["recentre"] = doubles_json(*recentre);
+  }
+  Report report;
+  report.head = *std::move(head);
+  report.head["things"] = file.things();
+  report.head["meshes"] = file.meshes().size();
+  report.head["triangles"] = triangles;
+  report.head["bytes"] = *bytes;
+  context.write(report);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void add_export_command(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<ExportOptions>();
+  CLI::App& command = *parent.add_subcommand(
+      "export", "Write a scene's level and objects to a GLB file, for Blender and other editors");
+  command.footer(R"(Examples:
+  locus export arena arena.glb
+  locus export arena arena.glb --up z
+  locus export arena level.glb --instances)");
+  add_scene_argument(command, options->scene);
+  command.add_option("OUT", options->out, "The file, ending in .glb")->required();
+  const NamedValues<UpAxis> axes = {{"y", UpAxis::kY}, {"z", UpAxis::kZ}};
+  command.add_option("--up", options->up, "What is up in the scene: y (as in the file), z (turned to y) [y]")
+      ->type_name("AXIS")
+      ->transform(choices(axes));
+  add_view_options(command, options->view);
+  run_when_chosen(command, options, context, export_scene);
+}
+
+}  // namespace locus::cli

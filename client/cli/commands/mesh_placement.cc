@@ -1,0 +1,107 @@
+#include "client/cli/commands/mesh_placement.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+namespace {
+
+// The last message is followed by the server's work, which takes the longest: the line stays until the answer is there.
+client::UploadProgress progress_line(const std::string& name, Context& context) {
+  if (context.progress() == Progress::kSilent) return {};
+  return [&context, name](uint64_t sent, uint64_t total) {
+    constexpr uint64_t kMebibyte = 1u << 20;
+    context.err() << "\r\x1b[Kuploading " << name << ": " << sent / kMebibyte << " of " << total / kMebibyte << " MiB"
+                  << (sent == total ? ", the server is building its tree" : "") << std::flush;
+  };
+}
+
+std::string mesh_name(const PlacementOptions& options, const ImportedLevel& level, const ImportedMesh& mesh) {
+  if (options.mesh.empty()) return mesh.name;
+  return level.meshes.size() == 1 ? options.mesh : absl::StrCat(options.mesh, "-", mesh.name);
+}
+
+absl::StatusOr<v1::UploadMeshResponse> upload(const std::string& name, const ImportedMesh& mesh, client::Client& client,
+                                              Context& context) {
+  std::vector<v1::MeshPart> parts;
+  for (const MeshPart& part : mesh.parts) {
+    v1::MeshPart& sent = parts.emplace_back();
+    sent.set_name(part.name);
+    sent.set_first_triangle(part.first_triangle);
+  }
+  absl::StatusOr<v1::UploadMeshResponse> uploaded = client.upload_mesh(
+      {.name = name, .vertices = mesh.vertices, .indices = mesh.indices, .parts = parts}, progress_line(name, context));
+  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
+  return uploaded;
+}
+
+absl::Status create_scene(const std::string& name, client::Client& client) {
+  v1::CreateSceneRequest request;
+  request.set_name(name);
+  request.set_if_absent(true);
+  return client.create_scene(request).status();
+}
+
+void add_placement(const PlacementOptions& options, const ImportedLevel& level, const std::string& mesh,
+                   v1::ChangeInstancesRequest& change) {
+  const uint64_t position = static_cast<uint64_t>(change.place_size());
+  v1::Placement& placement = *change.add_place();
+  placement.set_mesh(mesh);
+  if (options.id.value != 0) placement.add_ids(options.id.value + position);
+  placement.add_translations(level.recentre[0] + options.at.x);
+  placement.add_translations(level.recentre[1] + options.at.y);
+  placement.add_translations(level.recentre[2] + options.at.z);
+  for (const uint32_t layers : values32_of(options.layers)) placement.add_layers(layers);
+  for (const Number64& group : options.groups) placement.add_groups(group.value);
+}
+
+}  // namespace
+
+void add_placement_options(CLI::App& command, PlacementOptions& options) {
+  command.add_flag("--create", options.create, "Create the scene if there is none");
+  command.add_option("--mesh", options.mesh, "The mesh's name on the server [the level's]")->type_name("NAME");
+  command.add_option("--at", options.at, "Where its origin goes [0,0,0]")->type_name("X,Y,Z");
+  command.add_option("--id", options.id, "The instance's id [chosen by the server]")->type_name("ID");
+  command.add_option("--layers", options.layers, "What queries' masks look at [1]")
+      ->type_name("BITS")
+      ->expected(1)
+      ->check(fits_32_bits());
+  command.add_option("--group", options.groups, "What it is part of [0: nothing]")->type_name("GROUP")->expected(1);
+}
+
+absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context) {
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  if (options.create) {
+    const absl::Status created = create_scene(options.scene, **client);
+    if (!created.ok()) return created;
+  }
+  Report report;
+  report.rows_name = "meshes";
+  v1::ChangeInstancesRequest change;
+  change.set_scene(options.scene);
+  for (const ImportedMesh& mesh : level.meshes) {
+    const std::string name = mesh_name(options, level, mesh);
+    const absl::StatusOr<v1::UploadMeshResponse> uploaded = upload(name, mesh, **client, context);
+    if (!uploaded.ok()) return uploaded.status();
+    add_placement(options, level, name, change);
+    report.rows.push_back({{"mesh", name},
+                           {"triangles", uploaded->mesh().triangles()},
+                           {"zero_area_triangles", uploaded->mesh().zero_area_triangles()},
+                           {"already_known", uploaded->already_known()}});
+  }
+  const absl::StatusOr<v1::ChangeInstancesResponse> placed = (*client)->change_instances(change);
+  if (!placed.ok()) return placed.status();
+  context.remember_own(options.scene, {placed->epoch(), placed->revision()});
+  for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed->ids_size(); ++i) {
+    report.rows[i]["id"] = id_json(placed->ids(static_cast<int>(i)));
+  }
+  report.head = {{"scene", options.scene}, {"revision", placed->revision()}};
+  if (!level.source_format.empty()) report.head["format"] = level.source_format;
+  context.write(report);
+  return absl::OkStatus();
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,56 @@
+#include "client/cli/commands/query_command.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/commands.h"
+
+namespace locus::cli {
+
+absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::QueryBuilder& builder,
+                                          Context& context) {
+  const absl::Status checked = check(options);
+  if (!checked.ok()) return checked;
+  apply_to_batch(options, context, builder);
+  const absl::StatusOr<client::Client*> client = context.connect();
+  if (!client.ok()) return client.status();
+  absl::StatusOr<v1::QueryResult> result = (*client)->query(options.scene, builder.build());
+  if (result.ok() && result->blocks_size() != 1) {
+    return absl::DataLossError(absl::StrCat("the server answered one block with ", result->blocks_size()));
+  }
+  return result;
+}
+
+absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
+                            const std::string& rows_name, Context& context) {
+  const absl::StatusOr<v1::QueryResult> result = ask_block(options, builder, context);
+  if (!result.ok()) return result.status();
+  absl::StatusOr<std::vector<Json>> rows = rows_json(result->blocks(0), layout);
+  if (!rows.ok()) return rows.status();
+  Report report;
+  report.head = result_head(*result);
+  report.rows_name = rows_name;
+  report.rows = *std::move(rows);
+  report.keys = row_keys(layout);
+  context.write(report);
+  return absl::OkStatus();
+}
+
+void add_query_command(CLI::App& parent, Context& context) {
+  CLI::App& command =
+      *parent.add_subcommand("query", "Ask what rays hit, what balls and boxes touch, and what is nearest");
+  command.footer(R"(Examples:
+  locus query ray arena --from 0,1,0 --dir 0,0,-1
+  locus query ball arena --at 0,0,0 --radius 10
+  locus query box arena --at 0,0,0 --half 5,5,5
+  locus query nearest arena --at 0,0,0 --k 5
+  locus query ray arena --from 0,1,0 --dir 0,0,-1 --as-of 120+0.5
+  locus -o csv query ray arena --from-csv rays.csv > hits.csv)");
+  command.require_subcommand(1);
+  add_query_ray(command, context);
+  add_query_ball(command, context);
+  add_query_box(command, context);
+  add_query_nearest(command, context);
+}
+
+}  // namespace locus::cli

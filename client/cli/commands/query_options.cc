@@ -1,0 +1,108 @@
+#include "client/cli/commands/query_options.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "client/cli/choices.h"
+#include "client/cli/default_scene.h"
+#include "client/cli/failure.h"
+
+namespace locus::cli {
+namespace {
+
+const NamedValues<v1::Column>& column_names() {
+  static const auto& names = *new NamedValues<v1::Column>{
+      {"t", v1::COLUMN_T},         {"id", v1::COLUMN_ID},         {"triangle", v1::COLUMN_TRIANGLE},
+      {"uv", v1::COLUMN_UV},       {"normal", v1::COLUMN_NORMAL}, {"point", v1::COLUMN_POINT},
+      {"group", v1::COLUMN_GROUP}, {"tag", v1::COLUMN_TAG},       {"layers", v1::COLUMN_LAYERS},
+      {"pose", v1::COLUMN_POSE}};
+  return names;
+}
+
+// What is not finite travels as it is, for the server to name the position and not the frame.
+bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
+
+void add_filter_options(CLI::App& command, QueryOptions& options) {
+  const NamedValues<v1::Source> sources = {
+      {"both", v1::SOURCE_BOTH}, {"static", v1::SOURCE_STATIC}, {"dynamic", v1::SOURCE_DYNAMIC}};
+  command.add_option("--source", options.source, "Where to look: both, static, dynamic [both]")
+      ->type_name("SOURCE")
+      ->transform(choices(sources));
+  const NamedValues<v1::Precision> precisions = {{"exact", v1::PRECISION_EXACT},
+                                                 {"conservative", v1::PRECISION_CONSERVATIVE}};
+  command.add_option("--precision", options.precision, "What decides: exact, conservative (bounds) [exact]")
+      ->type_name("PRECISION")
+      ->transform(choices(precisions));
+  add_repeatable(command, "--mask", options.masks, "BITS", "Find only what has one of these layers [all]")
+      ->check(fits_32_bits());
+  add_repeatable(command, "--ignore-group", options.ignore_groups, "GROUP",
+                 "Pass over a group, one a query or for all");
+  add_repeatable(command, "--ignore-id", options.ignore_ids, "ID", "Pass over an id, at most 64");
+}
+
+void add_view_options(CLI::App& command, QueryOptions& options) {
+  command.add_option("--at-least", options.at_least, "Wait for this revision")->type_name("REVISION");
+  command.add_option("--exactly", options.exactly, "Ask at this revision")->type_name("REVISION");
+  command.add_option("--epoch", options.epoch, "The epoch the revision counts in")->type_name("EPOCH");
+  command.add_option("--max-work", options.max_work, "Budget in nodes, cells and tests [none]")->type_name("WORK");
+  command.add_flag("--explain", options.explain, "Report the work done");
+}
+
+}  // namespace
+
+void add_query_options(CLI::App& command, QueryOptions& options) {
+  add_scene_argument(command, options.scene);
+  add_filter_options(command, options);
+  command.add_option("--max-results", options.max_results, "Most rows a query [1024]")->type_name("ROWS");
+  command
+      .add_option("--columns", options.columns,
+                  "What to show: t, id, triangle, uv, normal, point, group, tag, layers, pose")
+      ->type_name("NAMES")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->transform(choices(column_names()));
+  add_past_options(command, options.past);
+  add_view_options(command, options);
+}
+
+void add_detail_option(CLI::App& command, v1::StaticDetail& detail) {
+  const NamedValues<v1::StaticDetail> details = {{"instances", v1::STATIC_DETAIL_INSTANCES},
+                                                 {"triangles", v1::STATIC_DETAIL_TRIANGLES},
+                                                 {"sorted", v1::STATIC_DETAIL_TRIANGLES_SORTED}};
+  command.add_option("--detail", detail, "Static rows: instances, triangles, sorted (triangles) [instances]")
+      ->type_name("DETAIL")
+      ->transform(choices(details));
+}
+
+absl::Status check(const QueryOptions& options) {
+  if (options.at_least && options.exactly) return usage_error("give --at-least or --exactly, not both");
+  return absl::OkStatus();
+}
+
+void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder) {
+  if (const std::optional<client::Revision> own = context.own(scene)) builder.at_least(*own);
+}
+
+void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder) {
+  if (!options.at_least && !options.exactly) see_own(options.scene, context, builder);
+  if (options.at_least) builder.at_least({options.epoch.value, *options.at_least});
+  if (options.exactly) builder.exactly({options.epoch.value, *options.exactly});
+  builder.max_work(options.max_work);
+  if (options.explain) builder.explain();
+}
+
+FramedPositions framed(const std::vector<Triple>& positions) {
+  const bool all_floats = std::all_of(positions.begin(), positions.end(), [](const Triple& position) {
+    return is_float(position.x) && is_float(position.y) && is_float(position.z);
+  });
+  FramedPositions result;
+  if (!all_floats) result.frame = {positions.front().x, positions.front().y, positions.front().z};
+  for (const Triple& position : positions) {
+    result.offsets.push_back(static_cast<float>(position.x - result.frame.x));
+    result.offsets.push_back(static_cast<float>(position.y - result.frame.y));
+    result.offsets.push_back(static_cast<float>(position.z - result.frame.z));
+  }
+  return result;
+}
+
+}  // namespace locus::cli

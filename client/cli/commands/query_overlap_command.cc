@@ -1,0 +1,183 @@
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/cli/arguments.h"
+#include "client/cli/commands.h"
+#include "client/cli/commands/bulk_query.h"
+#include "client/cli/commands/query_command.h"
+#include "client/cli/failure.h"
+
+namespace locus::cli {
+namespace {
+
+struct BallOptions {
+  QueryOptions query;
+  BulkOptions bulk;
+  std::vector<Triple> at;
+  std::vector<double> radii;
+  v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
+};
+
+struct BoxOptions {
+  QueryOptions query;
+  BulkOptions bulk;
+  std::vector<Triple> at;
+  std::vector<Triple> half_extents;
+  std::vector<Quaternion> rotations;
+  v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
+};
+
+// The columns to ask for and show: ids always, triangles where they are the rows.
+std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail detail) {
+  std::vector<v1::Column> columns = {v1::COLUMN_ID};
+  if (detail == v1::STATIC_DETAIL_TRIANGLES || detail == v1::STATIC_DETAIL_TRIANGLES_SORTED) {
+    columns.push_back(v1::COLUMN_TRIANGLE);
+  }
+  columns.insert(columns.end(), options.columns.begin(), options.columns.end());
+  return columns;
+}
+
+// Fields of bulk rows.
+enum BallField : size_t { kBallAt, kRadius, kBallFilter };
+enum BoxField : size_t { kBoxAt, kHalf, kRotation, kBoxFilter };
+
+Field at_field() {
+  return {.name = "at", .kind = FieldKind::kCoordinate, .parts = "xyz", .aliases = {"position"}, .required = true};
+}
+
+template <class Options>
+absl::Status check_input(const Options& options) {
+  absl::Status checked = check(options.query, options.bulk);
+  if (checked.ok() && !options.at.empty()) checked = usage_error("give --at or an input with its columns, not both");
+  return checked;
+}
+
+template <class Options>
+BulkQuery bulk_query(const Options& options, const char* kind) {
+  return {.schema = {at_field()},
+          .layout = {.query = kind, .columns = columns_of(options.query, options.detail)},
+          .rows_name = "found",
+          .add_block = {}};
+}
+
+absl::Status query_balls_of_input(const BallOptions& options, Context& context) {
+  absl::Status checked = check_input(options);
+  checked.Update(at_most_one(options.radii, "--radius"));
+  if (!checked.ok()) return checked;
+  BulkQuery query = bulk_query(options, "ball");
+  query.schema.push_back(column_or_option({.name = "radius", .required = true}, options.radii, "--radius"));
+  add_filter_fields(options.query, query.schema);
+  query.add_block = [&](const BlockRows& rows, client::QueryBuilder& builder) {
+    client::BallBlock block = builder.balls();
+    apply_to_block(options.query, block);
+    block.frame(rows.frame).columns(query.layout.columns).detail(options.detail);
+    block.balls(rows.offsets, float_column(rows.batch.columns[kRadius], rows.rows, {0}, floats_of(options.radii)));
+    apply_filter_columns(options.query, rows, kBallFilter, block);
+  };
+  return run_bulk_query(query, options.query, options.bulk, context);
+}
+
+absl::Status query_boxes_of_input(const BoxOptions& options, Context& context) {
+  absl::Status checked = check_input(options);
+  checked.Update(at_most_one(options.half_extents, "--half"));
+  checked.Update(at_most_one(options.rotations, "--rotation"));
+  if (!checked.ok()) return checked;
+  BulkQuery query = bulk_query(options, "box");
+  query.schema.push_back(column_or_option(
+      {.name = "half", .parts = "xyz", .aliases = {"half_extents"}, .required = true}, options.half_extents, "--half"));
+  query.schema.push_back(column_or_option({.name = "rotation", .parts = "xyzw"}, options.rotations, "--rotation"));
+  add_filter_fields(options.query, query.schema);
+  query.add_block = [&](const BlockRows& rows, client::QueryBuilder& builder) {
+    const std::vector<RowColumn>& columns = rows.batch.columns;
+    client::BoxBlock block = builder.boxes();
+    apply_to_block(options.query, block);
+    block.frame(rows.frame).columns(query.layout.columns).detail(options.detail);
+    block.boxes(rows.offsets, float_column(columns[kHalf], rows.rows, {0, 0, 0}, floats_of(options.half_extents)));
+    block.rotations(float_column(columns[kRotation], rows.rows, {0, 0, 0, 1}, floats_of(options.rotations)));
+    apply_filter_columns(options.query, rows, kBoxFilter, block);
+  };
+  return run_bulk_query(query, options.query, options.bulk, context);
+}
+
+absl::Status query_ball(const BallOptions& options, Context& context) {
+  if (options.bulk.given()) return query_balls_of_input(options, context);
+  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  if (options.at.empty() || options.radii.empty()) {
+    return usage_error("give --at and --radius, or rows with --from-csv or --from-ndjson");
+  }
+  const FramedPositions at = framed(options.at);
+  const RowLayout layout = {.query = "ball", .columns = columns_of(options.query, options.detail), .frame = at.frame};
+  client::QueryBuilder builder;
+  client::BallBlock block = builder.balls();
+  block.frame(at.frame).columns(layout.columns).detail(options.detail);
+  block.balls(at.offsets, floats_of(options.radii));
+  apply_to_block(options.query, block);
+  return ask_and_report(options.query, builder, layout, "found", context);
+}
+
+absl::Status query_box(const BoxOptions& options, Context& context) {
+  if (options.bulk.given()) return query_boxes_of_input(options, context);
+  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  if (options.at.empty() || options.half_extents.empty()) {
+    return usage_error("give --at and --half, or rows with --from-csv or --from-ndjson");
+  }
+  const FramedPositions at = framed(options.at);
+  const RowLayout layout = {.query = "box", .columns = columns_of(options.query, options.detail), .frame = at.frame};
+  client::QueryBuilder builder;
+  client::BoxBlock block = builder.boxes();
+  block.frame(at.frame).columns(layout.columns).detail(options.detail);
+  block.boxes(at.offsets, floats_of(options.half_extents)).rotations(floats_of(options.rotations));
+  apply_to_block(options.query, block);
+  return ask_and_report(options.query, builder, layout, "found", context);
+}
+
+// What only overlaps have.
+template <class Options>
+void add_overlap_options(CLI::App& command, Options& options) {
+  add_detail_option(command, options.detail);
+  command.add_option("--after-id", options.query.after_id, "Only higher ids: goes on after a cut")->type_name("ID");
+  add_bulk_query_options(command, options.bulk);
+  add_query_options(command, options.query);
+}
+
+}  // namespace
+
+void add_query_ball(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<BallOptions>();
+  CLI::App& command = *parent.add_subcommand("ball", "Ask what balls touch");
+  command.footer(R"(Examples:
+  locus query ball arena --at 0,0,0 --radius 10
+  locus query ball arena --at 0,0,0 --at 50,0,0 --radius 2.5 --source dynamic --columns group,tag
+  locus query ball arena --at 1,2,3 --radius 0 --detail triangles
+  locus -o csv query ball arena --from-csv balls.csv > found.csv
+
+Rows: at.x,at.y,at.z,radius[,mask,ignore_group] or {"at": [0,0,0], "radius": 10}; an option given once stands for a
+column. All rows are answered at one revision; see --follow.)");
+  add_repeatable(command, "--at", options->at, "X,Y,Z", "Its centre; repeat for more balls");
+  add_repeatable(command, "--radius", options->radii, "R", "Its radius, one for each or one for all");
+  add_overlap_options(command, *options);
+  run_or_check_when_chosen(command, options, context, query_ball);
+}
+
+void add_query_box(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<BoxOptions>();
+  CLI::App& command = *parent.add_subcommand("box", "Ask what boxes touch, turned ones too");
+  command.footer(R"(Examples:
+  locus query box arena --at 0,0,0 --half 5,5,5
+  locus query box arena --at 0,0,0 --half 5,1,1 --rotation 0,0,0.3826834,0.9238795
+  locus -o ndjson query box arena --at 0,0,0 --half 9,9,9 --detail sorted --max-results 100
+  generator | locus -o ndjson query box arena --from-ndjson - --half 5,5,5
+
+Rows: at.x,at.y,at.z,half.x,half.y,half.z[,rotation.x,rotation.y,rotation.z,rotation.w,mask,ignore_group] or
+{"at": [0,0,0], "half": [5,5,5]}; an option given once stands for a column. All rows are answered at one revision; see
+--follow.)");
+  add_repeatable(command, "--at", options->at, "X,Y,Z", "Its centre; repeat for more boxes");
+  add_repeatable(command, "--half", options->half_extents, "X,Y,Z",
+                 "Half its size along its own axes, one for each or one for all");
+  add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Unit quaternion [0,0,0,1]");
+  add_overlap_options(command, *options);
+  run_or_check_when_chosen(command, options, context, query_box);
+}
+
+}  // namespace locus::cli

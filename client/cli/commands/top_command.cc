@@ -1,0 +1,140 @@
+// `locus top`: what a server does, from its metrics, as a table that renews itself.
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/extras/top/http_get.h"
+#include "client/cli/extras/top/metrics_text.h"
+#include "client/cli/extras/top/top_figures.h"
+#include "client/cli/output.h"
+
+namespace locus::cli {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kTimeout{5000};
+// Cursor to the upper left corner, and everything away.
+constexpr const char* kClearScreen = "\x1b[H\x1b[2J";
+
+struct TopOptions {
+  std::string address = "127.0.0.1:7576";
+  double interval = 2;
+  bool once = false;
+  bool json = false;
+};
+
+struct Scraped {
+  steady_clock::time_point at;
+  std::vector<MetricSample> samples;
+};
+
+absl::StatusOr<Scraped> scrape(const TopOptions& options) {
+  const absl::StatusOr<std::string> text = http_get(options.address, "/metrics", kTimeout);
+  if (!text.ok()) return text.status();
+  absl::StatusOr<std::vector<MetricSample>> samples = parse_metrics(*text);
+  if (!samples.ok()) return samples.status();
+  return Scraped{steady_clock::now(), *std::move(samples)};
+}
+
+// Ctrl-C and the like end the table, not the program in the middle of a line: while this lives they wait to be asked.
+class Patience {
+ public:
+  Patience() {
+    sigemptyset(&ending_);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ending_, signal);
+    pthread_sigmask(SIG_BLOCK, &ending_, &before_);
+  }
+  ~Patience() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  Patience(const Patience&) = delete;
+  Patience& operator=(const Patience&) = delete;
+
+  // False once somebody wants it to end.
+  bool wait(double seconds) const {
+    const timespec time = {static_cast<time_t>(seconds), static_cast<long>((seconds - std::floor(seconds)) * 1e9)};
+    return sigtimedwait(&ending_, nullptr, &time) < 0;
+  }
+
+ private:
+  sigset_t ending_{};
+  sigset_t before_{};
+};
+
+void write_tables(Context& context, const TopFigures& figures) {
+  for (const auto& [name, rows] : {std::pair{"rpcs", &figures.rpcs}, std::pair{"queries", &figures.queries}}) {
+    Report report;
+    report.rows_name = name;
+    report.rows = *rows;
+    report.no_rows = "no calls";
+    context.write(report);
+    context.out() << "\n";
+  }
+  Report scenes;
+  scenes.rows_name = "scenes";
+  scenes.rows = figures.scenes;
+  scenes.no_rows = "no scenes";
+  context.write(scenes);
+  context.out() << "\n";
+  Report server;
+  server.head = figures.server;
+  context.write(server);
+}
+
+void write(Context& context, const TopFigures& figures) {
+  if (context.options().format == Format::kTable) return write_tables(context, figures);
+  Report report;
+  report.head = {{"server", figures.server}, {"rpcs", figures.rpcs}, {"queries", figures.queries}};
+  report.rows_name = "scenes";
+  report.rows = figures.scenes;
+  context.write(report);
+}
+
+absl::Status top(const TopOptions& options, Context& context) {
+  if (options.json) context.options().format = Format::kJson;
+  const bool live = !options.once && isatty(STDOUT_FILENO) == 1 && context.options().format == Format::kTable;
+  const Patience patience;
+  absl::StatusOr<Scraped> before = scrape(options);
+  if (!before.ok()) return before.status();
+  while (patience.wait(options.interval)) {
+    absl::StatusOr<Scraped> now = scrape(options);
+    if (!now.ok()) return now.status();
+    if (live) context.out() << kClearScreen;
+    write(context,
+          top_figures(before->samples, now->samples, std::chrono::duration<double>(now->at - before->at).count()));
+    context.out().flush();
+    if (options.once || !context.out()) break;
+    before = std::move(now);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void add_top_command(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<TopOptions>();
+  CLI::App& command = *parent.add_subcommand("top", "Show what a server does, from its metrics, again and again");
+  command.footer(R"(Rates and quantiles are those of the last interval. Ctrl-C ends it, with exit code 0.
+
+Examples:
+  locus top
+  locus top --metrics-address 10.0.0.7:7576 --interval 5
+  locus top --once --json
+  locus -o csv top --once --interval 10)");
+  command.add_option("--metrics-address", options->address, "locusd's HTTP port (its --http-listen): host:port")
+      ->envname("LOCUS_METRICS_ADDRESS")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  command.add_option("--interval", options->interval, "Seconds between two looks, 0.1 to 3600 [2]")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(0.1, 3600.0).description(""));
+  command.add_flag("--once", options->once, "Show one interval and end");
+  command.add_flag("--json", options->json, "The same as `-o json`");
+  run_when_chosen(command, options, context, top);
+}
+
+}  // namespace locus::cli

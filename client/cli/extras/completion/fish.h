@@ -1,0 +1,16 @@
+// The completion script of fish, whose language is its own. Internal to the completion scripts.
+#ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_FISH_H_
+#define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_FISH_H_
+
+#include <string>
+
+#include "client/cli/command_words.h"
+
+namespace locus::cli {
+
+// The script, complete.
+std::string fish_script(const CommandWords& program);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_FISH_H_

@@ -1,0 +1,29 @@
+// The level of `locus demo`: uploaded to a server and placed, and kept here for checking.
+#ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
+#define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
+
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "client/cli/extras/demo/brute_force.h"
+#include "client/cli/levels/import/imported_mesh.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+
+struct DemoLevel {
+  std::vector<CheckedInstance> instances;
+  Aabbd bounds;  // world
+  uint64_t triangles = 0;
+};
+
+// Where the level's meshes stand, as create_level() places them: mesh i as instance i + 1.
+DemoLevel place_level(const ImportedLevel& level);
+
+// Makes `scene` anew on the server, with the level in it. A scene of that name goes.
+absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_

@@ -1,0 +1,50 @@
+// The busy part of `locus demo`: a writer that moves every object each tick, and clients that ask meanwhile.
+#ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
+#define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "client/cli/extras/demo/demo_queries.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+
+struct LoadOptions {
+  std::string scene;
+  uint64_t ticks = 150;
+  double ticks_a_second = 30;
+  uint64_t seed = 1;
+};
+
+struct Sample {
+  v1::QueryBatch batch;
+  v1::QueryResult result;
+};
+
+// What one kind of query, or the updates, came to.
+struct LoadFigures {
+  uint64_t items = 0;  // queries asked or objects moved
+  uint64_t found = 0;
+  std::vector<double> milliseconds;  // of each batch
+  std::vector<Sample> samples;       // spread over the whole run, a bounded number
+
+  double percentile(double fraction) const;
+};
+
+struct LoadResult {
+  double seconds = 0;
+  LoadFigures moves;
+  std::array<LoadFigures, kDemoKinds.size()> queries;
+  uint64_t first_revision = 0, last_revision = 0;
+  uint64_t last_tick = 0;
+};
+
+// Runs until all ticks are acked. Uses three threads besides this one. The first error of any of them ends it.
+absl::StatusOr<LoadResult> run_load(const client::Client& client, const DemoWorld& world, const LoadOptions& options);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_

@@ -1,0 +1,56 @@
+// The questions of `locus demo`, and the check of the answers by brute force. Functions without state, but for the
+// checker, which is for one thread.
+#ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
+#define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/extras/demo/brute_force.h"
+#include "client/cli/extras/demo/demo_random.h"
+#include "client/cli/extras/demo/demo_world.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+
+enum class DemoKind { kFirst, kAny, kBalls, kBoxes };
+inline constexpr std::array<DemoKind, 4> kDemoKinds = {DemoKind::kFirst, DemoKind::kAny, DemoKind::kBalls,
+                                                       DemoKind::kBoxes};
+// What the table calls it.
+std::string name_of(DemoKind kind);
+
+// One block of `count` random queries within the world.
+v1::QueryBatch demo_batch(DemoKind kind, const DemoWorld& world, DemoRandom& random, int count);
+
+// Queries that found something.
+uint64_t count_found(const v1::BlockResult& block);
+
+class DemoChecker {
+ public:
+  // Both are borrowed.
+  DemoChecker(const std::vector<CheckedInstance>& instances, const DemoWorld& world)
+      : instances_(instances), world_(world) {}
+
+  struct Outcome {
+    uint64_t checked = 0;
+    uint64_t differences = 0;
+  };
+  // Checks the first `most` queries of a batch made by demo_batch() against the state at the answer's tick: every id,
+  // triangle and distance must be the same, bit for bit.
+  Outcome check(DemoKind kind, const v1::QueryBatch& batch, const v1::QueryResult& result, int most);
+
+ private:
+  bool same_ray(DemoKind kind, const v1::QueryBlock& asked, const v1::BlockResult& got, int i) const;
+  bool same_rows(const std::vector<OverlapRow>& wanted, const v1::BlockResult& got, int i) const;
+
+  const std::vector<CheckedInstance>& instances_;
+  const DemoWorld& world_;
+  std::vector<CheckedObject> objects_;
+  std::optional<uint64_t> tick_;  // of objects_
+};
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_

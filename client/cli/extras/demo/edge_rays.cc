@@ -1,0 +1,103 @@
+#include "client/cli/extras/demo/edge_rays.h"
+
+#include <array>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "client/cli/extras/demo/demo_random.h"
+
+namespace locus::cli {
+namespace {
+
+using Corner = std::array<float, 3>;
+
+Corner key_of(Vec3f v) { return {v.x, v.y, v.z}; }
+
+// An edge and the third vertices of the triangles on it.
+struct Edge {
+  Vec3f from, to;
+  std::vector<Vec3f> opposite;
+};
+
+std::vector<Edge> shared_edges(const std::vector<Triangle>& triangles) {
+  std::map<std::pair<Corner, Corner>, Edge> edges;
+  for (const Triangle& triangle : triangles) {
+    const std::array<Vec3f, 3> v = {triangle.a, triangle.b, triangle.c};
+    for (size_t k = 0; k < 3; ++k) {
+      const Vec3f from = v[k], to = v[(k + 1) % 3];
+      Edge& edge = edges[std::minmax(key_of(from), key_of(to))];
+      edge.from = from;
+      edge.to = to;
+      edge.opposite.push_back(v[(k + 2) % 3]);
+    }
+  }
+  std::vector<Edge> shared;
+  for (auto& [key, edge] : edges)
+    if (edge.opposite.size() == 2) shared.push_back(std::move(edge));
+  return shared;
+}
+
+// The part of `point` that is across the edge, seen from its start: unit, or nothing for slivers.
+std::optional<Vec3d> across(const Edge& edge, Vec3f point) {
+  const Vec3d along = to_double(edge.to) - to_double(edge.from);
+  const Vec3d way = to_double(point) - to_double(edge.from);
+  const double length = std::sqrt(squared_length(along));
+  // Also edges so short that rounding of the ray is as long as they are.
+  if (length <= 1e-5 * max_component(abs(to_double(edge.from)))) return std::nullopt;
+  const Vec3d unit = along * (1 / length);
+  const Vec3d rest = way - unit * dot(way, unit);
+  const double height = std::sqrt(squared_length(rest));
+  if (height < 0.02 * length) return std::nullopt;
+  return rest * (1 / height);
+}
+
+struct Aim {
+  Vec3d target;
+  Vec3d away;  // where to stand, from the target
+};
+
+// In front of both triangles, between their two sides: seen from there they lie on different sides of the edge.
+std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
+  const std::optional<Vec3d> left = across(edge, edge.opposite[0]);
+  const std::optional<Vec3d> right = across(edge, edge.opposite[1]);
+  if (!left || !right) return std::nullopt;
+  const Vec3d along = to_double(edge.to) - to_double(edge.from);
+  const double length = std::sqrt(squared_length(along));
+  const Vec3d side = cross(along * (1 / length), *left);
+  const Vec3d other = cross(*right, along * (1 / length));
+  Vec3d away = side + other;
+  if (squared_length(away) < 0.5) return std::nullopt;  // folded too sharply to stand in front of both
+  const Vec3d sway = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
+  away = normalized(away) + sway;
+  if (random.unit() < 0.5f) away = -away;
+  // Both triangles must be seen clearly, on different sides.
+  const Vec3d front = cross(along * (1 / length), normalized(away));
+  if (!(dot(front, *left) * dot(front, *right) < -0.05)) return std::nullopt;
+  const double weight = 0.02 + 0.96 * random.unit();  // not so near a corner that rounding passes it
+  return Aim{to_double(edge.from) + along * weight, away * (length * (0.1 + 2 * random.unit()))};
+}
+
+void append(std::vector<float>& column, Vec3f v) { column.insert(column.end(), {v.x, v.y, v.z}); }
+
+}  // namespace
+
+EdgeRays aim_at_edges(const std::vector<Triangle>& triangles, size_t count, uint64_t seed) {
+  EdgeRays rays;
+  const std::vector<Edge> edges = shared_edges(triangles);
+  DemoRandom random(seed);
+  // A mesh of slivers alone gives up after so many tries.
+  const size_t tries = 20 * count;
+  for (size_t i = 0; !edges.empty() && i < tries && rays.size() < count; ++i) {
+    const std::optional<Aim> aimed = aim(edges[i % edges.size()], random);
+    if (!aimed) continue;
+    const Vec3f origin = to_float(aimed->target + aimed->away);
+    const Vec3f direction = to_float(aimed->target - to_double(origin));
+    if (direction == Vec3f{}) continue;
+    append(rays.origins, origin);
+    append(rays.directions, direction);
+  }
+  return rays;
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,98 @@
+#include "client/cli/extras/render/camera_options.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "client/cli/extras/render/framing.h"
+#include "client/cli/failure.h"
+
+namespace locus::cli {
+namespace {
+
+constexpr double kSceneMargin = 1.04;
+constexpr double kThingMargin = 2;  // shows what a thing stands on and next to
+
+Vec3d vector_of(const Triple& triple) { return {triple.x, triple.y, triple.z}; }
+
+// Without --up the z axis points up, and the y axis in a picture taken along z.
+absl::StatusOr<ViewAxes> axes_of(const CameraOptions& options, Vec3d forward) {
+  absl::StatusOr<ViewAxes> axes = view_axes(forward, options.up ? vector_of(*options.up) : Vec3d{0, 0, 1});
+  if (!axes.ok() && !options.up) axes = view_axes(forward, {0, 1, 0});
+  if (!axes.ok()) return usage_error(absl::StrCat(axes.status().message(), ": give another --eye, --dir or --up"));
+  return axes;
+}
+
+Lens lens_of(const CameraOptions& options, const ImageSize& size) {
+  Lens lens;
+  lens.aspect = size.aspect();
+  lens.margin = options.at ? kThingMargin : kSceneMargin;
+  if (options.orthographic) {
+    lens.projection = Projection::kOrthographic;
+    lens.half_height = *options.orthographic / 2;
+  } else {
+    lens.half_height = half_height_of(options.degrees);
+  }
+  return lens;
+}
+
+}  // namespace
+
+std::istream& operator>>(std::istream& in, ImageSize& size) {
+  std::string text;
+  in >> text;
+  const std::pair<std::string, std::string> sides = absl::StrSplit(text, absl::MaxSplits('x', 1));
+  const bool good = absl::SimpleAtoi(sides.first, &size.width) && absl::SimpleAtoi(sides.second, &size.height) &&
+                    size.width > 0 && size.height > 0;
+  if (!good) in.setstate(std::ios::failbit);
+  return in;
+}
+
+void add_camera_options(CLI::App& command, CameraOptions& options) {
+  command.add_option("--at", options.at, "Frame this object or instance [the whole scene]")->type_name("ID");
+  command.add_option("--eye", options.eye, "Where the picture is taken from [where all of it shows]")
+      ->type_name("X,Y,Z");
+  command.add_option("--look-at", options.look_at, "The point in the middle of the picture; with --eye")
+      ->type_name("X,Y,Z");
+  command.add_option("--dir", options.direction, "Which way to look [from above and from a side]")->type_name("X,Y,Z");
+  command.add_option("--up", options.up, "Which way is up [0,0,1]")->type_name("X,Y,Z");
+  command.add_option("--fov", options.degrees, "Degrees between the lower and the upper edge [45]")
+      ->type_name("DEGREES")
+      ->check(CLI::Range(0.01, 170.0).description(""));
+  command
+      .add_option("--ortho", options.orthographic,
+                  "No perspective: so many units from the lower to the upper edge; 0 = what is framed")
+      ->type_name("UNITS")
+      ->check(CLI::Range(0.0, 1e9).description(""));
+}
+
+absl::Status check(const CameraOptions& options) {
+  if (options.look_at && options.direction) return usage_error("give --look-at or --dir, not both");
+  if (options.look_at && !options.eye) return usage_error("--look-at needs --eye; to frame one thing give --at");
+  if (options.look_at && options.at) return usage_error("give --look-at or --at, not both");
+  if (options.look_at && vector_of(*options.look_at) == vector_of(*options.eye)) {
+    return usage_error("--eye and --look-at are the same point: the view has no direction");
+  }
+  if (options.direction && vector_of(*options.direction) == Vec3d{}) {
+    return usage_error("--dir 0,0,0 is no direction");
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Camera> camera_of(const CameraOptions& options, const Aabbd& target, const ImageSize& size) {
+  const Vec3d up = options.up ? vector_of(*options.up) : Vec3d{0, 0, 1};
+  if (up == Vec3d{}) return usage_error("--up 0,0,0 is no direction");
+  Vec3d forward = options.direction ? vector_of(*options.direction) : three_quarter_view(up);
+  const Vec3d middle = options.look_at ? vector_of(*options.look_at) : (target.min + target.max) * 0.5;
+  if (options.eye && !options.direction) forward = middle - vector_of(*options.eye);
+  const absl::StatusOr<ViewAxes> axes = axes_of(options, forward);
+  if (!axes.ok()) return axes.status();
+  Camera camera = frame_box(target, *axes, lens_of(options, size));
+  if (options.eye) camera.eye = vector_of(*options.eye);
+  return camera;
+}
+
+}  // namespace locus::cli

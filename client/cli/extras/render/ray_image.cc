@@ -1,0 +1,68 @@
+#include "client/cli/extras/render/ray_image.h"
+
+#include <openssl/evp.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <limits>
+#include <memory>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/string_view.h"
+#include "client/lib/result_rows.h"
+
+namespace locus::cli {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "columns are hashed as they lie in memory");
+
+class Sha256 {
+ public:
+  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) { EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr); }
+
+  template <class T>
+  Sha256& add(const T* values, size_t count) {
+    EVP_DigestUpdate(context_.get(), values, count * sizeof(T));
+    return *this;
+  }
+  Sha256& add(const ImageSize& size) {
+    const std::array<uint32_t, 2> numbers = {size.width, size.height};
+    return add(numbers.data(), numbers.size());
+  }
+  std::string hex() {
+    std::array<unsigned char, 32> hash{};
+    EVP_DigestFinal_ex(context_.get(), hash.data(), nullptr);
+    return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(hash.data()), hash.size()));
+  }
+
+ private:
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+};
+
+}  // namespace
+
+RayImage::RayImage(const ImageSize& image_size)
+    : size(image_size),
+      t(image_size.pixels(), std::numeric_limits<float>::infinity()),
+      ids(image_size.pixels(), 0),
+      triangles(image_size.pixels(), client::kNoTriangle),
+      normals(image_size.pixels()) {}
+
+bool RayImage::hit_object(size_t pixel) const { return hit(pixel) && triangles[pixel] == client::kNoTriangle; }
+
+uint64_t RayImage::hits() const {
+  return static_cast<uint64_t>(std::count_if(ids.begin(), ids.end(), [](uint64_t id) { return id != 0; }));
+}
+
+std::string depth_sha256(const RayImage& image) {
+  return Sha256().add(image.size).add(image.t.data(), image.t.size()).hex();
+}
+
+std::string ids_sha256(const RayImage& image) {
+  Sha256 hash;
+  hash.add(image.size).add(image.ids.data(), image.ids.size());
+  return hash.add(image.triangles.data(), image.triangles.size()).hex();
+}
+
+}  // namespace locus::cli

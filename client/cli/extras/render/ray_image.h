@@ -1,0 +1,44 @@
+// What the rays of a picture hit, in columns, one entry a pixel, row by row from the upper left. For the painters, and
+// for tests that compare pictures. Plain data and functions without state.
+#ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_RAY_IMAGE_H_
+#define LOCUS_CLIENT_CLI_EXTRAS_RENDER_RAY_IMAGE_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "client/cli/extras/render/camera.h"
+#include "core/geometry/vec3.h"
+
+namespace locus::cli {
+
+// Of one ray.
+struct RayWork {
+  uint64_t nodes = 0;
+  uint64_t cells = 0;
+  uint64_t tests = 0;
+};
+
+struct RayImage {
+  ImageSize size;
+  std::vector<float> t;             // depth, in world units; +infinity = nothing hit
+  std::vector<uint64_t> ids;        // 0 = nothing hit
+  std::vector<uint32_t> triangles;  // client::kNoTriangle = an object, or nothing hit
+  std::vector<Vec3f> normals;       // unit, world axes, as the server gives them; 0 = nothing hit
+  std::vector<RayWork> work;        // empty unless it was asked for
+
+  explicit RayImage(const ImageSize& image_size);
+
+  bool hit(size_t pixel) const { return ids[pixel] != 0; }
+  bool hit_object(size_t pixel) const;
+  uint64_t hits() const;
+};
+
+// SHA-256 in hexadecimal over, all little-endian: width and height as uint32, then t as float32 of each pixel.
+std::string depth_sha256(const RayImage& image);
+// The same with the ids as uint64 of each pixel, then the triangles as uint32 of each pixel.
+std::string ids_sha256(const RayImage& image);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_EXTRAS_RENDER_RAY_IMAGE_H_

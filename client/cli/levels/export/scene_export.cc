@@ -1,0 +1,149 @@
+#include "client/cli/levels/export/scene_export.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/levels/export/unit_shapes.h"
+
+namespace locus::cli {
+namespace {
+
+float drawn(float size) { return std::max(size, kLeastDrawnSize); }
+
+Json facts_of(const SceneThing& thing) {
+  Json facts = {{"id", id_json(thing.id)}};
+  if (thing.kind != ThingKind::kInstance) facts["shape"] = shape_name(thing.kind);
+  if (thing.group != 0) facts["group"] = id_json(thing.group);
+  if (thing.tag != 0) facts["tag"] = id_json(thing.tag);
+  facts["layers"] = thing.layers;
+  return facts;
+}
+
+std::string object_name(const SceneThing& thing) { return absl::StrCat("object ", thing.id); }
+
+// The shortest rotation that takes +z to `axis`, which is not zero.
+std::array<float, 4> rotation_to(const std::array<float, 3>& axis, double length) {
+  const double x = axis[0] / length;
+  const double y = axis[1] / length;
+  const double w = 1 + axis[2] / length;
+  const double norm = std::sqrt(x * x + y * y + w * w);
+  if (norm < 1e-6) return {1, 0, 0, 0};  // straight down: any half turn about a level axis
+  return {static_cast<float>(-y / norm), static_cast<float>(x / norm), 0, static_cast<float>(w / norm)};
+}
+
+}  // namespace
+
+std::array<double, 3> recentre_of(const std::array<double, 3>& min, const std::array<double, 3>& max) {
+  constexpr double kFar = 8;
+  std::array<double, 3> middle{};
+  double distance = 0;
+  double longest = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    middle[axis] = std::round((min[axis] + max[axis]) / 2);
+    distance = std::max(distance, std::abs(middle[axis]));
+    longest = std::max(longest, max[axis] - min[axis]);
+  }
+  return distance > kFar * longest ? middle : std::array<double, 3>{};
+}
+
+GlbPlace SceneExport::place_of(const SceneThing& thing) const {
+  GlbPlace place;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    place.translation[axis] = static_cast<float>(thing.at[axis] - recentre_[axis]);
+  }
+  place.rotation = thing.rotation;
+  return place;
+}
+
+absl::StatusOr<size_t> SceneExport::shape_mesh(Part part) {
+  std::optional<size_t>& number = shape_meshes_[static_cast<size_t>(part)];
+  if (number) return *number;
+  ImportedMesh mesh;
+  switch (part) {
+    case Part::kMarker:
+      mesh = unit_marker();
+      break;
+    case Part::kBall:
+      mesh = unit_ball();
+      break;
+    case Part::kBox:
+      mesh = unit_box();
+      break;
+    case Part::kDome:
+      mesh = unit_dome();
+      break;
+    case Part::kTube:
+    case Part::kCount:
+      mesh = unit_tube();
+      break;
+  }
+  mesh.parts = {{"objects", 0}};
+  number = writer_.reserve_mesh();
+  if (absl::Status status = writer_.set_mesh(*number, mesh); !status.ok()) return status;
+  return *number;
+}
+
+absl::Status SceneExport::add_shape(const SceneThing& thing, Part part, const std::array<float, 3>& scale) {
+  const absl::StatusOr<size_t> mesh = shape_mesh(part);
+  if (!mesh.ok()) return mesh.status();
+  GlbPlace place = place_of(thing);
+  place.scale = scale;
+  return writer_.add_node(object_name(thing), place, *mesh, facts_of(thing));
+}
+
+// A side and two ends, since no scale of one mesh fits capsules of all proportions.
+absl::Status SceneExport::add_capsule(const SceneThing& thing) {
+  const std::array<float, 3>& axis = thing.size;
+  const double length = std::sqrt(double{axis[0]} * axis[0] + double{axis[1]} * axis[1] + double{axis[2]} * axis[2]);
+  const float radius = drawn(thing.radius);
+  if (length == 0) return add_shape(thing, Part::kBall, {radius, radius, radius});
+  const absl::StatusOr<size_t> dome = shape_mesh(Part::kDome);
+  if (!dome.ok()) return dome.status();
+  const absl::StatusOr<size_t> tube = shape_mesh(Part::kTube);
+  if (!tube.ok()) return tube.status();
+  const std::array<float, 3> back = {-axis[0], -axis[1], -axis[2]};
+  const std::array<float, 4> forth_rotation = rotation_to(axis, length);
+  const std::array<float, 3> round = {radius, radius, radius};
+  return writer_.add_group(object_name(thing), place_of(thing),
+                           {{*tube, {{}, forth_rotation, {radius, radius, drawn(static_cast<float>(length))}}},
+                            {*dome, {axis, forth_rotation, round}},
+                            {*dome, {back, rotation_to(back, length), round}}},
+                           facts_of(thing));
+}
+
+absl::Status SceneExport::add_instance(const SceneThing& thing) {
+  const auto [entry, is_new] = mesh_numbers_.try_emplace(thing.mesh);
+  if (is_new) {
+    entry->second = writer_.reserve_mesh();
+    mesh_names_.push_back(thing.mesh);
+  }
+  GlbPlace place = place_of(thing);
+  place.scale.fill(thing.scale);
+  return writer_.add_node(absl::StrCat("instance ", thing.id, " (", thing.mesh, ")"), place, entry->second,
+                          facts_of(thing));
+}
+
+absl::Status SceneExport::add(const SceneThing& thing) {
+  ++things_;
+  const float radius = drawn(thing.radius);
+  switch (thing.kind) {
+    case ThingKind::kPoint:
+      return add_shape(thing, Part::kMarker, {kPointMarkSize, kPointMarkSize, kPointMarkSize});
+    case ThingKind::kBall:
+      return add_shape(thing, Part::kBall, {radius, radius, radius});
+    case ThingKind::kBox:
+      return add_shape(thing, Part::kBox, {drawn(thing.size[0]), drawn(thing.size[1]), drawn(thing.size[2])});
+    case ThingKind::kCapsule:
+      return add_capsule(thing);
+    case ThingKind::kInstance:
+      return add_instance(thing);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SceneExport::set_mesh(const std::string& name, const ImportedMesh& mesh) {
+  return writer_.set_mesh(mesh_numbers_.at(name), mesh);
+}
+
+}  // namespace locus::cli

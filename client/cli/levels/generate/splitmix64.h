@@ -1,0 +1,37 @@
+// A small deterministic random number generator, the same on every machine. For generators and tests; not for secrets.
+// One object, one thread.
+#ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_SPLITMIX64_H_
+#define LOCUS_CLIENT_CLI_LEVELS_GENERATE_SPLITMIX64_H_
+
+#include <cstdint>
+
+namespace locus::cli {
+
+// Source: Steele, Lea, Flood, Fast Splittable Pseudorandom Number Generators, 2014 (the mixing of Java's
+// SplittableRandom). Every seed is good, and seeds that differ by one give unrelated streams.
+class SplitMix64 {
+ public:
+  explicit constexpr SplitMix64(uint64_t seed) : state_(seed) {}
+
+  // Uniform over all 64-bit numbers.
+  constexpr uint64_t next() {
+    state_ += 0x9E3779B97F4A7C15u;
+    uint64_t z = state_;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    return z ^ (z >> 31);
+  }
+
+  // Uniform over 0 ... bound - 1, up to a bias below bound / 2^32. bound must not be 0.
+  constexpr uint32_t below(uint32_t bound) { return static_cast<uint32_t>(((next() >> 32) * bound) >> 32); }
+
+  // Uniform over 0 <= x < 1, in steps of 2^-53.
+  constexpr double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
+
+ private:
+  uint64_t state_;
+};
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_LEVELS_GENERATE_SPLITMIX64_H_

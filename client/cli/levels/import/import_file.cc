@@ -1,0 +1,78 @@
+#include "client/cli/levels/import/import_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/string_view.h"
+#include "client/cli/levels/import/import_limits.h"
+#include "client/cli/levels/import/input_file.h"
+#include "client/cli/levels/import/quake/bsp_import.h"
+#include "client/cli/levels/import/quake/pk3_archive.h"
+#include "client/cli/levels/import/scene_import.h"
+
+namespace locus::cli {
+namespace {
+
+constexpr std::array<absl::string_view, 5> kSceneExtensions = {".obj", ".ply", ".stl", ".gltf", ".glb"};
+
+absl::Status check_options(const std::string& extension, const ImportOptions& options) {
+  if (!std::isfinite(options.scale) || options.scale <= 0) {
+    return absl::InvalidArgumentError(absl::StrCat("scale ", options.scale, ": give a finite number above 0"));
+  }
+  if (options.patch_subdivisions < 1 || options.patch_subdivisions > kMaxPatchSubdivisions) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("patch subdivisions ", options.patch_subdivisions, ": give 1 to ", kMaxPatchSubdivisions));
+  }
+  if (!options.entry.empty() && extension != ".pk3") {
+    return absl::InvalidArgumentError(
+        absl::StrCat("entry ", options.entry, " is for .pk3 archives only: leave it out"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<ImportedLevel> import_bsp_file(const std::string& path, const ImportOptions& options) {
+  const absl::StatusOr<std::string> bytes = read_input_file(path, kMaxBspBytes);
+  if (!bytes.ok()) return bytes.status();
+  return import_bsp(*bytes, file_stem(path), options);
+}
+
+absl::StatusOr<ImportedLevel> import_pk3_file(const std::string& path, const ImportOptions& options) {
+  absl::StatusOr<Pk3Level> found = read_pk3_level(path, options.entry);
+  if (!found.ok()) return found.status();
+  absl::StatusOr<ImportedLevel> level = import_bsp(found->bytes, file_stem(found->entry), options);
+  if (!level.ok())
+    return absl::Status(level.status().code(), absl::StrCat(found->entry, ": ", level.status().message()));
+  level->notes.push_back(absl::StrCat("Level ", found->entry, "."));
+  if (options.entry.empty() && !found->others.empty()) {
+    std::vector<std::string>& others = found->others;
+    const size_t unlisted = others.size() - std::min(others.size(), kMaxListedEntries);
+    others.resize(others.size() - unlisted);
+    level->notes.push_back(absl::StrCat("The archive holds other levels: ", absl::StrJoin(others, ", "),
+                                        unlisted > 0 ? absl::StrCat(" and ", unlisted, " more.") : "."));
+  }
+  return level;
+}
+
+}  // namespace
+
+absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportOptions& options) {
+  const std::string extension = lower_extension(path);
+  const bool is_scene =
+      std::find(kSceneExtensions.begin(), kSceneExtensions.end(), extension) != kSceneExtensions.end();
+  if (!is_scene && extension != ".bsp" && extension != ".pk3") {
+    return absl::InvalidArgumentError(absl::StrCat("unsupported file type ", extension.empty() ? path : extension,
+                                                   ": give OBJ, PLY, STL, GLB/glTF, BSP or PK3"));
+  }
+  if (absl::Status status = check_options(extension, options); !status.ok()) return status;
+  if (absl::Status status = check_input_file(path, kMaxImportFileBytes); !status.ok()) return status;
+  if (extension == ".bsp") return import_bsp_file(path, options);
+  if (extension == ".pk3") return import_pk3_file(path, options);
+  return import_scene(path, options);
+}
+
+}  // namespace locus::cli

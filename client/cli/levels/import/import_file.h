@@ -1,0 +1,34 @@
+// The one door of this room: a path in, meshes ready for upload out. For the import command. Functions without state;
+// any number of threads may import at once.
+#ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
+#define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "client/cli/levels/import/imported_mesh.h"
+
+namespace locus::cli {
+
+struct ImportOptions {
+  // The level inside a .pk3, for example "maps/delta.bsp" or just "delta". Empty takes the first in alphabetical order.
+  std::string entry;
+  // Each 3 x 3 Bezier patch of a Quake 3 level becomes this many squared quads. From 1 to kMaxPatchSubdivisions.
+  int patch_subdivisions = 6;
+  // Multiplies every coordinate. Above 0 and finite. A Quake 3 unit is about 0.0254 m.
+  double scale = 1;
+};
+
+// Reads OBJ, PLY, STL, glTF, GLB, BSP (Quake 3) or PK3, chosen by the file's extension in any case.
+// Node transforms and the scale are baked into the vertices, polygons are cut into triangles, equal vertices are
+// shared, axes are kept as the file has them. Triangles keep the file's order and zero-area ones stay. A file whose
+// bounding box is far from the origin (its centre further than 8 times its longest side) is recentred: every mesh is
+// moved by one shared translation in double before rounding to float, and `recentre` undoes it. Errors: NOT_FOUND (no
+// such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty file, bad option), RESOURCE_EXHAUSTED (a limit
+// of import_limits.h). Each says what to do next. Cost: the file is read once and held in memory, with about 60 bytes
+// for each vertex in it.
+absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportOptions& options);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_

@@ -1,0 +1,56 @@
+#include "client/cli/levels/import/part_name.h"
+
+#include <cstddef>
+#include <cstdint>
+
+#include "client/cli/levels/import/import_limits.h"
+
+namespace locus::cli {
+namespace {
+
+uint8_t byte_at(absl::string_view text, size_t i) { return static_cast<uint8_t>(text[i]); }
+
+bool is_continuation(absl::string_view text, size_t i) { return i < text.size() && (byte_at(text, i) & 0xC0) == 0x80; }
+
+// The length in bytes of the valid UTF-8 character at i, or 0.
+size_t character_length(absl::string_view text, size_t i) {
+  const uint8_t lead = byte_at(text, i);
+  if (lead < 0x80) return 1;
+  if (lead < 0xC2 || lead > 0xF4 || !is_continuation(text, i + 1)) return 0;
+  if (lead < 0xE0) return 2;
+  const uint8_t second = byte_at(text, i + 1);
+  // Overlong forms, surrogates and what lies beyond U+10FFFF show in the second byte.
+  if ((lead == 0xE0 && second < 0xA0) || (lead == 0xED && second > 0x9F)) return 0;
+  if ((lead == 0xF0 && second < 0x90) || (lead == 0xF4 && second > 0x8F)) return 0;
+  if (!is_continuation(text, i + 2)) return 0;
+  if (lead < 0xF0) return 3;
+  return is_continuation(text, i + 3) ? 4 : 0;
+}
+
+bool is_utf8(absl::string_view text) {
+  for (size_t i = 0; i < text.size();) {
+    const size_t length = character_length(text, i);
+    if (length == 0) return false;
+    i += length;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string clean_part_name(absl::string_view raw) {
+  if (raw.size() > kMaxPartNameBytes) {
+    size_t end = kMaxPartNameBytes;
+    while (end > 0 && is_continuation(raw, end)) --end;
+    raw = raw.substr(0, end);
+  }
+  const bool keep_high = is_utf8(raw);
+  std::string name(raw);
+  for (char& c : name) {
+    const auto byte = static_cast<uint8_t>(c);
+    if (byte < 0x20 || byte == 0x7F || (byte >= 0x80 && !keep_high)) c = '_';
+  }
+  return name;
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,43 @@
+// The parts of a Quake 3 level file (IBSP version 46) that carry its drawn surfaces, decoded and checked. For the BSP
+// importer. Plain data and one function without state. Invariant of what parse_bsp returns: every texture, vertex and
+// meshvert that a face names exists, every float is finite.
+#ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
+#define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+namespace locus::cli {
+
+enum class BspFaceType { kPolygon = 1, kPatch = 2, kMesh = 3, kBillboard = 4 };
+
+struct BspFace {
+  BspFaceType type = BspFaceType::kPolygon;
+  uint32_t texture = 0;
+  uint32_t first_vertex = 0;
+  uint32_t vertex_count = 0;
+  uint32_t first_meshvert = 0;  // polygons and meshes only
+  uint32_t meshvert_count = 0;  // a multiple of 3
+  uint32_t patch_width = 0;     // patches only: odd, at least 3, width * height = vertex_count
+  uint32_t patch_height = 0;
+};
+
+struct BspFile {
+  std::vector<std::string> textures;
+  std::vector<std::array<float, 3>> vertices;
+  std::vector<uint32_t> meshverts;  // each is relative to its face's first vertex
+  std::vector<BspFace> faces;
+};
+
+// Decodes a whole file held in memory; the bytes are untrusted. INVALID_ARGUMENT names the lump and the element at
+// fault. Cost: linear in the file's size.
+absl::StatusOr<BspFile> parse_bsp(absl::string_view bytes);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_

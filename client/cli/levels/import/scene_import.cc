@@ -1,0 +1,233 @@
+#include "client/cli/levels/import/scene_import.h"
+
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <array>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "client/cli/levels/import/import_limits.h"
+#include "client/cli/levels/import/input_file.h"
+#include "client/cli/levels/import/level_builder.h"
+#include "client/cli/levels/import/ply_check.h"
+
+namespace locus::cli {
+namespace {
+
+// Rows of a 3 x 4 matrix; the fourth column is the translation.
+struct Affine {
+  std::array<std::array<double, 4>, 3> rows{};
+
+  static Affine from(const aiMatrix4x4& m) {
+    return {{{{m.a1, m.a2, m.a3, m.a4}, {m.b1, m.b2, m.b3, m.b4}, {m.c1, m.c2, m.c3, m.c4}}}};
+  }
+
+  Affine times(const Affine& inner) const {
+    Affine product;
+    for (size_t r = 0; r < 3; ++r) {
+      for (size_t c = 0; c < 4; ++c) {
+        product.rows[r][c] = rows[r][0] * inner.rows[0][c] + rows[r][1] * inner.rows[1][c] +
+                             rows[r][2] * inner.rows[2][c] + (c == 3 ? rows[r][3] : 0.0);
+      }
+    }
+    return product;
+  }
+
+  std::array<double, 3> apply(const aiVector3D& p) const {
+    std::array<double, 3> result;
+    for (size_t r = 0; r < 3; ++r) {
+      result[r] = rows[r][0] * p.x + rows[r][1] * p.y + rows[r][2] * p.z + rows[r][3];
+    }
+    return result;
+  }
+
+  bool mirrors() const {
+    const auto& m = rows;
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+               m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]) <
+           0;
+  }
+};
+
+absl::Status refusal(absl::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat(what, "; export the file again or convert it to GLB"));
+}
+
+// The parser throws on some damaged files and on exhausted memory; nothing of ours does, so it ends here.
+absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const std::string& path) {
+  const aiScene* scene = nullptr;
+  try {
+    scene = importer.ReadFile(path, 0);
+  } catch (const std::exception& error) {
+    return refusal(absl::StrCat("cannot read ", path, ": ", error.what()));
+  }
+  if (scene == nullptr) return refusal(absl::StrCat("cannot read ", path, ": ", importer.GetErrorString()));
+  if (scene->mRootNode == nullptr) return refusal(absl::StrCat("cannot read ", path, ": it has no scene"));
+  return scene;
+}
+
+// Before triangulation, which trusts indices. The parser passes on indices of some formats unchecked.
+absl::Status check_mesh(const aiMesh& mesh, size_t number) {
+  const std::string name = absl::StrCat("mesh ", number, " (", mesh.mName.C_Str(), ")");
+  for (size_t v = 0; v < mesh.mNumVertices; ++v) {
+    const aiVector3D& p = mesh.mVertices[v];
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+      return refusal(absl::StrCat(name, ": vertex ", v, " is not finite"));
+    }
+  }
+  for (size_t f = 0; f < mesh.mNumFaces; ++f) {
+    const aiFace& face = mesh.mFaces[f];
+    for (size_t i = 0; i < face.mNumIndices; ++i) {
+      if (face.mIndices[i] >= mesh.mNumVertices) {
+        return refusal(absl::StrCat(name, ": face ", f, " names vertex ", face.mIndices[i], " of ", mesh.mNumVertices));
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+struct FaceCounts {
+  uint64_t faces = 0;
+  uint64_t points_and_lines = 0;
+  uint64_t triangles = 0;  // after cutting every polygon of n corners into n - 2
+};
+
+FaceCounts count_faces(const aiScene& scene) {
+  FaceCounts counts;
+  for (size_t m = 0; m < scene.mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene.mMeshes[m];
+    counts.faces += mesh.mNumFaces;
+    for (size_t f = 0; f < mesh.mNumFaces; ++f) {
+      const unsigned corners = mesh.mFaces[f].mNumIndices;
+      counts.points_and_lines += corners < 3 ? 1 : 0;
+      counts.triangles += corners < 3 ? 0 : corners - 2;
+    }
+  }
+  return counts;
+}
+
+// What a PLY file declares; nothing for other formats, which say no number that could be compared.
+absl::StatusOr<std::optional<uint64_t>> declared_faces(const std::string& path) {
+  if (lower_extension(path) != ".ply") return std::nullopt;
+  const absl::StatusOr<std::string> bytes = read_input_file(path, kMaxImportFileBytes);
+  if (!bytes.ok()) return bytes.status();
+  const absl::StatusOr<uint64_t> declared = check_ply(*bytes);
+  if (!declared.ok()) return declared.status();
+  return *declared;
+}
+
+absl::Status check_scene(const aiScene& scene, const FaceCounts& found, std::optional<uint64_t> declared) {
+  if (declared.has_value() && *declared != found.faces) {
+    return refusal(absl::StrCat("the PLY header declares ", *declared, " faces, but ", found.faces, " were read"));
+  }
+  for (size_t m = 0; m < scene.mNumMeshes; ++m) {
+    if (absl::Status status = check_mesh(*scene.mMeshes[m], m); !status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status add_mesh(const aiMesh& mesh, const Affine& to_world, LevelBuilder& builder) {
+  if (absl::Status status = builder.ensure_room(mesh.mNumVertices, mesh.mNumFaces); !status.ok()) return status;
+  const auto first = static_cast<uint32_t>(builder.vertex_count());
+  for (size_t v = 0; v < mesh.mNumVertices; ++v) builder.add_vertex(to_world.apply(mesh.mVertices[v]));
+  const bool turn = to_world.mirrors();
+  for (size_t f = 0; f < mesh.mNumFaces; ++f) {
+    const aiFace& face = mesh.mFaces[f];
+    if (face.mNumIndices != 3) continue;
+    const uint32_t b = first + face.mIndices[turn ? 2 : 1];
+    const uint32_t c = first + face.mIndices[turn ? 1 : 2];
+    builder.add_triangle(first + face.mIndices[0], b, c);
+  }
+  return absl::OkStatus();
+}
+
+std::string part_name(const aiNode& node, const aiMesh& mesh) {
+  const absl::string_view node_name = node.mName.C_Str();
+  const absl::string_view mesh_name = mesh.mName.C_Str();
+  if (node_name.empty() || node.mParent == nullptr) return std::string(mesh_name);
+  if (mesh_name.empty() || mesh_name == node_name) return std::string(node_name);
+  return absl::StrCat(node_name, "/", mesh_name);
+}
+
+// A stack of its own: the depth of the node tree is the file's choice.
+absl::Status add_nodes(const aiScene& scene, LevelBuilder& builder) {
+  std::vector<std::pair<const aiNode*, Affine>> stack;
+  stack.emplace_back(scene.mRootNode, Affine::from(scene.mRootNode->mTransformation));
+  while (!stack.empty()) {
+    const auto [node, to_world] = stack.back();
+    stack.pop_back();
+    for (size_t i = 0; i < node->mNumMeshes; ++i) {
+      const aiMesh& mesh = *scene.mMeshes[node->mMeshes[i]];
+      builder.begin_part(part_name(*node, mesh));
+      if (absl::Status status = add_mesh(mesh, to_world, builder); !status.ok()) return status;
+    }
+    for (size_t i = node->mNumChildren; i-- > 0;) {
+      const aiNode* child = node->mChildren[i];
+      stack.emplace_back(child, to_world.times(Affine::from(child->mTransformation)));
+    }
+  }
+  return absl::OkStatus();
+}
+
+std::string format_name(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".obj") return "OBJ";
+  if (extension == ".ply") return "PLY";
+  if (extension == ".stl") return "STL";
+  return extension == ".glb" ? "GLB" : "glTF";
+}
+
+void add_notes(const FaceCounts& found, uint64_t triangles_left, ImportedLevel& level) {
+  if (found.points_and_lines > 0) {
+    level.notes.push_back(absl::StrCat(found.points_and_lines, " points and lines were skipped."));
+  }
+  if (triangles_left < found.triangles) {
+    level.notes.push_back(absl::StrCat(found.triangles - triangles_left,
+                                       " triangles of self-intersecting polygons could not be cut: the mesh has "
+                                       "holes there, triangulate it before export."));
+  }
+  const double distance =
+      std::max({std::abs(level.recentre[0]), std::abs(level.recentre[1]), std::abs(level.recentre[2])});
+  if (distance > 0) {
+    level.notes.push_back(
+        absl::StrCat("Its coordinates are read as 32-bit floats: that far out they have steps of ",
+                     std::nextafter(static_cast<float>(distance), HUGE_VALF) - static_cast<float>(distance),
+                     "; export it near the origin to keep finer detail."));
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const ImportOptions& options) {
+  // Before parsing: what this refuses makes the parser read beyond its data.
+  const absl::StatusOr<std::optional<uint64_t>> declared = declared_faces(path);
+  if (!declared.ok()) return declared.status();
+  Assimp::Importer importer;
+  const absl::StatusOr<const aiScene*> parsed = parse(importer, path);
+  if (!parsed.ok()) return parsed.status();
+  const FaceCounts found = count_faces(**parsed);
+  if (absl::Status status = check_scene(**parsed, found, *declared); !status.ok()) return status;
+  const aiScene* scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  if (scene == nullptr) return refusal(absl::StrCat("cannot triangulate ", path, ": ", importer.GetErrorString()));
+
+  LevelBuilder builder(options.scale);
+  if (absl::Status status = add_nodes(*scene, builder); !status.ok()) return status;
+  absl::StatusOr<ImportedLevel> level = std::move(builder).finish(file_stem(path));
+  if (!level.ok()) return level;
+  level->source_format = format_name(path);
+  const FaceCounts left = count_faces(*scene);
+  add_notes(found, left.faces - left.points_and_lines, *level);
+  return level;
+}
+
+}  // namespace locus::cli

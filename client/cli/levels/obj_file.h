@@ -1,0 +1,16 @@
+// Writing a mesh as a Wavefront OBJ file, for looking at generated levels in other programs. A function without state.
+#ifndef LOCUS_CLIENT_CLI_LEVELS_OBJ_FILE_H_
+#define LOCUS_CLIENT_CLI_LEVELS_OBJ_FILE_H_
+
+#include <ostream>
+
+#include "client/cli/levels/import/imported_mesh.h"
+
+namespace locus::cli {
+
+// Coordinates in the shortest decimals that read back as the same floats; parts become groups. Errors are the stream's.
+void write_obj(std::ostream& out, const ImportedMesh& mesh);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_LEVELS_OBJ_FILE_H_

@@ -1,0 +1,38 @@
+// Rows from csv records: the first record names the columns. For the row reader. Not thread-safe.
+#ifndef LOCUS_CLIENT_CLI_ROWS_BULK_CSV_ROWS_H_
+#define LOCUS_CLIENT_CLI_ROWS_BULK_CSV_ROWS_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "client/cli/rows/bulk/row_builder.h"
+#include "client/cli/rows/bulk/row_schema.h"
+
+namespace locus::cli {
+
+class CsvRows {
+ public:
+  // Borrows the schema.
+  explicit CsvRows(const RowSchema& schema) : schema_(schema) {}
+
+  bool has_header() const { return !slots_.empty(); }
+  // INVALID_ARGUMENT for a column that is unknown, there twice, missing, or given by an option as well.
+  absl::Status read_header(absl::string_view record);
+  // Appends one row; an empty cell is a value that is not given. INVALID_ARGUMENT for anything else than one good value
+  // a column.
+  absl::Status read_row(absl::string_view record, uint64_t line, RowBuilder& builder, RowBatch& batch);
+
+ private:
+  absl::Status check_complete() const;
+
+  const RowSchema& schema_;
+  std::vector<Slot> slots_;  // one a column
+  std::vector<std::string> fields_;
+};
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_ROWS_BULK_CSV_ROWS_H_

@@ -1,0 +1,57 @@
+// The things of a scene as they come in a dump, one by one, and as rows. For the dump and export commands. Plain data
+// and functions without state.
+#ifndef LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
+#define LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "client/cli/output.h"
+#include "client/lib/client.h"
+
+namespace locus::cli {
+
+enum class ThingKind { kPoint, kBall, kBox, kCapsule, kInstance };
+
+// An object or an instance.
+struct SceneThing {
+  ThingKind kind = ThingKind::kPoint;
+  uint64_t id = 0;
+  std::array<double, 3> at{};
+  std::array<float, 4> rotation{0, 0, 0, 1};  // x, y, z, w
+  float radius = 0;                           // ball, capsule
+  std::array<float, 3> size{};                // box: half extents; capsule: half axis
+  std::string mesh;                           // instance
+  float scale = 1;                            // instance
+  uint32_t layers = 1;
+  uint64_t group = 0;
+  uint64_t tag = 0;
+};
+
+// "point", "ball", "box", "capsule"; an instance has no shape.
+std::string shape_name(ThingKind kind);
+
+// Calls `take` with each thing of a piece, objects before instances, until it fails. DATA_LOSS for a run whose columns
+// are not as long as a dump's are.
+absl::Status for_each_thing(const v1::DumpSceneResponse& piece,
+                            const std::function<absl::Status(const SceneThing&)>& take);
+
+// Which things of a scene a command is about.
+enum class Things { kAll, kObjects, kInstances };
+bool is_among(Things things, ThingKind kind);
+
+// The keys of rows, in order. They are the names of the insert command's options as far as that has them, so that rows
+// of objects can be inserted: id, shape or mesh, at, rotation, scale, radius, half, axis, layers, group, tag; where
+// rows are of both, before all others kind: "object" or "instance".
+const std::vector<std::string>& thing_keys(Things things);
+
+// A row with the keys that the thing has.
+Json thing_row(const SceneThing& thing, Things things);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_

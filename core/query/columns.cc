@@ -1,0 +1,98 @@
+#include "core/query/columns.h"
+
+#include "core/base/refusal.h"
+
+namespace locus {
+namespace {
+
+// Tags and lengths of every column of a block, and of a reply around its blocks, are shorter than this.
+constexpr uint64_t kBlockOverhead = 256;
+constexpr uint64_t kReplyOverhead = 256;
+constexpr uint64_t kCountBytes = 4;
+constexpr uint64_t kTruncatedBytes = 4;
+constexpr uint64_t kMomentBytes = 16;  // its tick, its fraction, and whether it was clamped
+
+struct ServedColumns {
+  ColumnSet operator()(const RayColumns& rays) const {
+    if (rays.mode == RayMode::kAny) return {};
+    return {Column::kT,     Column::kId,    Column::kTriangle, Column::kUv,     Column::kNormal,
+            Column::kPoint, Column::kGroup, Column::kTag,      Column::kLayers, Column::kPose};
+  }
+  ColumnSet operator()(const BallColumns&) const { return overlap(); }
+  ColumnSet operator()(const BoxColumns&) const { return overlap(); }
+  ColumnSet operator()(const NearestColumns&) const {
+    return {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+  }
+  ColumnSet operator()(const LookupColumns&) const {
+    return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+  }
+  static ColumnSet overlap() {
+    return {Column::kId, Column::kTriangle, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+  }
+};
+
+struct DefaultColumns {
+  ColumnSet operator()(const RayColumns& rays) const {
+    if (rays.mode == RayMode::kAny) return {};
+    return {Column::kT, Column::kId, Column::kTriangle};
+  }
+  ColumnSet operator()(const BallColumns& balls) const { return overlap(balls.detail); }
+  ColumnSet operator()(const BoxColumns& boxes) const { return overlap(boxes.detail); }
+  ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
+  ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
+  static ColumnSet overlap(StaticDetail detail) {
+    if (detail == StaticDetail::kInstances) return {Column::kId};
+    return {Column::kId, Column::kTriangle};
+  }
+};
+
+struct LayoutOf {
+  RowLayout operator()(const RayColumns& rays) const {
+    return rays.mode == RayMode::kFirst ? RowLayout::kDense
+           : rays.mode == RayMode::kAny ? RowLayout::kBytes
+                                        : RowLayout::kCounted;
+  }
+  RowLayout operator()(const BallColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const BoxColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const NearestColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const LookupColumns& lookup) const {
+    return lookup.groups.empty() ? RowLayout::kDense : RowLayout::kCounted;
+  }
+};
+
+}  // namespace
+
+ColumnSet served_columns(const QueryBlock& block) { return std::visit(ServedColumns(), block.kind); }
+
+ColumnSet returned_columns(const QueryBlock& block) {
+  return block.columns.empty() ? std::visit(DefaultColumns(), block.kind) : block.columns;
+}
+
+RowLayout row_layout(const QueryBlock& block) { return std::visit(LayoutOf(), block.kind); }
+
+uint64_t reply_limit(const QueryBatch& batch) {
+  return batch.max_reply_bytes == 0 ? limits::kDefaultReplyBytes : batch.max_reply_bytes;
+}
+
+uint64_t fixed_reply_bytes(const QueryBatch& batch) {
+  uint64_t bytes = kReplyOverhead;
+  for (const QueryBlock& block : batch.blocks) {
+    const RowLayout layout = row_layout(block);
+    const uint64_t a_query = layout == RowLayout::kDense   ? row_bytes(returned_columns(block))
+                             : layout == RowLayout::kBytes ? 1
+                                                           : kCountBytes;
+    const uint64_t a_moment = block.as_of_ticks.empty() ? 0 : kMomentBytes;
+    bytes += kBlockOverhead + query_count(block) * (a_query + kTruncatedBytes + a_moment);
+  }
+  return bytes;
+}
+
+absl::Status check_reply_size(const QueryBatch& batch) {
+  const uint64_t bytes = fixed_reply_bytes(batch);
+  if (bytes <= reply_limit(batch)) return absl::OkStatus();
+  return refuse_limit("max_reply_bytes", "reply_bytes", static_cast<double>(reply_limit(batch)),
+                      static_cast<double>(bytes));
+}
+
+}  // namespace locus

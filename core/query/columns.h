@@ -1,0 +1,136 @@
+// The result columns of a block: their names, element types and widths in one table, which of them a kind of query
+// serves, and how many bytes they take in a reply.
+//
+// To add a column: give it a number in Column (query_batch.h), an array in ColumnArrays and a row in kColumnNames and
+// kColumnArrays here, fill it in run/rows.cc, and name its field of the protocol in server/convert/result_columns.cc.
+// Whatever allocates, copies or measures columns loops over the table.
+#ifndef LOCUS_CORE_QUERY_COLUMNS_H_
+#define LOCUS_CORE_QUERY_COLUMNS_H_
+
+#include <array>
+#include <tuple>
+#include <utility>
+
+#include "absl/strings/string_view.h"
+#include "core/query/query_batch.h"
+
+namespace locus {
+
+// The arrays that result columns consist of. Array<T> is a std::vector<T> where rows are collected, and a T* where they
+// are written in place.
+template <template <class> class Array>
+struct ColumnArrays {
+  Array<float> t{};
+  Array<uint64_t> ids{};
+  Array<uint32_t> triangles{};
+  Array<float> uvs{};
+  Array<float> normals{};
+  Array<float> points{};  // relative to the block's frame
+  Array<uint64_t> groups{};
+  Array<uint64_t> tags{};
+  Array<uint32_t> layers{};
+  Array<double> positions{};
+  Array<float> rotations{};
+};
+
+// One row of the table: `width` numbers a row belong to `column`, in the array that get() selects.
+template <class Get>
+struct ColumnArray {
+  Column column;
+  uint32_t width;
+  Get get;
+};
+template <class Get>
+ColumnArray(Column, uint32_t, Get) -> ColumnArray<Get>;
+
+inline constexpr auto kColumnArrays =
+    std::make_tuple(ColumnArray{Column::kT, 1, [](auto& arrays) -> auto& { return arrays.t;
+}  // namespace locus
+}
+, ColumnArray{Column::kId, 1, [](auto& arrays) -> auto& {return arrays.ids;
+}
+}
+, ColumnArray{Column::kTriangle, 1, [](auto& arrays) -> auto& {return arrays.triangles;
+}
+}
+, ColumnArray{Column::kUv, 2, [](auto& arrays) -> auto& {return arrays.uvs;
+}
+}
+, ColumnArray{Column::kNormal, 3, [](auto& arrays) -> auto& {return arrays.normals;
+}
+}
+, ColumnArray{Column::kPoint, 3, [](auto& arrays) -> auto& {return arrays.points;
+}
+}
+, ColumnArray{Column::kGroup, 1, [](auto& arrays) -> auto& {return arrays.groups;
+}
+}
+, ColumnArray{Column::kTag, 1, [](auto& arrays) -> auto& {return arrays.tags;
+}
+}
+, ColumnArray{Column::kLayers, 1, [](auto& arrays) -> auto& {return arrays.layers;
+}
+}
+, ColumnArray{Column::kPose, 3, [](auto& arrays) -> auto& {return arrays.positions;
+}
+}
+, ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& {return arrays.rotations;
+}
+});
+
+// Names by column number, as the protocol spells them without "COLUMN_".
+inline constexpr std::array<absl::string_view, 11> kColumnNames = {
+    "UNSPECIFIED", "T", "ID", "TRIANGLE", "UV", "NORMAL", "POINT", "GROUP", "TAG", "LAYERS", "POSE"};
+static_assert(kColumnNames.size() == static_cast<size_t>(kLastColumn) + 1);
+
+// Calls visit(ColumnArray) for each row of the table, in order.
+template <class Visit>
+constexpr void for_each_column_array(const Visit& visit) {
+  std::apply([&visit](const auto&... array) { (visit(array), ...); }, kColumnArrays);
+}
+
+// The first entry of each array of some rows; null where the column is not wanted.
+template <class T>
+using Pointer = T*;
+using RowSpans = ColumnArrays<Pointer>;
+
+constexpr absl::string_view column_name(Column column) { return kColumnNames[static_cast<size_t>(column)]; }
+
+// Returns the encoded bytes of one row.
+constexpr uint32_t row_bytes(ColumnSet columns) {
+  uint32_t bytes = 0;
+  for_each_column_array([&bytes, columns](const auto& array) {
+    RowSpans spans;
+    if (columns.has(array.column)) bytes += array.width * uint32_t{sizeof(*array.get(spans))};
+  });
+  return bytes;
+}
+static_assert(
+    [] {
+      for (int number = 1; number <= static_cast<int>(kLastColumn); ++number)
+        if (row_bytes({static_cast<Column>(number)}) == 0) return false;
+      return true;
+    }(),
+    "a column has no array");
+
+// Returns the columns that a block of this kind can return.
+ColumnSet served_columns(const QueryBlock& block);
+// Returns the columns that the block does return: those it asks for, or its kind's default ones.
+ColumnSet returned_columns(const QueryBlock& block);
+
+// How a block's answer is laid out. Dense: one row a query, a miss included. Bytes: one byte a query, no rows. Counted:
+// any number of rows a query.
+enum class RowLayout : uint8_t { kDense, kBytes, kCounted };
+RowLayout row_layout(const QueryBlock& block);
+
+// Returns the encoded bytes that a batch's answer takes before its first counted row: dense rows, counts, room for
+// lists of truncated queries and for field headers.
+uint64_t fixed_reply_bytes(const QueryBatch& batch);
+uint64_t reply_limit(const QueryBatch& batch);
+
+// Returns INVALID_ARGUMENT LIMIT where fixed_reply_bytes() alone is over the batch's limit.
+absl::Status check_reply_size(const QueryBatch& batch);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_COLUMNS_H_

@@ -1,0 +1,35 @@
+#include "core/query/kinds/lookup_query.h"
+
+#include <utility>
+
+namespace locus {
+
+Hit look_up(const SceneSnapshot& snapshot, const Moment& moment, Id id) {
+  if (const GridRef object = moment.objects().find_ref(id)) return hit_on(object, 0, moment);
+  if (const Instance* instance = snapshot.statics->find(id)) return hit_on(*instance, 0);
+  return {};
+}
+
+absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const Moment& moment,
+                                                         absl::Span<const uint64_t> groups,
+                                                         const OverlapOptions& options) {
+  absl::flat_hash_map<Group, LowestRows> rows;
+  for (const Group group : groups) rows.emplace(group, LowestRows(options.max_results, false));
+  const auto offer = [&](const auto& labels, const auto& make_hit) {
+    ++task.work().tests;
+    if (!task.count_test() || labels.id <= options.after_id) return;
+    const auto wanted = rows.find(labels.group);
+    if (wanted != rows.end()) wanted->second.offer(make_hit());
+  };
+  for (const Instance& instance : task.snapshot().statics->tree().values())
+    offer(instance, [&] { return hit_on(instance, 0); });
+  moment.objects().grid().for_each([&](const GridRef& object) {
+    offer(object.entry(), [&] { return hit_on(object, 0, moment); });
+    return !task.ended();
+  });
+  absl::flat_hash_map<Group, OverlapAnswer> answers;
+  for (auto& [group, lowest] : rows) answers.emplace(group, lowest.finish());
+  return answers;
+}
+
+}  // namespace locus

@@ -1,0 +1,60 @@
+#include "core/query/kinds/lowest_rows.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace locus {
+namespace {
+
+bool lower_id(const RowRun& a, const RowRun& b) { return a.row.id < b.row.id; }
+
+}  // namespace
+
+void LowestRows::offer(const Hit& row) {
+  answer_.runs.push_back({row});
+  ++rows_;
+  if (rows_ > 2 * max_results_) keep_lowest();
+}
+
+void LowestRows::offer(const Hit& row, absl::Span<const uint32_t> triangles) {
+  if (triangles.empty()) return;
+  if (answer_.runs.empty() || answer_.runs.back().row.id != row.id)
+    answer_.runs.push_back({row, answer_.triangles.size(), 0});
+  answer_.runs.back().triangle_count += triangles.size();
+  answer_.triangles.insert(answer_.triangles.end(), triangles.begin(), triangles.end());
+  rows_ += triangles.size();
+  if (rows_ > 2 * max_results_) keep_lowest();
+}
+
+bool LowestRows::in_order() const {
+  return !sorted_triangles_ && std::is_sorted(answer_.runs.begin(), answer_.runs.end(), lower_id);
+}
+
+void LowestRows::keep_lowest() {
+  if (rows_ <= max_results_ && in_order()) return;
+  const OverlapAnswer all = std::exchange(answer_, {{}, {}, {}, answer_.truncated || rows_ > max_results_});
+  std::vector<RowRun> runs = all.runs;
+  // An instance whose rows were put in order before may have a second run with the later triangles.
+  std::stable_sort(runs.begin(), runs.end(), lower_id);
+  rows_ = 0;
+  for (size_t i = 0; i < runs.size() && rows_ < max_results_;) {
+    RowRun& kept = answer_.runs.emplace_back(runs[i]);
+    const size_t first = kept.first_triangle = answer_.triangles.size();
+    for (; i < runs.size() && runs[i].row.id == kept.row.id; ++i) {
+      const absl::Span<const uint32_t> triangles = all.triangles_of(runs[i]);
+      answer_.triangles.insert(answer_.triangles.end(), triangles.begin(), triangles.end());
+    }
+    const auto begin = answer_.triangles.begin() + static_cast<std::ptrdiff_t>(first);
+    if (sorted_triangles_) std::sort(begin, answer_.triangles.end());
+    kept.triangle_count = std::min(answer_.triangles.size() - first, max_results_ - rows_);
+    answer_.triangles.resize(first + kept.triangle_count);
+    rows_ += kept.rows();
+  }
+}
+
+OverlapAnswer LowestRows::finish() {
+  keep_lowest();
+  return std::move(answer_);
+}
+
+}  // namespace locus

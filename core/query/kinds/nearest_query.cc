@@ -1,0 +1,281 @@
+#include "core/query/kinds/nearest_query.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "core/geometry/point_triangle.h"
+#include "core/query/kinds/hit_collector.h"
+#include "core/query/kinds/placed_triangle.h"
+
+namespace locus {
+namespace {
+
+// Squared distances beyond this round to more than `farthest`.
+double squared_limit_of(float farthest) { return squared_limit(raised(farthest)); }
+
+// The nearest rows so far, and how near the next one must be.
+class NearestRows {
+ public:
+  explicit NearestRows(const NearestRequest& request)
+      : count_(request.count),
+        in_order_(request.count <= kMostInOrder),
+        farthest_(request.max_distance),
+        limit_(squared_limit_of(farthest_)) {
+    rows_.reserve(std::min<size_t>(count_, kMostInOrder));
+  }
+
+  // Nothing beyond it is wanted; a row exactly there may be, if its id is lower.
+  float farthest() const { return farthest_; }
+  // The same squared, for boxes in world axes.
+  double limit() const { return limit_; }
+
+  void offer(const Hit& row) {
+    if (!(row.t <= farthest_)) return;
+    if (rows_.size() == count_) {
+      if (!nearer(row, last())) return;
+      if (!in_order_) std::pop_heap(rows_.begin(), rows_.end(), nearer);
+      rows_.pop_back();
+    }
+    insert(row);
+    if (rows_.size() < count_ || last().t == farthest_) return;
+    farthest_ = last().t;
+    limit_ = squared_limit_of(farthest_);
+  }
+
+  std::vector<Hit> finish() {
+    if (!in_order_) std::sort_heap(rows_.begin(), rows_.end(), nearer);
+    return std::move(rows_);
+  }
+
+ private:
+  // Few rows are kept in order, since objects are offered nearly in order; more are a heap with the last on top.
+  static constexpr size_t kMostInOrder = 32;
+
+  const Hit& last() const { return in_order_ ? rows_.back() : rows_.front(); }
+  void insert(const Hit& row) {
+    rows_.push_back(row);
+    if (!in_order_) return std::push_heap(rows_.begin(), rows_.end(), nearer);
+    auto at = rows_.end() - 1;
+    for (; at != rows_.begin() && nearer(row, *(at - 1)); --at) *at = *(at - 1);
+    *at = row;
+  }
+
+  const size_t count_;
+  const bool in_order_;
+  float farthest_;
+  double limit_;
+  std::vector<Hit> rows_;
+};
+
+class ObjectsNear {
+ public:
+  ObjectsNear(QueryTask& task, const Moment& moment, const NearestRequest& request, const Filter& filter,
+              NearestRows& rows)
+      : task_(task), moment_(moment), request_(request), filter_(filter), rows_(rows) {}
+
+  double limit() const { return rows_.limit(); }
+  bool visit(const GridRef& object) {
+    if (!task_.count_test()) return false;
+    if (!filter_.accepts(object.entry())) return true;
+    const Shape shape = moment_.shape(object);
+    const double away = request_.precision == Precision::kConservative
+                            ? std::sqrt(squared_distance(request_.point, bounds_of(shape)))
+                            : distance(request_.point, shape);
+    rows_.offer(hit_on(object, rounded_distance(away), moment_));
+    return true;
+  }
+
+ private:
+  QueryTask& task_;
+  const Moment& moment_;
+  const NearestRequest& request_;
+  const Filter& filter_;
+  NearestRows& rows_;
+};
+
+// The rows of one instance: each of its triangles, or the nearest of them.
+class InstanceRows {
+ public:
+  InstanceRows(const NearestRequest& request, const Instance& instance, NearestRows& rows)
+      : request_(request),
+        instance_(instance),
+        rows_(rows),
+        away_(squared_distance(request.point, instance.bounds)),
+        farthest_(rows.farthest()),
+        limit_(rows.limit()) {}
+
+  // As NearestRows.
+  float farthest() const { return farthest_; }
+  double limit() const { return limit_; }
+
+  // `squared`: the triangle's distance, which counts as no less than that of the instance's bounds: the tree over
+  // instances may cull by them.
+  void offer(const Triangle& triangle, double squared) {
+    Hit row = hit_on(instance_, rounded_distance(std::sqrt(std::max(squared, away_))));
+    row.triangle = triangle.number;
+    if (request_.every_triangle) {
+      rows_.offer(row);
+      shrink(rows_.farthest());
+    } else if (row.t <= farthest_ && nearer(row, nearest_)) {
+      nearest_ = row;
+      shrink(row.t);
+    }
+  }
+
+  void finish() {
+    if (nearest_.id != kNoId) rows_.offer(nearest_);
+  }
+
+ private:
+  void shrink(float farthest) {
+    if (farthest == farthest_) return;
+    farthest_ = farthest;
+    limit_ = squared_limit_of(farthest);
+  }
+
+  const NearestRequest& request_;
+  const Instance& instance_;
+  NearestRows& rows_;
+  const double away_;
+  float farthest_;
+  double limit_;
+  Hit nearest_;
+};
+
+class TrianglesNear {
+ public:
+  TrianglesNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
+      : task_(task), point_(request.point), placed_(instance), rows_(rows), pad_(pad(request, instance)) {}
+
+  // In mesh axes.
+  double limit() const {
+    if (rows_.farthest() != farthest_) {
+      farthest_ = rows_.farthest();
+      limit_ = squared_limit((raised(farthest_) + pad_) / placed_.instance().transform.scale);
+    }
+    return limit_;
+  }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    const PlacedTriangles::Corners corners = placed_.corners_of(triangle);
+    const double to_bounds = squared_distance(point_, placed_.bounds_of_corners(corners));
+    if (to_bounds > rows_.limit()) return true;
+    rows_.offer(triangle, std::max(to_bounds, squared_distance(point_, corners[0], corners[1], corners[2])));
+    return true;
+  }
+
+ private:
+  // Distances in mesh and world axes differ by the scale and by rounding: that of the ways there and back, in double's
+  // precision of the numbers involved, and that of measuring to a triangle, at worst, for slivers, 2^-30 of its size.
+  static double pad(const NearestRequest& request, const Instance& instance) {
+    const Transform& transform = instance.transform;
+    return 0x1p-26 * (max_component(abs(request.point)) + max_component(abs(transform.translation)) +
+                      double{transform.scale} * magnitude(instance.mesh->bounds()));
+  }
+
+  QueryTask& task_;
+  const Vec3d point_;
+  const PlacedTriangles placed_;
+  InstanceRows& rows_;
+  const double pad_;
+  mutable float farthest_ = -1;  // to which limit_ belongs
+  mutable double limit_ = 0;
+};
+
+// Triangles of one instance by their placed bounds.
+class PlacedBoundsNear {
+ public:
+  PlacedBoundsNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
+      : task_(task), point_(request.point), placed_(instance), rows_(rows) {}
+
+  Aabbf bounds() const { return placed_.everything(); }
+  bool overlaps(const Aabbf& box) const {
+    return squared_distance(point_, placed_.bounds_of_box(box)) <= rows_.limit();
+  }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    rows_.offer(triangle, squared_distance(point_, placed_.bounds_of_triangle(triangle)));
+    return true;
+  }
+
+ private:
+  QueryTask& task_;
+  const Vec3d point_;
+  const PlacedTriangles placed_;
+  InstanceRows& rows_;
+};
+
+class InstancesNear {
+ public:
+  InstancesNear(QueryTask& task, const NearestRequest& request, const Filter& filter, NearestRows& rows)
+      : task_(task), request_(request), filter_(filter), rows_(rows) {}
+
+  double limit() const { return rows_.limit(); }
+  bool visit(const Instance& instance) {
+    if (!task_.count_test()) return false;
+    if (!filter_.accepts(instance)) return true;
+    InstanceRows rows(request_, instance, rows_);
+    const TriangleBvh& tree = instance.mesh->tree();
+    if (request_.precision == Precision::kConservative) {
+      PlacedBoundsNear visitor(task_, request_, instance, rows);
+      task_.visit_region(tree, visitor);
+    } else {
+      TrianglesNear visitor(task_, request_, instance, rows);
+      task_.visit_nearest(tree, instance.transform.point_to_mesh(request_.point), visitor);
+    }
+    rows.finish();
+    return !task_.ended();
+  }
+
+ private:
+  QueryTask& task_;
+  const NearestRequest& request_;
+  const Filter& filter_;
+  NearestRows& rows_;
+};
+
+}  // namespace
+
+NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& nearest, size_t i) {
+  const float* offset = ColumnReader<float>(nearest.points, 3).entry(i);
+  return {block.frame + Vec3d{offset[0], offset[1], offset[2]},
+          ColumnReader<float>(nearest.max_distances, 1).value(i, std::numeric_limits<float>::infinity()),
+          std::max(1u, nearest.count),
+          nearest.detail != StaticDetail::kInstances,
+          block.source,
+          block.precision};
+}
+
+std::vector<Hit> run_nearest(QueryTask& task, const Moment& moment, const NearestRequest& request,
+                             const Filter& filter) {
+  NearestRows rows(request);
+  if (request.source != Source::kStatic) {
+    ObjectsNear visitor(task, moment, request, filter, rows);
+    task.visit_objects_near(moment, request.point, visitor);
+  }
+  if (request.source != Source::kDynamic && !task.ended()) {
+    InstancesNear visitor(task, request, filter, rows);
+    task.visit_nearest(task.snapshot().statics->tree(), request.point, visitor);
+  }
+  return rows.finish();
+}
+
+Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
+  const Vec3d point = request.point;
+  const bool by_bounds = request.precision == Precision::kConservative;
+  // In axes around the point, where no digits are lost to far places.
+  if (row.object) {
+    Shape shape = row.object_shape();
+    if (by_bounds) return nearest_in(point, bounds_of(shape)) - point;
+    shape.position = shape.position - point;
+    return nearest_on_shape({}, shape);
+  }
+  const PlacedTriangles placed(*row.instance);
+  const PlacedTriangles::Corners corners = placed.corners_of(row.instance->mesh->triangle(row.triangle));
+  if (by_bounds) return nearest_in(point, placed.bounds_of_corners(corners)) - point;
+  return nearest_on_triangle({}, corners[0] - point, corners[1] - point, corners[2] - point);
+}
+
+}  // namespace locus

@@ -1,0 +1,343 @@
+#include "core/query/kinds/overlap_query.h"
+
+#include <optional>
+
+#include "core/index/regions.h"
+#include "core/query/kinds/placed_triangle.h"
+#include "core/query/kinds/triangle_search.h"
+
+namespace locus {
+namespace {
+
+// What can be told of an object whose place is known but for some slack: that it overlaps, that it does not, or
+// nothing.
+enum class Verdict { kIn, kOut, kOpen };
+
+// What a verdict goes by. The object reaches no farther than `reach` from its place; it fills a ball of radius `solid`
+// around it; and its place is off by `slack` at most, which covers the rounding of predicates and of what is told here.
+struct LooselyPlaced {
+  Vec3d place;
+  double solid;
+  double reach;
+  double slack;
+};
+
+// Of an object that is `astray` from where it is filed.
+LooselyPlaced loosely_placed(const GridRef& object, double astray) {
+  const Vec3d place = object.entry().position;
+  const double reach = object.reach();
+  const double solid = object.entry().kind == ShapeKind::kBall ? reach : 0;
+  return {place, solid, reach, astray + internal::kBoundsGrowth * (max_component(abs(place)) + reach + astray)};
+}
+
+// A ball or box in world axes, and the same in an instance's mesh axes: what the collecting below needs to know of it.
+struct BallShape {
+  using World = Balld;
+  using Mesh = Ballf;
+  using WorldRegion = BallRegion<double>;
+  using MeshRegion = BallRegion<float>;
+
+  static Ballf to_mesh(const Balld& ball, const Transform& transform) {
+    return {to_float(transform.point_to_mesh(ball.center)), static_cast<float>(ball.radius / transform.scale)};
+  }
+  static double size(const Ballf& ball) { return ball.radius; }
+  static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
+  static std::optional<Balld> as_ball(const Balld& ball) { return ball; }
+  static bool overlaps_bounds(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
+  static bool overlaps_object(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
+  static Verdict verdict(const Balld& ball, const LooselyPlaced& object) {
+    const double away = squared_length(object.place - ball.center);
+    const double far = ball.radius + object.reach + object.slack, near = ball.radius + object.solid - object.slack;
+    if (away > far * far) return Verdict::kOut;
+    return near > 0 && away < near * near ? Verdict::kIn : Verdict::kOpen;
+  }
+  static bool overlaps_triangle(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
+};
+
+struct BoxShape {
+  using World = Obbd;
+  using Mesh = Obbf;
+  using WorldRegion = BoxRegion<double>;
+  using MeshRegion = BoxRegion<float>;
+
+  static Obbf to_mesh(const Obbd& box, const Transform& transform) {
+    return {to_float(transform.point_to_mesh(box.center)), to_float(box.half * (1.0 / transform.scale)),
+            compose(inverse(transform.rotation), box.rotation)};
+  }
+  static double size(const Obbf& box) { return max_component(box.half); }
+  static double reach(const Obbd& box) { return max_component(abs(box.center)) + max_component(box.half) * 2; }
+  static std::optional<Balld> as_ball(const Obbd&) { return std::nullopt; }
+  static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
+  static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
+  static Verdict verdict(const Obbd& box, const LooselyPlaced& object) {
+    // How far outside of the box's sides; negative inside.
+    const double outside = max_component(abs(box.rotation.to_local(object.place - box.center)) - box.half);
+    if (outside > object.reach + object.slack) return Verdict::kOut;
+    return outside < -object.slack ? Verdict::kIn : Verdict::kOpen;
+  }
+  static bool overlaps_triangle(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
+};
+
+template <class Kind>
+GridRegion region_asked(const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options) {
+  const typename Kind::WorldRegion region(shape);
+  // Objects themselves, not only their bounds, are to reach into a ball.
+  return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
+}
+
+template <class Kind>
+class ObjectRows {
+ public:
+  ObjectRows(QueryTask& task, const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options,
+             const Filter& filter)
+      : task_(task), moment_(moment), shape_(shape), options_(options), filter_(filter), found_(task.found_objects()) {
+    found_.restart(options.max_results);
+  }
+
+  Aabbd bounds() const { return typename Kind::WorldRegion(shape_).bounds(); }
+  GridRegion region() const { return region_asked<Kind>(moment_, shape_, options_); }
+  bool visit(const GridRef& object) {
+    if (!task_.count_test()) return false;
+    if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;
+    if (overlaps(object)) found_.offer(object);
+    return true;
+  }
+
+ private:
+  bool overlaps(const GridRef& object) const {
+    const bool exact = options_.precision == Precision::kExact;
+    if (exact) {  // most objects need neither be looked up in the next tick nor be told by their shape
+      const Verdict verdict = Kind::verdict(shape_, loosely_placed(object, moment_.astray(object)));
+      if (verdict != Verdict::kOpen) return verdict == Verdict::kIn;
+    }
+    const Shape shape = moment_.shape(object);
+    return exact ? Kind::overlaps_object(shape_, shape) : Kind::overlaps_bounds(shape_, bounds_of(shape));
+  }
+
+  QueryTask& task_;
+  const Moment& moment_;
+  const typename Kind::World& shape_;
+  const OverlapOptions& options_;
+  const Filter& filter_;
+  FoundObjects& found_;
+};
+
+// Rows of one instance: itself once, or each of its triangles found, which come in storage order.
+class InstanceRows {
+ public:
+  InstanceRows(const Instance& instance, const OverlapOptions& options, LowestRows& rows)
+      : instance_(instance), detail_(options.detail), max_results_(options.max_results), rows_(rows) {}
+
+  // Numbers of triangles, in storage order. False when the instance needs no more: what comes behind the most results
+  // would not be kept.
+  bool offer(absl::Span<const uint32_t> numbers) {
+    if (detail_ == StaticDetail::kInstances) {
+      if (!numbers.empty()) rows_.offer(hit_on(instance_, 0));
+      return numbers.empty();
+    }
+    rows_.offer(hit_on(instance_, 0), numbers);
+    found_ += numbers.size();
+    return detail_ != StaticDetail::kTriangles || found_ <= max_results_;
+  }
+
+  bool offer(const Triangle& triangle) { return offer({&triangle.number, 1}); }
+
+ private:
+  const Instance& instance_;
+  const StaticDetail detail_;
+  const uint32_t max_results_;
+  LowestRows& rows_;
+  size_t found_ = 0;
+};
+
+template <class Kind>
+class ExactTriangles {
+ public:
+  // `world_shape` is `shape` in world axes.
+  ExactTriangles(QueryTask& task, const typename Kind::Mesh& shape, const typename Kind::World& world_shape,
+                 const PlacedTriangles& placed, InstanceRows rows)
+      : task_(task), shape_(shape), region_(shape), world_shape_(world_shape), placed_(placed), rows_(rows) {}
+
+  Aabbf bounds() const { return region_.bounds(); }
+  bool overlaps(const Aabbf& box) const { return region_.overlaps(box); }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    const bool found = Kind::overlaps_triangle(shape_, triangle) &&
+                       Kind::overlaps_bounds(world_shape_, placed_.bounds_of_triangle(triangle));
+    return !found || rows_.offer(triangle);
+  }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::Mesh& shape_;
+  typename Kind::MeshRegion region_;
+  const typename Kind::World& world_shape_;
+  const PlacedTriangles& placed_;
+  InstanceRows rows_;
+};
+
+template <class Kind>
+class PlacedBounds {
+ public:
+  PlacedBounds(QueryTask& task, const typename Kind::World& shape, const Instance& instance, InstanceRows rows)
+      : task_(task), shape_(shape), region_(shape), placed_(instance, Kind::reach(shape)), rows_(rows) {}
+
+  Aabbf bounds() const { return placed_.everything(); }
+  bool overlaps(const Aabbf& box) const { return region_.overlaps(placed_.bounds_of_box(box)); }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    return !Kind::overlaps_bounds(shape_, placed_.bounds_of_triangle(triangle)) || rows_.offer(triangle);
+  }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::World& shape_;
+  typename Kind::WorldRegion region_;
+  PlacedTriangles placed_;
+  InstanceRows rows_;
+};
+
+template <class Kind>
+class InstanceSearch {
+ public:
+  InstanceSearch(QueryTask& task, const typename Kind::World& shape, const OverlapOptions& options,
+                 const Filter& filter, LowestRows& rows)
+      : task_(task), shape_(shape), region_(shape), options_(options), filter_(filter), rows_(rows) {}
+
+  Aabbd bounds() const { return region_.bounds(); }
+  bool overlaps(const Aabbd& box) const { return region_.overlaps(box); }
+  bool visit(const Instance& instance) {
+    if (!task_.count_test()) return false;
+    if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
+    // Part of the verdict: the tree over instances may cull by it.
+    if (!region_.overlaps(instance.bounds)) return true;
+    InstanceRows rows(instance, options_, rows_);
+    if (options_.precision == Precision::kConservative) {
+      PlacedBounds<Kind> visitor(task_, shape_, instance, rows);
+      task_.visit_region(instance.mesh->tree(), visitor);
+    } else {
+      visit_exactly(instance, rows);
+    }
+    return !task_.ended();
+  }
+
+ private:
+  void visit_exactly(const Instance& instance, InstanceRows& rows) {
+    const TriangleBvh& tree = instance.mesh->tree();
+    const typename Kind::Mesh shape = Kind::to_mesh(shape_, instance.transform);
+    const PlacedTriangles placed(instance, Kind::reach(shape_));
+    if (task_.searches_triangles() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
+        placed.bounds_follow(to_double(shape.center), Kind::size(shape)))
+      return search(tree, shape, rows);
+    ExactTriangles<Kind> visitor(task_, shape, shape_, placed, rows);
+    task_.visit_region(tree, visitor);
+  }
+
+  void search(const TriangleBvh& tree, const typename Kind::Mesh& shape, InstanceRows& rows) {
+    TriangleSearch<typename Kind::Mesh> search(tree, shape);
+    uint32_t numbers[kNumbersAtOnce];
+    const size_t room = options_.detail == StaticDetail::kInstances ? kMinRegionRoom : kNumbersAtOnce;
+    bool more = true;
+    while (more && !search.over()) {
+      const size_t found = search.next(numbers, room);
+      task_.work().nodes += search.nodes();
+      task_.work().tests += search.tests();
+      more = rows.offer({numbers, found});
+      // What is found untested is work too, for whoever waits for an end of it.
+      more = task_.count_tests(search.tests() + found) && more;
+    }
+  }
+
+  static constexpr size_t kNumbersAtOnce = 2048;
+
+  QueryTask& task_;
+  const typename Kind::World& shape_;
+  typename Kind::WorldRegion region_;
+  const OverlapOptions& options_;
+  const Filter& filter_;
+  LowestRows& rows_;
+};
+
+// The rows of instances, and of objects: of either that come first, and of both.
+OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const Moment& moment,
+                           const OverlapOptions& options) {
+  const absl::Span<const FoundObject> objects = found.finish();
+  if (instances.runs.empty()) {
+    instances.objects = objects;
+    instances.truncated |= found.truncated();
+    return instances;
+  }
+  if (objects.empty()) return instances;
+  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
+  for (const RowRun& run : instances.runs) {
+    if (run.triangle_count == 0)
+      rows.offer(run.row);
+    else
+      rows.offer(run.row, instances.triangles_of(run));
+  }
+  for (const FoundObject& one : objects) rows.offer(hit_on(one.object, 0, moment));
+  OverlapAnswer both = rows.finish();
+  both.truncated |= instances.truncated || found.truncated();
+  return both;
+}
+
+template <class Kind>
+OverlapAnswer run_overlap(QueryTask& task, const Moment& moment, const typename Kind::World& shape,
+                          const OverlapOptions& options, const Filter& filter) {
+  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
+  if (options.source != Source::kDynamic) {
+    InstanceSearch<Kind> search(task, shape, options, filter, rows);
+    task.visit_region(task.snapshot().statics->tree(), search);
+  }
+  if (options.source != Source::kStatic && !task.ended()) {
+    ObjectRows<Kind> search(task, moment, shape, options, filter);
+    task.visit_objects_in_region(moment, search);
+    return with_objects(rows.finish(), task.found_objects(), moment, options);
+  }
+  return rows.finish();
+}
+
+Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
+
+}  // namespace
+
+OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
+  const uint32_t max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+  return {block.source, block.precision, detail, max_results, block.after_id};
+}
+
+OverlapAnswer run_ball(QueryTask& task, const Moment& moment, const Balld& ball, const OverlapOptions& options,
+                       const Filter& filter) {
+  return run_overlap<BallShape>(task, moment, ball, options, filter);
+}
+
+OverlapAnswer run_box(QueryTask& task, const Moment& moment, const Obbd& box, const OverlapOptions& options,
+                      const Filter& filter) {
+  return run_overlap<BoxShape>(task, moment, box, options, filter);
+}
+
+GridRegion ball_region(const Moment& moment, const Balld& ball, const OverlapOptions& options) {
+  return region_asked<BallShape>(moment, ball, options);
+}
+
+GridRegion box_region(const Moment& moment, const Obbd& box, const OverlapOptions& options) {
+  return region_asked<BoxShape>(moment, box, options);
+}
+
+Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {
+  return {block.frame + point(ColumnReader<float>(balls.centers, 3).entry(i)),
+          ColumnReader<float>(balls.radii, 1).value(i, 0)};
+}
+
+Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i) {
+  Obbd box{block.frame + point(ColumnReader<float>(boxes.centers, 3).entry(i)),
+           point(ColumnReader<float>(boxes.half_extents, 3).entry(i)),
+           {}};
+  const ColumnReader<float> rotations(boxes.rotations, 4);
+  if (!rotations.given()) return box;
+  const float* q = rotations.entry(i);
+  box.rotation = rotation_of(Quaternion{q[0], q[1], q[2], q[3]});
+  return box;
+}
+
+}  // namespace locus

@@ -1,0 +1,25 @@
+#include "core/query/kinds/query_task.h"
+
+namespace locus {
+
+bool BatchControl::go_on(uint64_t work) {
+  done_.fetch_add(work, std::memory_order_relaxed);
+  if (stopped() || out_of_work()) return false;
+  if (!stop_) return true;
+  absl::Status status = stop_();
+  if (status.ok()) return true;
+  if (!stopping_.exchange(true)) {
+    status_ = std::move(status);
+    stopped_.store(true, std::memory_order_release);
+  }
+  return false;
+}
+
+bool QueryTask::check() {
+  const uint64_t done = work_.nodes + work_.cells + work_.tests;
+  ended_ = ended_ || !control_.go_on(done - booked_);
+  booked_ = done;
+  return !ended_;
+}
+
+}  // namespace locus

@@ -1,0 +1,154 @@
+#include "core/query/kinds/ray_query.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include "core/query/kinds/hit_collector.h"
+#include "core/query/kinds/instance_rays.h"
+#include "core/query/kinds/kernel_rays.h"
+
+namespace locus {
+namespace {
+
+class ObjectVisitor {
+ public:
+  ObjectVisitor(QueryTask& task, const Moment& moment, const RayRequest& request, const Filter& filter,
+                HitCollector& collector)
+      : task_(task),
+        moment_(moment),
+        ray_(Rayd{request.origin, request.direction}, request.inside),
+        precision_(request.precision),
+        filter_(filter),
+        collector_(collector) {}
+
+  const SlabRay<double>& slabs() const { return ray_.slabs(); }
+  double limit() const { return raised(collector_.limit()); }
+  bool visit(const GridRef& object) {
+    if (!task_.count_test()) return false;
+    if (!filter_.accepts(object.entry())) return true;
+    const std::optional<float> t = test(moment_.shape(object));
+    return !t || collector_.offer(hit_on(object, *t, moment_));
+  }
+
+ private:
+  std::optional<float> test(const Shape& shape) const {
+    if (precision_ == Precision::kConservative) return entry(ray_.slabs(), bounds_of(shape));
+    const std::optional<ShapeHit> hit = ray_hit(ray_, shape);
+    if (!hit) return std::nullopt;
+    return rounded_distance(hit->t);
+  }
+
+  QueryTask& task_;
+  const Moment& moment_;
+  ObjectRay ray_;
+  Precision precision_;
+  const Filter& filter_;
+  HitCollector& collector_;
+};
+
+class InstanceVisitor {
+ public:
+  InstanceVisitor(QueryTask& task, const RayRequest& request, const Filter& filter, HitCollector& collector)
+      : task_(task),
+        request_(request),
+        slabs_(Rayd{request.origin, request.direction}, kInstancePad),
+        filter_(filter),
+        collector_(collector) {}
+
+  const SlabRay<double>& slabs() const { return slabs_; }
+  double limit() const { return raised(collector_.limit()); }
+  bool visit(const Instance& instance) {
+    if (!task_.count_test()) return false;
+    if (!filter_.accepts(instance)) return true;
+    // Part of the verdict, and hits are no nearer: the tree over instances may cull by it.
+    const std::optional<float> nearest = entry(slabs_, instance.bounds);
+    if (!nearest) return true;
+    ask_instance(task_, request_, slabs_, instance, *nearest, collector_);
+    return !task_.ended() && !collector_.done();
+  }
+
+ private:
+  QueryTask& task_;
+  const RayRequest& request_;
+  SlabRay<double> slabs_;
+  const Filter& filter_;
+  HitCollector& collector_;
+};
+
+bool asks_kernels(const QueryTask& task, const QueryBlock& block) {
+  return block.precision == Precision::kExact && block.source != Source::kDynamic && task.ray_kernels() != nullptr;
+}
+
+Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
+
+Cull stored_cull(Cull cull, Winding winding) {
+  if (winding == Winding::kCounterClockwise || cull == Cull::kNone) return cull;
+  return cull == Cull::kBack ? Cull::kFront : Cull::kBack;
+}
+
+}  // namespace
+
+RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i) {
+  RayRequest request;
+  request.origin = block.frame + point(ColumnReader<float>(rays.origins, 3).entry(i));
+  request.direction = point(ColumnReader<float>(rays.directions, 3).entry(i));
+  request.t_max = ColumnReader<float>(rays.t_max, 1).value(i, std::numeric_limits<float>::infinity());
+  request.mode = rays.mode;
+  request.cull = stored_cull(rays.cull, winding);
+  request.inside = rays.inside;
+  request.source = block.source;
+  request.precision = block.precision;
+  request.max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+  return request;
+}
+
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryMoments& moments,
+                    Winding winding, size_t begin, size_t end) {
+  std::vector<AskedRay> rays;
+  rays.reserve(end - begin);
+  for (size_t i = begin; i < end; ++i) rays.emplace_back(ray_request(block, columns, winding, i), Filter(block, i));
+  const bool by_kernels = asks_kernels(task, block);
+  if (by_kernels) ask_meshes(task, rays);
+  RayAnswers answers;
+  answers.reserve(rays.size());
+  for (size_t i = begin; i < end; ++i) {
+    AskedRay& ray = rays[i - begin];
+    if (!by_kernels && block.source != Source::kDynamic && !task.ended()) {
+      InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
+      task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
+    }
+    const Moment& moment = moments.of(i);
+    const bool asks_objects = block.source != Source::kStatic && moment.objects().grid().size() != 0;
+    if (asks_objects && !ray.collector.done() && !task.ended()) {
+      ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);
+      task.visit_objects_on_ray(moment, visitor.slabs(), visitor);
+    }
+    answers.push_back(ray.collector.finish());
+    answers.back().truncated |= task.ended();
+  }
+  return answers;
+}
+
+Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding) {
+  Surface surface;
+  if (request.precision == Precision::kConservative) return surface;
+  if (hit.object) {
+    const ObjectRay ray(Rayd{request.origin, request.direction}, request.inside);
+    if (const std::optional<ShapeHit> found = ray_hit(ray, hit.object_shape())) surface.normal = found->normal;
+    return surface;
+  }
+  if (hit.instance == nullptr) return surface;
+  const Transform& transform = hit.instance->transform;
+  const Triangle triangle = hit.instance->mesh->triangle(hit.triangle);
+  const TriangleRay ray(transform, request.origin, request.direction);
+  if (const std::optional<TriangleHit> found = ray.hit(triangle)) {
+    surface.u = found->u;
+    surface.v = found->v;
+  }
+  const Vec3d front = normalized(transform.rotation.to_world(area_normal(triangle)));
+  surface.normal = winding == Winding::kClockwise ? -front : front;
+  return surface;
+}
+
+}  // namespace locus

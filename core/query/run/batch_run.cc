@@ -1,0 +1,237 @@
+#include "core/query/run/batch_run.h"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/query/run/rows.h"
+
+namespace locus {
+namespace {
+
+// Queries of a piece. Those that turn out to be much work are parted further.
+constexpr size_t kPieceQueries = 256;
+
+size_t most_queries(const QueryBlock& block) {
+  const auto* const lookup = std::get_if<LookupColumns>(&block.kind);
+  // Groups are looked up in one pass over all objects.
+  return lookup != nullptr && !lookup->groups.empty() ? limits::kMaxQueries : kPieceQueries;
+}
+
+void copy_rows(const BlockResult& from, size_t first, size_t rows, const RowSpans& to) {
+  for_each_column_array([&](const auto& array) {
+    if (array.get(to) == nullptr) return;
+    std::copy_n(array.get(from).data() + first * array.width, rows * array.width, array.get(to));
+  });
+}
+
+void write_moments(const QueryMoments& moments, size_t block, size_t queries, AnswerSink& answer) {
+  if (!moments.asks_past() || queries == 0) return;
+  const MomentSpans to = answer.add_moments(block, queries);
+  for (size_t i = 0; i < queries; ++i) {
+    to.ticks[i] = moments.time(i).tick;
+    to.fractions[i] = moments.time(i).fraction;
+    if (moments.clamped(i)) *answer.add_clamped(block, 1) = static_cast<uint32_t>(i);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot& snapshot, const QueryBatch& batch,
+                                                            RunOptions options, AnswerSink& answer) {
+  std::vector<QueryMoments> moments;
+  moments.reserve(batch.blocks.size());
+  for (size_t b = 0; b < batch.blocks.size(); ++b) {
+    absl::StatusOr<QueryMoments> resolved =
+        QueryMoments::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"));
+    if (!resolved.ok()) return resolved.status();
+    moments.push_back(*std::move(resolved));
+  }
+  std::unique_ptr<BatchRun> run(new BatchRun(snapshot, batch, std::move(options), answer));
+  for (QueryMoments& of_block : moments) run->add_block(std::move(of_block));
+  const MutexLock lock(run->mutex_);
+  run->pass_empty_blocks();
+  return run;
+}
+
+BatchRun::BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOptions options, AnswerSink& answer)
+    : snapshot_(snapshot),
+      batch_(batch),
+      options_(std::move(options)),
+      answer_(answer),
+      control_(batch.max_work, options_.stop),
+      room_(reply_limit(batch) - fixed_reply_bytes(batch)) {}
+
+void BatchRun::add_block(QueryMoments moments) {
+  const size_t number = blocks_.size();
+  const QueryBlock& block = batch_.blocks[number];
+  const size_t queries = query_count(block);
+  Block& to = blocks_.emplace_back(std::move(moments), queries, most_queries(block));
+  if (row_layout(block) == RowLayout::kDense)
+    to.place.rows = answer_.add_rows(number, returned_columns(block), queries);
+  if (row_layout(block) == RowLayout::kBytes) to.place.hits = answer_.add_hits(number, queries);
+  write_moments(to.moments, number, queries, answer_);
+}
+
+QueryCost BatchRun::cost() const {
+  QueryCost sum;
+  for (const Block& block : blocks_) {
+    sum.work += block.cost.work;
+    sum.nanoseconds += block.cost.nanoseconds;
+  }
+  return sum;
+}
+
+Progress BatchRun::work(uint64_t nanoseconds) {
+  const uint64_t start = now();
+  Pieces::iterator piece;
+  {
+    const MutexLock lock(mutex_);
+    if (!can_begin()) return progress();
+    piece = begin_piece();
+  }
+  Stretch stretch = begin_stretch(piece->block);
+  const uint64_t worked_before = stretch.start;
+  while (true) {
+    end_piece(piece, run(*piece));
+    // Who lost the core meanwhile has not worked yet.
+    const bool enough = !options_.clock || (now() - start >= nanoseconds && worked() - worked_before >= nanoseconds);
+    const MutexLock lock(mutex_);
+    --at_work_;
+    const Progress reached = progress();
+    const bool over = reached != Progress::kMore || enough;
+    if (!over) piece = begin_piece();
+    if (over || piece->block != stretch.block) end_stretch(stretch);
+    if (over) return reached;
+    if (piece->block != stretch.block) stretch = begin_stretch(piece->block);
+  }
+}
+
+// What is in no piece yet may wait for those before it; the first of all pieces may not.
+bool BatchRun::can_begin() const {
+  if (control_.stopped()) return false;
+  if (!left_.empty()) return pieces_.size() < 2 * kMostPieces || left_.front() == pieces_.begin();
+  return next_block_ < blocks_.size() && pieces_.size() < kMostPieces;
+}
+
+BatchRun::Pieces::iterator BatchRun::begin_piece() {
+  ++at_work_;
+  if (!left_.empty()) return pop_left();
+  const Block& block = blocks_[next_block_];
+  const size_t end = std::min(block.queries, next_query_ + block.step);
+  pieces_.push_back({next_block_, next_query_, end});
+  next_query_ = end;
+  if (end == block.queries) {
+    ++next_block_;
+    next_query_ = 0;
+    pass_empty_blocks();
+  }
+  return std::prev(pieces_.end());
+}
+
+BatchRun::Pieces::iterator BatchRun::pop_left() {
+  const Pieces::iterator piece = left_.front();
+  left_.erase(left_.begin());
+  return piece;
+}
+
+void BatchRun::pass_empty_blocks() {
+  while (next_block_ < blocks_.size() && blocks_[next_block_].queries == 0) ++next_block_;
+}
+
+size_t BatchRun::run(Piece& piece) {
+  Block& block = blocks_[piece.block];
+  QueryTask task(snapshot_, control_, options_.brute_force);
+  BlockRunner runner(task, batch_.blocks[piece.block], block.moments, block.place,
+                     room_.load(std::memory_order_relaxed));
+  const size_t reached = runner.run(piece.begin, piece.end);
+  piece.rows = runner.take_rows();
+  piece.work = task.work();
+  return reached;
+}
+
+void BatchRun::end_piece(Pieces::iterator piece, size_t reached) {
+  {
+    const MutexLock lock(mutex_);
+    if (reached < piece->end) leave(piece, reached);
+    piece->done = true;
+    if (writing_ || !pieces_.front().done) return;
+    writing_ = true;
+  }
+  write_out();
+}
+
+// What is left of a piece is one of its own, right behind it.
+void BatchRun::leave(Pieces::iterator piece, size_t reached) {
+  const Pieces::iterator left = pieces_.insert(std::next(piece), {piece->block, reached, piece->end});
+  piece->end = reached;
+  const auto before = [](Pieces::iterator a, Pieces::iterator b) {
+    return std::tie(a->block, a->begin) < std::tie(b->block, b->begin);
+  };
+  left_.insert(std::upper_bound(left_.begin(), left_.end(), left, before), left);
+}
+
+void BatchRun::write_out() {
+  while (true) {
+    Pieces ready;
+    {
+      const MutexLock lock(mutex_);
+      const auto open = std::find_if(pieces_.begin(), pieces_.end(), [](const Piece& piece) { return !piece.done; });
+      ready.splice(ready.end(), pieces_, pieces_.begin(), open);
+      if (ready.empty()) {
+        writing_ = false;
+        return;
+      }
+    }
+    if (control_.stopped()) continue;
+    for (const Piece& piece : ready) write(piece);
+  }
+}
+
+void BatchRun::write(const Piece& piece) {
+  Block& block = blocks_[piece.block];
+  block.cost.work += piece.work;
+  if (row_layout(batch_.blocks[piece.block]) == RowLayout::kCounted) return write_counted(piece);
+  const std::vector<uint32_t>& cut = piece.rows.truncated;
+  if (!cut.empty()) std::copy(cut.begin(), cut.end(), answer_.add_truncated(piece.block, cut.size()));
+}
+
+// Cuts rows where the reply is full.
+void BatchRun::write_counted(const Piece& piece) {
+  const ColumnSet columns = returned_columns(batch_.blocks[piece.block]);
+  const uint32_t bytes = row_bytes(columns);
+  uint64_t room = room_.load(std::memory_order_relaxed);
+  uint32_t* const counts = answer_.add_counts(piece.block, piece.rows.counts.size());
+  size_t first = 0, row = 0;  // rows from first to row are to be copied
+  const auto copy = [&] {
+    if (row != first) copy_rows(piece.rows, first, row - first, answer_.add_rows(piece.block, columns, row - first));
+  };
+  auto cut = piece.rows.truncated.begin();
+  for (size_t i = 0; i < piece.rows.counts.size(); ++i) {
+    const auto query = static_cast<uint32_t>(piece.begin + i);
+    const uint32_t rows = piece.rows.counts[i];
+    const auto kept = static_cast<uint32_t>(std::min<uint64_t>(rows, room / bytes));
+    counts[i] = kept;
+    room -= uint64_t{kept} * bytes;
+    row += kept;
+    const bool was_cut = cut != piece.rows.truncated.end() && *cut == query;
+    if (was_cut) ++cut;
+    if (was_cut || kept < rows) *answer_.add_truncated(piece.block, 1) = query;
+    if (kept == rows) continue;
+    copy();
+    row += rows - kept;
+    first = row;
+  }
+  copy();
+  room_.store(room, std::memory_order_relaxed);
+}
+
+Progress BatchRun::progress() {
+  if (can_begin()) return Progress::kMore;
+  if (at_work_ > 0 || done_) return Progress::kBegun;
+  done_ = true;
+  return Progress::kDone;
+}
+
+}  // namespace locus

@@ -1,0 +1,98 @@
+#include "core/query/run/rows.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+namespace locus {
+namespace {
+
+// What objects and instances have in common in a row.
+struct Labels {
+  Group group = 0;
+  Tag tag = 0;
+  Layers layers = 0;
+  Vec3d position;
+  Quaternion rotation{0, 0, 0, 0};
+};
+
+Labels labels_of(const Hit& hit) {
+  if (hit.object) {
+    const GridEntry& entry = hit.object.entry();
+    const Shape shape = hit.object_shape();
+    return {entry.group, entry.tag, entry.layers, shape.position, shape.rotation};
+  }
+  if (hit.instance != nullptr)
+    return {hit.instance->group, hit.instance->tag, hit.instance->layers, hit.instance->transform.translation,
+            hit.instance->transform.quaternion};
+  return {};
+}
+
+template <class T, class V>
+void write_point(T* column, size_t row, V x, V y, V z) {
+  column += 3 * row;
+  column[0] = x;
+  column[1] = y;
+  column[2] = z;
+}
+
+void write_labels(const Hit& hit, const RowSpans& to, size_t row) {
+  const Labels labels = labels_of(hit);
+  if (to.groups != nullptr) to.groups[row] = labels.group;
+  if (to.tags != nullptr) to.tags[row] = labels.tag;
+  if (to.layers != nullptr) to.layers[row] = labels.layers;
+  if (to.positions == nullptr) return;
+  write_point(to.positions, row, labels.position.x, labels.position.y, labels.position.z);
+  const Quaternion& turned = labels.rotation;
+  std::copy_n(std::array{turned.x, turned.y, turned.z, turned.w}.begin(), 4, to.rotations + 4 * row);
+}
+
+bool has_labels(const RowSpans& to) {
+  return to.groups != nullptr || to.tags != nullptr || to.layers != nullptr || to.positions != nullptr;
+}
+
+}  // namespace
+
+void write_row(const Hit& hit, const RowSpans& to, size_t row) {
+  if (to.t != nullptr) to.t[row] = hit.t;
+  if (to.ids != nullptr) to.ids[row] = hit.id;
+  if (to.triangles != nullptr) to.triangles[row] = hit.triangle;
+  if (has_labels(to)) write_labels(hit, to, row);
+}
+
+void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row) {
+  if (to.ids != nullptr) std::fill_n(to.ids + row, triangles.size(), hit.id);
+  if (to.triangles != nullptr) std::copy(triangles.begin(), triangles.end(), to.triangles + row);
+  if (!has_labels(to)) return;
+  for (size_t i = 0; i < triangles.size(); ++i) write_labels(hit, to, row + i);
+}
+
+void write_object_rows(absl::Span<const FoundObject> objects, const Moment& moment, const RowSpans& to) {
+  if (to.ids != nullptr)
+    for (size_t row = 0; row < objects.size(); ++row) to.ids[row] = objects[row].id;
+  if (to.triangles != nullptr) std::fill_n(to.triangles, objects.size(), kNoTriangle);
+  if (!has_labels(to)) return;
+  for (size_t row = 0; row < objects.size(); ++row) write_labels(hit_on(objects[row].object, 0, moment), to, row);
+}
+
+void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
+                   size_t row) {
+  if (to.uvs != nullptr || to.normals != nullptr) {
+    const Surface surface = surface_at(request, hit, winding);
+    if (to.uvs != nullptr) std::copy_n(std::array{surface.u, surface.v}.begin(), 2, to.uvs + 2 * row);
+    const Vec3f normal = to_float(surface.normal);
+    if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
+  }
+  if (to.points == nullptr) return;
+  Vec3f point;
+  if (hit.id != kNoId) point = to_float(request.origin - frame + request.direction * double{hit.t});
+  write_point(to.points, row, point.x, point.y, point.z);
+}
+
+void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {
+  if (to.points == nullptr) return;
+  const Vec3f point = to_float(request.point - frame + nearest_offset(request, hit));
+  write_point(to.points, row, point.x, point.y, point.z);
+}
+
+}  // namespace locus

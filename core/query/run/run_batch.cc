@@ -1,0 +1,35 @@
+#include "core/query/run/run_batch.h"
+
+#include <limits>
+#include <memory>
+#include <utility>
+
+namespace locus {
+
+absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
+                                      const RunOptions& options) {
+  BatchResult result;
+  result.blocks.resize(batch.blocks.size());
+  BatchResultSink sink(result);
+  const absl::StatusOr<std::unique_ptr<BatchRun>> run = BatchRun::prepare(snapshot, batch, options, sink);
+  if (!run.ok()) return run.status();
+  const auto work = [&run](size_t) {
+    while ((*run)->work(std::numeric_limits<uint64_t>::max()) == Progress::kMore) {
+    }
+  };
+  // One who finds nothing to begin may go: those at work go on until all is done.
+  if (options.parallel_for)
+    options.parallel_for(BatchRun::kMostPieces, work);
+  else
+    work(0);
+  if (absl::Status status = (*run)->status(); !status.ok()) return status;
+  for (size_t b = 0; b < result.blocks.size(); ++b) {
+    result.blocks[b].work = (*run)->cost(b).work;
+    result.blocks[b].nanoseconds = (*run)->cost(b).nanoseconds;
+  }
+  result.work = (*run)->cost().work;
+  result.nanoseconds = (*run)->cost().nanoseconds;
+  return result;
+}
+
+}  // namespace locus

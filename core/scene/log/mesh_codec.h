@@ -1,0 +1,64 @@
+// A mesh's columns as chunks for the log, and the mesh again from them. The tree is not among them: what saves building
+// it again is tree_codec.h. One thread at a time.
+#ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
+#define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "core/mesh/triangle_mesh.h"
+#include "core/scene/log/byte_codec.h"
+#include "core/scene/statics/static_mesh.h"
+
+namespace locus {
+
+class MeshWriter {
+ public:
+  // Unpacks the vertices; everything else a chunk at a time.
+  explicit MeshWriter(std::shared_ptr<const StaticMesh> mesh);
+
+  // The next chunk, at most UpdateLog::kMaxChunkBytes, or nothing at the end: to be called by a ChunkSource.
+  absl::StatusOr<std::optional<std::string>> next();
+
+ private:
+  std::string header() const;
+  std::string next_vertices();
+  std::string next_indices();
+  std::string next_parts();
+
+  const std::shared_ptr<const StaticMesh> mesh_;
+  const std::vector<float> vertices_;
+  PackedIndices::Reader indices_;
+  bool begun_ = false;
+  size_t next_vertex_ = 0;  // number of a coordinate
+  size_t next_index_ = 0;
+  size_t next_part_ = 0;
+};
+
+class MeshReader {
+ public:
+  // The next chunk; all in the order in which they were written. DATA_LOSS saying what is wrong.
+  absl::Status add(absl::string_view chunk);
+  // Once all chunks came.
+  absl::StatusOr<TriangleMesh> finish() &&;
+
+ private:
+  void read_header(ByteReader& reader);
+  void read_parts(ByteReader& reader);
+
+  bool begun_ = false;
+  uint64_t vertex_numbers_ = 0;  // how many there are to be
+  uint64_t index_numbers_ = 0;
+  uint64_t part_count_ = 0;
+  std::vector<float> vertices_;
+  std::vector<uint32_t> indices_;
+  std::vector<MeshPart> parts_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_

@@ -1,0 +1,98 @@
+#include "core/scene/log/scene_journal.h"
+
+#include "core/base/check.h"
+#include "core/base/limits.h"
+#include "core/base/refusal.h"
+#include "core/base/scratch.h"
+#include "core/scene/log/record_codec.h"
+
+namespace locus {
+namespace {
+
+// What a batch can take: each item in all columns, and each list's lengths.
+static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
+              UpdateLog::kMaxRecordBytes);
+static_assert(uint64_t{limits::kMaxInstances} * 128 <= UpdateLog::kMaxRecordBytes);
+
+}  // namespace
+
+void SceneJournal::end_record(uint64_t epoch, const UpdateBatch& numbers) {
+  entries_.push_back({epoch, numbers.writer, numbers.batch, {}});
+  ends_.push_back(bytes_.size());
+}
+
+absl::Status SceneJournal::append_each(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) {
+  if (!on() || batches.empty()) return absl::OkStatus();
+  for (const UpdateBatch* batch : batches) {
+    encode_batch(*batch, bytes_);
+    end_record(epoch, *batch);
+  }
+  return append(log_.level);
+}
+
+absl::Status SceneJournal::append_joined(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) {
+  if (!on() || batches.empty()) return absl::OkStatus();
+  encode_joined(batches, bytes_);
+  end_record(epoch, *batches.back());
+  return append(log_.level);
+}
+
+absl::Status SceneJournal::append_change(uint64_t epoch, const StaticChange& change, absl::Span<const Id> placed) {
+  if (!on()) return absl::OkStatus();
+  encode_change(change, placed, bytes_);
+  end_record(epoch, UpdateBatch());
+  return append(AckLevel::kLocal);
+}
+
+absl::Status SceneJournal::append(AckLevel level) {
+  absl::Status status;
+  size_t begin = 0;
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    entries_[i].bytes = absl::string_view(bytes_).substr(begin, ends_[i] - begin);
+    begin = ends_[i];
+    if (entries_[i].bytes.size() > UpdateLog::kMaxRecordBytes)
+      status = refuse_limit("batch", "record_bytes", static_cast<double>(UpdateLog::kMaxRecordBytes),
+                            static_cast<double>(entries_[i].bytes.size()));
+  }
+  if (status.ok()) {
+    const absl::StatusOr<uint64_t> last = log_.log->append(log_.key, entries_, level);
+    status = last.status();
+    if (status.ok()) {
+      const MutexLock lock(mutex_);
+      position_.sequence += entries_.size();
+      position_.bytes += bytes_.size();
+      // A log that numbers otherwise is another scene's.
+      LOCUS_CHECK_EQ(*last, position_.sequence);
+    }
+  }
+  entries_.clear();
+  ends_.clear();
+  bytes_.clear();
+  if (bytes_.capacity() > kKeptScratch) std::string().swap(bytes_);
+  return status;
+}
+
+absl::Status SceneJournal::remove() { return on() ? log_.log->delete_scene(log_.key) : absl::OkStatus(); }
+
+LogPosition SceneJournal::position() const {
+  const MutexLock lock(mutex_);
+  return position_;
+}
+
+uint64_t SceneJournal::total_bytes() const {
+  const MutexLock lock(mutex_);
+  return bytes_in_snapshots_ + position_.bytes;
+}
+
+void SceneJournal::snapshot_written(uint64_t sequence, uint64_t total_bytes) {
+  const MutexLock lock(mutex_);
+  if (sequence < position_.snapshot_sequence) return;  // a later one is there already
+  LOCUS_CHECK_LE(sequence, position_.sequence);
+  const uint64_t all = bytes_in_snapshots_ + position_.bytes;
+  LOCUS_CHECK_LE(total_bytes, all);
+  position_.snapshot_sequence = sequence;
+  position_.bytes = all - total_bytes;
+  bytes_in_snapshots_ = total_bytes;
+}
+
+}  // namespace locus

@@ -1,0 +1,224 @@
+#include "core/scene/log/state_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/column.h"
+#include "core/base/limits.h"
+#include "core/scene/log/state_limits.h"
+
+namespace locus {
+namespace {
+
+constexpr size_t kLeastWriter = 8 * 8;
+constexpr size_t kLeastError = 3 * 8;
+
+UpdateAck read_ack(ByteReader& reader) {
+  UpdateAck ack;
+  ack.epoch = reader.number("the epoch of an ack");
+  ack.revision = reader.number("the revision of an ack");
+  ack.tick = reader.number("the tick of an ack");
+  const ByteReader::Pair counts = reader.pair("the counts of an ack");
+  ack.applied = counts.first;
+  ack.refused = counts.second;
+  const uint64_t errors = reader.count(kLeastError, "the number of errors of an ack");
+  if (errors > limits::kMaxListedItemErrors) reader.fail("the number of errors of an ack", "is out of range");
+  for (uint64_t i = 0; i < errors && reader.good(); ++i) {
+    ItemError& error = ack.errors.emplace_back();
+    const ByteReader::Pair pair = reader.pair("an error of an ack");
+    error.index = pair.first;
+    if (pair.second > static_cast<uint32_t>(Reason::kHashMismatch)) reader.fail("the reason of an error", "is unknown");
+    error.reason = static_cast<Reason>(pair.second);
+    error.id = reader.number("the id of an error");
+    error.field = std::string(reader.text(kMaxErrorField, "the field of an error"));
+  }
+  return ack;
+}
+
+// NaN fails, too.
+template <class T>
+bool all_within(absl::Span<const T> numbers, double low, double high) {
+  bool right = true;
+  for (const T number : numbers) right &= number >= low && number <= high;
+  return right;
+}
+
+bool all_unit(absl::Span<const float> quaternions) {
+  bool right = true;
+  for (size_t at = 0; at < quaternions.size(); at += 4) {
+    const float* q = &quaternions[at];
+    right &= unit_deviation({q[0], q[1], q[2], q[3]}) <= limits::kMaxQuaternionDeviation;
+  }
+  return right;
+}
+
+struct LabelColumns {
+  absl::Span<const uint64_t> ids, groups, tags;
+  absl::Span<const uint32_t> layers;
+
+  LabelColumns(ByteReader& reader, size_t most) {
+    ids = reader.column<uint64_t>("ids");
+    if (ids.empty() || ids.size() > most) reader.fail("ids", "are too many, or none");
+    if (std::find(ids.begin(), ids.end(), kNoId) != ids.end()) reader.fail("an id", "is 0");
+    groups = reader.shared_column<uint64_t>(ids.size(), 1, "groups");
+    tags = reader.shared_column<uint64_t>(ids.size(), 1, "tags");
+    layers = reader.shared_column<uint32_t>(ids.size(), 1, "layers");
+  }
+};
+
+struct ShapeColumns {
+  absl::Span<const uint8_t> kinds;
+  absl::Span<const double> positions;
+  absl::Span<const float> rotations, sizes, radii;
+
+  ShapeColumns(ByteReader& reader, size_t n) {
+    kinds = reader.shared_column<uint8_t>(n, 1, "kinds");
+    positions = reader.shared_column<double>(n, 3, "positions");
+    rotations = reader.shared_column<float>(n, 4, "rotations");
+    sizes = reader.shared_column<float>(n, 3, "sizes");
+    radii = reader.shared_column<float>(n, 1, "radii");
+    constexpr double kMost = limits::kMaxCoordinate;
+    if (!all_within(kinds, 0, static_cast<double>(ShapeKind::kCapsule)))
+      reader.fail("the kind of a shape", "is unknown");
+    if (!all_within(positions, -kMost, kMost)) reader.fail("a position", "is out of range");
+    if (!all_unit(rotations)) reader.fail("a rotation", "is not of unit length");
+    if (!all_within(sizes, -kMost, kMost)) reader.fail("a size", "is out of range");
+    if (!all_within(radii, 0, kMost)) reader.fail("a radius", "is out of range");
+  }
+};
+
+template <class T>
+void append(std::vector<T>& to, const ColumnReader<T>& column, size_t i, size_t width) {
+  to.insert(to.end(), column.entry(i), column.entry(i) + width);
+}
+
+}  // namespace
+
+absl::Status StateReader::add(absl::string_view chunk) {
+  const AlignedBytes aligned(chunk);
+  ByteReader reader(aligned.bytes());
+  const BytesKind kind = read_kind(reader);
+  if (reader.good() && (kind == BytesKind::kStateHeader) == begun_) reader.fail("the header", "is not first");
+  if (kind == BytesKind::kStateHeader) {
+    read_header(reader);
+  } else if (kind == BytesKind::kStateWriters) {
+    read_writers(reader);
+  } else if (kind == BytesKind::kStateInstances) {
+    read_instances(reader);
+  } else if (kind == BytesKind::kStateObjects) {
+    read_objects(reader);
+  } else {
+    reader.fail("the kind of a chunk", "is not known");
+  }
+  reader.end("a chunk");
+  return reader.status();
+}
+
+void StateReader::read_header(ByteReader& reader) {
+  begun_ = true;
+  state_.epoch = reader.number("the epoch");
+  if (reader.good() && state_.epoch == 0) reader.fail("the epoch", "is 0");
+  state_.revision = reader.number("the revision");
+  state_.tick = reader.number("the tick");
+  state_.has_past = reader.number_upto(1, "whether there is a past") != 0;
+  writers_ = reader.number_upto(limits::kMaxWriters, "the number of writers");
+  instances_ = reader.number_upto(limits::kMaxInstances, "the number of instances");
+  objects_ = reader.number_upto(limits::kMaxObjects, "the number of objects");
+  state_.cell_size = reader.real("the size of cells");
+  if (!(state_.cell_size >= 0x1p-40 && state_.cell_size <= 0x1p40)) reader.fail("the size of cells", "is out of range");
+}
+
+void StateReader::read_writers(ByteReader& reader) {
+  while (reader.good() && reader.left() >= kLeastWriter) {
+    WriterTable::Writer writer;
+    writer.number = reader.number("a writer");
+    writer.batch = reader.number("the last batch of a writer");
+    writer.heard = reader.number("when a writer was heard");
+    writer.ack = read_ack(reader);
+    if (reader.good() && !state_.writers.restore(std::move(writer))) reader.fail("a writer", "is there twice, or 0");
+  }
+}
+
+void StateReader::read_instances(ByteReader& reader) {
+  const absl::Span<const Sha256> meshes = reader.column<Sha256>("the contents of meshes");
+  const LabelColumns labels(reader, kInstancesPerChunk);
+  const size_t n = labels.ids.size();
+  const auto numbers = reader.shared_column<uint32_t>(n, 1, "the meshes of instances");
+  const auto translations = reader.shared_column<double>(n, 3, "translations");
+  const auto rotations = reader.shared_column<float>(n, 4, "rotations");
+  const auto scales = reader.shared_column<float>(n, 1, "scales");
+  if (reader.good() && !all_within(numbers, 0, static_cast<double>(meshes.size()) - 1))
+    reader.fail("the mesh of an instance", "is unknown");
+  if (!reader.good()) return;
+  for (size_t i = 0; i < n; ++i) {
+    Placed& placed = placed_[meshes[*ColumnReader<uint32_t>(numbers, 1).entry(i)]];
+    placed.ids.push_back(labels.ids[i]);
+    append(placed.groups, ColumnReader<uint64_t>(labels.groups, 1), i, 1);
+    append(placed.tags, ColumnReader<uint64_t>(labels.tags, 1), i, 1);
+    append(placed.layers, ColumnReader<uint32_t>(labels.layers, 1), i, 1);
+    append(placed.translations, ColumnReader<double>(translations, 3), i, 3);
+    append(placed.rotations, ColumnReader<float>(rotations, 4), i, 4);
+    append(placed.scales, ColumnReader<float>(scales, 1), i, 1);
+  }
+  instances_read_ += n;
+}
+
+void StateReader::read_objects(ByteReader& reader) {
+  const LabelColumns labels(reader, kObjectsPerChunk);
+  const size_t n = labels.ids.size();
+  const ShapeColumns shapes(reader, n);
+  if (!reader.good()) return;
+  const ColumnReader<uint64_t> groups(labels.groups, 1), tags(labels.tags, 1);
+  const ColumnReader<uint32_t> layers(labels.layers, 1);
+  const ColumnReader<uint8_t> kinds(shapes.kinds, 1);
+  const ColumnReader<double> positions(shapes.positions, 3);
+  const ColumnReader<float> rotations(shapes.rotations, 4), sizes(shapes.sizes, 3), radii(shapes.radii, 1);
+  std::vector<Object>& objects = state_.objects.emplace_back(n);
+  for (size_t i = 0; i < n; ++i) {
+    Object& object = objects[i];
+    object.id = labels.ids[i];
+    object.group = *groups.entry(i);
+    object.tag = *tags.entry(i);
+    object.layers = *layers.entry(i);
+    const double* p = positions.entry(i);
+    const float* q = rotations.entry(i);
+    const float* s = sizes.entry(i);
+    object.shape = {static_cast<ShapeKind>(*kinds.entry(i)),
+                    {p[0], p[1], p[2]},
+                    {q[0], q[1], q[2], q[3]},
+                    {s[0], s[1], s[2]},
+                    *radii.entry(i)};
+    const bool box = object.shape.kind == ShapeKind::kBox;
+    if (box && !(s[0] >= 0 && s[1] >= 0 && s[2] >= 0)) reader.fail("the extent of a box", "is negative");
+  }
+  objects_read_ += n;
+}
+
+// As the scene had them: a transform is stored as it is placed.
+absl::Status StateReader::place(const FindMesh& find_mesh) {
+  StaticChange change;
+  for (const auto& [content, placed] : placed_) {
+    PlacementColumns place{find_mesh(content), placed.ids,    placed.translations, placed.rotations,
+                           placed.scales,      placed.layers, placed.groups,       placed.tags};
+    if (place.mesh == nullptr) return data_loss("a mesh that instances use is not there");
+    change.place.push_back(std::move(place));
+  }
+  const auto no_object = [](Id) { return false; };
+  absl::StatusOr<StaticSet::Changed> changed = StaticSet::empty()->apply(change, no_object, 0);
+  if (!changed.ok()) return data_loss(absl::StrCat("an instance is wrong: ", changed.status().message()));
+  state_.statics = std::move(changed->set);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SceneState> StateReader::finish(const FindMesh& find_mesh) && {
+  if (!begun_) return data_loss("the header is not there");
+  if (state_.writers.size() != writers_ || instances_read_ != instances_ || objects_read_ != objects_)
+    return data_loss(absl::StrCat("of ", writers_, " writers, ", instances_, " instances and ", objects_, " objects ",
+                                  state_.writers.size(), ", ", instances_read_, " and ", objects_read_, " are there"));
+  if (absl::Status status = place(find_mesh); !status.ok()) return status;
+  return std::move(state_);
+}
+
+}  // namespace locus

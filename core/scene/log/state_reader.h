@@ -1,0 +1,54 @@
+// Makes a scene's state again from the chunks that StateWriter put down. Trusts them with nothing: DATA_LOSS says what
+// is wrong. One thread at a time.
+#ifndef LOCUS_CORE_SCENE_LOG_STATE_READER_H_
+#define LOCUS_CORE_SCENE_LOG_STATE_READER_H_
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "core/scene/log/byte_codec.h"
+#include "core/scene/log/scene_state.h"
+
+namespace locus {
+
+// The mesh of that content, or null.
+using FindMesh = std::function<std::shared_ptr<const StaticMesh>(const Sha256&)>;
+
+class StateReader {
+ public:
+  // The next chunk; all in the order in which they were written.
+  absl::Status add(absl::string_view chunk);
+  // Once all chunks came: builds the tree of instances. `find_mesh` knows every mesh there is.
+  absl::StatusOr<SceneState> finish(const FindMesh& find_mesh) &&;
+
+ private:
+  // The placements of one mesh.
+  struct Placed {
+    std::vector<uint64_t> ids, groups, tags;
+    std::vector<uint32_t> layers;
+    std::vector<double> translations;
+    std::vector<float> rotations, scales;
+  };
+  void read_header(ByteReader& reader);
+  void read_writers(ByteReader& reader);
+  void read_instances(ByteReader& reader);
+  void read_objects(ByteReader& reader);
+  absl::Status place(const FindMesh& find_mesh);
+
+  SceneState state_;
+  bool begun_ = false;
+  uint64_t writers_ = 0;  // how many there are to be
+  uint64_t instances_ = 0;
+  uint64_t objects_ = 0;
+  uint64_t instances_read_ = 0;
+  uint64_t objects_read_ = 0;
+  std::map<Sha256, Placed> placed_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_LOG_STATE_READER_H_

@@ -1,0 +1,46 @@
+// Puts a scene's state down in chunks, one at a time, from a snapshot that never changes: the scene goes on meanwhile,
+// and no more than a chunk is in memory. One thread at a time.
+//
+// Chunks: a header that says how much of everything follows; writers; instances; objects, in the order the grid has
+// them. Read again by StateReader (core/scene/log/state_reader.h).
+#ifndef LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
+#define LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/scene/log/scene_state.h"
+#include "core/scene/log/update_log.h"
+
+namespace locus {
+
+class StateWriter {
+ public:
+  explicit StateWriter(FrozenScene scene);
+
+  // The next chunk, at most UpdateLog::kMaxChunkBytes, or nothing at the end: to be called by a ChunkSource.
+  absl::StatusOr<std::optional<std::string>> next();
+  // Of all chunks so far.
+  uint64_t bytes() const { return bytes_; }
+
+ private:
+  std::string header() const;
+  std::string next_writers();
+  std::string next_instances();
+  std::string next_objects();
+
+  const FrozenScene scene_;
+  const std::vector<WriterTable::Writer> writers_;
+  bool begun_ = false;
+  size_t next_writer_ = 0;
+  size_t next_instance_ = 0;
+  size_t objects_written_ = 0;
+  GridCursor next_object_;
+  uint64_t bytes_ = 0;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_

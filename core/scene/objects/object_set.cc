@@ -1,0 +1,62 @@
+#include "core/scene/objects/object_set.h"
+
+#include <cmath>
+#include <limits>
+
+namespace locus {
+namespace {
+
+float at_least(double length) {
+  return std::nextafter(static_cast<float>(length), std::numeric_limits<float>::infinity());
+}
+
+// Whatever the rotation, so that turning changes nothing of where an object is filed.
+float reach_of(const Shape& shape) {
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+      return 0;
+    case ShapeKind::kBall:
+      return shape.radius;
+    case ShapeKind::kBox:
+      return at_least(std::sqrt(squared_length(to_double(shape.size))));
+    case ShapeKind::kCapsule:
+      return at_least(std::sqrt(squared_length(to_double(shape.size))) + shape.radius);
+  }
+  return 0;
+}
+
+}  // namespace
+
+Shape shape_of(const GridRef& value) {
+  const GridForm form = value.form();
+  const ShapeKind kind = value.entry().kind;
+  const float radius = kind == ShapeKind::kBall ? value.reach() : form.radius;
+  return {kind, value.entry().position, form.rotation, form.size, radius};
+}
+
+Object object_of(const GridRef& value) {
+  const GridEntry& entry = value.entry();
+  return {entry.id, entry.group, entry.tag, entry.layers, shape_of(value)};
+}
+
+GridItem grid_item_of(const Object& object, uint32_t handle) {
+  const Shape& shape = object.shape;
+  GridItem item;
+  item.entry = {shape.position, object.id, object.group, object.tag, object.layers, shape.kind};
+  item.handle = handle;
+  item.reach = reach_of(shape);
+  item.form = {shape.rotation, shape.size, shape.kind == ShapeKind::kBall ? 0 : shape.radius};
+  return item;
+}
+
+GridRef ObjectSet::find_ref(Id id) const {
+  const uint32_t handle = handles_.find(id);
+  return handle == PersistentIdTable<>::kNone ? GridRef() : grid_.at(handle);
+}
+
+std::optional<Object> ObjectSet::find(Id id) const {
+  const GridRef value = find_ref(id);
+  return value ? std::optional<Object>(object_of(value)) : std::nullopt;
+}
+
+}  // namespace locus

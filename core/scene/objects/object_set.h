@@ -1,0 +1,90 @@
+// The moving objects of a scene at one revision: by id, and in the grid. Immutable, any thread; what it shares with
+// other revisions is not seen. A SpatialIndex (core/index/spatial_index.h) of objects.
+#ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
+#define LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
+
+#include <optional>
+#include <utility>
+
+#include "core/base/persistent_id_table.h"
+#include "core/index/hash_grid/grid_snapshot.h"
+#include "core/index/spatial_index.h"
+#include "core/scene/objects/object.h"
+
+namespace locus {
+
+// The shape, or the whole object, that the grid keeps as a reference says.
+Shape shape_of(const GridRef& value);
+Object object_of(const GridRef& value);
+// The object as the grid takes it.
+GridItem grid_item_of(const Object& object, uint32_t handle);
+
+class ObjectSet {
+ public:
+  using Value = Object;
+
+  ObjectSet() = default;
+  ObjectSet(GridSnapshot grid, PersistentIdTable<> handles) : grid_(std::move(grid)), handles_(std::move(handles)) {}
+
+  size_t size() const { return grid_.size(); }
+  const GridSnapshot& grid() const { return grid_; }
+  // Nothing where no object has the id. O(1) and a look through the keys of one brick.
+  GridRef find_ref(Id id) const;
+  std::optional<Object> find(Id id) const;
+  // Whether the object is here, at its position.
+  bool contains(const Object& object) const {
+    const GridRef known = find_ref(object.id);
+    return known && known.entry().position == object.shape.position;
+  }
+
+  // fn(object) for each, in an order that depends on the grid's history only. O(size).
+  template <class Fn>
+  void for_each(Fn&& fn) const {
+    grid_.for_each([&fn](const GridRef& value) {
+      fn(object_of(value));
+      return true;
+    });
+  }
+
+  // The same from a cursor on, which it moves, until fn is false: to be gone on with.
+  template <class Fn>
+  void for_each_from(GridCursor& cursor, const Fn& fn) const {
+    grid_.for_each_from(cursor, [&fn](const GridRef& value) { return fn(object_of(value)); });
+  }
+
+  // As SpatialIndex asks.
+  template <RayVisitor<Object> Visitor>
+  void visit_ray(const SlabRay<double>& ray, Visitor& visitor, Work& work) const {
+    grid_.visit_ray(
+        ray, [&visitor] { return std::as_const(visitor).limit(); }, work,
+        [&visitor](const GridRef& value) { return visitor.visit(object_of(value)); });
+  }
+  template <RegionVisitor<Object> Visitor>
+  void visit_region(Visitor& visitor, Work& work) const {
+    grid_.visit_region(std::as_const(visitor).bounds(), work,
+                       [&visitor](const GridRef& value) { return visitor.visit(object_of(value)); });
+  }
+
+  template <PointVisitor<Object> Visitor>
+  void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
+    grid_.visit_nearest(
+        point, [&visitor] { return std::as_const(visitor).limit(); }, work,
+        [&visitor](const GridRef& value) { return visitor.visit(object_of(value)); });
+  }
+
+  GridStatistics statistics() const { return grid_.statistics(); }
+  // Of objects, bricks and what finds them. O(bricks).
+  size_t bytes() const { return bytes_apart_from(ObjectSet()); }
+  // Of what `other`, a set of the same scene, does not share. O(what differs).
+  size_t bytes_apart_from(const ObjectSet& other) const {
+    return grid_.bytes_apart_from(other.grid_) + handles_.bytes_apart_from(other.handles_);
+  }
+
+ private:
+  GridSnapshot grid_;
+  PersistentIdTable<> handles_;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_

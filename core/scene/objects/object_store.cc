@@ -1,0 +1,138 @@
+#include "core/scene/objects/object_store.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/container/flat_hash_map.h"
+#include "core/base/check.h"
+
+namespace locus {
+namespace {
+
+constexpr size_t kAhead = 16;  // objects whose memory is on its way before they are looked up
+constexpr uint32_t kNewLife = ~0u;
+
+// For each of `inserted` the number among `removed` of the object that lives on as it; kNewLife where none does.
+std::vector<uint32_t> lives_that_go_on(absl::Span<const Object> removed, absl::Span<const Object> inserted,
+                                       const absl::flat_hash_set<Id>& reborn) {
+  std::vector<uint32_t> before(inserted.size(), kNewLife);
+  if (removed.empty() || inserted.empty()) return before;
+  absl::flat_hash_map<Id, uint32_t> numbers;
+  for (uint32_t i = 0; i < removed.size(); ++i)
+    if (!reborn.contains(removed[i].id)) numbers.emplace(removed[i].id, i);
+  for (size_t i = 0; i < inserted.size(); ++i)
+    if (const auto found = numbers.find(inserted[i].id); found != numbers.end()) before[i] = found->second;
+  return before;
+}
+
+}  // namespace
+
+std::optional<Object> ObjectStore::find(Id id) const {
+  const uint32_t known = handle(id);
+  return known == kNoHandle ? std::nullopt : std::optional<Object>(object_of(grid_.at(known)));
+}
+
+uint32_t ObjectStore::new_handle() {
+  if (free_handles_.empty()) return next_handle_++;
+  const uint32_t handle = free_handles_.back();
+  free_handles_.pop_back();
+  return handle;
+}
+
+void ObjectStore::free_handle(uint32_t handle) {
+  if (moves_ == nullptr) {
+    free_handles_.push_back(handle);
+  } else {
+    resting_.push_back({handle, tick_});
+  }
+}
+
+// Sets from the end of a tick hold no life that ended in it.
+void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
+  LOCUS_CHECK(moves_ != nullptr);
+  tick_ = tick;
+  moves_->start_tick(grid_.cell_size());
+  for (; !resting_.empty() && resting_.front().tick <= oldest_tick; resting_.pop_front())
+    free_handles_.push_back(resting_.front().handle);
+}
+
+size_t ObjectStore::move(const GridMoves& moves) {
+  if (moves_ != nullptr)
+    for (const GridMove& move : moves.moves) moves_->moved(grid_.at(move.handle), move.position);
+  return grid_.apply({{}, moves, {}});
+}
+
+// All of which are here.
+std::vector<uint32_t> ObjectStore::handles_of(absl::Span<const Object> objects) const {
+  std::vector<Id> ids;
+  ids.reserve(objects.size());
+  for (const Object& object : objects) ids.push_back(object.id);
+  std::vector<uint32_t> handles(ids.size());
+  find_handles(ids, absl::MakeSpan(handles));
+  for (const uint32_t known : handles) LOCUS_CHECK_NE(known, kNoHandle);
+  return handles;
+}
+
+GridItem ObjectStore::begin_life(const Object& object) {
+  const uint32_t handle = new_handle();
+  LOCUS_CHECK(handles_.set(object.id, handle));
+  if (moves_ != nullptr) moves_->born(handle);
+  return grid_item_of(object, handle);
+}
+
+GridItem ObjectStore::go_on(const Object& object, uint32_t handle) {
+  if (moves_ != nullptr) moves_->moved(grid_.at(handle), object.shape.position);
+  return grid_item_of(object, handle);
+}
+
+size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
+                          const absl::flat_hash_set<Id>& reborn) {
+  const std::vector<uint32_t> leaving = handles_of(removed);
+  const std::vector<uint32_t> before = lives_that_go_on(removed, inserted, reborn);
+  std::vector<uint8_t> ends(removed.size(), 1);
+  for (const uint32_t number : before)
+    if (number != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[number], uint8_t{0}), 1);
+  for (size_t i = 0; i < removed.size(); ++i)
+    if (ends[i] != 0) LOCUS_CHECK(handles_.erase(removed[i].id));
+  handles_.fit(handles_.size() + static_cast<size_t>(std::count(before.begin(), before.end(), kNewLife)));
+  std::vector<GridItem> items;
+  items.reserve(inserted.size());
+  for (size_t i = 0; i < inserted.size(); ++i) {
+    if (i + kAhead < inserted.size()) handles_.prefetch(inserted[i + kAhead].id);
+    items.push_back(before[i] == kNewLife ? begin_life(inserted[i]) : go_on(inserted[i], leaving[before[i]]));
+  }
+  for (size_t i = 0; i < removed.size(); ++i)
+    if (ends[i] != 0) free_handle(leaving[i]);
+  return grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+}
+
+bool ObjectStore::fill(std::vector<std::vector<Object>> pieces, double cell_size) {
+  LOCUS_CHECK_EQ(next_handle_, 0u);
+  size_t count = 0;
+  for (const std::vector<Object>& piece : pieces) count += piece.size();
+  handles_.fit(count);
+  std::vector<GridItem> items;
+  items.reserve(count);
+  for (std::vector<Object>& piece : pieces) {
+    for (size_t i = 0; i < piece.size(); ++i) {
+      if (i + kAhead < piece.size()) handles_.prefetch(piece[i + kAhead].id);
+      const uint32_t handle = new_handle();
+      if (!handles_.set(piece[i].id, handle)) return false;
+      if (moves_ != nullptr) moves_->born(handle);
+      items.push_back(grid_item_of(piece[i], handle));
+    }
+    std::vector<Object>().swap(piece);
+  }
+  grid_.fill(items, cell_size);
+  handles_.take_replaced_bytes();
+  return true;
+}
+
+bool ObjectStore::remove(const Object& object) {
+  const std::optional<Object> known = find(object.id);
+  if (!known) return false;
+  apply({&*known, 1}, {});
+  return true;
+}
+
+}  // namespace locus

@@ -1,0 +1,65 @@
+#include "core/scene/objects/tick_moves.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace locus {
+
+void TickMoves::start_tick(double fast_length) {
+  ++tick_;
+  fast_length_ = fast_length;
+  fast_.clear();
+  fast_changed_ = false;
+  displacement_ = {};
+}
+
+TickMoves::Start& TickMoves::start_of(uint32_t handle) {
+  if (handle >= starts_.size()) starts_.resize(std::max<size_t>(handle + size_t{1}, starts_.size() * 3 / 2));
+  return starts_[handle];
+}
+
+void TickMoves::born(uint32_t handle) { start_of(handle) = {{}, tick_, 0, true}; }
+
+void TickMoves::moved(const GridRef& before, Vec3d to) {
+  Start& start = start_of(before.handle());
+  if (start.tick != tick_) start = {before.entry().position, tick_, before.reach(), false};
+  if (start.newborn) return;
+  const double length = std::sqrt(squared_length(to - start.position));
+  if (length <= displacement_.reach) return;
+  if (length > fast_length_) return add_fast(before, start, to, length);
+  displacement_.reach = length;
+}
+
+void TickMoves::add_fast(const GridRef& before, const Start& start, Vec3d to, double length) {
+  const uint32_t handle = before.handle();
+  const auto at = std::lower_bound(fast_.begin(), fast_.end(), handle,
+                                   [](const FastMover& mover, uint32_t value) { return mover.handle < value; });
+  const Aabbd centers{min(start.position, to), max(start.position, to)};
+  fast_changed_ = true;
+  if (at != fast_.end() && at->handle == handle) {
+    at->length = std::max(at->length, length);
+    at->centers = merge(at->centers, centers);
+    return;
+  }
+  fast_.insert(at, {handle, start.reach, length, centers});
+  if (fast_.size() > kMostFast) list_fewer();
+}
+
+void TickMoves::list_fewer() {
+  while (fast_.size() > kMostFast / 2) {
+    fast_length_ *= 2;
+    std::erase_if(fast_, [this](const FastMover& mover) {
+      if (mover.length > fast_length_) return false;
+      displacement_.reach = std::max(displacement_.reach, mover.length);
+      return true;
+    });
+  }
+}
+
+const Displacement& TickMoves::displacement() {
+  if (!std::exchange(fast_changed_, false)) return displacement_;
+  displacement_.fast = fast_.empty() ? nullptr : std::make_shared<const std::vector<FastMover>>(fast_);
+  return displacement_;
+}
+
+}  // namespace locus

@@ -1,0 +1,65 @@
+#include "core/scene/snapshot/history.h"
+
+#include <utility>
+
+namespace locus {
+namespace {
+
+std::shared_ptr<const HistoryRecord> record_of(const HistoryRecord& record, const ObjectSet& next) {
+  HistoryRecord counted = record;
+  counted.bytes = sizeof(HistoryRecord) + record.objects.bytes_apart_from(next);
+  if (record.to_next.fast != nullptr) counted.bytes += record.to_next.fast->size() * sizeof(FastMover);
+  return std::make_shared<const HistoryRecord>(std::move(counted));
+}
+
+}  // namespace
+
+void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last,
+                            uint64_t next_tick) {
+  has_past_ = true;
+  History next;
+  if (history_ != nullptr) {
+    next = *history_;
+    HistoryRecord last = *next.records.back();
+    last.to_next = since_last;
+    next.records.back() = record_of(last, objects);
+  }
+  next.records.push_back(
+      std::make_shared<const HistoryRecord>(HistoryRecord{tick, objects, {}, sizeof(HistoryRecord)}));
+  size_t first = 0;
+  while (first + 1 < next.records.size() && next_tick >= options_.ticks &&
+         next.records[first + 1]->tick <= next_tick - options_.ticks)
+    ++first;
+  drop_first(next, first);
+  publish(std::move(next));
+  measured_ = false;
+}
+
+void HistoryRecorder::drop() {
+  has_past_ = false;
+  if (history_ != nullptr) dropped_bytes_ += history_->bytes;
+  history_ = nullptr;
+}
+
+void HistoryRecorder::drop_first(History& history, size_t count) {
+  for (size_t i = 0; i < count; ++i) dropped_bytes_ += history.records[i]->bytes;
+  history.records.erase(history.records.begin(), history.records.begin() + static_cast<std::ptrdiff_t>(count));
+}
+
+void HistoryRecorder::measure(const ObjectSet& now) {
+  if (std::exchange(measured_, true) || history_ == nullptr) return;
+  History next = *history_;
+  next.records.back() = record_of(*next.records.back(), now);
+  publish(std::move(next));
+}
+
+void HistoryRecorder::publish(History history) {
+  history.bytes = 0;
+  size_t first = history.records.size();
+  while (first > 0 && history.bytes + history.records[first - 1]->bytes <= options_.bytes)
+    history.bytes += history.records[--first]->bytes;
+  drop_first(history, first);
+  history_ = history.records.empty() ? nullptr : std::make_shared<const History>(std::move(history));
+}
+
+}  // namespace locus

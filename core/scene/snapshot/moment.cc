@@ -1,0 +1,64 @@
+#include "core/scene/snapshot/moment.h"
+
+#include "core/base/limits.h"
+#include "core/geometry/rotation.h"
+
+namespace locus {
+namespace {
+
+// Covers the rounding of lengths and of places between two: a few 2^-52 of the magnitudes.
+constexpr double kRelativeSlack = 1 + 0x1p-36;
+constexpr double kPlaceSlack = limits::kMaxCoordinate * 0x1p-49;
+
+bool before(const AsOf& a, const AsOf& b) { return a.tick < b.tick || (a.tick == b.tick && a.fraction < b.fraction); }
+
+}  // namespace
+
+Moment::Moment(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement)
+    : at_(&at),
+      next_(&next),
+      weight_(weight),
+      reach_(displacement.reach * weight * kRelativeSlack + kPlaceSlack),
+      fast_(displacement.fast.get()) {}
+
+GridRegion Moment::region(const Aabbd& bounds, const std::optional<Balld>& ball) const {
+  if (next_ == nullptr) return {&at_->grid(), bounds, ball};
+  const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
+  std::optional<Balld> near = ball;
+  if (near) near->radius += reach;
+  return {&at_->grid(), grown(bounds, reach), near};
+}
+
+Shape Moment::shape_between(const GridRef& object) const {
+  Shape shape = shape_of(object);
+  const GridRef later = next_->grid().find_like(object);
+  if (!later) return shape;
+  shape.position = shape.position + (later.entry().position - shape.position) * weight_;
+  shape.rotation = blended(shape.rotation, later.form().rotation, weight_);
+  return shape;
+}
+
+std::optional<Moment> find_moment(const SceneSnapshot& snapshot, const AsOf& time) {
+  const AsOf now{snapshot.tick, 0};
+  if (time == now) return Moment(snapshot.objects);
+  if (before(now, time) || time.tick < snapshot.oldest_tick()) return std::nullopt;
+  const auto& records = snapshot.history->records;
+  const auto next = std::upper_bound(records.begin(), records.end(), time.tick,
+                                     [](uint64_t tick, const auto& record) { return tick < record->tick; });
+  const HistoryRecord& at = **(next - 1);
+  if (time == AsOf{at.tick, 0}) return Moment(at.objects);
+  const bool last = next == records.end();
+  const uint64_t next_tick = last ? snapshot.tick : (*next)->tick;
+  const double weight =
+      (static_cast<double>(time.tick - at.tick) + double{time.fraction}) / static_cast<double>(next_tick - at.tick);
+  return Moment(at.objects, last ? snapshot.objects : (*next)->objects, weight,
+                last ? snapshot.since_close : at.to_next);
+}
+
+AsOf nearest_kept(const SceneSnapshot& snapshot, const AsOf& time) {
+  if (time.tick < snapshot.oldest_tick()) return {snapshot.oldest_tick(), 0};
+  const AsOf now{snapshot.tick, 0};
+  return before(now, time) ? now : time;
+}
+
+}  // namespace locus

@@ -1,0 +1,192 @@
+#include "core/scene/statics/static_set.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/container/flat_hash_set.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "core/base/column.h"
+#include "core/base/limits.h"
+#include "core/base/refusal.h"
+
+namespace locus {
+namespace {
+
+// Placed bounds may reach a little beyond the world's positions, no farther.
+constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
+
+absl::Status check_columns(const PlacementColumns& place, const std::string& field) {
+  const size_t n = place.count();
+  const auto check = [&](size_t numbers, size_t width, ColumnNeed need, absl::string_view name) {
+    return check_column(numbers, width, n, need, absl::StrCat(field, ".", name));
+  };
+  if (absl::Status s = check(place.translations.size(), 3, ColumnNeed::kEachOrOne, "translations"); !s.ok()) return s;
+  if (absl::Status s = check(place.rotations.size(), 4, ColumnNeed::kOptional, "rotations"); !s.ok()) return s;
+  if (absl::Status s = check(place.scales.size(), 1, ColumnNeed::kOptional, "scales"); !s.ok()) return s;
+  if (absl::Status s = check(place.layers.size(), 1, ColumnNeed::kOptional, "layers"); !s.ok()) return s;
+  if (absl::Status s = check(place.groups.size(), 1, ColumnNeed::kOptional, "groups"); !s.ok()) return s;
+  return check(place.tags.size(), 1, ColumnNeed::kOptional, "tags");
+}
+
+absl::StatusOr<Quaternion> read_rotation(const PlacementColumns& place, uint32_t i, const std::string& field) {
+  const ColumnReader<float> rotations(place.rotations, 4);
+  if (!rotations.given()) return Quaternion{};
+  const float* q = rotations.entry(i);
+  const Quaternion quaternion{q[0], q[1], q[2], q[3]};
+  const double deviation = unit_deviation(quaternion);
+  if (!std::isfinite(deviation))
+    return refuse_argument(Reason::kNotFinite, field + ".rotations", i, "a quaternion needs finite numbers");
+  if (deviation > limits::kMaxQuaternionDeviation)
+    return refuse_argument(Reason::kOutOfRange, field + ".rotations", i,
+                           "a quaternion (x, y, z, w) must be of unit length");
+  return normalized(quaternion);
+}
+
+absl::StatusOr<Transform> read_transform(const PlacementColumns& place, uint32_t i, const std::string& field) {
+  const double* t = ColumnReader<double>(place.translations, 3).entry(i);
+  const Vec3d translation{t[0], t[1], t[2]};
+  if (!is_finite(translation))
+    return refuse_argument(Reason::kNotFinite, field + ".translations", i, "a translation needs finite numbers");
+  if (max_component(abs(translation)) > limits::kMaxCoordinate)
+    return refuse_argument(Reason::kOutOfRange, field + ".translations", i, "translations must lie within +-1e9");
+  const float scale = ColumnReader<float>(place.scales, 1).value(i, 1.0f);
+  if (!std::isfinite(scale))
+    return refuse_argument(Reason::kNotFinite, field + ".scales", i, "a scale must be a finite number");
+  if (!(scale >= limits::kMinScale && scale <= limits::kMaxScale))
+    return refuse_argument(Reason::kOutOfRange, field + ".scales", i, "a scale must lie within 1e-12 and 1e12");
+  absl::StatusOr<Quaternion> rotation = read_rotation(place, i, field);
+  if (!rotation.ok()) return rotation.status();
+  return make_transform(translation, *rotation, scale);
+}
+
+absl::StatusOr<Instance> read_instance(const PlacementColumns& place, uint32_t i, const std::string& field) {
+  absl::StatusOr<Transform> transform = read_transform(place, i, field);
+  if (!transform.ok()) return transform.status();
+  Instance instance;
+  instance.mesh = place.mesh;
+  instance.transform = *transform;
+  instance.bounds = bounds_to_world(*transform, place.mesh->bounds());
+  instance.layers = ColumnReader<uint32_t>(place.layers, 1).value(i, kDefaultLayers);
+  instance.group = ColumnReader<uint64_t>(place.groups, 1).value(i, 0);
+  instance.tag = ColumnReader<uint64_t>(place.tags, 1).value(i, 0);
+  if (magnitude(instance.bounds) > kMaxPlacedBound)
+    return refuse_argument(Reason::kOutOfRange, field + ".scales", i, "the placed mesh must lie within +-2e9");
+  return instance;
+}
+
+absl::Status refuse_group_zero(const StaticChange& change) {
+  const auto zero = std::find(change.remove_groups.begin(), change.remove_groups.end(), Group{0});
+  return refuse_argument(Reason::kOutOfRange, "remove_groups",
+                         static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
+}
+
+// The instances of a change: those kept and those placed, with their ids.
+class Changing {
+ public:
+  Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, uint64_t seed)
+      : old_(old), is_object_(is_object), next_id_(seed) {}
+
+  absl::Status remove(const StaticChange& change) {
+    absl::flat_hash_set<Id> removed;
+    for (size_t i = 0; i < change.remove_ids.size(); ++i) {
+      const Id id = change.remove_ids[i];
+      if (old_.find(id) == nullptr)
+        return refuse_argument(Reason::kUnknownId, "remove_ids", static_cast<uint32_t>(i),
+                               absl::StrCat("no instance has the id ", id));
+      removed.insert(id);
+    }
+    const absl::flat_hash_set<Group> groups(change.remove_groups.begin(), change.remove_groups.end());
+    if (groups.contains(0)) return refuse_group_zero(change);
+    for (const Instance& instance : old_.tree().values()) {
+      if (removed.contains(instance.id) || groups.contains(instance.group)) continue;
+      instances_.push_back(instance);
+      taken_.insert(instance.id);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status place(const PlacementColumns& columns, const std::string& field) {
+    LOCUS_CHECK(columns.mesh != nullptr);
+    if (absl::Status status = check_columns(columns, field); !status.ok()) return status;
+    const size_t n = columns.count();
+    if (instances_.size() + n > limits::kMaxInstances)
+      return refuse_full(field, "instances", limits::kMaxInstances, static_cast<double>(instances_.size() + n), 0);
+    for (uint32_t i = 0; i < n; ++i) {
+      absl::StatusOr<Instance> instance = read_instance(columns, i, field);
+      if (!instance.ok()) return instance.status();
+      instance->id = columns.ids.empty() ? choose_id() : columns.ids[i];
+      if (absl::Status status = check_id(instance->id, i, field); !status.ok()) return status;
+      taken_.insert(instance->id);
+      placed_.push_back(instance->id);
+      instances_.push_back(*std::move(instance));
+    }
+    return absl::OkStatus();
+  }
+
+  std::vector<Instance>& instances() { return instances_; }
+  std::vector<Id>& placed() { return placed_; }
+
+ private:
+  absl::Status check_id(Id id, uint32_t i, const std::string& field) const {
+    if (id == kNoId) return refuse_argument(Reason::kOutOfRange, field + ".ids", i, "0 is no id");
+    if (taken_.contains(id) || is_object_(id))
+      return refuse_argument(Reason::kDuplicateId, field + ".ids", i,
+                             absl::StrCat("the id ", id, " is taken; instances and objects share one id space"));
+    return absl::OkStatus();
+  }
+
+  Id choose_id() {
+    Id id = kNoId;
+    do {
+      id = kChosenIdBit | ++next_id_;
+    } while (taken_.contains(id) || is_object_(id));
+    return id;
+  }
+
+  const StaticSet& old_;
+  const std::function<bool(Id)>& is_object_;
+  uint64_t next_id_;
+  absl::flat_hash_set<Id> taken_;
+  std::vector<Instance> instances_;
+  std::vector<Id> placed_;
+};
+
+}  // namespace
+
+std::shared_ptr<const StaticSet> StaticSet::empty() { return std::shared_ptr<const StaticSet>(new StaticSet()); }
+
+absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
+                                                    const std::function<bool(Id)>& is_object, uint64_t seed) const {
+  Changing changing(*this, is_object, seed);
+  if (absl::Status status = changing.remove(change); !status.ok()) return status;
+  for (size_t i = 0; i < change.place.size(); ++i)
+    if (absl::Status status = changing.place(change.place[i], absl::StrCat("place[", i, "]")); !status.ok())
+      return status;
+  absl::StatusOr<Bvh<Instance>> tree = Bvh<Instance>::build(std::move(changing.instances()), BvhOptions{});
+  if (!tree.ok()) return tree.status();
+  std::shared_ptr<StaticSet> set(new StaticSet());
+  set->tree_ = *std::move(tree);
+  for (uint32_t i = 0; i < set->tree_.values().size(); ++i) {
+    const Instance& instance = set->tree_.values()[i];
+    set->positions_.emplace(instance.id, i);
+    ++set->uses_[instance.mesh.get()];
+    set->triangle_count_ += instance.mesh->triangle_count();
+  }
+  return Changed{std::move(set), std::move(changing.placed())};
+}
+
+const Instance* StaticSet::find(Id id) const {
+  const auto found = positions_.find(id);
+  return found == positions_.end() ? nullptr : &tree_.values()[found->second];
+}
+
+uint32_t StaticSet::uses(const StaticMesh* mesh) const {
+  const auto found = uses_.find(mesh);
+  return found == uses_.end() ? 0 : found->second;
+}
+
+uint64_t StaticSet::bytes() const { return tree_.bytes() + positions_.capacity() * (sizeof(Id) + sizeof(uint32_t)); }
+
+}  // namespace locus

@@ -1,0 +1,201 @@
+#include "core/scene/updates/batch_application.h"
+
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/column.h"
+#include "core/base/limits.h"
+
+namespace locus {
+namespace {
+
+// OK is kUnspecified.
+Reason check_numbers(const float* numbers, size_t count, float lowest) {
+  for (size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(numbers[i])) return Reason::kNotFinite;
+    if (numbers[i] < lowest || numbers[i] > limits::kMaxCoordinate) return Reason::kOutOfRange;
+  }
+  return Reason::kUnspecified;
+}
+
+Vec3f point(const float* p) { return {p[0], p[1], p[2]}; }
+
+template <class Columns>
+void read_labels(const Columns& columns, size_t i, Object& object) {
+  object.layers = ColumnReader<uint32_t>(columns.layers, 1).value(i, object.layers);
+  object.group = ColumnReader<uint64_t>(columns.groups, 1).value(i, object.group);
+  object.tag = ColumnReader<uint64_t>(columns.tags, 1).value(i, object.tag);
+}
+
+}  // namespace
+
+BatchApplication::BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
+                                   Lives lives)
+    : objects_(objects), statics_(statics), batch_(batch), lives_(lives), count_(batch.clear ? 0 : objects.size()) {}
+
+void BatchApplication::run() {
+  remove_ids();
+  remove_groups();
+  for (size_t i = 0; i < batch_.inserts.size(); ++i) insert(batch_.inserts[i], absl::StrCat("inserts[", i, "]"));
+  for (size_t i = 0; i < batch_.moves.size(); ++i) move(batch_.moves[i], absl::StrCat("moves[", i, "]"));
+  for (size_t i = 0; i < batch_.relabels.size(); ++i) relabel(batch_.relabels[i], absl::StrCat("relabels[", i, "]"));
+}
+
+std::optional<Object> BatchApplication::current(Id id) const {
+  const auto changed = changed_.find(id);
+  if (changed != changed_.end()) return changed->second;
+  return batch_.clear ? std::nullopt : objects_.find(id);
+}
+
+void BatchApplication::refuse(std::string field, size_t index, Id id, Reason reason) {
+  ++refused_;
+  if (errors_.size() < limits::kMaxListedItemErrors)
+    errors_.push_back({std::move(field), static_cast<uint32_t>(index), id, reason});
+}
+
+void BatchApplication::remove_ids() {
+  for (size_t i = 0; i < batch_.remove_ids.size(); ++i) {
+    const Id id = batch_.remove_ids[i];
+    if (!current(id)) {
+      refuse("remove_ids", i, id, Reason::kUnknownId);
+      continue;
+    }
+    changed_[id] = std::nullopt;
+    --count_;
+    ++applied_;
+  }
+}
+
+void BatchApplication::remove_groups() {
+  absl::flat_hash_set<Group> groups;
+  for (size_t i = 0; i < batch_.remove_groups.size(); ++i) {
+    if (batch_.remove_groups[i] == 0) {
+      refuse("remove_groups", i, kNoId, Reason::kOutOfRange);
+      continue;
+    }
+    groups.insert(batch_.remove_groups[i]);
+    ++applied_;
+  }
+  if (groups.empty() || batch_.clear) return;
+  objects_.for_each([&](const Object& object) {
+    if (!groups.contains(object.group) || !current(object.id)) return;
+    changed_[object.id] = std::nullopt;
+    --count_;
+  });
+}
+
+bool BatchApplication::read_pose(const PoseReader& poses, uint32_t index, Id id, const std::string& field,
+                                 Shape& shape) {
+  if (const Reason reason = poses.read_position(index, shape.position); reason != Reason::kUnspecified) {
+    refuse(absl::StrCat(field, ".", poses.position_column()), index, id, reason);
+    return false;
+  }
+  if (!poses.turns()) return true;
+  if (const Reason reason = poses.read_rotation(index, shape.rotation); reason != Reason::kUnspecified) {
+    refuse(absl::StrCat(field, ".", PoseReader::kRotationColumn), index, id, reason);
+    return false;
+  }
+  return true;
+}
+
+bool BatchApplication::read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field,
+                                  Shape& shape) {
+  shape.kind = columns.kind;
+  const bool capsule = columns.kind == ShapeKind::kCapsule;
+  if (columns.kind == ShapeKind::kBall || capsule) {
+    shape.radius = ColumnReader<float>(columns.radii, 1).value(index, 0);
+    if (const Reason reason = check_numbers(&shape.radius, 1, 0); reason != Reason::kUnspecified) {
+      refuse(field + (capsule ? ".capsule.radii" : ".ball.radii"), index, id, reason);
+      return false;
+    }
+  }
+  if (columns.kind != ShapeKind::kBox && !capsule) return true;
+  const float* extents = ColumnReader<float>(columns.extents, 3).entry(index);
+  const float lowest = capsule ? -static_cast<float>(limits::kMaxCoordinate) : 0;
+  if (const Reason reason = check_numbers(extents, 3, lowest); reason != Reason::kUnspecified) {
+    refuse(field + (capsule ? ".capsule.half_axes" : ".box.half_extents"), index, id, reason);
+    return false;
+  }
+  shape.size = point(extents);
+  return true;
+}
+
+bool BatchApplication::may_insert(Id id, uint32_t index, const std::string& field) {
+  Reason reason = Reason::kUnspecified;
+  const bool known = current(id).has_value();
+  if (id == kNoId) reason = Reason::kOutOfRange;
+  if (statics_.find(id) != nullptr || (known && !batch_.upsert)) reason = Reason::kDuplicateId;
+  if (reason != Reason::kUnspecified) refuse(field + ".ids", index, id, reason);
+  return reason == Reason::kUnspecified;
+}
+
+void BatchApplication::insert(const InsertColumns& columns, const std::string& field) {
+  const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
+  for (uint32_t i = 0; i < columns.ids.size(); ++i) {
+    Object object;
+    object.id = columns.ids[i];
+    if (!may_insert(object.id, i, field)) continue;
+    if (!read_pose(poses, i, object.id, field, object.shape)) continue;
+    if (!read_shape(columns, i, object.id, field, object.shape)) continue;
+    read_labels(columns, i, object);
+    if (!current(object.id)) {
+      ++count_;
+      begin_life(object.id);
+    }
+    put(object);
+    ++applied_;
+  }
+}
+
+void BatchApplication::move(const MoveColumns& columns, const std::string& field) {
+  const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
+  for (uint32_t i = 0; i < columns.ids.size(); ++i) {
+    const Id id = columns.ids[i];
+    const std::optional<Object> known = current(id);
+    if (!known) {
+      refuse(field + ".ids", i, id, Reason::kUnknownId);
+      continue;
+    }
+    Object object = *known;
+    if (!read_pose(poses, i, id, field, object.shape)) continue;
+    if (columns.teleport) begin_life(id);
+    put(object);
+    ++applied_;
+  }
+}
+
+void BatchApplication::relabel(const RelabelColumns& columns, const std::string& field) {
+  for (uint32_t i = 0; i < columns.ids.size(); ++i) {
+    const std::optional<Object> known = current(columns.ids[i]);
+    if (!known) {
+      refuse(field + ".ids", i, columns.ids[i], Reason::kUnknownId);
+      continue;
+    }
+    Object object = *known;
+    read_labels(columns, i, object);
+    put(object);
+    ++applied_;
+  }
+}
+
+BatchApplication::Difference BatchApplication::difference() {
+  Difference difference;
+  difference.reborn = std::move(reborn_);
+  const auto lives_on = [&difference](const Object& before, const std::optional<Object>& now) {
+    return now && *now == before && !difference.reborn.contains(before.id);
+  };
+  if (batch_.clear)
+    objects_.for_each([&](const Object& object) {
+      const auto changed = changed_.find(object.id);
+      if (changed == changed_.end() || !lives_on(object, changed->second)) difference.gone.push_back(object);
+    });
+  for (const auto& [id, object] : changed_) {
+    const std::optional<Object> before = objects_.find(id);
+    if (before && lives_on(*before, object)) continue;
+    if (before && !batch_.clear) difference.gone.push_back(*before);
+    if (object) difference.come.push_back(*object);
+  }
+  return difference;
+}
+
+}  // namespace locus

@@ -1,0 +1,91 @@
+#include "core/scene/updates/move_application.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+
+namespace locus {
+namespace {
+
+// Items that are looked up together, so that their memory is on its way before it is needed.
+constexpr size_t kItemsAtOnce = 64;
+
+}  // namespace
+
+bool MoveApplication::serves(const UpdateBatch& batch) {
+  return !batch.clear && !batch.restart_ticks && batch.remove_ids.empty() && batch.remove_groups.empty() &&
+         batch.inserts.empty() && batch.relabels.empty() && !batch.moves.empty();
+}
+
+void MoveApplication::begin(const ObjectStore& objects) {
+  moves_.clear();
+  rotations_.clear();
+  last_move_.resize(std::max(last_move_.size(), objects.handle_count()));
+}
+
+void MoveApplication::add(const ObjectStore& objects, const UpdateBatch& batch) {
+  applied_ = refused_ = 0;
+  errors_.clear();
+  for (size_t list = 0; list < batch.moves.size(); ++list) run(objects, batch.frame, batch.moves[list], list);
+}
+
+void MoveApplication::finish(const ObjectStore& objects) {
+  changes_ = std::any_of(moves_.begin(), moves_.end(), [&](const GridMove& move) {
+    const GridRef now = objects.at(move.handle);
+    return !(move.position == now.entry().position) ||
+           (move.rotation != GridMove::kKeeps && !(rotations_[move.rotation] == now.form().rotation));
+  });
+}
+
+void MoveApplication::refuse(const char* column, const Item& item, Reason reason) {
+  ++refused_;
+  if (errors_.size() < limits::kMaxListedItemErrors)
+    errors_.push_back({absl::StrCat("moves[", item.list, "].", column), item.index, item.id, reason});
+}
+
+inline GridMove& MoveApplication::move_of(uint32_t handle) {
+  const uint32_t last = last_move_[handle];
+  if (last < moves_.size() && moves_[last].handle == handle) return moves_[last];
+  last_move_[handle] = static_cast<uint32_t>(moves_.size());
+  GridMove& move = moves_.emplace_back();
+  move.handle = handle;
+  return move;
+}
+
+inline void MoveApplication::move(const PoseReader& poses, uint32_t handle, const Item& item) {
+  if (handle == ObjectStore::kNoHandle) return refuse("ids", item, Reason::kUnknownId);
+  Vec3d position;
+  Quaternion rotation;
+  if (const Reason reason = poses.read_position(item.index, position); reason != Reason::kUnspecified)
+    return refuse(poses.position_column(), item, reason);
+  if (poses.turns()) {
+    if (const Reason reason = poses.read_rotation(item.index, rotation); reason != Reason::kUnspecified)
+      return refuse(PoseReader::kRotationColumn, item, reason);
+  }
+  GridMove& move = move_of(handle);
+  move.position = position;
+  if (poses.turns()) {
+    move.rotation = static_cast<uint32_t>(rotations_.size());
+    rotations_.push_back(rotation);
+  }
+  ++applied_;
+}
+
+void MoveApplication::run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list) {
+  const PoseReader poses(frame, columns.positions, columns.positions_f64, columns.rotations);
+  moves_.reserve(moves_.size() + columns.ids.size());
+  for (size_t begin = 0; begin < columns.ids.size(); begin += kItemsAtOnce) {
+    const absl::Span<const uint64_t> ids = columns.ids.subspan(begin, kItemsAtOnce);
+    handles_.resize(ids.size());
+    objects.find_handles(ids, absl::MakeSpan(handles_));
+    for (const uint32_t handle : handles_) {
+      if (handle == ObjectStore::kNoHandle) continue;
+      objects.prefetch_slot(handle);
+      __builtin_prefetch(&last_move_[handle]);
+    }
+    for (size_t i = 0; i < ids.size(); ++i) move(poses, handles_[i], {list, static_cast<uint32_t>(begin + i), ids[i]});
+  }
+}
+
+}  // namespace locus

@@ -1,0 +1,166 @@
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+#include "server/convert/convert.h"
+#include "server/convert/status.h"
+
+namespace locus::server {
+namespace {
+
+// The core's value for each number of a protocol enum; number 0 is the default.
+constexpr std::array kSources = {Source::kBoth, Source::kBoth, Source::kStatic, Source::kDynamic};
+constexpr std::array kPrecisions = {Precision::kExact, Precision::kExact, Precision::kConservative};
+constexpr std::array kRayModes = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};
+constexpr std::array kCulls = {Cull::kNone, Cull::kNone, Cull::kBack, Cull::kFront};
+constexpr std::array kInsides = {Inside::kSolid, Inside::kSolid, Inside::kHollow, Inside::kSkip};
+constexpr std::array kOutsides = {OutsideHistory::kReject, OutsideHistory::kReject, OutsideHistory::kClamp};
+constexpr std::array kDetails = {StaticDetail::kInstances, StaticDetail::kInstances, StaticDetail::kTriangles,
+                                 StaticDetail::kTrianglesSorted};
+
+static_assert(kSources.size() == v1::Source_ARRAYSIZE && kPrecisions.size() == v1::Precision_ARRAYSIZE);
+static_assert(kRayModes.size() == v1::RayMode_ARRAYSIZE && kCulls.size() == v1::Cull_ARRAYSIZE);
+static_assert(kOutsides.size() == v1::OutsideHistory_ARRAYSIZE);
+static_assert(kInsides.size() == v1::Inside_ARRAYSIZE && kDetails.size() == v1::StaticDetail_ARRAYSIZE);
+static_assert(static_cast<int>(kLastColumn) == v1::COLUMN_POSE && v1::Column_ARRAYSIZE == v1::COLUMN_POSE + 1);
+
+template <class T, size_t kCount>
+absl::Status read_enum(int number, const std::array<T, kCount>& values, absl::string_view field, T* out) {
+  if (number < 0 || static_cast<size_t>(number) >= kCount) return unknown_enum(field, number);
+  *out = values[static_cast<size_t>(number)];
+  return absl::OkStatus();
+}
+
+absl::Status read_kind(const v1::Rays& rays, const std::string& field, QueryBlock* out) {
+  RayColumns columns;
+  columns.origins = span_of(rays.origins());
+  columns.directions = span_of(rays.directions());
+  columns.t_max = span_of(rays.t_max());
+  absl::Status status = read_enum(rays.mode(), kRayModes, field + ".rays.mode", &columns.mode);
+  if (status.ok()) status = read_enum(rays.cull(), kCulls, field + ".rays.cull", &columns.cull);
+  if (status.ok()) status = read_enum(rays.inside(), kInsides, field + ".rays.inside", &columns.inside);
+  out->kind = columns;
+  return status;
+}
+
+absl::Status read_kind(const v1::Balls& balls, const std::string& field, QueryBlock* out) {
+  BallColumns columns;
+  columns.centers = span_of(balls.centers());
+  columns.radii = span_of(balls.radii());
+  const absl::Status status = read_enum(balls.detail(), kDetails, field + ".balls.detail", &columns.detail);
+  out->kind = columns;
+  return status;
+}
+
+absl::Status read_kind(const v1::Boxes& boxes, const std::string& field, QueryBlock* out) {
+  BoxColumns columns;
+  columns.centers = span_of(boxes.centers());
+  columns.half_extents = span_of(boxes.half_extents());
+  columns.rotations = span_of(boxes.rotations());
+  const absl::Status status = read_enum(boxes.detail(), kDetails, field + ".boxes.detail", &columns.detail);
+  out->kind = columns;
+  return status;
+}
+
+absl::Status read_kind(const v1::Nearest& nearest, const std::string& field, QueryBlock* out) {
+  NearestColumns columns;
+  columns.points = span_of(nearest.points());
+  columns.max_distances = span_of(nearest.max_distances());
+  columns.count = nearest.k();
+  const absl::Status status = read_enum(nearest.detail(), kDetails, field + ".nearest.detail", &columns.detail);
+  out->kind = columns;
+  return status;
+}
+
+absl::Status read_kind(const v1::Lookup& lookup, const std::string& field, QueryBlock* out) {
+  if (lookup.ids().empty() == lookup.groups().empty())
+    return refuse_argument(Reason::kMalformed, field + ".lookup", {}, "give ids or groups, one of the two");
+  out->kind = LookupColumns{span_of(lookup.ids()), span_of(lookup.groups())};
+  return absl::OkStatus();
+}
+
+absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, QueryBlock* out) {
+  switch (block.kind_case()) {
+    case v1::QueryBlock::kRays:
+      return read_kind(block.rays(), field, out);
+    case v1::QueryBlock::kBalls:
+      return read_kind(block.balls(), field, out);
+    case v1::QueryBlock::kBoxes:
+      return read_kind(block.boxes(), field, out);
+    case v1::QueryBlock::kLookup:
+      return read_kind(block.lookup(), field, out);
+    case v1::QueryBlock::kCapsules:
+      return not_served(field + ".capsules");
+    case v1::QueryBlock::kFrustums:
+      return not_served(field + ".frustums");
+    case v1::QueryBlock::kSweeps:
+      return not_served(field + ".sweeps");
+    case v1::QueryBlock::kNearest:
+      return read_kind(block.nearest(), field, out);
+    case v1::QueryBlock::kSight:
+      return not_served(field + ".sight");
+    case v1::QueryBlock::KIND_NOT_SET:
+      break;
+  }
+  return refuse_argument(Reason::kMalformed, field, {}, "say what is asked: rays, balls, boxes, lookup or nearest");
+}
+
+absl::Status read_columns(const v1::QueryBlock& block, const std::string& field, ColumnSet* out) {
+  for (int i = 0; i < block.columns_size(); ++i) {
+    const int number = block.columns(i);
+    if (number <= v1::COLUMN_UNSPECIFIED || number >= v1::Column_ARRAYSIZE)
+      return refuse_argument(Reason::kMalformed, field + ".columns", static_cast<uint32_t>(i),
+                             absl::StrCat("there is no column number ", number));
+    out->add(static_cast<Column>(number));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status read_block(const v1::QueryBlock& block, const std::string& field, QueryBlock* out) {
+  if (absl::Status status = read_kind(block, field, out); !status.ok()) return status;
+  if (absl::Status status = read_enum(block.source(), kSources, field + ".source", &out->source); !status.ok())
+    return status;
+  if (absl::Status status = read_enum(block.precision(), kPrecisions, field + ".precision", &out->precision);
+      !status.ok())
+    return status;
+  if (absl::Status status = read_enum(block.outside_history(), kOutsides, field + ".outside_history", &out->outside);
+      !status.ok())
+    return status;
+  out->as_of_ticks = span_of(block.as_of_ticks());
+  out->as_of_fractions = span_of(block.as_of_fractions());
+  out->frame = to_vec(block.frame());
+  out->masks = span_of(block.masks());
+  out->ignore_groups = span_of(block.ignore_groups());
+  out->ignore_ids = span_of(block.ignore_ids());
+  out->max_results = block.max_results();
+  out->after_id = block.after_id();
+  return read_columns(block, field, &out->columns);
+}
+
+}  // namespace
+
+absl::StatusOr<QueryBatch> to_queries(const v1::QueryBatch& batch) {
+  if (static_cast<uint32_t>(batch.blocks_size()) > limits::kMaxBlocks)
+    return refuse_limit("blocks", "blocks", limits::kMaxBlocks, batch.blocks_size());
+  QueryBatch out;
+  out.max_work = batch.max_work();
+  out.max_reply_bytes = batch.max_reply_bytes();
+  out.blocks.resize(static_cast<size_t>(batch.blocks_size()));
+  for (int i = 0; i < batch.blocks_size(); ++i)
+    if (absl::Status status =
+            read_block(batch.blocks(i), absl::StrCat("blocks[", i, "]"), &out.blocks[static_cast<size_t>(i)]);
+        !status.ok())
+      return status;
+  return out;
+}
+
+v1::Work to_proto(const Work& work, uint64_t nanoseconds) {
+  v1::Work out;
+  out.set_nodes(work.nodes);
+  out.set_cells(work.cells);
+  out.set_tests(work.tests);
+  out.set_nanoseconds(nanoseconds);
+  return out;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,150 @@
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+#include "server/convert/convert.h"
+#include "server/convert/status.h"
+
+namespace locus::server {
+namespace {
+
+// Bounds of everything at one revision. Touches every object, so it is for descriptions only.
+Aabbd bounds_of_all(const SceneSnapshot& snapshot) {
+  Aabbd bounds = snapshot.statics->tree().bounds();
+  snapshot.objects.for_each([&bounds](const Object& object) { bounds = merge(bounds, bounds_of(object.shape)); });
+  return bounds;
+}
+
+v1::SceneSpec to_proto(const SceneSpec& spec) {
+  v1::SceneSpec out;
+  for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
+  out.set_history_ticks(spec.history.ticks);
+  out.set_history_bytes(spec.history.bytes);
+  out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
+  out.set_overload(spec.overload == OverloadPolicy::kLatestWins ? v1::OVERLOAD_POLICY_LATEST_WINS
+                                                                : v1::OVERLOAD_POLICY_EVERY_BATCH);
+  return out;
+}
+
+absl::Status check_served(const v1::SceneSpec& spec) {
+  if (spec.idle_ttl_s() != 0) return not_served("spec.idle_ttl_s");
+  if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
+  if (!v1::Winding_IsValid(spec.winding())) return unknown_enum("spec.winding", spec.winding());
+  if (!v1::OverloadPolicy_IsValid(spec.overload())) return unknown_enum("spec.overload", spec.overload());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<HistoryOptions> to_history(const v1::SceneSpec& spec) {
+  if (spec.history_ticks() > limits::kMaxHistoryTicks)
+    return refuse_limit("spec.history_ticks", "history_ticks", limits::kMaxHistoryTicks, spec.history_ticks());
+  if (spec.history_bytes() > limits::kMaxHistoryBytes)
+    return refuse_limit("spec.history_bytes", "history_bytes", static_cast<double>(limits::kMaxHistoryBytes),
+                        static_cast<double>(spec.history_bytes()));
+  if (spec.history_ticks() == 0) {
+    if (spec.history_bytes() == 0) return HistoryOptions();
+    return refuse_argument(Reason::kMalformed, "spec.history_bytes", {},
+                           "goes with history_ticks: say how many ticks are to be kept, or leave both at 0");
+  }
+  return HistoryOptions{spec.history_ticks(),
+                        spec.history_bytes() == 0 ? limits::kDefaultHistoryBytes : spec.history_bytes()};
+}
+
+}  // namespace
+
+Vec3d to_vec(const v1::Vec3d& vec) { return {vec.x(), vec.y(), vec.z()}; }
+
+v1::Vec3d to_proto(const Vec3d& vec) {
+  v1::Vec3d out;
+  out.set_x(vec.x);
+  out.set_y(vec.y);
+  out.set_z(vec.z);
+  return out;
+}
+
+View to_view(const v1::View& view) {
+  View out;
+  out.epoch = view.epoch();
+  if (view.revision_case() == v1::View::kAtLeast) {
+    out.kind = View::Kind::kAtLeast;
+    out.revision = view.at_least();
+  } else if (view.revision_case() == v1::View::kExactly) {
+    out.kind = View::Kind::kExactly;
+    out.revision = view.exactly();
+  }
+  return out;
+}
+
+absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field) {
+  if (labels.size() > limits::kMaxLabels)
+    return refuse_limit(field, "labels", limits::kMaxLabels, static_cast<double>(labels.size()));
+  for (const auto& [key, value] : labels) {
+    const size_t longest = std::max(key.size(), value.size());
+    if (longest > limits::kMaxLabelLength)
+      return refuse_limit(field, "label_length", limits::kMaxLabelLength, static_cast<double>(longest));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
+  if (absl::Status status = check_served(spec); !status.ok()) return status;
+  if (absl::Status status = check_labels(spec.labels(), "spec.labels"); !status.ok()) return status;
+  const absl::StatusOr<HistoryOptions> history = to_history(spec);
+  if (!history.ok()) return history.status();
+  SceneSpec out;
+  out.history = *history;
+  out.labels.insert(spec.labels().begin(), spec.labels().end());
+  out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
+  if (spec.overload() == v1::OVERLOAD_POLICY_LATEST_WINS) out.overload = OverloadPolicy::kLatestWins;
+  if (spec.durability() == v1::DURABILITY_MEMORY) out.durability = Durability::kMemory;
+  return out;
+}
+
+v1::Scene to_proto(const Scene& scene) {
+  const SnapshotPtr snapshot = scene.latest();
+  const SceneStatus status = scene.status();
+  v1::Scene out;
+  out.set_name(scene.name());
+  *out.mutable_spec() = to_proto(scene.spec());
+  const bool local = scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
+  out.mutable_spec()->set_durability(local ? v1::DURABILITY_LOCAL : v1::DURABILITY_MEMORY);
+  out.set_state(status.pending_changes > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
+  out.set_epoch(snapshot->epoch);
+  out.set_revision(snapshot->revision);
+  out.set_tick(snapshot->tick);
+  out.set_oldest_tick(snapshot->oldest_tick());
+  out.set_recorded_ticks(status.recorded_ticks);
+  out.set_history_bytes(status.history_bytes);
+  out.set_pinned_bytes(status.pinned_bytes);
+  out.set_max_pinned_bytes(status.max_pinned_bytes);
+  out.set_objects(snapshot->objects.size());
+  out.set_instances(snapshot->statics->size());
+  out.set_triangles(snapshot->statics->triangle_count());
+  out.set_memory_bytes(status.memory_bytes);
+  out.set_pending_changes(status.pending_changes);
+  out.set_joined_updates(status.joined_updates);
+  out.set_last_build_error(status.last_build_error);
+  const Aabbd bounds = bounds_of_all(*snapshot);
+  if (!bounds.empty()) {
+    *out.mutable_min() = to_proto(bounds.min);
+    *out.mutable_max() = to_proto(bounds.max);
+  }
+  return out;
+}
+
+v1::Mesh to_proto(const Registry::NamedMesh& mesh) {
+  v1::Mesh out;
+  out.set_name(mesh.name);
+  const Sha256& sha256 = mesh.mesh->sha256();
+  out.set_sha256(sha256.data(), sha256.size());
+  out.set_vertices(mesh.mesh->vertex_count());
+  out.set_triangles(mesh.mesh->triangle_count());
+  out.set_zero_area_triangles(mesh.mesh->zero_area_count());
+  out.set_bytes(mesh.mesh->bytes());
+  out.set_uses(mesh.uses);
+  for (const MeshPart& part : mesh.mesh->parts()) {
+    v1::MeshPart* out_part = out.add_parts();
+    out_part->set_name(part.name);
+    out_part->set_first_triangle(part.first_triangle);
+  }
+  return out;
+}
+
+}  // namespace locus::server

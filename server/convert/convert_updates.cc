@@ -1,0 +1,139 @@
+#include "absl/strings/str_cat.h"
+#include "core/base/limits.h"
+#include "server/convert/convert.h"
+
+namespace locus::server {
+namespace {
+
+absl::Status malformed(absl::string_view field, absl::string_view message) {
+  return refuse_argument(Reason::kMalformed, field, {}, message);
+}
+
+// Exactly one of the two ways to give positions; with no ids, none is fine too.
+template <class Message>
+absl::Status check_positions(const Message& message, const std::string& field) {
+  const bool relative = !message.positions().empty();
+  const bool absolute = !message.positions_f64().empty();
+  if (relative && absolute) return malformed(field + ".positions_f64", "give positions or positions_f64, not both");
+  if (!relative && !absolute && !message.ids().empty())
+    return malformed(field + ".positions", "give positions, relative to the frame, or positions_f64, absolute");
+  return absl::OkStatus();
+}
+
+absl::Status read_shape(const v1::Insert& insert, const std::string& field, InsertColumns* out) {
+  switch (insert.shape_case()) {
+    case v1::Insert::kPoint:
+      out->kind = ShapeKind::kPoint;
+      return absl::OkStatus();
+    case v1::Insert::kBall:
+      out->kind = ShapeKind::kBall;
+      out->radii = span_of(insert.ball().radii());
+      return absl::OkStatus();
+    case v1::Insert::kBox:
+      out->kind = ShapeKind::kBox;
+      out->extents = span_of(insert.box().half_extents());
+      return absl::OkStatus();
+    case v1::Insert::kCapsule:
+      out->kind = ShapeKind::kCapsule;
+      out->radii = span_of(insert.capsule().radii());
+      out->extents = span_of(insert.capsule().half_axes());
+      return absl::OkStatus();
+    case v1::Insert::SHAPE_NOT_SET:
+      break;
+  }
+  return malformed(field + ".shape", "say what the objects are: point, ball, box or capsule");
+}
+
+absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::string& field) {
+  if (absl::Status status = check_positions(insert, field); !status.ok()) return status;
+  InsertColumns columns;
+  if (absl::Status status = read_shape(insert, field, &columns); !status.ok()) return status;
+  columns.ids = span_of(insert.ids());
+  columns.positions = span_of(insert.positions());
+  columns.positions_f64 = span_of(insert.positions_f64());
+  columns.rotations = span_of(insert.rotations());
+  columns.layers = span_of(insert.layers());
+  columns.groups = span_of(insert.groups());
+  columns.tags = span_of(insert.tags());
+  return columns;
+}
+
+absl::StatusOr<MoveColumns> to_move(const v1::Move& move, const std::string& field) {
+  if (absl::Status status = check_positions(move, field); !status.ok()) return status;
+  MoveColumns columns;
+  columns.ids = span_of(move.ids());
+  columns.positions = span_of(move.positions());
+  columns.positions_f64 = span_of(move.positions_f64());
+  columns.rotations = span_of(move.rotations());
+  columns.teleport = move.teleport();
+  return columns;
+}
+
+RelabelColumns to_relabel(const v1::Relabel& relabel) {
+  RelabelColumns columns;
+  columns.ids = span_of(relabel.ids());
+  columns.layers = span_of(relabel.layers());
+  columns.groups = span_of(relabel.groups());
+  columns.tags = span_of(relabel.tags());
+  return columns;
+}
+
+absl::Status check_batch_form(const v1::UpdateBatch& batch) {
+  const int64_t lists = int64_t{batch.inserts_size()} + batch.moves_size() + batch.relabels_size();
+  if (lists > limits::kMaxUpdateLists)
+    return refuse_limit("", "update_lists", limits::kMaxUpdateLists, static_cast<double>(lists));
+  if (batch.writer() == 0 && batch.batch() != 0)
+    return malformed("writer", "goes with batch: a random number that is not 0");
+  if (batch.writer() != 0 && batch.batch() == 0)
+    return malformed("batch", "goes with writer: 1 for its first batch, then 2, 3 and so on");
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
+  if (absl::Status status = check_batch_form(batch); !status.ok()) return status;
+  UpdateBatch out;
+  out.frame = to_vec(batch.frame());
+  if (batch.has_tick()) out.tick = batch.tick();
+  out.clear = batch.clear();
+  out.remove_ids = span_of(batch.remove_ids());
+  out.remove_groups = span_of(batch.remove_groups());
+  for (int i = 0; i < batch.inserts_size(); ++i) {
+    absl::StatusOr<InsertColumns> insert = to_insert(batch.inserts(i), absl::StrCat("inserts[", i, "]"));
+    if (!insert.ok()) return insert.status();
+    out.inserts.push_back(*insert);
+  }
+  for (int i = 0; i < batch.moves_size(); ++i) {
+    absl::StatusOr<MoveColumns> move = to_move(batch.moves(i), absl::StrCat("moves[", i, "]"));
+    if (!move.ok()) return move.status();
+    out.moves.push_back(*move);
+  }
+  for (const v1::Relabel& relabel : batch.relabels()) out.relabels.push_back(to_relabel(relabel));
+  out.upsert = batch.upsert();
+  out.all_or_nothing = batch.all_or_nothing();
+  out.restart_ticks = batch.restart_ticks();
+  out.writer = batch.writer();
+  out.batch = batch.batch();
+  return out;
+}
+
+v1::UpdateAck to_proto(const UpdateAck& ack) {
+  v1::UpdateAck out;
+  out.set_epoch(ack.epoch);
+  out.set_revision(ack.revision);
+  out.set_tick(ack.tick);
+  out.set_applied(ack.applied);
+  out.set_refused(ack.refused);
+  out.set_duplicate(ack.duplicate);
+  for (const ItemError& error : ack.errors) {
+    v1::ItemError* item = out.add_errors();
+    item->set_field(error.field);
+    item->set_index(error.index);
+    item->set_id(error.id);
+    item->set_reason(static_cast<v1::Reason>(error.reason));
+  }
+  return out;
+}
+
+}  // namespace locus::server

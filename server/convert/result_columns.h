@@ -1,0 +1,32 @@
+// A query batch's answer written straight into the columns of its reply: memory is made once and no number is moved
+// again.
+#ifndef LOCUS_SERVER_CONVERT_RESULT_COLUMNS_H_
+#define LOCUS_SERVER_CONVERT_RESULT_COLUMNS_H_
+
+#include "core/query/run/answer_sink.h"
+#include "locus/v1/query_service.pb.h"
+
+namespace locus::server {
+
+class ResultColumns final : public AnswerSink {
+ public:
+  // `result` is borrowed; it gets `blocks` blocks, which replace what it has. Columns of blocks that it had before keep
+  // their memory.
+  ResultColumns(v1::QueryResult& result, size_t blocks);
+
+  RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) override;
+  char* add_hits(size_t block, size_t queries) override;
+  uint32_t* add_counts(size_t block, size_t queries) override;
+  uint32_t* add_truncated(size_t block, size_t queries) override;
+  MomentSpans add_moments(size_t block, size_t queries) override;
+  uint32_t* add_clamped(size_t block, size_t queries) override;
+
+ private:
+  v1::BlockResult& block(size_t number) { return *result_.mutable_blocks(static_cast<int>(number)); }
+
+  v1::QueryResult& result_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_CONVERT_RESULT_COLUMNS_H_

@@ -1,0 +1,85 @@
+#include "server/convert/status.h"
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace locus::server {
+namespace {
+
+// gRPC metadata is refused by peers beyond 8 KiB in all; the message is in it three times.
+constexpr size_t kMaxText = 1024;
+constexpr uint32_t kDrainRetryMs = 1000;
+constexpr uint32_t kRecoveryRetryMs = 200;
+
+static_assert(static_cast<int>(Reason::kDamaged) == v1::REASON_DAMAGED);
+static_assert(static_cast<int>(Reason::kHashMismatch) == v1::REASON_HASH_MISMATCH);
+static_assert(static_cast<int>(Reason::kMalformed) == v1::REASON_MALFORMED);
+static_assert(static_cast<int>(Reason::kNotServed) == v1::REASON_NOT_SERVED);
+static_assert(static_cast<int>(Reason::kNotFinite) == v1::REASON_NOT_FINITE);
+
+// At most kMaxText bytes that end with a whole UTF-8 character.
+std::string cut(absl::string_view text) {
+  if (text.size() <= kMaxText) return std::string(text);
+  size_t end = kMaxText;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return std::string(text.substr(0, end));
+}
+
+}  // namespace
+
+v1::Error to_error(const absl::Status& status) {
+  v1::Error error;
+  error.set_code(static_cast<int>(status.code()));
+  error.set_message(cut(status.message()));
+  const std::optional<Refusal> refusal = refusal_of(status);
+  if (!refusal) return error;
+  error.set_reason(static_cast<v1::Reason>(refusal->reason));
+  error.set_field(cut(refusal->field));
+  if (refusal->index) error.set_index(*refusal->index);
+  error.set_limit(refusal->limit);
+  error.set_limit_value(refusal->limit_value);
+  error.set_asked(refusal->asked);
+  error.set_retry_after_ms(refusal->retry_after_ms);
+  return error;
+}
+
+grpc::Status to_grpc(const absl::Status& status) {
+  if (status.ok()) return grpc::Status::OK;
+  const v1::Error error = to_error(status);
+  v1::Status details;
+  details.set_code(error.code());
+  details.set_message(error.message());
+  details.add_details()->PackFrom(error);
+  return grpc::Status(static_cast<grpc::StatusCode>(status.code()), error.message(), details.SerializeAsString());
+}
+
+absl::Status not_served(absl::string_view field) {
+  Refusal refusal;
+  refusal.reason = Reason::kNotServed;
+  refusal.field = std::string(field);
+  return refuse(absl::StatusCode::kUnimplemented, "not served by this build; GetServer lists what is", refusal);
+}
+
+absl::Status unknown_enum(absl::string_view field, int number) {
+  return refuse_argument(
+      Reason::kMalformed, field, {},
+      absl::StrCat("this build knows no number ", number, " here; see the schema for those it does"));
+}
+
+absl::Status draining() {
+  Refusal refusal;
+  refusal.reason = Reason::kDraining;
+  refusal.retry_after_ms = kDrainRetryMs;
+  return refuse(absl::StatusCode::kUnavailable, "the server is shutting down; try again elsewhere or later", refusal);
+}
+
+absl::Status recovering() {
+  Refusal refusal;
+  refusal.reason = Reason::kRecovering;
+  refusal.retry_after_ms = kRecoveryRetryMs;
+  return refuse(absl::StatusCode::kUnavailable, "the server still reads back what it keeps; try again in a moment",
+                refusal);
+}
+
+}  // namespace locus::server

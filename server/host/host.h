@@ -1,0 +1,83 @@
+// What all services of one server share: the scenes, the threads, and the way from serving to ended. Members are safe
+// to use from any thread by themselves.
+#ifndef LOCUS_SERVER_HOST_HOST_H_
+#define LOCUS_SERVER_HOST_HOST_H_
+
+#include <algorithm>
+#include <atomic>
+
+#include "core/scene/log/update_log.h"
+#include "core/scene/registry.h"
+#include "server/config/observability_limits.h"
+#include "server/config/server_config.h"
+#include "server/host/memory_use.h"
+#include "server/observability/metrics.h"
+#include "server/observability/slow_queries.h"
+#include "server/scheduling/change_queue.h"
+#include "server/scheduling/clocks.h"
+#include "server/scheduling/cost_estimates.h"
+#include "server/scheduling/drain.h"
+#include "server/scheduling/gate.h"
+#include "server/scheduling/memory_budget.h"
+#include "server/scheduling/query_scheduler.h"
+#include "server/scheduling/snapshot_keeper.h"
+#include "server/scheduling/update_pump.h"
+#include "server/scheduling/worker_pool.h"
+
+namespace locus::server {
+
+struct Host {
+  // `with_log` is borrowed; null keeps scenes in memory only.
+  Host(const ServerConfig& with, UpdateLog* with_log)
+      : config(with),
+        log(with_log),
+        slow_queries(with.slow_query_ms),
+        registry(with_log),
+        memory(with.memory_limit, process_memory(registry)),
+        pool(with.threads),
+        scheduler(scheduler_options(with)),
+        updates(pump_options(with, with_log)),
+        calls(with.max_calls),
+        streams(with.max_streams) {}
+
+  static constexpr uint32_t kChangeThreads = 2;
+  static constexpr uint32_t kLoggingThreads = 8;
+
+  static SchedulerOptions scheduler_options(const ServerConfig& config) {
+    SchedulerOptions options;
+    options.threads = config.threads;
+    options.priority = config.batch_priority;
+    options.clock = &thread_nanoseconds;
+    return options;
+  }
+  // Threads that wait for a disk need no cores, and one sync serves all of them.
+  static UpdatePumpOptions pump_options(const ServerConfig& config, const UpdateLog* log) {
+    UpdatePumpOptions options;
+    options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
+    return options;
+  }
+  static SnapshotKeeperOptions keeper_options(const ServerConfig& config);
+
+  const ServerConfig config;
+  UpdateLog* const log;
+  CallMetrics metrics;
+  SlowQueries slow_queries;
+  Registry registry;
+  MemoryBudget memory;
+  WorkerPool pool;
+  CostEstimates costs;
+  QueryScheduler scheduler;
+  UpdatePump updates;
+  SnapshotKeeper snapshots{registry, log, keeper_options(config)};
+  ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
+  Gate calls;    // in work, streams apart
+  Gate streams;  // open
+  Gate health_watchers{kMaxHealthWatchers};
+  Gate backups{limits::kMaxBackups};
+  Drain drain;
+  std::atomic<bool> recovering{false};  // what the log keeps is being read back
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_HOST_HOST_H_

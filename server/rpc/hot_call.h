@@ -1,0 +1,418 @@
+// The calls that come by the thousand, unary or streams, as one state machine on completion queues. A Method says what
+// is asked and how it is answered; everything that gRPC demands of a call is here, once.
+//
+// Lifetime. A call belongs to its IO loop; only there is it touched, so it has no locks. It waits for a caller, and
+// from accepted() on lives until three things are true: its status was sent (finished_), gRPC has said that the call is
+// over (gone_), and nothing is out: no read, no write, no message in work. Then, at the end of advance(), it deletes
+// itself. Work on a message may be anywhere, but comes back to the IO loop exactly once, by answered(); when the
+// caller is gone or the server drains, give_up() asks it to do so soon. Slots hold a message, its answer and the work
+// on it; they outlive calls and are used again and again, so that steady traffic allocates no columns.
+//
+// A stream has at most kSlots messages in work or waiting to be taken by the caller, and reads on when one has been:
+// that is all the memory that a caller who does not read can take. Reads, one write and the work on several messages
+// are under way at once; answers go out as they come, or in the order of the messages where Method::kInOrder.
+#ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
+#define LOCUS_SERVER_RPC_HOT_CALL_H_
+
+#include <grpcpp/impl/codegen/proto_utils.h>
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/async_stream.h>
+#include <grpcpp/support/async_unary_call.h>
+#include <grpcpp/support/byte_buffer.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/base/check.h"
+#include "server/convert/status.h"
+#include "server/host/host.h"
+#include "server/rpc/call.h"
+#include "server/rpc/call_slot.h"
+#include "server/rpc/io_threads.h"
+#include "server/rpc/scene_binding.h"
+
+namespace locus::server {
+
+template <class Method>
+class HotCall;
+
+// Waits for calls of one rpc on one IO loop, and keeps what they use again. Outlives the loop's calls.
+//
+// What a Method is: the types Request, Response and Work; kRpc, kStream, kInOrder; listen(), which asks gRPC for the
+// next call; and begin(), which has the work on a message begun. A Work is built from a CallSlot and has give_up():
+// where it has not answered, it is to do so soon.
+template <class Method>
+class Listener {
+ public:
+  Listener(Host& host, const Method& rpc, IoLoop& io) : host_(host), rpc_(rpc), io_(io) {}
+
+  // Once, after the server started and before the IO threads did.
+  void listen() {
+    for (int i = 0; i < kWaiting; ++i) HotCall<Method>::listen(*this);
+  }
+
+ private:
+  friend class HotCall<Method>;
+  using Slot = typename HotCall<Method>::Slot;
+
+  static constexpr int kWaiting = 4;         // calls that gRPC can begin at once
+  static constexpr size_t kSpareSlots = 16;  // kept for later messages
+
+  std::unique_ptr<Slot> take_slot() {
+    if (spare_.empty()) return std::make_unique<Slot>(host_);
+    std::unique_ptr<Slot> slot = std::move(spare_.back());
+    spare_.pop_back();
+    return slot;
+  }
+  void give_back(std::unique_ptr<Slot> slot) {
+    if (spare_.size() < kSpareSlots && slot->fit_to_keep()) spare_.push_back(std::move(slot));
+  }
+
+  Host& host_;
+  const Method rpc_;
+  IoLoop& io_;
+  std::vector<std::unique_ptr<Slot>> spare_;
+};
+
+template <class Method>
+class HotCall final : private IoLoop::Resident {
+ public:
+  using Request = typename Method::Request;
+  using Response = typename Method::Response;
+
+  // A message of a call, from its arrival until its answer is on its way.
+  class Slot final : public CallSlot {
+   public:
+    explicit Slot(Host& host) : CallSlot(host), work_(*this) {}
+
+    const Caller& caller() const override { return *call_->caller_; }
+    IoLoop& io() const override { return call_->listener_.io_; }
+    uint64_t client() const override { return call_->client(); }
+    bool stream() const override { return Method::kStream; }
+    void hold() override { holds_ = true; }
+    void answered(absl::Status status) override { call_->answered(*this, std::move(status)); }
+
+    // Whether what it keeps of its past messages is little enough. Looks closely now and then only, which takes a
+    // while.
+    bool fit_to_keep() {
+      if (bytes_since_look_ < kLookEvery) return true;
+      bytes_since_look_ = 0;
+      return request_.SpaceUsedLong() + response_.SpaceUsedLong() <= kMostKept;
+    }
+
+   private:
+    friend class HotCall;
+    static constexpr size_t kLookEvery = 1u << 20;
+    static constexpr size_t kMostKept = 1u << 20;
+
+    HotCall* call_ = nullptr;
+    Request request_;
+    Response response_;
+    typename Method::Work work_;
+    bool answered_ = false;
+    bool holds_ = false;  // the call from reading on
+    SteadyTime arrived_;
+    size_t bytes_since_look_ = 0;
+  };
+
+  static void listen(Listener<Method>& listener) {
+    HotCall& call = *new HotCall(listener);
+    listener.io_.expect();
+    call.context_.AsyncNotifyWhenDone(&call.gone_tag_);
+    if constexpr (Method::kStream)
+      listener.rpc_.listen(&call.context_, &call.wire_, listener.io_.queue(), &call.accepted_tag_);
+    else
+      listener.rpc_.listen(&call.context_, &call.incoming_, &call.wire_, listener.io_.queue(), &call.accepted_tag_);
+  }
+
+ private:
+  using Bytes = grpc::ByteBuffer;
+  using Wire = std::conditional_t<Method::kStream, grpc::ServerAsyncReaderWriter<Bytes, Bytes>,
+                                  grpc::ServerAsyncResponseWriter<Bytes>>;
+  using Tag = MemberTag<HotCall>;
+  using Slots = std::vector<std::unique_ptr<Slot>>;
+
+  static constexpr size_t kSlots = 8;
+  static constexpr uint32_t kRetryAfterMs = Method::kStream ? 1000 : 100;
+
+  explicit HotCall(Listener<Method>& listener) : listener_(listener) {}
+  ~HotCall() {
+    if (resident_)
+      listener_.io_.leave(*resident_);
+    else
+      listener_.io_.forgo();
+  }
+
+  // Everything that happens to a call goes through here. What follows from it is decided once, when it has happened.
+  template <class Happening>
+  void act(const Happening& happening) {
+    ++acting_;
+    happening();
+    if (--acting_ == 0) advance();
+  }
+
+  void advance() {
+    if (!finishing_) {
+      if (stopping_) drop_answers();
+      write_next();
+      read_next();
+      if (no_more_ && writing_ == nullptr && all_done()) finish();
+    }
+    if (finished_ && gone_ && !reading_ && writing_ == nullptr && slots_.empty()) delete this;
+  }
+
+  void accepted(bool ok) {
+    if (!ok) {  // the server has ended, and gone_tag_ will not come
+      delete this;
+      return;
+    }
+    listen(listener_);
+    resident_ = listener_.io_.enter(*this);
+    arrived_ = std::chrono::steady_clock::now();
+    caller_.emplace(listener_.host_, context_, &stopped_);
+    act([this] {
+      if (absl::Status status = admit(); !status.ok()) {
+        refuse(std::move(status));
+      } else if (!Method::kStream) {
+        no_more_ = true;
+        take(incoming_);
+      }
+    });
+  }
+
+  absl::Status admit() {
+    Host& host = listener_.host_;
+    Gate& gate = Method::kStream ? host.streams : host.calls;
+    pass_ = gate.enter();
+    if (!pass_)
+      return refuse_full("", Method::kStream ? "streams" : "calls", gate.max(), gate.max() + 1.0, kRetryAfterMs);
+    if (absl::Status status = check_serving(host); !status.ok()) return status;
+    if (Method::kStream) open_.emplace(host.metrics, Method::kRpc);
+    return absl::OkStatus();
+  }
+
+  void read_next() {
+    if constexpr (Method::kStream) {
+      if (reading_ || no_more_ || slots_.size() >= kSlots) return;
+      if (std::any_of(slots_.begin(), slots_.end(), [](const auto& slot) { return slot->holds_; })) return;
+      reading_ = true;
+      incoming_.Clear();
+      wire_.Read(&incoming_, &read_tag_);
+    }
+  }
+
+  void read(bool ok) {
+    act([this, ok] {
+      reading_ = false;
+      if (no_more_) return;  // too late to be answered
+      if (!ok) {
+        no_more_ = true;
+        return;
+      }
+      Bytes bytes;
+      bytes.Swap(&incoming_);
+      take(bytes);
+    });
+  }
+
+  void take(Bytes& bytes) {
+    std::unique_ptr<Slot> slot = listener_.take_slot();
+    slot->bytes_since_look_ += bytes.Valid() ? bytes.Length() : 0;
+    if (!bytes.Valid() || !grpc::SerializationTraits<Request>::Deserialize(&bytes, &slot->request_).ok())
+      return refuse(refuse_argument(Reason::kMalformed, "", {}, "the bytes are no message of this call's type"));
+    if constexpr (Method::kStream)
+      if (absl::Status status = scene_.bind(*caller_, slot->request_.scene()); !status.ok())
+        return refuse(std::move(status));
+    slot->call_ = this;
+    slot->answered_ = false;
+    slot->arrived_ = std::chrono::steady_clock::now();
+    slots_.push_back(std::move(slot));
+    begin(*slots_.back());
+  }
+
+  void begin(Slot& slot) {
+    if constexpr (Method::kStream) {
+      read_next();  // the next message may arrive while this one is in work
+      slot.response_.set_sequence(slot.request_.sequence());
+      if (absl::Status status = scene_.check(slot.request_.scene()); !status.ok()) return slot.answered(status);
+      listener_.rpc_.begin(slot.work_, scene_.scene(), slot.request_, slot.response_);
+    } else {
+      listener_.rpc_.begin(slot.work_, slot.request_.scene(), slot.request_, slot.response_);
+    }
+  }
+
+  void answered(Slot& slot, absl::Status status) {
+    act([&] {
+      LOCUS_CHECK(!slot.answered_);
+      slot.answered_ = true;
+      slot.holds_ = false;
+      record_answer(listener_.host_.metrics, *caller_, Method::kRpc, status, slot.arrived_);
+      if (stopping_ || status.ok()) return;
+      if constexpr (Method::kStream) {
+        if (ends_stream(*caller_, status)) return stop(std::move(status));
+        *slot.response_.mutable_error() = to_error(status);
+      } else {
+        end(std::move(status));
+      }
+    });
+  }
+
+  // Whether nothing remains to be done but to send the status, of a unary call with its answer.
+  bool all_done() const { return slots_.empty() || (!Method::kStream && slots_.front()->answered_); }
+
+  void write_next() {
+    if constexpr (Method::kStream) {
+      if (writing_ != nullptr || stopping_) return;
+      const auto last = Method::kInOrder && !slots_.empty() ? slots_.begin() + 1 : slots_.end();
+      const auto next = std::find_if(slots_.begin(), last, [](const auto& slot) { return slot->answered_; });
+      if (next == last) return;
+      writing_ = next->get();
+      serialize(*writing_);
+      wire_.Write(outgoing_, &written_tag_);
+    }
+  }
+
+  void written(bool ok) {
+    act([this, ok] {
+      release(*std::exchange(writing_, nullptr));
+      if (!ok) stop(absl::CancelledError("the caller is gone"));
+    });
+  }
+
+  void serialize(Slot& slot) {
+    bool own = false;
+    outgoing_.Clear();
+    const grpc::Status status = grpc::SerializationTraits<Response>::Serialize(slot.response_, &outgoing_, &own);
+    LOCUS_CHECK(status.ok());  // replies are far below what a message can be
+    slot.bytes_since_look_ += outgoing_.Length();
+  }
+
+  void release(Slot& slot) {
+    const auto place =
+        std::find_if(slots_.begin(), slots_.end(), [&](const auto& entry) { return entry.get() == &slot; });
+    std::unique_ptr<Slot> owned = std::move(*place);
+    slots_.erase(place);
+    listener_.give_back(std::move(owned));
+  }
+
+  // What is no answer to a message ends the call.
+  void refuse(absl::Status status) {
+    record_answer(listener_.host_.metrics, *caller_, Method::kRpc, status, arrived_);
+    end(std::move(status));
+  }
+
+  // Nothing more is read; what was is answered, then the call ends with `status`.
+  void end(absl::Status status) {
+    no_more_ = true;
+    end_status_ = std::move(status);
+  }
+
+  // The same, but nobody waits for answers any more.
+  void stop(absl::Status status) {
+    if (stopping_) return;
+    end(std::move(status));
+    stopping_ = true;
+    stopped_.store(true);
+    give_up();
+  }
+
+  void give_up() {
+    for (size_t i = 0; i < slots_.size(); ++i)
+      if (!slots_[i]->answered_) slots_[i]->work_.give_up();
+  }
+
+  void drop_answers() {
+    for (size_t i = slots_.size(); i-- > 0;)
+      if (slots_[i]->answered_ && slots_[i].get() != writing_) release(*slots_[i]);
+  }
+
+  void finish() {
+    finishing_ = true;
+    // A caller who has its answer may call again at once, and must find room.
+    pass_ = Gate::Pass();
+    // Who failed may ask what happened; to all others it would only cost bytes.
+    if (!end_status_.ok()) context_.AddTrailingMetadata(kRequestIdMetadata, caller_->trace().request_id);
+    if constexpr (Method::kStream) {
+      wire_.Finish(to_grpc(end_status_), &finished_tag_);
+    } else {
+      if (end_status_.ok() && !slots_.empty()) {
+        serialize(*slots_.front());
+        wire_.Finish(outgoing_, grpc::Status::OK, &finished_tag_);
+      } else {
+        wire_.FinishWithError(to_grpc(end_status_), &finished_tag_);
+      }
+      if (!slots_.empty()) release(*slots_.front());
+    }
+  }
+
+  void finished(bool) {
+    act([this] { finished_ = true; });
+  }
+
+  // gRPC says that the call is over; before finish() that means that the caller gave up or its deadline passed.
+  void gone(bool) {
+    act([this] {
+      gone_ = true;
+      if (!finishing_) stop(absl::CancelledError("the caller gave up"));
+    });
+  }
+
+  void drain() override {
+    act([this] {
+      if (Method::kStream && !no_more_) end(draining());
+      give_up();
+    });
+  }
+
+  // Connections of a unix socket cannot be told apart: there each stream counts by itself.
+  uint64_t client() {
+    if (!client_) {
+      const std::string peer = context_.peer();
+      client_ = std::hash<std::string>{}(peer);
+      if (Method::kStream && peer.rfind("unix", 0) == 0) *client_ ^= reinterpret_cast<uintptr_t>(this);
+    }
+    return *client_;
+  }
+
+  Listener<Method>& listener_;
+  grpc::ServerContext context_;
+  Wire wire_{&context_};
+  Bytes incoming_;  // gRPC's while reading_
+  Bytes outgoing_;  // gRPC's while writing_
+  Tag accepted_tag_{*this, &HotCall::accepted};
+  Tag read_tag_{*this, &HotCall::read};
+  Tag written_tag_{*this, &HotCall::written};
+  Tag finished_tag_{*this, &HotCall::finished};
+  Tag gone_tag_{*this, &HotCall::gone};
+
+  std::optional<IoLoop::Residents::iterator> resident_;
+  std::atomic<bool> stopped_{false};  // for work on other threads: nobody waits for it
+  SteadyTime arrived_;
+  std::optional<OpenStream> open_;
+  std::optional<Caller> caller_;
+  std::optional<uint64_t> client_;
+  Gate::Pass pass_;
+  SceneBinding scene_;
+  Slots slots_;  // in the order of arrival
+  Slot* writing_ = nullptr;
+  absl::Status end_status_;
+  int acting_ = 0;
+  bool reading_ = false;
+  bool no_more_ = false;    // messages are taken
+  bool stopping_ = false;   // answers are dropped
+  bool finishing_ = false;  // the status is on its way
+  bool finished_ = false;
+  bool gone_ = false;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_RPC_HOT_CALL_H_

@@ -1,0 +1,145 @@
+#include "server/rpc/io_threads.h"
+
+#include <grpc/support/time.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/check.h"
+#include "server/scheduling/semaphore.h"
+#include "server/scheduling/thread_priority.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::system_clock;
+
+constexpr uint32_t kMostThreads = 16;
+
+}  // namespace
+
+class IoWaker {
+ public:
+  void watch(IoLoop& loop) { loops_.push_back(&loop); }
+  void start() {
+    thread_ = std::thread([this] { run(); });
+  }
+  // From any thread.
+  void wake() { calls_.post(); }
+  // Afterwards no alarm is set any more.
+  void stop() {
+    over_.store(true);
+    wake();
+    thread_.join();
+  }
+
+ private:
+  void run() {
+    while (!over_.load()) {
+      calls_.wait();
+      for (IoLoop* loop : loops_) tell(*loop);
+    }
+  }
+
+  // An alarm on its way is enough: whoever gets it looks for what was posted afterwards.
+  static void tell(IoLoop& loop) {
+    if (!loop.wanted_.exchange(false) || loop.alarm_set_.exchange(true)) return;
+    loop.alarm_.Set(loop.queue_.get(), gpr_inf_past(GPR_CLOCK_MONOTONIC), &loop.woken_);
+  }
+
+  std::vector<IoLoop*> loops_;
+  Semaphore calls_;
+  std::atomic<bool> over_{false};
+  std::thread thread_;
+};
+
+IoLoop::IoLoop(std::unique_ptr<grpc::ServerCompletionQueue> queue, IoWaker& waker)
+    : EventLoop(static_cast<EventSource&>(*this)), queue_(std::move(queue)), waker_(waker) {}
+
+EventSource::Next IoLoop::next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok) {
+  void* which = nullptr;
+  switch (queue_->AsyncNext(&which, ok, system_clock::now() + wait)) {
+    case grpc::CompletionQueue::SHUTDOWN:
+      return Next::kEnd;
+    case grpc::CompletionQueue::TIMEOUT:
+      return Next::kNothing;
+    case grpc::CompletionQueue::GOT_EVENT:
+      break;
+  }
+  *tag = static_cast<EventTag*>(which);
+  return Next::kEvent;
+}
+
+void IoLoop::interrupt() {
+  wanted_.store(true);
+  waker_.wake();
+}
+
+void IoLoop::woken(bool) { alarm_set_.store(false); }
+
+void IoLoop::leave(Residents::iterator call) {
+  residents_.erase(call);
+  forgo();
+}
+
+void IoLoop::forgo() {
+  expected_or_resident_.fetch_sub(1);
+  expected_or_resident_.notify_all();
+}
+
+void IoLoop::wait_until_empty(bool running) {
+  for (uint32_t left = expected_or_resident_.load(); left > 0; left = expected_or_resident_.load())
+    if (running)
+      expected_or_resident_.wait(left);
+    else
+      turn();
+}
+
+// Residents may leave while they are told.
+void IoLoop::drain_residents(bool) {
+  for (auto resident = residents_.begin(); resident != residents_.end();) (*resident++)->drain();
+}
+
+uint32_t IoThreads::count_for(uint32_t cores) {
+  if (cores <= 1) return 1;
+  return std::clamp(cores / 2, 2u, kMostThreads);
+}
+
+IoThreads::IoThreads(grpc::ServerBuilder& builder, uint32_t count)
+    : count_(count), waker_(std::make_unique<IoWaker>()) {
+  LOCUS_CHECK_LE(1u, count);
+  for (uint32_t i = 0; i < std::max(1u, count / kThreadsOfALoop); ++i) {
+    loops_.push_back(std::make_unique<IoLoop>(builder.AddCompletionQueue(), *waker_));
+    waker_->watch(*loops_.back());
+  }
+  waker_->start();
+}
+
+IoThreads::~IoThreads() { stop(); }
+
+void IoThreads::start() {
+  for (uint32_t i = 0; i < count_; ++i)
+    running_.emplace_back([&loop = *loops_[i % loops_.size()]] {
+      take_short_slices();
+      while (loop.turn()) {
+      }
+    });
+}
+
+void IoThreads::drain() {
+  for (const auto& loop : loops_) loop->post(loop->drain_);
+}
+
+void IoThreads::stop() {
+  if (std::exchange(stopped_, true)) return;
+  for (const auto& loop : loops_) loop->wait_until_empty(!running_.empty());
+  waker_->stop();
+  for (const auto& loop : loops_) loop->queue_->Shutdown();
+  for (std::thread& thread : running_) thread.join();
+  // Queues that nobody served are emptied all the same, as gRPC asks.
+  for (const auto& loop : loops_)
+    while (running_.empty() && loop->turn()) {
+    }
+}
+
+}  // namespace locus::server

@@ -1,0 +1,171 @@
+#include "server/services/instance_changes.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <random>
+
+#include "absl/strings/str_cat.h"
+#include "server/convert/convert.h"
+#include "server/observability/log.h"
+
+namespace locus::server {
+namespace {
+
+// How late a waiting call notices that its caller is gone.
+constexpr std::chrono::milliseconds kWaitSlice{50};
+
+// What a background change hands to the call that waits for it, if that still does.
+class Outcome {
+ public:
+  void set(absl::StatusOr<InstanceChange> change) LOCUS_EXCLUDES(mutex_) {
+    MutexLock lock(mutex_);
+    change_ = std::move(change);
+    known_.notify_all();
+  }
+
+  // The change's result, or why the caller stopped waiting; the change goes on then.
+  absl::StatusOr<InstanceChange> wait(const Caller& caller) LOCUS_EXCLUDES(mutex_) {
+    MutexLock lock(mutex_);
+    while (!change_) {
+      if (absl::Status status = caller.stop(); !status.ok()) return status;
+      known_.wait_until(mutex_, std::min(caller.deadline(), std::chrono::steady_clock::now() + kWaitSlice));
+    }
+    return *change_;
+  }
+
+ private:
+  Mutex mutex_;
+  ConditionVariable known_;
+  std::optional<absl::StatusOr<InstanceChange>> change_ LOCUS_GUARDED_BY(mutex_);
+};
+
+// A request with the memory its columns point to.
+struct OwnedChange {
+  v1::ChangeInstancesRequest request;
+  StaticChange change;
+};
+
+size_t placement_count(const v1::Placement& place) {
+  return static_cast<size_t>(place.ids().empty() ? place.translations_size() / 3 : place.ids_size());
+}
+
+absl::StatusOr<PlacementColumns> to_placement(const Registry& registry, const v1::Placement& place,
+                                              const std::string& field) {
+  if (absl::Status status = check_mesh_name(place.mesh(), field + ".mesh"); !status.ok()) return status;
+  absl::StatusOr<MeshPtr> mesh = registry.find_mesh(place.mesh(), field + ".mesh");
+  if (!mesh.ok()) return mesh.status();
+  PlacementColumns columns;
+  columns.mesh = *std::move(mesh);
+  columns.ids = span_of(place.ids());
+  columns.translations = span_of(place.translations());
+  columns.rotations = span_of(place.rotations());
+  columns.scales = span_of(place.scales());
+  columns.layers = span_of(place.layers());
+  columns.groups = span_of(place.groups());
+  columns.tags = span_of(place.tags());
+  return columns;
+}
+
+// Who does not wait gets the chosen ids before the change is built, so they are chosen here: at random among 2^63.
+void choose_ids(v1::ChangeInstancesRequest& request) {
+  std::random_device device;
+  for (v1::Placement& place : *request.mutable_place()) {
+    if (!place.ids().empty()) continue;
+    const size_t n = placement_count(place);
+    for (size_t i = 0; i < n; ++i) place.add_ids(kChosenIdBit | uint64_t{device()} << 32 | device());
+  }
+}
+
+absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registry,
+                                                         const v1::ChangeInstancesRequest& request) {
+  auto owned = std::make_shared<OwnedChange>();
+  owned->request = request;
+  if (request.no_wait()) choose_ids(owned->request);
+  owned->change.remove_ids = span_of(owned->request.remove_ids());
+  owned->change.remove_groups = span_of(owned->request.remove_groups());
+  for (int i = 0; i < owned->request.place_size(); ++i) {
+    absl::StatusOr<PlacementColumns> place =
+        to_placement(registry, owned->request.place(i), absl::StrCat("place[", i, "]"));
+    if (!place.ok()) return place.status();
+    owned->change.place.push_back(*std::move(place));
+  }
+  return owned;
+}
+
+// All that can be said of placements before the changes that wait ahead of them are made.
+absl::Status check_placements(const StaticChange& change) {
+  StaticChange alone;
+  alone.place = change.place;
+  return StaticSet::empty()
+      ->apply(
+          alone, [](Id) { return false; }, 0)
+      .status();
+}
+
+using SharedClaim = std::shared_ptr<const MemoryBudget::Claim>;
+
+// Room for the next set of instances while it is built. Removing is never refused.
+absl::StatusOr<SharedClaim> make_room(Host& host, const Scene& scene, const StaticChange& change) {
+  const uint64_t cost = change_cost(*scene.latest()->statics, change);
+  if (cost == 0) return nullptr;
+  absl::StatusOr<MemoryBudget::Claim> claim = host.memory.claim("place", cost);
+  if (!claim.ok()) return claim.status();
+  return std::make_shared<const MemoryBudget::Claim>(*std::move(claim));
+}
+
+void log_change(const Scene& scene, uint64_t number, const absl::StatusOr<InstanceChange>& change) {
+  if (change.ok()) return;
+  log(LogLevel::kInfo, "change of instances failed",
+      {{"scene", scene.name()}, {"change", absl::StrCat(number)}, {"text", std::string(change.status().message())}});
+}
+
+}  // namespace
+
+absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
+                              v1::ChangeInstancesResponse* response) {
+  const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.scene(), "scene");
+  if (!scene.ok()) return scene.status();
+  absl::StatusOr<std::shared_ptr<OwnedChange>> owned = read_change(host.registry, request);
+  if (!owned.ok()) return owned.status();
+  if (request.no_wait())
+    if (absl::Status status = check_placements((*owned)->change); !status.ok()) return status;
+  const absl::StatusOr<SharedClaim> room = make_room(host, **scene, (*owned)->change);
+  if (!room.ok()) return room.status();
+  const auto outcome = std::make_shared<Outcome>();
+  const uint64_t epoch = (*scene)->latest()->epoch;
+  const absl::StatusOr<uint64_t> number =
+      host.changes.submit(epoch, [&host, arrived = SteadyTime::clock::now(), scene = *scene, owned = *owned, outcome,
+                                  room = *room, trace = LogScope::current()](uint64_t change_number) {
+        const LogScope scope(trace);
+        // Whoever asked may be gone by now; readers end in any case.
+        (void)wait_for_readers(*scene, [] { return absl::OkStatus(); });
+        absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
+        if (change.ok()) host.metrics.record_instance_change(nanoseconds_since(arrived));
+        log_change(*scene, change_number, change);
+        outcome->set(std::move(change));
+      });
+  if (!number.ok()) return number.status();
+  response->set_change(*number);
+  response->set_epoch(epoch);
+  if (request.no_wait()) {
+    for (const v1::Placement& place : (*owned)->request.place()) response->mutable_ids()->MergeFrom(place.ids());
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<InstanceChange> change = outcome->wait(caller);
+  if (!change.ok()) return change.status();
+  response->mutable_ids()->Add(change->placed.begin(), change->placed.end());
+  response->set_revision(change->revision);
+  return absl::OkStatus();
+}
+
+v1::Scene describe(const Host& host, const Scene& scene) {
+  v1::Scene out = to_proto(scene);
+  // The queue's count includes the change that the scene itself is working on.
+  const uint32_t pending = std::max(out.pending_changes(), host.changes.pending(out.epoch()));
+  out.set_pending_changes(pending);
+  out.set_state(pending > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
+  return out;
+}
+
+}  // namespace locus::server

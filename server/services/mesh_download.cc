@@ -1,0 +1,110 @@
+#include "server/services/mesh_download.h"
+
+#include <grpcpp/impl/codegen/proto_utils.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "absl/types/span.h"
+#include "core/base/limits.h"
+#include "server/convert/convert.h"
+
+namespace locus::server {
+namespace {
+
+// What the tags and lengths of a piece's fields, and its description, may take.
+constexpr size_t kFrameBytes = 1024;
+static_assert(limits::kMaxNameLength + sizeof(Sha256) + 64 < kFrameBytes);
+constexpr size_t kRoom = limits::kDefaultReplyBytes - kFrameBytes;
+// A vertex or a triangle: three numbers of four bytes.
+constexpr size_t kTripleBytes = 12;
+// A part's name, the triangle it begins at, and the tags and lengths of both and of the part.
+constexpr size_t kMostPartBytes = limits::kMaxLabelLength + 16;
+static_assert(kMostPartBytes <= kRoom);
+// Indices that are unpacked before they go into a piece.
+constexpr uint64_t kIndicesAtOnce = 3 << 14;
+
+// Fills pieces and hands each over when it is full.
+class Pieces {
+ public:
+  Pieces(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) : take_(take) {
+    *piece_.mutable_mesh() = to_proto(mesh);
+    piece_.mutable_mesh()->clear_parts();
+  }
+
+  void add(const MeshPart& part) {
+    make_room(kMostPartBytes);
+    v1::MeshPart* out = piece_.add_parts();
+    out->set_name(part.name);
+    out->set_first_triangle(part.first_triangle);
+    used_ += kMostPartBytes;
+  }
+
+  // Appends triples to the column that `mutable_column` returns of the piece in hand.
+  template <class T, class Column>
+  void add(absl::Span<const T> numbers, Column mutable_column) {
+    while (taken_ && !numbers.empty()) {
+      make_room(kTripleBytes);
+      const absl::Span<const T> some = numbers.subspan(0, (kRoom - used_) / kTripleBytes * 3);
+      (piece_.*mutable_column)()->Add(some.begin(), some.end());
+      used_ += some.size() * sizeof(T);
+      numbers.remove_prefix(some.size());
+    }
+  }
+
+  bool taken() const { return taken_; }
+
+  bool finish() {
+    taken_ = taken_ && take_(piece_);
+    return taken_;
+  }
+
+ private:
+  void make_room(size_t bytes) {
+    if (used_ + bytes <= kRoom) return;
+    taken_ = taken_ && take_(piece_);
+    piece_.Clear();
+    used_ = 0;
+  }
+
+  const TakeMeshPiece& take_;
+  v1::DownloadMeshResponse piece_;
+  size_t used_ = 0;  // an upper bound of the bytes in the columns
+  bool taken_ = true;
+};
+
+}  // namespace
+
+bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) {
+  const StaticMesh& from = *mesh.mesh;
+  Pieces pieces(mesh, take);
+  for (const MeshPart& part : from.parts()) pieces.add(part);
+  pieces.add(absl::MakeConstSpan(from.vertices()), &v1::DownloadMeshResponse::mutable_vertices);
+  PackedIndices::Reader reader = from.indices();
+  std::vector<uint32_t> some;
+  for (uint64_t left = uint64_t{3} * from.triangle_count(); left > 0 && pieces.taken(); left -= some.size()) {
+    some.resize(std::min(left, kIndicesAtOnce));
+    for (uint32_t& index : some) index = reader.next();
+    pieces.add(absl::MakeConstSpan(some), &v1::DownloadMeshResponse::mutable_indices);
+  }
+  return pieces.finish();
+}
+
+absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
+                           grpc::ServerWriter<v1::DownloadMeshResponse>& writer) {
+  if (absl::Status status = check_mesh_name(request.mesh(), "mesh"); !status.ok()) return status;
+  absl::StatusOr<MeshPtr> mesh = host.registry.find_mesh(request.mesh(), "mesh");
+  if (!mesh.ok()) return mesh.status();
+  // The vertices are made anew.
+  const absl::StatusOr<MemoryBudget::Claim> room =
+      host.memory.claim("mesh", uint64_t{kTripleBytes} * (*mesh)->vertex_count());
+  if (!room.ok()) return room.status();
+  const uint32_t uses = host.registry.mesh_uses(mesh->get());
+  const auto take = [&](const v1::DownloadMeshResponse& piece) { return caller.stop().ok() && writer.Write(piece); };
+  if (send_mesh({request.mesh(), *std::move(mesh), uses}, take)) return absl::OkStatus();
+  const absl::Status status = caller.stop();
+  return status.ok() ? absl::CancelledError("the caller stopped reading") : status;
+}
+
+}  // namespace locus::server

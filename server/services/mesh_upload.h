@@ -1,0 +1,62 @@
+// UploadMesh: collects a mesh from the pieces of a stream, checks it against what was announced and against its hash,
+// builds its tree and registers it.
+#ifndef LOCUS_SERVER_SERVICES_MESH_UPLOAD_H_
+#define LOCUS_SERVER_SERVICES_MESH_UPLOAD_H_
+
+#include <grpcpp/support/sync_stream.h>
+
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/scene/statics/static_mesh.h"
+#include "locus/v1/scene_service.pb.h"
+#include "server/rpc/call.h"
+
+namespace locus::server {
+
+// SHA-256 of vertex count, triangle count, vertices and indices, as UploadMeshRequest.sha256 defines it. Lengths are
+// multiples of three.
+Sha256 mesh_hash(absl::Span<const float> vertices, absl::Span<const uint32_t> indices);
+
+// A mesh that arrives in pieces. Never holds more than was announced.
+class MeshUpload {
+ public:
+  // Checks the first message's form and limits before anything is allocated.
+  static absl::StatusOr<MeshUpload> begin(const v1::UploadMeshRequest& first);
+
+  // Appends the columns of a message, the first included.
+  absl::Status append(const v1::UploadMeshRequest& message);
+  // For messages after the first: these may hold nothing but columns.
+  absl::Status append_later(const v1::UploadMeshRequest& message);
+
+  const std::string& name() const { return name_; }
+  const std::optional<Sha256>& announced() const { return announced_; }
+  // True for a mesh with as many vertices and triangles as were announced.
+  bool has_counts_of(const StaticMesh& mesh) const;
+
+  struct Complete {
+    Sha256 sha256;
+    TriangleMesh mesh;
+  };
+  // All of it, checked. Empties the upload.
+  absl::StatusOr<Complete> finish();
+
+ private:
+  MeshUpload() = default;
+
+  std::string name_;
+  std::optional<Sha256> announced_;
+  size_t vertex_numbers_ = 0;  // announced, three a vertex
+  size_t index_numbers_ = 0;
+  std::vector<MeshPart> parts_;
+  std::vector<float> vertices_;
+  std::vector<uint32_t> indices_;
+};
+
+absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1::UploadMeshRequest>& reader,
+                         v1::UploadMeshResponse* response);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICES_MESH_UPLOAD_H_

@@ -1,0 +1,69 @@
+#include "server/services/query_service.h"
+
+#include <list>
+#include <string>
+
+#include "server/rpc/hot_call.h"
+#include "server/services/query_work.h"
+
+namespace locus::server {
+namespace {
+
+struct QueryMethod {
+  using Request = v1::QueryRequest;
+  using Response = v1::QueryResponse;
+  using Work = QueryWork;
+  static constexpr Rpc kRpc = Rpc::kQuery;
+  static constexpr bool kStream = false;
+  static constexpr bool kInOrder = false;
+
+  void listen(grpc::ServerContext* context, grpc::ByteBuffer* request,
+              grpc::ServerAsyncResponseWriter<grpc::ByteBuffer>* wire, grpc::ServerCompletionQueue* queue,
+              void* tag) const {
+    service->RequestQuery(context, request, wire, queue, queue, tag);
+  }
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_result());
+  }
+
+  QueryService* service;
+};
+
+// Answers as they come.
+struct StreamQueriesMethod {
+  using Request = v1::StreamQueriesRequest;
+  using Response = v1::StreamQueriesResponse;
+  using Work = QueryWork;
+  static constexpr Rpc kRpc = Rpc::kStreamQueries;
+  static constexpr bool kStream = true;
+  static constexpr bool kInOrder = false;
+
+  void listen(grpc::ServerContext* context, grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer>* wire,
+              grpc::ServerCompletionQueue* queue, void* tag) const {
+    service->RequestStreamQueries(context, wire, queue, queue, tag);
+  }
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_result());
+  }
+
+  QueryService* service;
+};
+
+}  // namespace
+
+struct QueryService::Listeners {
+  std::list<Listener<QueryMethod>> query;
+  std::list<Listener<StreamQueriesMethod>> stream;
+};
+
+QueryService::QueryService(Host& host) : host_(host), listeners_(std::make_unique<Listeners>()) {}
+QueryService::~QueryService() = default;
+
+void QueryService::listen(IoThreads& threads) {
+  for (size_t i = 0; i < threads.loops(); ++i) {
+    listeners_->query.emplace_back(host_, QueryMethod{this}, threads.loop(i)).listen();
+    listeners_->stream.emplace_back(host_, StreamQueriesMethod{this}, threads.loop(i)).listen();
+  }
+}
+
+}  // namespace locus::server

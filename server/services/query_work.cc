@@ -1,0 +1,182 @@
+#include "server/services/query_work.h"
+
+#include <chrono>
+#include <set>
+#include <utility>
+
+#include "absl/strings/str_join.h"
+#include "server/convert/convert.h"
+#include "server/convert/status.h"
+#include "server/observability/log.h"
+#include "server/scheduling/clocks.h"
+
+namespace locus::server {
+
+using std::chrono::steady_clock;
+
+namespace {
+
+// Work that is not worth waking another thread for, which would watch for events meanwhile.
+constexpr uint64_t kShortNanoseconds = 30'000;
+
+}  // namespace
+
+void QueryWork::begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result) {
+  message_ = &batch;
+  result_ = &result;
+  result_->Clear();
+  if (absl::Status status = read(scene, batch); !status.ok()) return answer(std::move(status));
+  until_ = slot_.caller().wait_until(slot_.stream());
+  look();
+}
+
+absl::Status QueryWork::read(const std::string& scene, const v1::QueryBatch& batch) {
+  absl::StatusOr<ScenePtr> found = find_scene(slot_.caller(), scene, "scene");
+  if (!found.ok()) return found.status();
+  scene_ = *std::move(found);
+  absl::StatusOr<QueryBatch> queries = to_queries(batch);
+  if (!queries.ok()) return queries.status();
+  batch_ = *std::move(queries);
+  view_ = to_view(batch.view());
+  return check_batch(batch_);
+}
+
+void QueryWork::answer(absl::Status status) {
+  ticket_.reset();
+  run_.reset();
+  pin_.reset();
+  scene_.reset();
+  slot_.answered(std::move(status));
+}
+
+void QueryWork::look() {
+  absl::StatusOr<SnapshotPin> pin = scene_->pin(view_, SteadyTime::min());
+  if (pin.ok()) {
+    pin_.emplace(*std::move(pin));
+    return run();
+  }
+  const bool may_come = pin.status().code() == absl::StatusCode::kDeadlineExceeded && steady_clock::now() < until_;
+  if (!may_come) return answer(pin.status());
+  if (slot_.host().drain.draining()) return answer(no_longer());
+  wait();
+}
+
+// Nobody may write any more. A stream's messages are answered even so, before the stream ends.
+absl::Status QueryWork::no_longer() const {
+  if (absl::Status status = slot_.caller().stop(); !status.ok()) return status;
+  if (!slot_.stream()) return draining();
+  return absl::DeadlineExceededError("the server is shutting down before the scene reached the revision");
+}
+
+void QueryWork::wait() {
+  told_.store(false);
+  timer_ = slot_.io().at(until_, [this] {
+    timer_.reset();
+    if (end_wait()) look();
+  });
+  watch_.emplace(*scene_, view_.revision, [this, &io = slot_.io()] {
+    told_.store(true);
+    io.post(woken_);
+  });
+}
+
+bool QueryWork::end_wait() {
+  if (timer_) slot_.io().cancel(*timer_);
+  timer_.reset();
+  watch_.reset();
+  return !told_.load();
+}
+
+void QueryWork::woken(bool) {
+  end_wait();
+  look();
+}
+
+void QueryWork::give_up() {
+  if (watch_ && end_wait()) return answer(no_longer());
+  if (!ticket_ || slot_.caller().stop().ok() || !slot_.host().scheduler.withdraw(*ticket_)) return;
+  answer(slot_.caller().stop());
+}
+
+void QueryWork::run() {
+  started_ = steady_clock::now();
+  RunOptions options;
+  options.stop = [this] {
+    absl::Status told = pin_->status();
+    return told.ok() ? slot_.caller().stop() : told;
+  };
+  // Not by the clock on the wall: what is learned from a thread that waits for a core would keep it waiting.
+  options.work_clock = &thread_nanoseconds;
+  options.clock = &steady_nanoseconds;
+  columns_.emplace(*result_, batch_.blocks.size());
+  absl::StatusOr<std::unique_ptr<BatchRun>> run = BatchRun::prepare(**pin_, batch_, std::move(options), *columns_);
+  if (!run.ok()) return answer(run.status());
+  run_ = *std::move(run);
+  const uint64_t cost = slot_.host().costs.nanoseconds((*pin_)->epoch, batch_);
+  if (!slot_.host().scheduler.runs_inline(cost)) return submit(cost);
+  slot_.io().set_aside(*this, cost < kShortNanoseconds ? AsideLength::kShort : AsideLength::kLong);
+}
+
+void QueryWork::run_aside() { progress_ = slot_.host().scheduler.run_inline(*this); }
+
+void QueryWork::aside_done() {
+  if (progress_ == Progress::kDone) return finished(true);
+  submit(slot_.host().scheduler.options().inline_nanoseconds);  // it has shown that it takes longer
+}
+
+void QueryWork::submit(uint64_t nanoseconds) {
+  absl::StatusOr<QueryScheduler::TicketPtr> ticket = slot_.host().scheduler.submit(*this, slot_.client(), nanoseconds);
+  if (!ticket.ok()) return answer(ticket.status());
+  ticket_ = *std::move(ticket);
+}
+
+void QueryWork::done() { slot_.io().post(finished_); }
+
+void QueryWork::finished(bool) {
+  if (absl::Status status = run_->status(); !status.ok()) return answer(std::move(status));
+  result_->set_epoch((*pin_)->epoch);
+  result_->set_revision((*pin_)->revision);
+  result_->set_tick((*pin_)->tick);
+  for (size_t i = 0; i < batch_.blocks.size(); ++i) learn(batch_.blocks[i], run_->cost(i));
+  if (message_->explain()) explain();
+  note_if_slow();
+  answer(absl::OkStatus());
+}
+
+void QueryWork::learn(const QueryBlock& block, const QueryCost& cost) {
+  slot_.host().costs.learn((*pin_)->epoch, block, cost.nanoseconds);
+  slot_.host().metrics.record_block(static_cast<QueryKind>(block.kind.index()), query_count(block), cost.nanoseconds,
+                                    cost.work);
+}
+
+void QueryWork::explain() {
+  const QueryCost whole = run_->cost();
+  *result_->mutable_work() = to_proto(whole.work, whole.nanoseconds);
+  for (size_t i = 0; i < batch_.blocks.size(); ++i)
+    *result_->mutable_blocks(static_cast<int>(i))->mutable_work() =
+        to_proto(run_->cost(i).work, run_->cost(i).nanoseconds);
+}
+
+void QueryWork::note_if_slow() {
+  const uint64_t nanoseconds = nanoseconds_since(started_);
+  SlowQueries& slow = slot_.host().slow_queries;
+  if (!slow.is_slow(nanoseconds)) return;
+  const QueryCost cost = run_->cost();
+  SlowQuery query;
+  query.rpc = rpc_name(slot_.stream() ? Rpc::kStreamQueries : Rpc::kQuery);
+  query.scene = scene_->name();
+  query.revision = (*pin_)->revision;
+  query.nanoseconds = nanoseconds;
+  query.work_nanoseconds = cost.nanoseconds;
+  query.work = cost.work;
+  std::set<absl::string_view> kinds;
+  for (const QueryBlock& block : batch_.blocks) {
+    query.queries += query_count(block);
+    kinds.insert(query_kind_name(static_cast<QueryKind>(block.kind.index())));
+  }
+  query.kinds = absl::StrJoin(kinds, ",");
+  const LogScope scope(slot_.caller().trace());
+  slow.record(query, steady_clock::now());
+}
+
+}  // namespace locus::server

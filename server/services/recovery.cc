@@ -1,0 +1,191 @@
+#include "server/services/recovery.h"
+
+#include <chrono>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/mutex.h"
+#include "core/base/refusal.h"
+#include "core/scene/recovery.h"
+#include "core/scene/spec_codec.h"
+#include "server/observability/log.h"
+#include "server/services/epochs.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::steady_clock;
+
+// Between two lines that say how far a long recovery is.
+constexpr std::chrono::seconds kReportEvery{5};
+
+std::string milliseconds_since(steady_clock::time_point start) {
+  return absl::StrCat(std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now() - start).count());
+}
+
+// What callers are told of it, for as long as it is there.
+absl::Status damaged(const char* field, const absl::Status& damage) {
+  Refusal refusal;
+  refusal.reason = Reason::kDamaged;
+  refusal.field = field;
+  const char* const advice =
+      absl::StrContains(damage.message(), "locusd") ? "" : "; see `locusd check`, then `locusd repair` or a backup";
+  return refuse(absl::StatusCode::kDataLoss, absl::StrCat(damage.message(), advice), refusal);
+}
+
+class Recovery {
+ public:
+  Recovery(Host& host, const std::atomic<bool>& stop) : host_(host), log_(*host.log), stop_(stop) {}
+
+  absl::Status run() {
+    const std::vector<StoredScene>& scenes = log_.stored_scenes();
+    const std::vector<StoredMesh>& meshes = log_.stored_meshes();
+    total_ = scenes.size() + meshes.size();
+    if (const absl::Status damage = log_.catalogue_damage(); !damage.ok()) log(LogLevel::kError, damage.message());
+    if (total_ == 0) return absl::OkStatus();
+    log(LogLevel::kInfo, "recovering",
+        {{"scenes", absl::StrCat(scenes.size())}, {"meshes", absl::StrCat(meshes.size())}});
+    // Of each content one mesh, under its first name; other names share it.
+    std::map<Sha256, std::vector<const StoredMesh*>> contents;
+    for (const StoredMesh& mesh : meshes) contents[mesh.sha256].push_back(&mesh);
+    std::vector<const std::vector<const StoredMesh*>*> lists;
+    for (const auto& [sha256, names] : contents) lists.push_back(&names);
+    host_.pool.parallel_for(lists.size(), [&](size_t i) { recover(*lists[i]); });
+    host_.pool.parallel_for(scenes.size(), [&](size_t i) { recover(scenes[i]); });
+    if (stop_.load()) return absl::CancelledError("told to end while what is kept was read back");
+    const MutexLock lock(mutex_);
+    if (failure_.ok())
+      log(LogLevel::kInfo, "recovered",
+          {{"milliseconds", milliseconds_since(start_)}, {"damaged", absl::StrCat(damaged_)}});
+    return failure_;
+  }
+
+ private:
+  bool goes_on() LOCUS_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    return failure_.ok() && !stop_.load();
+  }
+
+  void recover(const std::vector<const StoredMesh*>& names) {
+    if (!goes_on()) return;
+    const steady_clock::time_point start = steady_clock::now();
+    const absl::StatusOr<RecoveredMesh> mesh = recover_sound(*names.front());
+    if (mesh.ok())
+      log(LogLevel::kInfo, "mesh recovered",
+          {{"mesh", names.front()->name},
+           {"triangles", absl::StrCat(mesh->mesh->triangle_count())},
+           {"tree", mesh->built ? "built" : "restored"},
+           {"milliseconds", milliseconds_since(start)}});
+    for (const StoredMesh* name : names) {
+      if (mesh.ok()) {
+        host_.registry.restore_mesh(name->name, mesh->mesh);
+      } else if (take_damage("mesh", name->name, mesh.status())) {
+        host_.registry.restore_damaged_mesh(name->name, damaged("mesh", mesh.status()));
+      }
+      count();
+    }
+  }
+
+  void recover(const StoredScene& stored) {
+    if (!goes_on()) return;
+    const steady_clock::time_point start = steady_clock::now();
+    const absl::StatusOr<ScenePtr> scene = recover_sound(stored);
+    if (scene.ok()) {
+      host_.registry.restore_scene(*scene);
+      log(LogLevel::kInfo, "scene recovered",
+          {{"scene", stored.name},
+           {"objects", absl::StrCat((*scene)->latest()->objects.size())},
+           {"records", absl::StrCat(stored.last_sequence - stored.snapshot_sequence)},
+           {"milliseconds", milliseconds_since(start)}});
+    } else if (take_damage("scene", stored.name, scene.status())) {
+      host_.registry.restore_damaged_scene(stored.name, stored.key, damaged("scene", scene.status()));
+    }
+    count();
+  }
+
+  absl::StatusOr<RecoveredMesh> recover_sound(const StoredMesh& stored) {
+    if (!stored.damage.ok()) return stored.damage;
+    BvhOptions options;
+    options.cancel = &stop_;
+    options.parallel_for = [this](size_t n, const std::function<void(size_t)>& work) {
+      host_.pool.parallel_for(n, work);
+    };
+    return recover_mesh(log_, stored, options);
+  }
+
+  // Where acks did not wait for the disk, something acknowledged may be missing after a crash, and what was copied may
+  // have gone on where it came from: then it is another count of revisions.
+  absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
+    if (!stored.damage.ok()) return stored.damage;
+    absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
+    if (!spec.ok()) return spec.status();
+    // What readers may hold is for this daemon's options to say, not for those of the one that made the scene.
+    spec->pinned_bytes = host_.config.pinned_limit;
+    stored.spec = encode_spec(*spec);
+    if (stored.copied || (spec->durability == Durability::kMemory && !log_.closed_in_order())) {
+      stored.epoch = new_epoch();
+      if (absl::Status status = log_.restart_scene(stored.key, stored.epoch); !status.ok()) return status;
+    }
+    const auto find_mesh = [this](const Sha256& sha256) { return host_.registry.find_content(sha256); };
+    return recover_scene(log_, stored, find_mesh);
+  }
+
+  // Whether it is damage; anything else ends the recovery.
+  bool take_damage(const char* kind, const std::string& name, const absl::Status& status) LOCUS_EXCLUDES(mutex_) {
+    log(LogLevel::kError, status.message(), {{kind, name}});
+    const MutexLock lock(mutex_);
+    const bool damage = status.code() == absl::StatusCode::kDataLoss;
+    if (damage)
+      ++damaged_;
+    else
+      failure_ = status;
+    return damage;
+  }
+
+  void count() LOCUS_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    ++done_;
+    if (steady_clock::now() - reported_ < kReportEvery || done_ == total_) return;
+    reported_ = steady_clock::now();
+    log(LogLevel::kInfo, "recovering", {{"done", absl::StrCat(done_)}, {"of", absl::StrCat(total_)}});
+  }
+
+  Host& host_;
+  UpdateLog& log_;
+  const std::atomic<bool>& stop_;
+  const steady_clock::time_point start_ = steady_clock::now();
+  size_t total_ = 0;
+  Mutex mutex_;
+  absl::Status failure_ LOCUS_GUARDED_BY(mutex_);
+  size_t done_ LOCUS_GUARDED_BY(mutex_) = 0;
+  size_t damaged_ LOCUS_GUARDED_BY(mutex_) = 0;
+  steady_clock::time_point reported_ LOCUS_GUARDED_BY(mutex_) = start_;
+};
+
+void log_snapshot(const Scene& scene, const absl::StatusOr<uint64_t>& bytes) {
+  if (bytes.ok())
+    log(LogLevel::kInfo, "snapshot written",
+        {{"scene", scene.name()},
+         {"bytes", absl::StrCat(*bytes)},
+         {"sequence", absl::StrCat(scene.log_position().snapshot_sequence)}});
+  else
+    log(LogLevel::kWarning, "no snapshot could be written; the log goes on and grows",
+        {{"scene", scene.name()}, {"why", std::string(bytes.status().message())}});
+}
+
+}  // namespace
+
+absl::Status recover_all(Host& host, const std::atomic<bool>& stop) { return Recovery(host, stop).run(); }
+
+SnapshotKeeperOptions Host::keeper_options(const ServerConfig& config) {
+  SnapshotKeeperOptions options;
+  options.log_bytes = config.snapshot_after;
+  options.tell = log_snapshot;
+  return options;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,183 @@
+#include "server/services/scene_dump.h"
+
+#include <grpcpp/impl/codegen/proto_utils.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "core/base/limits.h"
+#include "server/convert/convert.h"
+
+namespace locus::server {
+namespace {
+
+// Things a piece. One thing takes at most its columns, the frame of a run of its own, and a mesh's name.
+constexpr size_t kThingsPerPiece = 16384;
+constexpr size_t kMostBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
+static_assert(kThingsPerPiece * kMostBytesPerThing <= limits::kDefaultReplyBytes);
+
+template <class Message>
+void add_position(const Vec3d& position, Message* to) {
+  to->Add(position.x);
+  to->Add(position.y);
+  to->Add(position.z);
+}
+
+template <class Message>
+void add_rotation(const Quaternion& rotation, Message* to) {
+  to->add_rotations(rotation.x);
+  to->add_rotations(rotation.y);
+  to->add_rotations(rotation.z);
+  to->add_rotations(rotation.w);
+}
+
+template <class Thing, class Message>
+void add_labels(const Thing& thing, Message* to) {
+  to->add_layers(thing.layers);
+  to->add_groups(thing.group);
+  to->add_tags(thing.tag);
+}
+
+void add_size(const Vec3f& size, google::protobuf::RepeatedField<float>* to) {
+  to->Add(size.x);
+  to->Add(size.y);
+  to->Add(size.z);
+}
+
+void add_shape(const Shape& shape, v1::Insert* to) {
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+      to->mutable_point();
+      return;
+    case ShapeKind::kBall:
+      to->mutable_ball()->add_radii(shape.radius);
+      return;
+    case ShapeKind::kBox:
+      add_size(shape.size, to->mutable_box()->mutable_half_extents());
+      return;
+    case ShapeKind::kCapsule:
+      to->mutable_capsule()->add_radii(shape.radius);
+      add_size(shape.size, to->mutable_capsule()->mutable_half_axes());
+      return;
+  }
+}
+
+// Fills pieces and hands each over when it is full.
+class Dump {
+ public:
+  Dump(const SceneSnapshot& snapshot, const TakePiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
+
+  void add(const Object& object) {
+    if (!make_room()) return;
+    if (piece_.objects().empty() || object.shape.kind != last_kind_) piece_.add_objects();
+    last_kind_ = object.shape.kind;
+    v1::Insert* run = piece_.mutable_objects(piece_.objects_size() - 1);
+    run->add_ids(object.id);
+    add_position(object.shape.position, run->mutable_positions_f64());
+    add_rotation(object.shape.rotation, run);
+    add_shape(object.shape, run);
+    add_labels(object, run);
+  }
+
+  void add(const Instance& instance, const std::string& mesh) {
+    if (!make_room()) return;
+    if (piece_.instances().empty() || instance.mesh.get() != last_mesh_) piece_.add_instances()->set_mesh(mesh);
+    last_mesh_ = instance.mesh.get();
+    v1::Placement* run = piece_.mutable_instances(piece_.instances_size() - 1);
+    run->add_ids(instance.id);
+    add_position(instance.transform.translation, run->mutable_translations());
+    add_rotation(instance.transform.quaternion, run);
+    run->add_scales(instance.transform.scale);
+    add_labels(instance, run);
+  }
+
+  bool finish() {
+    taken_ = taken_ && (things_ == 0 && pieces_ > 0 ? true : take_(piece_));
+    return taken_;
+  }
+
+ private:
+  // False once a piece was not taken.
+  bool make_room() {
+    if (taken_ && things_ == kThingsPerPiece) {
+      taken_ = take_(piece_);
+      ++pieces_;
+      start_piece();
+    }
+    ++things_;
+    return taken_;
+  }
+
+  void start_piece() {
+    piece_.Clear();
+    piece_.set_epoch(snapshot_.epoch);
+    piece_.set_revision(snapshot_.revision);
+    things_ = 0;
+  }
+
+  const SceneSnapshot& snapshot_;
+  const TakePiece& take_;
+  v1::DumpSceneResponse piece_;
+  size_t things_ = 0;
+  size_t pieces_ = 0;
+  bool taken_ = true;
+  ShapeKind last_kind_ = ShapeKind::kPoint;
+  const StaticMesh* last_mesh_ = nullptr;
+};
+
+// Placed meshes can be known under several names, and not under the one they were first uploaded as, if that was
+// deleted before they were placed. Any name that is known will do; the lowest is taken.
+MeshName names_of(const Registry& registry) {
+  absl::flat_hash_map<const StaticMesh*, std::string> names;
+  std::string after;
+  while (true) {
+    const std::vector<Registry::NamedMesh> meshes = registry.list_meshes(after, limits::kMaxPageSize);
+    for (const Registry::NamedMesh& mesh : meshes) names.emplace(mesh.mesh.get(), mesh.name);
+    if (meshes.size() < limits::kMaxPageSize) break;
+    after = meshes.back().name;
+  }
+  return [names = std::move(names)](const StaticMesh& mesh) {
+    const auto name = names.find(&mesh);
+    return name == names.end() ? mesh.name() : name->second;
+  };
+}
+
+}  // namespace
+
+bool dump_snapshot(const SceneSnapshot& snapshot, const MeshName& mesh_name, const TakePiece& take) {
+  std::vector<GridRef> objects;
+  objects.reserve(snapshot.objects.size());
+  snapshot.objects.grid().for_each([&objects](const GridRef& object) {
+    objects.push_back(object);
+    return true;
+  });
+  std::sort(objects.begin(), objects.end(),
+            [](const GridRef& a, const GridRef& b) { return a.entry().id < b.entry().id; });
+  std::vector<const Instance*> instances;
+  for (const Instance& instance : snapshot.statics->tree().values()) instances.push_back(&instance);
+  std::sort(instances.begin(), instances.end(), [](const Instance* a, const Instance* b) { return a->id < b->id; });
+  Dump dump(snapshot, take);
+  for (const GridRef& object : objects) dump.add(object_of(object));
+  for (const Instance* instance : instances) dump.add(*instance, mesh_name(*instance->mesh));
+  return dump.finish();
+}
+
+absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request,
+                        grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
+  const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.scene(), "scene");
+  if (!scene.ok()) return scene.status();
+  absl::StatusOr<SnapshotPin> snapshot = wait_for(**scene, to_view(request.view()), caller.wait_until(false), caller);
+  if (!snapshot.ok()) return snapshot.status();
+  // Its caller may take what is written as slowly as it likes.
+  snapshot->when_stuck([&caller] { caller.cut_off(); });
+  const auto take = [&](const v1::DumpSceneResponse& piece) {
+    return snapshot->status().ok() && caller.stop().ok() && writer.Write(piece);
+  };
+  if (dump_snapshot(**snapshot, names_of(host.registry), take)) return absl::OkStatus();
+  if (absl::Status told = snapshot->status(); !told.ok()) return told;
+  const absl::Status status = caller.stop();
+  return status.ok() ? absl::CancelledError("the caller stopped reading") : status;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,199 @@
+#include "server/services/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/resource_quota.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/config/listen_address.h"
+#include "server/host/host.h"
+#include "server/observability/http_server.h"
+#include "server/observability/log.h"
+#include "server/rpc/io_threads.h"
+#include "server/rpc/listening.h"
+#include "server/services/backup.h"
+#include "server/services/health_service.h"
+#include "server/services/query_service.h"
+#include "server/services/recovery.h"
+#include "server/services/scene_service.h"
+#include "server/services/scrape.h"
+#include "server/services/server_service.h"
+#include "server/services/update_service.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+using std::chrono::system_clock;
+
+// gRPC's own threads, and calls that are being refused for want of room.
+constexpr int kSpareThreads = 64;
+// Of the memory limit, and never too little for a few of the largest messages.
+constexpr uint64_t kNetworkShare = 8;
+constexpr size_t kLeastNetworkBytes = size_t{256} << 20;
+// A caller whose machine is gone would otherwise keep its streams for ever.
+constexpr int kPingEveryMs = 30'000;
+constexpr int kPingAnswerMs = 10'000;
+// Callers may ping that often too, to notice when this server is gone.
+constexpr int kLeastPingIntervalMs = 5'000;
+// For statuses on their way and for health watchers, once no call is in work.
+constexpr milliseconds kLastWords{500};
+
+absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& config) {
+  std::vector<ListenAddress> addresses;
+  for (const std::string& text : config.listen) {
+    absl::StatusOr<ListenAddress> address = parse_listen_address(text);
+    if (!address.ok()) return address.status();
+    if (absl::Status status = check_free(*address); !status.ok())
+      return absl::Status(status.code(), absl::StrCat("cannot listen on ", text, ": ", status.message()));
+    addresses.push_back(*std::move(address));
+  }
+  return addresses;
+}
+
+// Null where there is to be none, or the default address is taken.
+absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, Scrape& scrape) {
+  if (config.http_listen.empty()) return nullptr;
+  const absl::StatusOr<ListenAddress> address = parse_listen_address(config.http_listen);
+  if (!address.ok()) return address.status();
+  absl::StatusOr<std::unique_ptr<HttpServer>> http = HttpServer::start(*address, scrape.pages());
+  if (http.ok()) return http;
+  const std::string text =
+      absl::StrCat("cannot listen on ", config.http_listen, " for metrics and health pages: ", why_not(*address));
+  if (config.http_listen != kDefaultHttpListen) return absl::UnavailableError(text);
+  log(LogLevel::kWarning, text, {{"hint", "choose another address with --http-listen, or none by leaving it empty"}});
+  return nullptr;
+}
+
+// Before the first ServerBuilder of the process, once.
+void enable_extras() {
+  static const bool kDone = [] {
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    return true;
+  }();
+  static_cast<void>(kDone);
+}
+
+void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
+  grpc::ResourceQuota quota("locusd");
+  const int calls = static_cast<int>(config.max_calls);
+  quota.SetMaxThreads(2 * calls + kSpareThreads);
+  // What connections hold of messages under way: who sends and never reads is cut off when it is used up.
+  quota.Resize(std::max(kLeastNetworkBytes, static_cast<size_t>(config.memory_limit / kNetworkShare)));
+  builder.SetResourceQuota(quota);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
+  builder.SetMaxSendMessageSize(-1);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             static_cast<int>(config.max_streams) + calls + kSpareThreads);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kLeastPingIntervalMs);
+  // Two daemons on one port would share its calls at random; the second is to fail instead.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+}
+
+}  // namespace
+
+struct Server::Parts {
+  Parts(const ServerConfig& config, UpdateLog* log)
+      : host(config, log),
+        scrape(host),
+        health_service(host),
+        server_service(host),
+        scene_service(host),
+        update_service(host),
+        query_service(host) {}
+
+  std::vector<grpc::Service*> services() {
+    return {&health_service, &server_service, &scene_service, &update_service, &query_service};
+  }
+
+  std::unique_ptr<IoThreads> io;  // ended with the server; what its calls had in work may still be on its way to it
+  Host host;
+  Scrape scrape;
+  HealthService health_service;
+  ServerService server_service;
+  SceneService scene_service;
+  UpdateService update_service;
+  QueryService query_service;
+  std::unique_ptr<grpc::Server> grpc;
+  std::unique_ptr<HttpServer> http;  // from before calls are served until none are
+  bool ended = false;
+};
+
+Server::Server(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
+Server::~Server() {
+  if (!parts_->ended) drain(milliseconds(0));
+}
+
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config, UpdateLog* log,
+                                                      const std::atomic<bool>& stop) {
+  const absl::StatusOr<std::vector<ListenAddress>> addresses = read_addresses(config);
+  if (!addresses.ok()) return addresses.status();
+  enable_extras();
+  auto parts = std::make_unique<Parts>(config, log);
+  if (can_back_up(parts->host)) remove_leftover_backup(parts->host);
+  parts->host.recovering = log != nullptr;
+  absl::StatusOr<std::unique_ptr<HttpServer>> http = start_http(config, parts->scrape);
+  if (!http.ok()) return http.status();
+  parts->http = *std::move(http);
+  grpc::ServerBuilder builder;
+  set_limits(config, builder);
+  std::vector<int> ports(addresses->size(), 0);
+  for (size_t i = 0; i < addresses->size(); ++i)
+    builder.AddListeningPort(config.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
+  for (grpc::Service* service : parts->services()) builder.RegisterService(service);
+  parts->io = std::make_unique<IoThreads>(builder, IoThreads::count_for(config.threads));
+  parts->grpc = builder.BuildAndStart();
+  if (parts->grpc == nullptr) {
+    parts->ended = true;
+    const size_t failed = static_cast<size_t>(std::find(ports.begin(), ports.end(), 0) - ports.begin());
+    if (failed == ports.size()) return absl::InternalError("gRPC could not start the server");
+    return absl::UnavailableError(
+        absl::StrCat("cannot listen on ", config.listen[failed], ": ", why_not((*addresses)[failed])));
+  }
+  parts->update_service.listen(*parts->io);
+  parts->query_service.listen(*parts->io);
+  parts->io->start();
+  std::unique_ptr<Server> server(new Server(std::move(parts)));
+  for (size_t i = 0; i < addresses->size(); ++i) {
+    const auto port = static_cast<uint16_t>(ports[i]);
+    server->addresses_.push_back(to_string((*addresses)[i], port));
+    const bool tcp = (*addresses)[i].kind == ListenAddress::Kind::kTcp;
+    if (tcp && server->port_ == 0) server->port_ = port;
+  }
+  Host& host = server->parts_->host;
+  if (log != nullptr)
+    if (absl::Status status = recover_all(host, stop); !status.ok()) return status;
+  host.recovering = false;
+  server->parts_->health_service.serving();
+  server->parts_->scrape.serving(server->addresses_);
+  return server;
+}
+
+uint16_t Server::http_port() const { return parts_->http == nullptr ? 0 : parts_->http->port(); }
+
+void Server::drain(milliseconds grace) {
+  const steady_clock::time_point deadline = steady_clock::now() + grace;
+  Host& host = parts_->host;
+  parts_->health_service.not_serving();
+  host.drain.begin();
+  parts_->io->drain();
+  const bool idle = host.streams.wait_until_empty(deadline) && host.calls.wait_until_empty(deadline);
+  host.drain.end();
+  parts_->health_service.end();
+  parts_->grpc->Shutdown(system_clock::now() + (idle ? kLastWords : milliseconds(0)));
+  parts_->grpc->Wait();
+  parts_->io->stop();
+  parts_->http.reset();
+  parts_->ended = true;
+}
+
+}  // namespace locus::server

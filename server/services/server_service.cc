@@ -1,0 +1,130 @@
+#include "server/services/server_service.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "core/base/instruction_set.h"
+#include "core/base/limits.h"
+#include "server/config/observability_limits.h"
+#include "server/config/version.h"
+#include "server/rpc/call.h"
+#include "server/services/backup.h"
+
+namespace locus::server {
+namespace {
+
+bool serves(const Host& host, absl::string_view feature) {
+  if (feature == kBackupFeature) return can_back_up(host);
+  return feature != "durability_local" || host.log != nullptr;
+}
+
+struct NamedLimit {
+  const char* name;
+  double value;
+  double used = 0;
+};
+
+// Batches that wait or are in work, and the work that they should be for all threads together.
+void add_queue(const char* jobs_name, const char* work_name, const QueueLimit& limit, uint32_t threads, uint64_t jobs,
+               uint64_t nanoseconds, std::vector<NamedLimit>& all) {
+  constexpr double kNanosecondsAMs = 1e6;
+  all.push_back({jobs_name, static_cast<double>(limit.jobs), static_cast<double>(jobs)});
+  all.push_back({work_name, static_cast<double>(limit.nanoseconds) * threads / kNanosecondsAMs,
+                 static_cast<double>(nanoseconds) / kNanosecondsAMs});
+}
+
+void add_queues(const Host& host, std::vector<NamedLimit>& all) {
+  const SchedulerOptions& options = host.scheduler.options();
+  const SchedulerStats now = host.scheduler.stats();
+  const uint32_t threads = options.threads;
+  add_queue("small_batches", "small_batch_work_ms", options.limits[0], threads, now.jobs[0], now.nanoseconds[0], all);
+  add_queue("large_batches", "large_batch_work_ms", options.limits[1], threads, now.jobs[1], now.nanoseconds[1], all);
+  add_queue("batches", "batch_work_ms", options.limit, threads, now.jobs[0] + now.jobs[1],
+            now.nanoseconds[0] + now.nanoseconds[1], all);
+  // Of each scene; used by all together.
+  const UpdatePumpStats updates = host.updates.stats();
+  all.push_back({"waiting_updates", static_cast<double>(host.updates.options().max_updates),
+                 static_cast<double>(updates.updates)});
+  all.push_back({"waiting_update_items", static_cast<double>(host.updates.options().max_items),
+                 static_cast<double>(updates.items)});
+}
+
+// Every limit under the name that refusals use.
+std::vector<NamedLimit> limits_of(const Host& host) {
+  std::vector<NamedLimit> all = {
+      {"backup_files", limits::kMaxBackupFiles},
+      {"backups", static_cast<double>(host.backups.max()), static_cast<double>(host.backups.used())},
+      {"blocks", limits::kMaxBlocks},
+      {"calls", static_cast<double>(host.calls.max()), static_cast<double>(host.calls.used())},
+      {"coordinate", limits::kMaxCoordinate},
+      {"health_watchers", kMaxHealthWatchers, static_cast<double>(host.health_watchers.used())},
+      {"history_bytes", static_cast<double>(limits::kMaxHistoryBytes)},
+      {"history_ticks", limits::kMaxHistoryTicks},
+      {"http_connections", kHttpThreads + kMaxHttpWaiting},
+      {"http_request_bytes", kMaxHttpRequestBytes},
+      {"ignored_ids", limits::kMaxIgnoredIds},
+      {"instances", limits::kMaxInstances},
+      {"label_length", limits::kMaxLabelLength},
+      {"labelled_scenes", kMaxLabelledScenes},
+      {"labels", limits::kMaxLabels},
+      {"listed_item_errors", limits::kMaxListedItemErrors},
+      {"reply_bytes", limits::kMaxReplyBytes},
+      {"max_results", limits::kMaxMaxResults},
+      {"memory_bytes", static_cast<double>(host.memory.limit()), static_cast<double>(host.memory.used())},
+      {"mesh_parts", limits::kMaxMeshParts},
+      {"mesh_triangles", limits::kMaxMeshTriangles},
+      {"mesh_vertices", limits::kMaxMeshVertices},
+      {"meshes", static_cast<double>(host.config.max_meshes), static_cast<double>(host.registry.mesh_count())},
+      {"name_length", limits::kMaxNameLength},
+      {"nearest", limits::kMaxNearest},
+      {"objects", limits::kMaxObjects},
+      {"page_size", limits::kMaxPageSize},
+      {"pending_changes", limits::kMaxPendingChanges},
+      {"pinned_bytes",
+       static_cast<double>(host.config.pinned_limit != 0 ? host.config.pinned_limit : limits::kPinnedBytes)},
+      {"queries", limits::kMaxQueries},
+      {"receive_bytes", static_cast<double>(host.config.max_receive_bytes)},
+      {"recent_revisions", limits::kRecentRevisions},
+      {"request_id_length", kMaxRequestIdLength},
+      {"scenes", static_cast<double>(host.config.max_scenes), static_cast<double>(host.registry.scene_count())},
+      {"slow_query_lines", kMaxSlowQueryLines},
+      {"streams", static_cast<double>(host.streams.max()), static_cast<double>(host.streams.used())},
+      {"threads", static_cast<double>(host.pool.threads())},
+      {"update_items", limits::kMaxUpdateItems},
+      {"update_lists", limits::kMaxUpdateLists},
+      {"wait_ms", limits::kDefaultWaitMs},
+      {"writers", limits::kMaxWriters},
+  };
+  add_queues(host, all);
+  std::sort(all.begin(), all.end(),
+            [](const NamedLimit& a, const NamedLimit& b) { return absl::string_view(a.name) < b.name; });
+  return all;
+}
+
+}  // namespace
+
+grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::GetServerRequest*,
+                                      v1::GetServerResponse* response) {
+  const auto body = [&](const Caller&) {
+    response->set_version(kVersion);
+    response->set_instruction_set(std::string(instruction_set()));
+    for (const absl::string_view feature : {"as_of", "backup", "balls", "boxes", "download_mesh", "durability_local",
+                                            "history", "latest_wins", "lookup", "nearest", "rays", "static_from"})
+      if (serves(host_, feature)) response->add_features(std::string(feature));
+    for (const NamedLimit& limit : limits_of(host_)) {
+      v1::Limit* out = response->add_limits();
+      out->set_name(limit.name);
+      out->set_value(limit.value);
+      out->set_used(limit.used);
+    }
+    return absl::OkStatus();
+  };
+  return serve(host_, *context, Rpc::kGetServer, body, WhileClosed::kServe);
+}
+
+grpc::Status ServerService::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
+                                   grpc::ServerWriter<v1::BackupResponse>* writer) {
+  return serve(host_, *context, Rpc::kBackup, [&](const Caller& caller) { return back_up(host_, caller, *writer); });
+}
+
+}  // namespace locus::server

@@ -1,0 +1,69 @@
+#include "server/services/update_service.h"
+
+#include <list>
+#include <string>
+
+#include "server/rpc/hot_call.h"
+#include "server/services/update_work.h"
+
+namespace locus::server {
+namespace {
+
+struct ApplyUpdatesMethod {
+  using Request = v1::ApplyUpdatesRequest;
+  using Response = v1::ApplyUpdatesResponse;
+  using Work = UpdateWork;
+  static constexpr Rpc kRpc = Rpc::kApplyUpdates;
+  static constexpr bool kStream = false;
+  static constexpr bool kInOrder = true;
+
+  void listen(grpc::ServerContext* context, grpc::ByteBuffer* request,
+              grpc::ServerAsyncResponseWriter<grpc::ByteBuffer>* wire, grpc::ServerCompletionQueue* queue,
+              void* tag) const {
+    service->RequestApplyUpdates(context, request, wire, queue, queue, tag);
+  }
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_ack());
+  }
+
+  UpdateService* service;
+};
+
+// Answers in the order of the messages, as they are applied.
+struct StreamUpdatesMethod {
+  using Request = v1::StreamUpdatesRequest;
+  using Response = v1::StreamUpdatesResponse;
+  using Work = UpdateWork;
+  static constexpr Rpc kRpc = Rpc::kStreamUpdates;
+  static constexpr bool kStream = true;
+  static constexpr bool kInOrder = true;
+
+  void listen(grpc::ServerContext* context, grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer>* wire,
+              grpc::ServerCompletionQueue* queue, void* tag) const {
+    service->RequestStreamUpdates(context, wire, queue, queue, tag);
+  }
+  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
+    work.begin(scene, request.batch(), *response.mutable_ack());
+  }
+
+  UpdateService* service;
+};
+
+}  // namespace
+
+struct UpdateService::Listeners {
+  std::list<Listener<ApplyUpdatesMethod>> apply;
+  std::list<Listener<StreamUpdatesMethod>> stream;
+};
+
+UpdateService::UpdateService(Host& host) : host_(host), listeners_(std::make_unique<Listeners>()) {}
+UpdateService::~UpdateService() = default;
+
+void UpdateService::listen(IoThreads& threads) {
+  for (size_t i = 0; i < threads.loops(); ++i) {
+    listeners_->apply.emplace_back(host_, ApplyUpdatesMethod{this}, threads.loop(i)).listen();
+    listeners_->stream.emplace_back(host_, StreamUpdatesMethod{this}, threads.loop(i)).listen();
+  }
+}
+
+}  // namespace locus::server

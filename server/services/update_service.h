@@ -1,0 +1,31 @@
+// UpdateService over the scenes of a host: one batch a call, or a stream of them. Both live on IO loops.
+#ifndef LOCUS_SERVER_SERVICES_UPDATE_SERVICE_H_
+#define LOCUS_SERVER_SERVICES_UPDATE_SERVICE_H_
+
+#include <memory>
+
+#include "locus/v1/update_service.grpc.pb.h"
+#include "server/host/host.h"
+#include "server/rpc/io_threads.h"
+
+namespace locus::server {
+
+class UpdateService final : public v1::UpdateService::WithRawMethod_ApplyUpdates<
+                                v1::UpdateService::WithRawMethod_StreamUpdates<v1::UpdateService::Service>> {
+ public:
+  explicit UpdateService(Host& host);
+  ~UpdateService() override;
+
+  // Once, after the server started and before the IO threads do. They end before the service.
+  void listen(IoThreads& threads);
+
+ private:
+  struct Listeners;
+
+  Host& host_;
+  std::unique_ptr<Listeners> listeners_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICES_UPDATE_SERVICE_H_

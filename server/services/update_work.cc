@@ -1,0 +1,61 @@
+#include "server/services/update_work.h"
+
+#include <chrono>
+#include <utility>
+
+#include "server/convert/convert.h"
+#include "server/host/memory_use.h"
+
+namespace locus::server {
+namespace {
+
+// Room for what the batch needs while it is applied. A batch that inserts may be refused; others only change what is
+// there, or make room themselves.
+absl::StatusOr<MemoryBudget::Claim> make_room(Host& host, const UpdateBatch& batch) {
+  const UpdateCost cost = cost_of(batch);
+  if (cost.inserts) return host.memory.claim("inserts", cost.bytes);
+  return host.memory.claim_anyway(cost.bytes);
+}
+
+}  // namespace
+
+void UpdateWork::begin(const std::string& scene, const v1::UpdateBatch& batch, v1::UpdateAck& ack) {
+  arrived_ = std::chrono::steady_clock::now();
+  ack_ = &ack;
+  if (absl::Status status = post(scene, batch); !status.ok()) {
+    room_.reset();
+    slot_.answered(std::move(status));
+  }
+}
+
+absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBatch& batch) {
+  const absl::StatusOr<ScenePtr> scene = find_scene(slot_.caller(), scene_name, "scene");
+  if (!scene.ok()) return scene.status();
+  absl::StatusOr<UpdateBatch> updates = to_updates(batch);
+  if (!updates.ok()) return updates.status();
+  batch_ = *std::move(updates);
+  absl::StatusOr<MemoryBudget::Claim> room = make_room(slot_.host(), batch_);
+  if (!room.ok()) return room.status();
+  room_.emplace(*std::move(room));
+  const WhenFull when_full = slot_.stream() ? WhenFull::kHold : WhenFull::kRefuse;
+  const absl::StatusOr<Posted> posted = slot_.host().updates.post(*scene, *this, when_full);
+  if (posted.ok() && *posted == Posted::kFull) slot_.hold();
+  return posted.status();
+}
+
+// The pump may be done before post() returns; what it says arrives after that.
+void UpdateWork::done(absl::StatusOr<UpdateAck> ack) {
+  outcome_ = std::move(ack);
+  slot_.io().post(applied_);
+}
+
+void UpdateWork::applied(bool) {
+  room_.reset();
+  if (outcome_.ok()) {
+    slot_.host().metrics.record_update(outcome_->applied, nanoseconds_since(arrived_));
+    *ack_ = to_proto(*outcome_);
+  }
+  slot_.answered(outcome_.status());
+}
+
+}  // namespace locus::server

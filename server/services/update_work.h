@@ -1,0 +1,45 @@
+// One update batch from message to ack: checks, memory, its scene's mailbox.
+#ifndef LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
+#define LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
+
+#include <optional>
+#include <string>
+
+#include "core/scene/updates/update_batch.h"
+#include "locus/v1/update_service.pb.h"
+#include "server/rpc/call_slot.h"
+#include "server/rpc/io_threads.h"
+#include "server/scheduling/memory_budget.h"
+#include "server/scheduling/update_pump.h"
+
+namespace locus::server {
+
+class UpdateWork final : private PendingUpdate {
+ public:
+  explicit UpdateWork(CallSlot& slot) : slot_(slot) {}
+
+  // `batch` and `ack` stay until the slot is answered.
+  void begin(const std::string& scene, const v1::UpdateBatch& batch, v1::UpdateAck& ack);
+  // A batch that waits is asked about before it is applied; there is nothing to hurry.
+  void give_up() {}
+
+ private:
+  absl::Status post(const std::string& scene, const v1::UpdateBatch& batch);
+
+  const UpdateBatch& batch() const override { return batch_; }
+  absl::Status stop() const override { return slot_.caller().stop(); }
+  void done(absl::StatusOr<UpdateAck> ack) override;
+  void applied(bool);
+
+  CallSlot& slot_;
+  UpdateBatch batch_;
+  SteadyTime arrived_;
+  v1::UpdateAck* ack_ = nullptr;
+  std::optional<MemoryBudget::Claim> room_;
+  absl::StatusOr<UpdateAck> outcome_;
+  MemberTag<UpdateWork> applied_{*this, &UpdateWork::applied};
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICES_UPDATE_WORK_H_

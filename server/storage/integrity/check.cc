@@ -1,0 +1,89 @@
+#include "server/storage/integrity/check.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/storage/integrity/opening.h"
+#include "server/storage/rocksdb/errors.h"
+
+namespace locus::server {
+namespace {
+
+// Nobody may write while this reads. A copy that was never open has no lock, and a disk that cannot be written needs
+// none.
+absl::Status take_lock(const StorageOptions& options, std::unique_ptr<DirectoryLock>& lock) {
+  if (!options.env->FileExists(absl::StrCat(options.path, "/", DirectoryLock::kName)).ok()) return absl::OkStatus();
+  auto taken = DirectoryLock::take(*options.env, options.path);
+  if (absl::IsFailedPrecondition(taken.status())) return taken.status();
+  if (taken.ok()) lock = *std::move(taken);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+bool DirectoryReport::sound() const {
+  const auto is_sound = [](const auto& one) { return one.damage.empty(); };
+  return damage.empty() && catalogue_damage.empty() && std::all_of(scenes.begin(), scenes.end(), is_sound) &&
+         std::all_of(meshes.begin(), meshes.end(), is_sound);
+}
+
+DirectoryReport report_of(const Findings& findings) {
+  DirectoryReport report;
+  if (!findings.has_format) report.damage = "the catalogue is lost";
+  report.catalogue_damage = findings.catalogue_damage;
+  for (const SceneFinding& found : findings.scenes) {
+    SceneReport& scene = report.scenes.emplace_back();
+    scene.key = found.key;
+    scene.name = found.name;
+    scene.last_sequence = found.last;
+    scene.promised = found.promised;
+    scene.log_bytes = found.log_bytes;
+    scene.damage = found.damage;
+    if (!found.row) continue;
+    scene.epoch = found.row->epoch;
+    scene.snapshot_sequence = found.row->snapshot_sequence;
+    scene.snapshot_chunks = found.row->snapshot.chunks;
+    scene.snapshot_bytes = found.row->snapshot.bytes;
+  }
+  std::sort(report.scenes.begin(), report.scenes.end(),
+            [](const SceneReport& a, const SceneReport& b) { return a.name < b.name; });
+  for (const MeshFinding& found : findings.meshes)
+    report.meshes.push_back({found.name, found.sha256, found.content.chunks.bytes, found.damage});
+  return report;
+}
+
+absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
+  const StorageOptions options = settled(given);
+  const DatabaseOptions wanted = database_options_of(options);
+  if (!options.env->FileExists(wanted.folder).ok() &&
+      !options.env->FileExists(absl::StrCat(options.path, "/", HighWaterFile::kName)).ok())
+    return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
+  std::unique_ptr<DirectoryLock> lock;
+  if (absl::Status status = take_lock(options, lock); !status.ok()) return status;
+
+  DirectoryReport report;
+  const absl::StatusOr<HighWater> high_water = HighWaterFile::read(*options.env, options.path);
+  if (absl::IsUnavailable(high_water.status())) return high_water.status();
+  if (high_water.ok()) {
+    const absl::Status list = check_file_list(*options.env, wanted.folder, *high_water);
+    if (!list.ok() && !absl::IsDataLoss(list)) return list;
+    report.damage = std::string(list.message());
+    if (!list.ok()) return report;
+  }
+  std::unique_ptr<Database> database;
+  const rocksdb::Status strict = Database::open(wanted, OpenMode::kReadOnly, database);
+  if (!strict.ok() && !says_damage(strict)) return disk_error(absl::StrCat("opening ", options.path), strict);
+  if (!strict.ok() && !Database::open(wanted, OpenMode::kReadOnlyLenient, database).ok()) {
+    report.damage = strict.ToString();
+    return report;
+  }
+  const absl::StatusOr<Findings> findings =
+      judge(*database, high_water.ok() ? &*high_water : nullptr, Depth::kEverything);
+  if (!findings.ok()) return findings.status();
+  report = report_of(*findings);
+  report.closed_in_order = high_water.ok() && high_water->closed;
+  return report;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,225 @@
+#include "server/storage/integrity/judge.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/storage/rocksdb/bytes.h"
+#include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/reading.h"
+
+namespace locus::server {
+namespace {
+
+constexpr absl::string_view kNoHighWater =
+    "HIGH_WATER is lost, which says how much must be here, so that nobody knows whether all is";
+
+// How what the database says of its catalogue compares with what it must say.
+struct Standing {
+  bool whole = false;   // it is of the time of HIGH_WATER or later, and its rows are those it was made of
+  bool later = false;   // changes came after HIGH_WATER was written
+  bool meshes = false;  // the rows of meshes are those that must be there
+};
+
+std::string count_of(uint64_t count, absl::string_view thing) {
+  return absl::StrCat(count, " ", thing, count == 1 ? "" : "s");
+}
+
+absl::Status read_meta(const Database& database, Findings& found) {
+  const std::unique_ptr<rocksdb::Iterator> at(database.db().NewIterator(reading_options(), database.meta()));
+  for (at->SeekToFirst(); at->Valid(); at->Next()) {
+    const absl::string_view key = view_of(at->key());
+    const std::optional<absl::string_view> bytes = unsealed(key, view_of(at->value()));
+    if (!bytes || key == kFamilyMark) continue;
+    if (key == kFormatKey) {
+      const uint32_t format = ByteReader(*bytes).u32();
+      if (format != kFormat)
+        return absl::FailedPreconditionError(absl::StrCat("the data directory has format ", format,
+                                                          ", of another version of locusd; this one knows format ",
+                                                          kFormat));
+      found.has_format = true;
+    } else if (key == kCatalogueKey) {
+      found.catalogue = decode_catalogue(*bytes);
+    } else if (key[0] == kPendingSnapshotTag || key[0] == kPendingMeshTag) {
+      found.pending.emplace_back(key);
+    } else {
+      found.rows.emplace(key, view_of(at->value()));
+    }
+  }
+  // What follows a place that cannot be read is as good as lost, and missed below.
+  if (at->status().ok() || says_damage(at->status())) return absl::OkStatus();
+  return read_error("reading the catalogue", at->status());
+}
+
+Standing compare(const Findings& found, const HighWater& must) {
+  CatalogueRow sums;
+  Catalogue::add_sums(found.rows, sums);
+  const CatalogueRow said = found.catalogue.value_or(CatalogueRow());
+  Standing standing;
+  standing.later = said.generation > must.catalogue;
+  standing.whole =
+      said.generation >= must.catalogue && said.scene_sum == sums.scene_sum && said.mesh_sum == sums.mesh_sum;
+  standing.meshes = sums.mesh_sum == (standing.later ? said.mesh_sum : must.mesh_sum);
+  return standing;
+}
+
+// What is wrong with the scene's row, apart from its log.
+std::string row_damage(const SceneFinding& scene, const Mark* mark, const Standing& standing) {
+  if (standing.whole && standing.later) return "";
+  if (mark == nullptr)
+    return standing.whole ? "it was deleted, and is back" : "it is not in HIGH_WATER, and the catalogue is not whole";
+  if (!scene.row) return "its entry in the catalogue is lost";
+  if (mark->row_seal != scene.row_seal) return "its entry in the catalogue is of another time";
+  return "";
+}
+
+// A disk that fails is no damage: that goes into `disk`.
+std::string damage_of(const absl::Status& status, absl::Status& disk) {
+  if (!status.ok() && !absl::IsDataLoss(status)) disk.Update(status);
+  return std::string(status.message());
+}
+
+std::string log_damage(SceneFinding& scene, const Mark* mark, const HighWater& must, const Database& database,
+                       absl::Status& disk) {
+  const SceneRow& row = *scene.row;
+  uint64_t chain_at = 0;
+  const bool marked = mark != nullptr && mark->sequence >= row.snapshot_sequence;
+  if (marked) scene.promised = mark->sequence;
+  const RecordScan scan = scan_records(database, row, scene.promised, chain_at);
+  scene.last = scan.last;
+  scene.chain = scan.chain;
+  scene.log_bytes = scan.bytes;
+  if (!scan.error.ok()) return damage_of(scan.error, disk);
+  if (scan.beyond != 0)
+    return absl::StrCat(count_of(scan.beyond - scan.last - 1, "record"), " from ", scan.last + 1,
+                        " on missing, before ", count_of(scan.after, "other"));
+  if (scan.last < scene.promised)
+    return absl::StrCat("the last ", count_of(scene.promised - scan.last, "acknowledged record"), " from ",
+                        scan.last + 1, " on missing");
+  if (marked && chain_at != mark->chain)
+    return absl::StrCat("record ", mark->sequence, " is not the one that was written");
+  const uint64_t gap_end = database.wal_watch().gap_end();
+  if (gap_end > must.covered_sequence && !must.closed && !database.wal_watch().has_records_after_gap(scene.key))
+    return absl::StrCat("part of the log before the crash cannot be read, and records after ", scan.last,
+                        " may have stood there");
+  return "";
+}
+
+// Every byte, for whoever asks for it.
+std::string deep_damage(const SceneFinding& scene, const Database& database, absl::Status& disk) {
+  const SceneRow& row = *scene.row;
+  const auto nowhere = [](absl::string_view) { return absl::OkStatus(); };
+  absl::Status status =
+      read_chunks(database, database.snapshot(), snapshot_prefix(row.key, row.snapshot_number), row.snapshot, nowhere);
+  if (!status.ok()) return absl::StrCat("its snapshot: ", damage_of(status, disk));
+  status = read_records(database, row.key, row.snapshot_sequence + 1, scene.last, row.chain,
+                        [](const LogRecord&) { return absl::OkStatus(); });
+  return damage_of(status, disk);
+}
+
+absl::Status judge_scene(SceneFinding& scene, const Mark* mark, const HighWater* must, const Standing& standing,
+                         const Database& database, Depth depth) {
+  absl::Status disk;
+  if (mark != nullptr) scene.promised = mark->sequence;
+  scene.copied = mark != nullptr && mark->copied;
+  scene.damage = mark != nullptr ? mark->damage : "";
+  std::string more = must == nullptr ? std::string(kNoHighWater) : row_damage(scene, mark, standing);
+  // The numbers are wanted of a damaged scene, too.
+  if (scene.row) {
+    std::string log = log_damage(scene, mark, must == nullptr ? HighWater() : *must, database, disk);
+    if (more.empty()) more = std::move(log);
+    if (more.empty() && depth == Depth::kEverything) more = deep_damage(scene, database, disk);
+  }
+  if (scene.damage.empty()) scene.damage = std::move(more);
+  return disk;
+}
+
+absl::Status find_scenes(const HighWater* must, const Standing& standing, const Database& database, Depth depth,
+                         Findings& found) {
+  std::map<SceneKey, SceneFinding> scenes;
+  std::map<SceneKey, const Mark*> marks;
+  for (const auto& [key, value] : found.rows) {
+    if (key[0] != kSceneTag) continue;
+    std::optional<SceneRow> row = decode_scene(*unsealed(key, value));
+    if (!row) continue;
+    SceneFinding& scene = scenes[row->key];
+    scene.key = row->key;
+    scene.name = row->name;
+    scene.row_seal = seal_of(value);
+    scene.row = std::move(row);
+  }
+  if (must != nullptr) {
+    for (const Mark& mark : must->marks) {
+      marks[mark.scene] = &mark;
+      if (scenes.contains(mark.scene)) continue;
+      // Deleted after HIGH_WATER was written, and rightly so.
+      if (standing.whole && standing.later && mark.damage.empty()) continue;
+      SceneFinding& scene = scenes[mark.scene];
+      scene.key = mark.scene;
+      scene.name = mark.name;
+    }
+  }
+  for (auto& [key, scene] : scenes) {
+    const auto mark = marks.find(key);
+    absl::Status disk =
+        judge_scene(scene, mark == marks.end() ? nullptr : mark->second, must, standing, database, depth);
+    if (!disk.ok()) return disk;
+    found.scenes.push_back(std::move(scene));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status find_meshes(const Database& database, Depth depth, Findings& found) {
+  absl::Status disk;
+  const std::string start(1, kMeshTag);
+  for (auto row = found.rows.lower_bound(start); row != found.rows.end() && row->first[0] == kMeshTag; ++row) {
+    MeshFinding& mesh = found.meshes.emplace_back();
+    mesh.name = row->first.substr(1);
+    mesh.damage = found.catalogue_damage;
+    const absl::string_view sha256 = *unsealed(row->first, row->second);
+    if (sha256.size() == mesh.sha256.size()) std::copy(sha256.begin(), sha256.end(), mesh.sha256.begin());
+    const auto content = found.rows.find(content_key(mesh.sha256));
+    const std::optional<ContentRow> list =
+        content == found.rows.end() ? std::nullopt : decode_content(*unsealed(content->first, content->second));
+    if (list) mesh.content = *list;
+    if (!list && mesh.damage.empty()) mesh.damage = "its content is lost";
+    if (!mesh.damage.empty() || depth == Depth::kKeys) continue;
+    const absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.content.number),
+                                          mesh.content.chunks, [](absl::string_view) { return absl::OkStatus(); });
+    mesh.damage = damage_of(read, disk);
+  }
+  return disk;
+}
+
+}  // namespace
+
+absl::StatusOr<Findings> judge(const Database& database, const HighWater* high_water, Depth depth) {
+  Findings found;
+  if (absl::Status status = read_meta(database, found); !status.ok()) return status;
+  Standing standing;
+  if (high_water != nullptr) standing = compare(found, *high_water);
+  if (high_water == nullptr) {
+    found.catalogue_damage = std::string(kNoHighWater);
+  } else if (!high_water->catalogue_damage.empty()) {
+    found.catalogue_damage = high_water->catalogue_damage;
+  } else if (!standing.meshes) {
+    found.catalogue_damage =
+        "the catalogue of meshes is not the one that was written: names may be missing, or be back";
+  } else if (standing.later && !standing.whole) {
+    found.catalogue_damage =
+        "the catalogue of scenes is not the one that was written: names may be missing, or be back";
+  }
+  absl::Status disk = find_scenes(high_water, standing, database, depth, found);
+  if (disk.ok()) disk = find_meshes(database, depth, found);
+  if (!disk.ok()) return disk;
+  return found;
+}
+
+std::string remedy(const std::string& path) {
+  return absl::StrCat("; `locusd check ", path, "` says more, `locusd repair ", path,
+                      "` keeps what is sound, or restore a backup");
+}
+
+}  // namespace locus::server

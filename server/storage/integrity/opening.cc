@@ -1,0 +1,253 @@
+#include "server/storage/integrity/opening.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include "core/base/refusal.h"
+#include "server/storage/rocksdb/bytes.h"
+#include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/reading.h"
+
+namespace locus::server {
+namespace {
+
+constexpr uint64_t kMostReserve = uint64_t{64} << 20;
+constexpr uint64_t kReserveShare = 20;
+constexpr uint64_t kBufferShare = 16;
+constexpr uint64_t kLeastBuffer = uint64_t{256} << 10;
+
+absl::Status nothing_opens(const StorageOptions& options, absl::string_view why) {
+  return absl::DataLossError(
+      absl::StrCat("the data directory ", options.path, " cannot be opened: ", why, remedy(options.path)));
+}
+
+absl::Status open_error(const StorageOptions& options, const rocksdb::Status& status) {
+  if (says_damage(status)) return nothing_opens(options, status.ToString());
+  return disk_error(absl::StrCat("opening ", options.path), status);
+}
+
+std::vector<std::string> files_in(rocksdb::Env& env, const std::string& folder) {
+  std::vector<std::string> names;
+  if (!env.GetChildren(folder, &names).ok()) names.clear();
+  return names;
+}
+
+// Logs that a process wrote and did not sync are read from the kernel's memory, and what they say is served: so it has
+// to be on the disk first.
+rocksdb::Status sync_logs(rocksdb::Env& env, const std::string& folder) {
+  rocksdb::Status status;
+  for (const std::string& name : files_in(env, folder)) {
+    if (!status.ok() || !absl::EndsWith(name, ".log")) continue;
+    std::unique_ptr<rocksdb::RandomRWFile> file;
+    status = env.NewRandomRWFile(absl::StrCat(folder, "/", name), &file, rocksdb::EnvOptions());
+    if (status.ok()) status = file->Fsync();
+  }
+  if (status.ok()) status = sync_folder(env, folder);
+  return status;
+}
+
+absl::Status make_folder(rocksdb::Env& env, const std::string& path) {
+  rocksdb::Status status = env.CreateDirIfMissing(path);
+  const std::string parent = std::filesystem::path(path).parent_path().string();
+  if (status.ok()) status = sync_folder(env, parent.empty() ? "." : parent);
+  return status.ok() ? absl::OkStatus() : disk_error(absl::StrCat("making the data directory ", path), status);
+}
+
+// Whether there never was a database here, or its making did not come to an end.
+absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<HighWater>& high_water) {
+  if (high_water.ok()) return high_water->catalogue == 0;
+  if (!absl::IsNotFound(high_water.status())) return false;
+  const std::string folder = database_options_of(options).folder;
+  for (const std::string& name : files_in(*options.env, folder)) {
+    if (name != "." && name != "..") return false;
+  }
+  return true;
+}
+
+absl::Status make_new(const StorageOptions& options, OpenedDirectory& opened) {
+  // First of all: from now on an empty database is known to be one that was never finished.
+  if (absl::Status status = opened.high_water_file->replace(opened.high_water); !status.ok()) return status;
+  const DatabaseOptions wanted = database_options_of(options);
+  rocksdb::Status status = Database::open(wanted, OpenMode::kCreate, opened.database);
+  if (!status.ok()) return open_error(options, status);
+  Database& database = *opened.database;
+  const Catalogue catalogue(Catalogue::Rows(), 0, 1);
+  rocksdb::WriteBatch batch;
+  status = batch.Put(database.meta(), slice_of(kFormatKey), sealed(kFormatKey, ByteWriter().u32(kFormat).view()));
+  if (!status.ok()) return disk_error("the format", status);
+  catalogue.add_to(batch, database.meta(), CatalogueChange());
+  if (absl::Status written = database.write(batch, true); !written.ok()) return written;
+  opened.high_water.catalogue = 1;
+  describe_file_list(database, opened.high_water);
+  return opened.high_water_file->replace(opened.high_water);
+}
+
+// Takes over what was judged of a damaged directory, so that the next one to open it finds the same.
+void remember(const Findings& findings, HighWater& high_water) {
+  std::vector<Mark> marks;
+  for (const SceneFinding& scene : findings.scenes) {
+    Mark& mark = marks.emplace_back();
+    for (const Mark& before : high_water.marks) {
+      if (before.scene == scene.key) mark = before;
+    }
+    mark.scene = scene.key;
+    mark.name = scene.name;
+    mark.damage = scene.damage;
+    high_water.next_scene = std::max(high_water.next_scene, scene.key + 1);
+  }
+  high_water.marks = std::move(marks);
+  high_water.catalogue_damage = findings.catalogue_damage;
+  if (findings.catalogue) {
+    high_water.next_scene = std::max(high_water.next_scene, findings.catalogue->next_scene);
+    high_water.catalogue = std::max(high_water.catalogue, findings.catalogue->generation);
+  }
+  high_water.catalogue = std::max<uint64_t>(high_water.catalogue, 1);
+}
+
+bool is_sound(const Findings& findings) {
+  return findings.catalogue_damage.empty() &&
+         std::all_of(findings.scenes.begin(), findings.scenes.end(),
+                     [](const SceneFinding& scene) { return scene.damage.empty(); });
+}
+
+// Judges, and writes down what is damaged before anything else happens.
+absl::Status judge_and_remember(const Database& database, const HighWater* must, OpenedDirectory& opened) {
+  absl::StatusOr<Findings> findings = judge(database, must, Depth::kKeys);
+  if (!findings.ok()) return findings.status();
+  opened.findings = *std::move(findings);
+  if (is_sound(opened.findings)) return absl::OkStatus();
+  remember(opened.findings, opened.high_water);
+  return opened.high_water_file->replace(opened.high_water);
+}
+
+// What a strict opening refused.
+absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& why, const HighWater* must,
+                          OpenedDirectory& opened) {
+  const DatabaseOptions wanted = database_options_of(options);
+  {
+    std::unique_ptr<Database> reader;
+    if (!Database::open(wanted, OpenMode::kReadOnlyLenient, reader).ok()) return nothing_opens(options, why.ToString());
+    absl::Status judged = judge_and_remember(*reader, must, opened);
+    if (!judged.ok()) return judged;
+  }
+  rocksdb::Status status = Database::open(wanted, OpenMode::kLenient, opened.database);
+  if (!status.ok()) return nothing_opens(options, status.ToString());
+  // A damaged log is gone with that, and a strict database gets over errors of the disk.
+  opened.database = nullptr;
+  if (Database::open(wanted, OpenMode::kStrict, opened.database).ok()) return absl::OkStatus();
+  status = Database::open(wanted, OpenMode::kLenient, opened.database);
+  return status.ok() ? absl::OkStatus() : nothing_opens(options, status.ToString());
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::take(rocksdb::Env& env, const std::string& path) {
+  rocksdb::FileLock* lock = nullptr;
+  const rocksdb::Status status = env.LockFile(absl::StrCat(path, "/", kName), &lock);
+  if (status.ok()) return std::unique_ptr<DirectoryLock>(new DirectoryLock(env, lock));
+  const std::string what = status.ToString();
+  // In another process, or in this one.
+  if (absl::StrContains(what, "Resource temporarily unavailable") || absl::StrContains(what, "lock hold")) {
+    Refusal refusal;
+    refusal.reason = Reason::kInUse;
+    return refuse(absl::StatusCode::kFailedPrecondition,
+                  absl::StrCat("the data directory ", path,
+                               " is in use: stop the locusd that has it open, or name another (", what, ")"),
+                  refusal);
+  }
+  return disk_error(absl::StrCat("locking the data directory ", path), status);
+}
+
+DirectoryLock::~DirectoryLock() { env_.UnlockFile(lock_).PermitUncheckedError(); }
+
+StorageOptions settled(StorageOptions options) {
+  if (options.env == nullptr) options.env = rocksdb::Env::Default();
+  // Of the disk that it will be on, where it is yet to be made.
+  std::error_code failed;
+  std::filesystem::path place = std::filesystem::absolute(options.path, failed);
+  while (!std::filesystem::exists(place, failed) && place.has_relative_path()) place = place.parent_path();
+  const std::filesystem::space_info space = std::filesystem::space(place, failed);
+  const uint64_t capacity = failed ? ~uint64_t{0} : uint64_t{space.capacity};
+  if (!options.reserve_bytes) options.reserve_bytes = std::min(kMostReserve, capacity / kReserveShare);
+  options.log_buffer_bytes = std::max(kLeastBuffer, std::min(options.log_buffer_bytes, capacity / kBufferShare));
+  return options;
+}
+
+DatabaseOptions database_options_of(const StorageOptions& options) {
+  return {options.env, absl::StrCat(options.path, "/", kDatabaseFolder), options.log_buffer_bytes};
+}
+
+absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
+  OpenedDirectory opened;
+  if (absl::Status status = make_folder(*options.env, options.path); !status.ok()) return status;
+  auto lock = DirectoryLock::take(*options.env, options.path);
+  if (!lock.ok()) return lock.status();
+  opened.lock = *std::move(lock);
+  const std::string repaired = absl::StrCat(options.path, "/", kRepairedFolder);
+  if (options.env->FileExists(repaired).ok())
+    return absl::FailedPreconditionError(absl::StrCat(
+        "a repair of ", options.path, " did not come to its end: run `locusd repair ", options.path, "` again"));
+  opened.high_water_file = std::make_unique<HighWaterFile>(*options.env, options.path);
+  absl::StatusOr<HighWater> high_water = HighWaterFile::read(*options.env, options.path);
+  if (absl::IsUnavailable(high_water.status())) return high_water.status();
+  const absl::StatusOr<bool> fresh = is_new(options, high_water);
+  if (high_water.ok()) opened.high_water = *high_water;
+  const HighWater* must = high_water.ok() ? &*high_water : nullptr;
+  if (*fresh) {
+    if (absl::Status status = make_new(options, opened); !status.ok()) return status;
+    high_water = opened.high_water;
+    must = &*high_water;
+  } else {
+    const DatabaseOptions wanted = database_options_of(options);
+    if (must != nullptr) {
+      const absl::Status list = check_file_list(*options.env, wanted.folder, *must);
+      if (absl::IsDataLoss(list)) return nothing_opens(options, list.message());
+      if (!list.ok()) return list;
+    }
+    rocksdb::Status status = sync_logs(*options.env, wanted.folder);
+    if (status.ok()) status = Database::open(wanted, OpenMode::kStrict, opened.database);
+    if (!status.ok()) {
+      if (!says_damage(status)) return open_error(options, status);
+      absl::Status found = open_damaged(options, status, must, opened);
+      if (!found.ok()) return found;
+      must = &opened.high_water;
+    }
+  }
+  absl::Status judged = judge_and_remember(*opened.database, must, opened);
+  if (!judged.ok()) return judged;
+  if (!opened.findings.has_format) return nothing_opens(options, "its catalogue is lost");
+  return opened;
+}
+
+absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder, const HighWater& high_water) {
+  std::string current;
+  const rocksdb::Status status = rocksdb::ReadFileToString(&env, absl::StrCat(database_folder, "/CURRENT"), &current);
+  if (status.IsNotFound() || status.IsPathNotFound()) return absl::DataLossError("its database is missing");
+  if (!status.ok()) return disk_error("reading CURRENT", status);
+  current = std::string(absl::StripSuffix(current, "\n"));
+  if (current != high_water.manifest) return absl::OkStatus();
+  uint64_t size = 0;
+  if (!env.GetFileSize(absl::StrCat(database_folder, "/", current), &size).ok() || size < high_water.manifest_bytes)
+    return absl::DataLossError(absl::StrCat("RocksDB's list of its files, ", current, ", has ", size, " of ",
+                                            high_water.manifest_bytes, " bytes"));
+  return absl::OkStatus();
+}
+
+void describe_file_list(const Database& database, HighWater& high_water) {
+  std::vector<std::string> names;
+  uint64_t bytes = 0;
+  if (!database.db().GetLiveFiles(names, &bytes, false).ok()) return;
+  for (const std::string& name : names) {
+    const absl::string_view plain = absl::StripPrefix(name, "/");
+    if (!absl::StartsWith(plain, "MANIFEST")) continue;
+    high_water.manifest = std::string(plain);
+    high_water.manifest_bytes = bytes;
+  }
+}
+
+}  // namespace locus::server

@@ -1,0 +1,287 @@
+#include "server/storage/integrity/repair.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "server/storage/integrity/opening.h"
+#include "server/storage/integrity/scene_table.h"
+#include "server/storage/rocksdb/bytes.h"
+#include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/reading.h"
+
+namespace locus::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr absl::string_view kReadyName = "READY";
+constexpr absl::string_view kSalvageFolder = "salvage";
+constexpr size_t kBatchBytes = size_t{4} << 20;
+
+absl::Status moved(const fs::path& from, const fs::path& to) {
+  std::error_code failed;
+  if (fs::exists(from)) fs::rename(from, to, failed);
+  return failed ? absl::UnavailableError(absl::StrCat("moving ", from.string(), ": ", failed.message()))
+                : absl::OkStatus();
+}
+
+// Collects what goes into the new database, and writes it in pieces.
+class Copy {
+ public:
+  explicit Copy(Database& target) : target_(target) {}
+
+  void put(rocksdb::ColumnFamilyHandle* family, const std::string& key, const std::string& value) {
+    LOCUS_CHECK(batch_.Put(family, key, value).ok());
+  }
+  absl::Status write_if_large() { return batch_.GetDataSize() < kBatchBytes ? absl::OkStatus() : write(false); }
+  absl::Status write(bool sync) {
+    absl::Status status = target_.write(batch_, sync);
+    batch_.Clear();
+    return status;
+  }
+  Database& target() { return target_; }
+  rocksdb::WriteBatch& batch() { return batch_; }
+
+ private:
+  Database& target_;
+  rocksdb::WriteBatch batch_;
+};
+
+absl::Status copy_chunks(const Database& source, rocksdb::ColumnFamilyHandle* from, rocksdb::ColumnFamilyHandle* to,
+                         const std::string& prefix, const ChunkList& list, Copy& copy) {
+  uint32_t index = 0;
+  return read_chunks(source, from, prefix, list, [&](absl::string_view chunk) {
+    const std::string key = chunk_key(prefix, index++);
+    copy.put(to, key, sealed(key, chunk));
+    return copy.write_if_large();
+  });
+}
+
+// Records as far as they are sound; `last` and `chain` say how far that was.
+absl::Status copy_records(const Database& source, const SceneRow& row, Position& last, Copy& copy) {
+  absl::Status failed;
+  last = {row.snapshot_sequence, row.chain};
+  const absl::Status read =
+      read_records(source, row.key, row.snapshot_sequence + 1, 0, row.chain, [&](const LogRecord& record) {
+        const std::string key = log_key(row.key, record.sequence);
+        const std::string head = record_head(record.entry);
+        last = {record.sequence, record_checksum(key, head, record.entry.bytes, last.chain)};
+        copy.put(copy.target().log(), key, absl::StrCat(head, record.entry.bytes, ByteWriter().u64(last.chain).view()));
+        failed = copy.write_if_large();
+        return failed;
+      });
+  if (!failed.ok()) return failed;
+  return absl::IsDataLoss(read) ? absl::OkStatus() : read;
+}
+
+// What the new directory will say of itself.
+struct Result {
+  Catalogue::Rows rows;
+  HighWater high_water;
+};
+
+void keep_row(const std::string& key, const std::string& value, Result& result, Copy& copy) {
+  result.rows[key] = value;
+  copy.put(copy.target().meta(), key, value);
+}
+
+absl::Status copy_scene(const Database& source, const SceneFinding& found, const HighWater* must, Copy& copy,
+                        Result& result, RepairReport& report) {
+  SceneRepair repaired;
+  repaired.key = found.key;
+  repaired.name = found.name;
+  repaired.damage = found.damage;
+  bool marked = must == nullptr;
+  if (must != nullptr) {
+    for (const Mark& mark : must->marks) marked = marked || mark.scene == found.key;
+  }
+  const bool damaged = !found.damage.empty();
+  repaired.deleted = damaged && !marked && must->catalogue_damage.empty();
+  repaired.dropped = !found.row || repaired.deleted;
+  Position last;
+  if (!repaired.dropped) {
+    const SceneRow& row = *found.row;
+    const absl::Status chunks = copy_chunks(source, source.snapshot(), copy.target().snapshot(),
+                                            snapshot_prefix(row.key, row.snapshot_number), row.snapshot, copy);
+    if (!chunks.ok() && !absl::IsDataLoss(chunks)) return chunks;
+    repaired.dropped = !chunks.ok();
+  }
+  if (!repaired.dropped) {
+    SceneRow row = *found.row;
+    if (absl::Status status = copy_records(source, row, last, copy); !status.ok()) return status;
+    if (damaged) ++row.epoch;
+    const std::string key = scene_key(row.key);
+    const std::string value = sealed(key, encode(row));
+    keep_row(key, value, result, copy);
+    result.high_water.marks.push_back(
+        {row.key, row.name, last.sequence, last.chain, seal_of(value), found.copied && !damaged, ""});
+    repaired.epoch = row.epoch;
+    repaired.kept_to = last.sequence;
+  }
+  if (!repaired.deleted && last.sequence < found.promised) {
+    repaired.lost_from = last.sequence + 1;
+    repaired.lost_to = found.promised;
+  }
+  if (damaged) report.scenes.push_back(std::move(repaired));
+  return absl::OkStatus();
+}
+
+absl::Status copy_mesh(const Database& source, const MeshFinding& found, Copy& copy, Result& result,
+                       RepairReport& report) {
+  const std::string content = content_key(found.sha256);
+  absl::Status status = absl::DataLossError("");
+  if (result.rows.contains(content)) {
+    status = absl::OkStatus();
+  } else if (found.content.number != 0) {
+    status = copy_chunks(source, source.mesh(), copy.target().mesh(), mesh_prefix(found.sha256, found.content.number),
+                         found.content.chunks, copy);
+  }
+  if (!status.ok() && !absl::IsDataLoss(status)) return status;
+  if (status.ok()) {
+    keep_row(content, sealed(content, encode(found.content)), result, copy);
+    const std::string key = mesh_key(found.name);
+    keep_row(key, sealed(key, content.substr(1)), result, copy);
+  }
+  if (!found.damage.empty()) report.meshes.push_back({found.name, found.damage, !status.ok()});
+  return absl::OkStatus();
+}
+
+absl::Status make_copy(const Database& source, const Findings& findings, const HighWater* must,
+                       const StorageOptions& options, const std::string& folder, RepairReport& report) {
+  DatabaseOptions wanted = database_options_of(options);
+  wanted.folder = absl::StrCat(folder, "/", kDatabaseFolder);
+  std::unique_ptr<Database> target;
+  rocksdb::Status opened = options.env->CreateDirIfMissing(folder);
+  if (opened.ok()) opened = Database::open(wanted, OpenMode::kCreate, target);
+  if (!opened.ok()) return disk_error("making the repaired database", opened);
+  Copy copy(*target);
+  Result result;
+  HighWater& high_water = result.high_water;
+  if (must != nullptr) high_water.next_scene = must->next_scene;
+  for (const SceneFinding& scene : findings.scenes) {
+    high_water.next_scene = std::max(high_water.next_scene, scene.key + 1);
+    if (absl::Status status = copy_scene(source, scene, must, copy, result, report); !status.ok()) return status;
+  }
+  for (const MeshFinding& mesh : findings.meshes) {
+    if (absl::Status status = copy_mesh(source, mesh, copy, result, report); !status.ok()) return status;
+  }
+  const uint64_t generation =
+      std::max(must == nullptr ? 0 : must->catalogue, findings.catalogue ? findings.catalogue->generation : 0);
+  const Catalogue catalogue(result.rows, generation, high_water.next_scene);
+  copy.put(target->meta(), std::string(kFormatKey), sealed(kFormatKey, ByteWriter().u32(kFormat).view()));
+  catalogue.add_to(copy.batch(), target->meta(), CatalogueChange());
+  if (absl::Status status = copy.write(true); !status.ok()) return status;
+  high_water.catalogue = generation + 1;
+  high_water.mesh_sum = catalogue.totals().mesh_sum;
+  high_water.closed = true;
+  high_water.covered_sequence = target->db().GetLatestSequenceNumber();
+  describe_file_list(*target, high_water);
+  return HighWaterFile(*options.env, folder).replace(high_water);
+}
+
+// From here on repaired/ is what the directory is to be.
+absl::Status put_in_place(const StorageOptions& options, std::string& kept_at) {
+  rocksdb::Env& env = *options.env;
+  const fs::path here = options.path;
+  const fs::path repaired = here / std::string(kRepairedFolder);
+  const fs::path ready = repaired / std::string(kReadyName);
+  rocksdb::Status status = rocksdb::ReadFileToString(&env, ready.string(), &kept_at);
+  if (status.ok()) status = env.CreateDirIfMissing(kept_at);
+  if (!status.ok()) return disk_error("ending the repair", status);
+  for (const absl::string_view name : {kDatabaseFolder, HighWaterFile::kName}) {
+    const std::string part(name);
+    if (!fs::exists(repaired / part)) continue;  // it is in place already
+    absl::Status done = moved(here / part, fs::path(kept_at) / part);
+    if (done.ok()) done = moved(repaired / part, here / part);
+    if (!done.ok()) return done;
+  }
+  status = sync_folder(env, kept_at);
+  if (status.ok()) status = sync_folder(env, here.string());
+  std::error_code failed;
+  if (status.ok()) fs::remove_all(repaired, failed);
+  if (status.ok()) status = sync_folder(env, here.string());
+  return status.ok() && !failed ? absl::OkStatus() : disk_error("ending the repair", status);
+}
+
+std::string free_name(const std::string& path) {
+  for (int number = 1;; ++number) {
+    std::string name = absl::StrCat(path, "/before-repair-", number);
+    if (!fs::exists(name)) return name;
+  }
+}
+
+// A database that opens in no way is taken apart by RocksDB, in a copy.
+absl::Status open_salvage(const StorageOptions& options, const std::string& folder,
+                          std::unique_ptr<Database>& database) {
+  DatabaseOptions wanted = database_options_of(options);
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  const std::string copy = absl::StrCat(folder, "/", kSalvageFolder);
+  if (!failed) fs::copy(wanted.folder, copy, fs::copy_options::recursive, failed);
+  if (failed) return absl::UnavailableError(absl::StrCat("copying ", wanted.folder, ": ", failed.message()));
+  wanted.folder = copy;
+  rocksdb::Status status =
+      rocksdb::RepairDB(copy, database_options(wanted, OpenMode::kLenient), families(wanted, OpenMode::kLenient));
+  if (status.ok()) status = Database::open(wanted, OpenMode::kReadOnlyLenient, database);
+  if (status.ok()) return absl::OkStatus();
+  return absl::DataLossError(
+      absl::StrCat("nothing of ", options.path, " can be read (", status.ToString(), "): restore a backup"));
+}
+
+absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& options, const HighWater* must,
+                                                      const std::string& folder) {
+  const DatabaseOptions wanted = database_options_of(options);
+  std::unique_ptr<Database> database;
+  const bool whole = must == nullptr || check_file_list(*options.env, wanted.folder, *must).ok();
+  if (whole && Database::open(wanted, OpenMode::kReadOnly, database).ok()) return database;
+  if (whole && Database::open(wanted, OpenMode::kReadOnlyLenient, database).ok()) return database;
+  if (absl::Status status = open_salvage(options, folder, database); !status.ok()) return status;
+  return database;
+}
+
+}  // namespace
+
+absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
+  const StorageOptions options = settled(given);
+  const std::string folder = absl::StrCat(options.path, "/", kRepairedFolder);
+  RepairReport report;
+  if (!fs::exists(options.path)) return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
+  const auto lock = DirectoryLock::take(*options.env, options.path);
+  if (!lock.ok()) return lock.status();
+  if (fs::exists(absl::StrCat(folder, "/", kReadyName))) {
+    std::string kept_at;
+    if (absl::Status status = put_in_place(options, kept_at); !status.ok()) return status;
+  }
+  std::error_code failed;
+  fs::remove_all(folder, failed);
+  const absl::StatusOr<HighWater> high_water = HighWaterFile::read(*options.env, options.path);
+  const HighWater* must = high_water.ok() ? &*high_water : nullptr;
+  {
+    const auto source = open_source(options, must, folder);
+    if (!source.ok()) return source.status();
+    const absl::StatusOr<Findings> findings = judge(**source, must, Depth::kEverything);
+    if (!findings.ok()) return findings.status();
+    report.found = report_of(*findings);
+    if (report.found.sound() && !fs::exists(folder)) return report;
+    if (absl::Status status = make_copy(**source, *findings, must, options, folder, report); !status.ok()) {
+      fs::remove_all(folder, failed);
+      return status;
+    }
+  }
+  fs::remove_all(absl::StrCat(folder, "/", kSalvageFolder), failed);
+  rocksdb::Status status = sync_folder(*options.env, folder);
+  if (status.ok())
+    status =
+        rocksdb::WriteStringToFile(options.env, free_name(options.path), absl::StrCat(folder, "/", kReadyName), true);
+  if (status.ok()) status = sync_folder(*options.env, folder);
+  if (!status.ok()) return disk_error("writing the repaired database", status);
+  report.changed = true;
+  if (absl::Status placed = put_in_place(options, report.kept_at); !placed.ok()) return placed;
+  return report;
+}
+
+}  // namespace locus::server

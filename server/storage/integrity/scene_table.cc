@@ -1,0 +1,146 @@
+#include "server/storage/integrity/scene_table.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/refusal.h"
+
+namespace locus::server {
+namespace {
+
+absl::Status not_found(SceneKey scene) {
+  Refusal refusal;
+  refusal.reason = Reason::kNotFound;
+  return refuse(absl::StatusCode::kNotFound, absl::StrCat("the log has no scene ", scene, "; it may have been deleted"),
+                refusal);
+}
+
+}  // namespace
+
+void SceneTable::add(ScenePlace scene) {
+  MutexLock lock(mutex_);
+  scenes_[scene->key] = std::move(scene);
+}
+
+absl::StatusOr<ScenePlace> SceneTable::find(SceneKey scene) const {
+  ScenePlace found = find_any(scene);
+  if (found == nullptr) return not_found(scene);
+  if (!found->damage.ok()) return found->damage;
+  return found;
+}
+
+ScenePlace SceneTable::find_any(SceneKey scene) const {
+  MutexLock lock(mutex_);
+  const auto found = scenes_.find(scene);
+  return found == scenes_.end() ? nullptr : found->second;
+}
+
+bool SceneTable::has_name(absl::string_view name) const {
+  MutexLock lock(mutex_);
+  return std::any_of(scenes_.begin(), scenes_.end(), [&](const auto& scene) { return scene.second->name == name; });
+}
+
+size_t SceneTable::size() const {
+  MutexLock lock(mutex_);
+  return scenes_.size();
+}
+
+uint64_t SceneTable::last_of(const SceneState& scene) const {
+  MutexLock lock(mutex_);
+  return scene.written.sequence;
+}
+
+absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneState& scene, uint64_t epoch,
+                                                           uint64_t database_sequence) {
+  MutexLock lock(mutex_);
+  if (scene.deleted) return not_found(scene.key);
+  if (scene.epoch != epoch) {
+    Refusal refusal;
+    refusal.reason = Reason::kSceneRestarted;
+    return refuse(absl::StatusCode::kFailedPrecondition,
+                  absl::StrCat("scene '", scene.name, "' is in epoch ", scene.epoch, ", not ", epoch,
+                               ": load it anew before writing to it"),
+                  refusal);
+  }
+  scene.begun_at = database_sequence;
+  return Start{scene.written, scene.doubtful_end};
+}
+
+void SceneTable::end_append(SceneState& scene, Position written, bool synced) {
+  MutexLock lock(mutex_);
+  scene.begun_at.reset();
+  scene.written = written;
+  scene.doubtful_end = 0;
+  if (synced) scene.synced = written;
+}
+
+void SceneTable::fail_append(SceneState& scene, uint64_t last) {
+  MutexLock lock(mutex_);
+  scene.begun_at.reset();
+  scene.doubtful_end = std::max(scene.doubtful_end, last);
+}
+
+std::vector<std::pair<ScenePlace, Position>> SceneTable::written() const {
+  MutexLock lock(mutex_);
+  std::vector<std::pair<ScenePlace, Position>> positions;
+  positions.reserve(scenes_.size());
+  for (const auto& [key, scene] : scenes_) positions.emplace_back(scene, scene->written);
+  return positions;
+}
+
+void SceneTable::on_disk(const std::vector<std::pair<ScenePlace, Position>>& positions) {
+  MutexLock lock(mutex_);
+  for (const auto& [scene, position] : positions) {
+    if (scene->synced.sequence < position.sequence) scene->synced = position;
+  }
+}
+
+void SceneTable::set_catalogue(const CatalogueRow& totals) {
+  MutexLock lock(mutex_);
+  totals_ = totals;
+}
+
+void SceneTable::set_row(SceneState& scene, const SceneRow& row, uint64_t row_seal, const CatalogueRow& totals) {
+  MutexLock lock(mutex_);
+  if (scene.epoch != row.epoch) scene.copied = false;
+  scene.epoch = row.epoch;
+  scene.row_seal = row_seal;
+  // The snapshot holds these records, and is on the disk.
+  if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.chain};
+  totals_ = totals;
+}
+
+void SceneTable::remove(SceneKey scene, const CatalogueRow& totals) {
+  MutexLock lock(mutex_);
+  const auto found = scenes_.find(scene);
+  if (found != scenes_.end()) {
+    found->second->deleted = true;
+    scenes_.erase(found);
+  }
+  totals_ = totals;
+}
+
+void SceneTable::describe(uint64_t database_sequence, HighWater& high_water) const {
+  MutexLock lock(mutex_);
+  high_water.catalogue = totals_.generation;
+  high_water.next_scene = totals_.next_scene;
+  high_water.mesh_sum = totals_.mesh_sum;
+  high_water.marks.clear();
+  bool all_synced = true;
+  for (const auto& [key, scene] : scenes_) {
+    // An append that is at work has a number above the one it began at, and is not in the marks.
+    if (scene->begun_at) database_sequence = std::min(database_sequence, *scene->begun_at);
+    all_synced = all_synced && scene->synced.sequence == scene->written.sequence;
+    Mark& mark = high_water.marks.emplace_back();
+    mark.scene = key;
+    mark.name = scene->name;
+    mark.sequence = scene->synced.sequence;
+    mark.chain = scene->synced.chain;
+    mark.row_seal = scene->row_seal;
+    mark.copied = scene->copied;
+    mark.damage = scene->damage_found;
+  }
+  if (all_synced) high_water.covered_sequence = database_sequence;
+}
+
+}  // namespace locus::server

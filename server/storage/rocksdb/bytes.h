@@ -1,0 +1,91 @@
+// Numbers and strings as bytes and back, for whatever the data directory holds: little endian in values, big endian in
+// keys, so that keys sort by their numbers. A reader never passes the end: what is short makes it not ok. Any thread,
+// one at a time each.
+#ifndef LOCUS_SERVER_STORAGE_ROCKSDB_BYTES_H_
+#define LOCUS_SERVER_STORAGE_ROCKSDB_BYTES_H_
+
+#include <cstdint>
+#include <string>
+
+#include "absl/strings/string_view.h"
+
+namespace locus::server {
+
+class ByteWriter {
+ public:
+  ByteWriter& u8(uint8_t value) {
+    bytes_.push_back(static_cast<char>(value));
+    return *this;
+  }
+  ByteWriter& u32(uint32_t value) { return little(value, 4); }
+  ByteWriter& u64(uint64_t value) { return little(value, 8); }
+  ByteWriter& big_u32(uint32_t value) { return big(value, 4); }
+  ByteWriter& big_u64(uint64_t value) { return big(value, 8); }
+  // As they are, without their number.
+  ByteWriter& bytes(absl::string_view value) {
+    bytes_.append(value.data(), value.size());
+    return *this;
+  }
+  ByteWriter& string(absl::string_view value) { return u32(static_cast<uint32_t>(value.size())).bytes(value); }
+
+  const std::string& view() const { return bytes_; }
+  std::string take() { return std::move(bytes_); }
+
+ private:
+  ByteWriter& little(uint64_t value, int count) {
+    for (int i = 0; i < count; ++i) bytes_.push_back(static_cast<char>(value >> (8 * i)));
+    return *this;
+  }
+  ByteWriter& big(uint64_t value, int count) {
+    for (int i = count; i-- > 0;) bytes_.push_back(static_cast<char>(value >> (8 * i)));
+    return *this;
+  }
+
+  std::string bytes_;
+};
+
+class ByteReader {
+ public:
+  explicit ByteReader(absl::string_view bytes) : rest_(bytes) {}
+
+  uint8_t u8() { return static_cast<uint8_t>(little(1)); }
+  uint32_t u32() { return static_cast<uint32_t>(little(4)); }
+  uint64_t u64() { return little(8); }
+  uint32_t big_u32() { return static_cast<uint32_t>(big(4)); }
+  uint64_t big_u64() { return big(8); }
+  absl::string_view bytes(size_t count) {
+    if (count > rest_.size()) {
+      ok_ = false;
+      return {};
+    }
+    const absl::string_view found = rest_.substr(0, count);
+    rest_.remove_prefix(count);
+    return found;
+  }
+  std::string string() { return std::string(bytes(u32())); }
+
+  absl::string_view rest() const { return rest_; }
+  bool ok() const { return ok_; }
+  // Everything was there, and nothing more.
+  bool ended() const { return ok_ && rest_.empty(); }
+
+ private:
+  uint64_t little(size_t count) {
+    const absl::string_view found = bytes(count);
+    uint64_t value = 0;
+    for (size_t i = found.size(); i-- > 0;) value = value << 8 | static_cast<uint8_t>(found[i]);
+    return value;
+  }
+  uint64_t big(size_t count) {
+    uint64_t value = 0;
+    for (const char byte : bytes(count)) value = value << 8 | static_cast<uint8_t>(byte);
+    return value;
+  }
+
+  absl::string_view rest_;
+  bool ok_ = true;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_STORAGE_ROCKSDB_BYTES_H_

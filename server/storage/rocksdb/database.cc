@@ -1,0 +1,230 @@
+#include "server/storage/rocksdb/database.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "core/base/check.h"
+#include "rocksdb/listener.h"
+#include "rocksdb/table.h"
+#include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/rows.h"
+#include "server/storage/rocksdb/table_guard.h"
+
+namespace locus::server {
+namespace {
+
+constexpr uint64_t kTableBytes = uint64_t{32} << 20;  // of the buffers of chunks
+constexpr uint64_t kMetaBytes = uint64_t{4} << 20;
+constexpr size_t kBlockBytes = size_t{64} << 10;
+constexpr size_t kCacheBytes = size_t{8} << 20;
+constexpr int kBuffers = 4;
+// Tables of the first level that RocksDB may gather; beyond the last it would make writers wait, which never helps
+// here.
+constexpr int kTablesToMerge = 4;
+constexpr int kTablesWithoutEnd = 1 << 20;
+constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
+constexpr size_t kInfoLogBytes = size_t{1} << 20;
+constexpr uint64_t kLogBuffersOnDisk = 4;
+constexpr auto kBufferPoll = std::chrono::milliseconds(1);
+
+// Where nothing may be written, not even why.
+class NoLogger final : public rocksdb::Logger {
+ public:
+  using rocksdb::Logger::Logv;
+  void Logv(const char*, va_list) override {}
+};
+
+bool read_only(OpenMode mode) { return mode == OpenMode::kReadOnly || mode == OpenMode::kReadOnlyLenient; }
+bool lenient(OpenMode mode) { return mode == OpenMode::kLenient || mode == OpenMode::kReadOnlyLenient; }
+
+rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode) {
+  rocksdb::ColumnFamilyOptions options;
+  options.write_buffer_size = buffer_bytes;
+  options.max_write_buffer_number = kBuffers;
+  options.compression = rocksdb::kNoCompression;
+  options.level0_file_num_compaction_trigger = kTablesToMerge;
+  options.level0_slowdown_writes_trigger = kTablesWithoutEnd;
+  options.level0_stop_writes_trigger = kTablesWithoutEnd;
+  options.soft_pending_compaction_bytes_limit = 0;
+  options.hard_pending_compaction_bytes_limit = 0;
+  // Merging would end at the first block that cannot be read, and all writing with it.
+  options.disable_auto_compactions = lenient(mode);
+  rocksdb::BlockBasedTableOptions table;
+  table.block_size = kBlockBytes;
+  table.checksum = rocksdb::kXXH3;
+  table.block_cache = rocksdb::NewLRUCache(kCacheBytes);
+  options.table_factory.reset(rocksdb::NewBlockBasedTableFactory(table));
+  return options;
+}
+
+}  // namespace
+
+// Sees to it that errors of the disk can be got over: by us, and by going on in a new log. RocksDB would give up on
+// some for as long as the process lives, and try the others every five seconds.
+class Database::ErrorWatch final : public rocksdb::EventListener {
+ public:
+  std::atomic<bool> seen = false;
+
+  void OnBackgroundError(rocksdb::BackgroundErrorReason, rocksdb::Status* error) override {
+    seen = true;
+    if (error->IsIOError() && !error->IsIOFenced() && error->severity() > rocksdb::Status::Severity::kHardError)
+      *error = rocksdb::Status(*error, rocksdb::Status::Severity::kHardError);
+  }
+  void OnErrorRecoveryBegin(rocksdb::BackgroundErrorReason, rocksdb::Status, bool* automatically) override {
+    *automatically = false;
+  }
+};
+
+rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mode) {
+  rocksdb::DBOptions found;
+  found.create_if_missing = mode == OpenMode::kCreate;
+  found.create_missing_column_families = mode == OpenMode::kCreate;
+  found.paranoid_checks = !lenient(mode);
+  // The default, recovery to a point in time, drops all that follows a place it cannot read, and says nothing.
+  found.wal_recovery_mode = lenient(mode) ? rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords
+                                          : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
+  // A log that was read is kept, and synced before (see RocksdbLog::open): writing it into tables would double the time
+  // to the first query. Of one with damage what could be read goes into tables, so that the rest can be left behind.
+  found.avoid_flush_during_recovery = mode != OpenMode::kLenient;
+  found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
+  found.max_manifest_file_size = kManifestBytes;
+  found.info_log_level = rocksdb::InfoLogLevel::WARN_LEVEL;
+  found.max_log_file_size = kInfoLogBytes;
+  found.keep_log_file_num = 2;
+  found.stats_dump_period_sec = 0;
+  found.stats_persist_period_sec = 0;
+  found.skip_stats_update_on_db_open = true;
+  found.max_file_opening_threads = 1;  // the default starts sixty-four threads to open what are a few files
+  if (read_only(mode)) found.info_log = std::make_shared<NoLogger>();
+  return found;
+}
+
+std::vector<rocksdb::ColumnFamilyDescriptor> families(const DatabaseOptions& options, OpenMode mode) {
+  const uint64_t chunk_buffer = std::min(kTableBytes, options.log_buffer_bytes);
+  return {{rocksdb::kDefaultColumnFamilyName, family_options(std::min(kMetaBytes, options.log_buffer_bytes), mode)},
+          {std::string(kLogFamily), family_options(options.log_buffer_bytes, mode)},
+          {"snapshot", family_options(chunk_buffer, mode)},
+          {"mesh", family_options(chunk_buffer, mode)}};
+}
+
+Database::Database(OpenMode mode)
+    : mode_(mode), wal_watch_(lenient(mode) ? AtGap::kGoOn : AtGap::kRefuse), errors_(std::make_shared<ErrorWatch>()) {}
+
+rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, std::unique_ptr<Database>& result) {
+  std::unique_ptr<Database> database(new Database(mode));
+  rocksdb::DBOptions wanted = database_options(options, mode);
+  database->env_ = rocksdb::NewCompositeEnv(std::make_shared<TableGuard>(options.env->GetFileSystem()));
+  wanted.env = database->env_.get();
+  wanted.wal_filter = &database->wal_watch_;
+  wanted.listeners = {database->errors_};
+  rocksdb::DB* db = nullptr;
+  rocksdb::Status status =
+      read_only(mode)
+          ? rocksdb::DB::OpenForReadOnly(wanted, options.folder, families(options, mode), &database->families_, &db)
+          : rocksdb::DB::Open(wanted, options.folder, families(options, mode), &database->families_, &db);
+  if (!status.ok()) return status;
+  database->db_.reset(db);
+  result = std::move(database);
+  if (mode == OpenMode::kCreate) status = result->renew();
+  return status;
+}
+
+Database::~Database() {
+  if (db_ == nullptr) return;
+  for (rocksdb::ColumnFamilyHandle* family : families_) db_->DestroyColumnFamilyHandle(family).PermitUncheckedError();
+  db_->Close().PermitUncheckedError();
+}
+
+absl::Status Database::write(rocksdb::WriteBatch& batch, bool sync) {
+  if (!lenient(mode_)) return write_now(batch, sync);
+  MutexLock lock(lenient_);
+  return write_now(batch, sync);
+}
+
+absl::Status Database::write_now(rocksdb::WriteBatch& batch, bool sync) {
+  ++writers_;
+  rocksdb::Status status;
+  const bool broken = broken_;
+  if (!broken) {
+    rocksdb::WriteOptions options;
+    options.sync = sync;
+    status = db_->Write(options, &batch);
+  }
+  absl::Status error;
+  if (broken || !status.ok()) error = break_with(status);
+  --writers_;
+  return error;
+}
+
+absl::Status Database::break_with(const rocksdb::Status& status) {
+  MutexLock lock(mutex_);
+  if (!status.ok()) error_ = disk_error("writing the log", status);
+  broken_ = true;
+  return error_;
+}
+
+// SyncWAL() would do, but ends the process where another thread's write has just failed.
+absl::Status Database::sync() {
+  rocksdb::WriteBatch nothing;
+  return write(nothing, true);
+}
+
+bool Database::needs_recovery() const { return broken_ || errors_->seen; }
+
+absl::Status Database::recover() {
+  if (!broken_) break_with(rocksdb::Status::IOError("a table could not be written")).IgnoreError();
+  // RocksDB ends the process at a write to a log that failed before, and between the two steps it would allow one.
+  while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
+  errors_->seen = false;
+  rocksdb::Status status = db_->Resume();
+  // With nothing in memory that took nothing: RocksDB would go on in the log that it could not write. Then this fails,
+  // too, but leaves something in memory, and the next time both succeed.
+  if (status.ok()) status = renew();
+  if (!status.ok()) {
+    errors_->seen = true;
+    MutexLock lock(mutex_);
+    error_ = disk_error("going on after an error", status);
+    return error_;
+  }
+  MutexLock lock(mutex_);
+  error_ = absl::OkStatus();
+  broken_ = false;
+  return absl::OkStatus();
+}
+
+rocksdb::Status Database::renew() {
+  rocksdb::WriteBatch batch;
+  const absl::string_view mark(kFamilyMark);
+  const std::string value = sealed(mark, "");
+  rocksdb::Status status;
+  for (rocksdb::ColumnFamilyHandle* family : families_) {
+    if (status.ok()) status = batch.Put(family, rocksdb::Slice(mark.data(), mark.size()), value);
+  }
+  rocksdb::WriteOptions past_the_log;
+  past_the_log.disableWAL = true;
+  if (status.ok()) status = db_->Write(past_the_log, &batch);
+  if (status.ok()) status = db_->Flush(rocksdb::FlushOptions(), families_);
+  return status;
+}
+
+void Database::flush_soon() {
+  rocksdb::FlushOptions options;
+  options.wait = false;
+  options.allow_write_stall = true;
+  db_->Flush(options, families_).PermitUncheckedError();
+}
+
+void Database::wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const {
+  uint64_t waiting = 0;
+  while (!needs_recovery() && db_->GetIntProperty(family, rocksdb::DB::Properties::kNumImmutableMemTable, &waiting) &&
+         waiting >= 2)
+    std::this_thread::sleep_for(kBufferPoll);
+}
+
+uint64_t Database::buffered_bytes() const {
+  uint64_t bytes = 0;
+  return db_->GetAggregatedIntProperty(rocksdb::DB::Properties::kCurSizeAllMemTables, &bytes) ? bytes : 0;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,63 @@
+#include "server/storage/rocksdb/errors.h"
+
+#include <memory>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/refusal.h"
+
+namespace locus::server {
+namespace {
+
+constexpr uint32_t kRetryAfterMs = 1000;
+
+absl::Status full_disk(absl::string_view message, double limit, double asked) {
+  Refusal refusal;
+  refusal.reason = Reason::kLimit;
+  refusal.limit = "disk_bytes";
+  refusal.limit_value = limit;
+  refusal.asked = asked;
+  refusal.retry_after_ms = kRetryAfterMs;
+  return refuse(absl::StatusCode::kResourceExhausted, message, refusal);
+}
+
+bool says_full(const rocksdb::Status& status) {
+  return status.IsNoSpace() || status.subcode() == rocksdb::Status::SubCode::kSpaceLimit;
+}
+
+}  // namespace
+
+absl::Status disk_error(absl::string_view doing, const rocksdb::Status& status) {
+  const std::string message = absl::StrCat(doing, ": ", status.ToString());
+  if (says_full(status))
+    return full_disk(absl::StrCat(message, "; free some of the disk, and writing goes on within seconds"), 0, 0);
+  if (status.IsCorruption()) return absl::DataLossError(message);
+  return absl::UnavailableError(message);
+}
+
+absl::Status read_error(absl::string_view doing, const rocksdb::Status& status) {
+  if (status.IsPathNotFound()) return absl::DataLossError(absl::StrCat(doing, ": ", status.ToString()));
+  return disk_error(doing, status);
+}
+
+absl::Status refuse_full_disk(absl::string_view what, uint64_t reserve_bytes, uint64_t free_bytes) {
+  return full_disk(absl::StrCat(what, ": the disk has ", free_bytes, " bytes left, and the last ", reserve_bytes,
+                                " are for snapshots and recovery; free some, and writing goes on within seconds"),
+                   static_cast<double>(reserve_bytes), static_cast<double>(free_bytes));
+}
+
+bool says_damage(const rocksdb::Status& status) {
+  if (status.ok() || says_full(status) || status.IsBusy() || status.IsTimedOut() || status.IsAborted() ||
+      status.IsMemoryLimit() || status.IsShutdownInProgress())
+    return false;
+  if (status.IsPathNotFound()) return true;  // a file that the list of files names
+  return !status.IsIOError();
+}
+
+rocksdb::Status sync_folder(rocksdb::Env& env, const std::string& folder) {
+  std::unique_ptr<rocksdb::Directory> directory;
+  rocksdb::Status status = env.NewDirectory(folder, &directory);
+  if (status.ok()) status = directory->Fsync();
+  return status;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,67 @@
+#include "server/storage/rocksdb/outline_files.h"
+
+#include <vector>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include "core/base/limits.h"
+
+namespace locus::server {
+namespace {
+
+constexpr absl::string_view kUnfinished = ".new";
+// Of an outline, more than any has: what is larger was not written here, and is not read.
+constexpr uint64_t kMostBytes = uint64_t{8} * limits::kMaxMeshTriangles;
+
+std::string name_of(const Sha256& sha256) {
+  return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
+}
+
+// Or of one that was left unfinished.
+bool is_name(absl::string_view name) {
+  name = absl::StripSuffix(name, kUnfinished);
+  return name.size() == 2 * Sha256().size() && name.find_first_not_of("0123456789abcdef") == name.npos;
+}
+
+}  // namespace
+
+OutlineFiles::OutlineFiles(rocksdb::Env& env, absl::string_view path)
+    : env_(env), folder_(absl::StrCat(path, "/", kFolder)) {}
+
+std::string OutlineFiles::path_of(const std::string& name) const { return absl::StrCat(folder_, "/", name); }
+
+void OutlineFiles::keep(const Sha256& sha256, absl::string_view bytes) {
+  const std::string name = name_of(sha256);
+  const std::string unfinished = absl::StrCat(path_of(name), kUnfinished);
+  rocksdb::Status status = env_.CreateDirIfMissing(folder_);
+  if (status.ok()) status = rocksdb::WriteStringToFile(&env_, sealed(name, bytes), unfinished);
+  if (status.ok()) status = env_.RenameFile(unfinished, path_of(name));
+  if (!status.ok()) env_.DeleteFile(unfinished).PermitUncheckedError();
+}
+
+std::optional<std::string> OutlineFiles::read(const Sha256& sha256) const {
+  const std::string name = name_of(sha256);
+  std::string bytes;
+  uint64_t size = 0;
+  if (!env_.GetFileSize(path_of(name), &size).ok() || size > kMostBytes) return std::nullopt;
+  if (!rocksdb::ReadFileToString(&env_, path_of(name), &bytes).ok()) return std::nullopt;
+  const std::optional<absl::string_view> found = unsealed(name, bytes);
+  if (!found) return std::nullopt;
+  bytes.resize(found->size());
+  return bytes;
+}
+
+void OutlineFiles::drop(const Sha256& sha256) { env_.DeleteFile(path_of(name_of(sha256))).PermitUncheckedError(); }
+
+void OutlineFiles::drop_all_but(const std::set<Sha256>& used) {
+  std::set<std::string> names;
+  for (const Sha256& sha256 : used) names.insert(name_of(sha256));
+  std::vector<std::string> there;
+  if (!env_.GetChildren(folder_, &there).ok()) return;
+  for (const std::string& name : there) {
+    if (is_name(name) && !names.contains(name)) env_.DeleteFile(path_of(name)).PermitUncheckedError();
+  }
+}
+
+}  // namespace locus::server

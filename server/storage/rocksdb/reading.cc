@@ -1,0 +1,118 @@
+#include "server/storage/rocksdb/reading.h"
+
+#include <memory>
+
+#include "absl/strings/str_cat.h"
+#include "server/storage/rocksdb/bytes.h"
+#include "server/storage/rocksdb/errors.h"
+
+namespace locus::server {
+namespace {
+
+constexpr size_t kReadAhead = size_t{2} << 20;
+
+// Walks the keys of one prefix in order.
+class Walk {
+ public:
+  Walk(const Database& database, rocksdb::ColumnFamilyHandle* family, const std::string& from, std::string end)
+      : end_(std::move(end)), end_slice_(end_) {
+    rocksdb::ReadOptions options = reading_options();
+    options.readahead_size = kReadAhead;
+    options.iterate_upper_bound = &end_slice_;
+    iterator_.reset(database.db().NewIterator(options, family));
+    iterator_->Seek(from);
+  }
+
+  bool more() const { return iterator_->Valid(); }
+  void next() { iterator_->Next(); }
+  absl::string_view key() const { return view_of(iterator_->key()); }
+  absl::string_view value() const { return view_of(iterator_->value()); }
+  rocksdb::Status status() const { return iterator_->status(); }
+
+ private:
+  const std::string end_;
+  const rocksdb::Slice end_slice_;
+  std::unique_ptr<rocksdb::Iterator> iterator_;
+};
+
+uint64_t sequence_of(absl::string_view log_key) { return ByteReader(log_key.substr(8)).big_u64(); }
+
+absl::Status damaged(absl::string_view what) { return absl::DataLossError(what); }
+
+}  // namespace
+
+rocksdb::ReadOptions reading_options() {
+  rocksdb::ReadOptions options;
+  options.fill_cache = false;
+  options.ignore_range_deletions = true;
+  return options;
+}
+
+RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t sequence, uint64_t& chain_at) {
+  RecordScan found;
+  found.last = row.snapshot_sequence;
+  found.chain = row.chain;
+  if (sequence == row.snapshot_sequence) chain_at = row.chain;
+  Walk walk(database, database.log(), log_key(row.key, row.snapshot_sequence + 1), end_of(scene_prefix(row.key)));
+  for (; walk.more(); walk.next()) {
+    const uint64_t at = sequence_of(walk.key());
+    if (found.beyond == 0 && at != found.last + 1) found.beyond = at;
+    if (found.beyond != 0) {
+      ++found.after;
+      continue;
+    }
+    const absl::string_view value = walk.value();
+    if (value.size() < kRecordOverhead) {
+      found.error = damaged(absl::StrCat("record ", at, " is too short"));
+      return found;
+    }
+    found.last = at;
+    found.chain = seal_of(value);
+    found.bytes += value.size() - kRecordOverhead;
+    if (at == sequence) chain_at = found.chain;
+  }
+  if (!walk.status().ok())
+    found.error = read_error(absl::StrCat("reading the record after ", found.last), walk.status());
+  return found;
+}
+
+absl::Status read_records(const Database& database, SceneKey scene, uint64_t from, uint64_t last, uint64_t chain,
+                          RecordSink sink) {
+  Walk walk(database, database.log(), log_key(scene, from), end_of(scene_prefix(scene)));
+  LogRecord record;
+  for (record.sequence = from; walk.more(); walk.next(), ++record.sequence) {
+    if (sequence_of(walk.key()) != record.sequence)
+      return damaged(absl::StrCat("record ", record.sequence, " is missing"));
+    const absl::string_view value = walk.value();
+    const std::optional<LogEntry> entry = decode_record(value);
+    if (!entry) return damaged(absl::StrCat("record ", record.sequence, " is no record"));
+    chain = record_checksum(walk.key(), value.substr(0, kRecordHeadBytes), entry->bytes, chain);
+    if (chain != seal_of(value))
+      return damaged(absl::StrCat("record ", record.sequence, " is not the one that was written"));
+    record.entry = *entry;
+    if (absl::Status status = sink(record); !status.ok()) return status;
+  }
+  if (!walk.status().ok()) return read_error(absl::StrCat("reading record ", record.sequence), walk.status());
+  if (record.sequence > last) return absl::OkStatus();
+  return damaged(absl::StrCat("record ", record.sequence, " is missing"));
+}
+
+absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* family, const std::string& prefix,
+                         const ChunkList& list, ChunkSink sink) {
+  Walk walk(database, family, prefix, end_of(prefix));
+  ChunkList found;
+  for (; walk.more(); walk.next()) {
+    if (walk.key() != chunk_key(prefix, static_cast<uint32_t>(found.chunks)))
+      return damaged(absl::StrCat("chunk ", found.chunks, " is missing"));
+    const std::optional<absl::string_view> bytes = unsealed(walk.key(), walk.value());
+    if (!bytes) return damaged(absl::StrCat("chunk ", found.chunks, " is not the one that was written"));
+    found.add(walk.value());
+    if (absl::Status status = sink(*bytes); !status.ok()) return status;
+  }
+  if (!walk.status().ok()) return read_error(absl::StrCat("reading chunk ", found.chunks), walk.status());
+  if (found == list) return absl::OkStatus();
+  return damaged(
+      absl::StrCat("there are ", found.chunks, " of ", list.chunks, " chunks, and not those that were written"));
+}
+
+}  // namespace locus::server

@@ -1,0 +1,150 @@
+#include "server/storage/rocksdb/rows.h"
+
+#include <xxhash.h>
+
+#include "server/storage/rocksdb/bytes.h"
+
+namespace locus::server {
+namespace {
+
+constexpr uint8_t kRecordFormat = 1;
+constexpr size_t kSealBytes = 8;
+
+std::string tagged(char tag, absl::string_view rest) { return std::string(1, tag).append(rest.data(), rest.size()); }
+
+absl::string_view view_of(const Sha256& sha256) {
+  return {reinterpret_cast<const char*>(sha256.data()), sha256.size()};
+}
+
+}  // namespace
+
+uint64_t checksum(absl::string_view bytes, uint64_t seed) {
+  return XXH3_64bits_withSeed(bytes.data(), bytes.size(), seed);
+}
+
+void ChunkList::add(absl::string_view chunk_value) {
+  ++chunks;
+  bytes += chunk_value.size() - kSealBytes;
+  digest = checksum(chunk_value.substr(chunk_value.size() - kSealBytes), digest);
+}
+
+std::string scene_key(SceneKey scene) { return ByteWriter().u8(kSceneTag).big_u64(scene).take(); }
+std::string mesh_key(absl::string_view name) { return tagged(kMeshTag, name); }
+std::string content_key(const Sha256& sha256) { return tagged(kContentTag, view_of(sha256)); }
+std::string pending_snapshot_key(SceneKey scene, uint64_t number) {
+  return ByteWriter().u8(kPendingSnapshotTag).big_u64(scene).big_u64(number).take();
+}
+std::string pending_mesh_key(const Sha256& sha256, uint64_t number) {
+  return ByteWriter().u8(kPendingMeshTag).bytes(view_of(sha256)).big_u64(number).take();
+}
+std::string log_key(SceneKey scene, uint64_t sequence) { return ByteWriter().big_u64(scene).big_u64(sequence).take(); }
+
+std::string end_of(std::string prefix) {
+  while (!prefix.empty() && prefix.back() == '\xff') prefix.pop_back();
+  if (prefix.empty()) return std::string(64, '\xff');  // longer than any key
+  prefix.back() = static_cast<char>(prefix.back() + 1);
+  return prefix;
+}
+std::string scene_prefix(SceneKey scene) { return ByteWriter().big_u64(scene).take(); }
+std::string snapshot_prefix(SceneKey scene, uint64_t number) {
+  return ByteWriter().big_u64(scene).big_u64(number).take();
+}
+std::string mesh_prefix(const Sha256& sha256, uint64_t number) {
+  return ByteWriter().bytes(view_of(sha256)).big_u64(number).take();
+}
+std::string chunk_key(absl::string_view prefix, uint32_t index) {
+  return ByteWriter().bytes(prefix).big_u32(index).take();
+}
+
+std::string sealed(absl::string_view key, absl::string_view bytes) {
+  std::string value;
+  value.reserve(bytes.size() + kSealBytes);
+  value.append(bytes.data(), bytes.size());
+  return value.append(ByteWriter().u64(checksum(bytes, checksum(key))).view());
+}
+
+std::optional<absl::string_view> unsealed(absl::string_view key, absl::string_view value) {
+  if (value.size() < kSealBytes) return std::nullopt;
+  const absl::string_view bytes = value.substr(0, value.size() - kSealBytes);
+  if (seal_of(value) != checksum(bytes, checksum(key))) return std::nullopt;
+  return bytes;
+}
+
+uint64_t seal_of(absl::string_view value) {
+  return value.size() < kSealBytes ? 0 : ByteReader(value.substr(value.size() - kSealBytes)).u64();
+}
+
+std::string encode(const ContentRow& row) {
+  return ByteWriter().u64(row.number).u64(row.chunks.chunks).u64(row.chunks.bytes).u64(row.chunks.digest).take();
+}
+
+std::string encode(const SceneRow& row) {
+  ByteWriter out;
+  out.u64(row.key).string(row.name).string(row.spec).u64(row.epoch).u64(row.snapshot_sequence).u64(row.chain);
+  return out.bytes(encode(ContentRow{row.snapshot_number, row.snapshot})).take();
+}
+
+std::string encode(const CatalogueRow& row) {
+  return ByteWriter().u64(row.generation).u64(row.next_scene).u64(row.scene_sum).u64(row.mesh_sum).take();
+}
+
+std::optional<ContentRow> decode_content(absl::string_view bytes) {
+  ByteReader in(bytes);
+  ContentRow row;
+  row.number = in.u64();
+  row.chunks.chunks = in.u64();
+  row.chunks.bytes = in.u64();
+  row.chunks.digest = in.u64();
+  return in.ended() ? std::optional(row) : std::nullopt;
+}
+
+std::optional<SceneRow> decode_scene(absl::string_view bytes) {
+  ByteReader in(bytes);
+  SceneRow row;
+  row.key = in.u64();
+  row.name = in.string();
+  row.spec = in.string();
+  row.epoch = in.u64();
+  row.snapshot_sequence = in.u64();
+  row.chain = in.u64();
+  const std::optional<ContentRow> snapshot = decode_content(in.rest());
+  if (!in.ok() || !snapshot) return std::nullopt;
+  row.snapshot_number = snapshot->number;
+  row.snapshot = snapshot->chunks;
+  return row;
+}
+
+std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes) {
+  ByteReader in(bytes);
+  CatalogueRow row;
+  row.generation = in.u64();
+  row.next_scene = in.u64();
+  row.scene_sum = in.u64();
+  row.mesh_sum = in.u64();
+  return in.ended() ? std::optional(row) : std::nullopt;
+}
+
+std::string record_head(const LogEntry& entry) {
+  ByteWriter out;
+  out.u8(kRecordFormat).u64(entry.epoch).u64(entry.writer).u64(entry.batch);
+  return out.u32(static_cast<uint32_t>(entry.bytes.size())).take();
+}
+
+uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes, uint64_t chain) {
+  return checksum(ByteWriter().bytes(key).bytes(head).u64(checksum(bytes)).view(), chain);
+}
+
+std::optional<LogEntry> decode_record(absl::string_view value) {
+  ByteReader in(value);
+  LogEntry entry;
+  const uint8_t format = in.u8();
+  entry.epoch = in.u64();
+  entry.writer = in.u64();
+  entry.batch = in.u64();
+  entry.bytes = in.bytes(in.u32());
+  in.u64();
+  if (!in.ended() || format != kRecordFormat) return std::nullopt;
+  return entry;
+}
+
+}  // namespace locus::server

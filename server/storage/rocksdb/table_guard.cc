@@ -1,0 +1,101 @@
+#include "server/storage/rocksdb/table_guard.h"
+
+#include <xxhash.h>
+
+#include <cstdint>
+#include <cstring>
+#include <optional>
+
+#include "absl/strings/match.h"
+#include "absl/strings/string_view.h"
+
+namespace locus::server {
+namespace {
+
+// A table ends with a block that lists the others, and a footer: the kind of checksums, where that block is and where
+// the index, and zeros up to the version and the magic number. Source: RocksDB 7, table formats 2 to 5.
+constexpr size_t kFooterBytes = 53;
+constexpr size_t kTrailerBytes = 5;  // how it is compressed, and a checksum
+constexpr char kXxh3 = 4;
+constexpr absl::string_view kProperties = "rocksdb.properties";
+constexpr uint64_t kMostBytes = uint64_t{16} << 20;
+
+struct Handle {
+  uint64_t offset = 0;
+  uint64_t size = 0;
+};
+
+std::optional<uint64_t> read_varint(absl::string_view& bytes) {
+  uint64_t value = 0;
+  for (int shift = 0; shift < 64 && !bytes.empty(); shift += 7) {
+    const auto byte = static_cast<uint8_t>(bytes.front());
+    bytes.remove_prefix(1);
+    value |= uint64_t{byte & 0x7Fu} << shift;
+    if (byte < 0x80) return value;
+  }
+  return std::nullopt;
+}
+
+std::optional<Handle> read_handle(absl::string_view bytes) {
+  const auto offset = read_varint(bytes);
+  const auto size = offset ? read_varint(bytes) : std::nullopt;
+  return size ? std::optional(Handle{*offset, *size}) : std::nullopt;
+}
+
+class Tail {
+ public:
+  Tail(rocksdb::FSRandomAccessFile& file, uint64_t size) : file_(file), size_(size) {}
+
+  bool is_sound() {
+    std::string footer, list, properties;
+    if (size_ < kFooterBytes || !read(size_ - kFooterBytes, kFooterBytes, footer) || footer.front() != kXxh3)
+      return false;
+    const auto listed = read_handle(absl::string_view(footer).substr(1));
+    if (!listed || !read_block(*listed, list)) return false;
+    const size_t name = list.find(std::string(kProperties));
+    if (name == std::string::npos) return false;
+    const auto found = read_handle(absl::string_view(list).substr(name + kProperties.size()));
+    return found && read_block(*found, properties);
+  }
+
+ private:
+  bool read(uint64_t offset, uint64_t size, std::string& bytes) {
+    if (size > kMostBytes || offset > size_ || size > size_ - offset) return false;
+    bytes.resize(size);
+    rocksdb::Slice found;
+    const rocksdb::IOStatus status = file_.Read(offset, size, rocksdb::IOOptions(), &found, bytes.data(), nullptr);
+    if (!status.ok() || found.size() != size) return false;
+    if (found.data() != bytes.data()) bytes.assign(found.data(), found.size());
+    return true;
+  }
+
+  bool read_block(const Handle& handle, std::string& bytes) {
+    if (handle.size > kMostBytes || !read(handle.offset, handle.size + kTrailerBytes, bytes)) return false;
+    uint32_t said = 0;
+    std::memcpy(&said, bytes.data() + handle.size + 1, sizeof(said));
+    const auto last = static_cast<uint8_t>(bytes[handle.size]);
+    const auto sum = static_cast<uint32_t>(XXH3_64bits(bytes.data(), handle.size)) ^ last * 0x6B9083D9u;
+    bytes.resize(handle.size);
+    return sum == said;
+  }
+
+  rocksdb::FSRandomAccessFile& file_;
+  const uint64_t size_;
+};
+
+}  // namespace
+
+rocksdb::IOStatus TableGuard::NewRandomAccessFile(const std::string& path, const rocksdb::FileOptions& options,
+                                                  std::unique_ptr<rocksdb::FSRandomAccessFile>* file,
+                                                  rocksdb::IODebugContext* context) {
+  rocksdb::IOStatus status = FileSystemWrapper::NewRandomAccessFile(path, options, file, context);
+  if (!status.ok() || !absl::EndsWith(path, ".sst")) return status;
+  uint64_t size = 0;
+  status = GetFileSize(path, options.io_options, &size, context);
+  if (status.ok() && !Tail(**file, size).is_sound())
+    status = rocksdb::IOStatus::Corruption("the end of the table is damaged", path);
+  if (!status.ok()) file->reset();
+  return status;
+}
+
+}  // namespace locus::server

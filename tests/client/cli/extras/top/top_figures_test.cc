@@ -1,0 +1,76 @@
+#include "client/cli/extras/top/top_figures.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace locus::cli {
+namespace {
+
+std::vector<MetricSample> samples(const std::string& text) {
+  auto read = parse_metrics(text);
+  EXPECT_TRUE(read.ok()) << read.status();
+  return *std::move(read);
+}
+
+TEST(TopFiguresTest, CountersBecomeRates) {
+  const TopFigures figures =
+      top_figures(samples("locus_queries_total{kind=\"ray\"} 1000\nlocus_query_block_seconds_sum{kind=\"ray\"} 1\n"
+                          "locus_scene_revision{scene=\"arena\"} 10\nlocus_refusals_total{reason=\"LIMIT\"} 1\n"),
+                  samples("locus_queries_total{kind=\"ray\"} 5000\nlocus_query_block_seconds_sum{kind=\"ray\"} 1.5\n"
+                          "locus_scene_revision{scene=\"arena\"} 70\nlocus_scene_objects{scene=\"arena\"} 12\n"
+                          "locus_refusals_total{reason=\"LIMIT\"} 3\nlocus_ready 1\n"),
+                  2);
+  EXPECT_EQ(figures.queries[0], (Json{{"kind", "ray"}, {"per_s", 2000}, {"us_each", 125}}));
+  EXPECT_EQ(figures.scenes[0]["scene"], "arena");
+  EXPECT_EQ(figures.scenes[0]["revisions_per_s"], 30);
+  EXPECT_EQ(figures.scenes[0]["objects"], 12);
+  EXPECT_EQ(figures.server["refusals_per_s"], 1);
+  EXPECT_EQ(figures.server["ready"], true);
+}
+
+TEST(TopFiguresTest, QuantilesAreThoseOfTheIntervalWithinTheirBucket) {
+  const TopFigures figures = top_figures(
+      samples("locus_calls_total{rpc=\"Query\",code=\"OK\"} 100\n"
+              "locus_call_seconds_bucket{rpc=\"Query\",le=\"0.001\"} 100\n"
+              "locus_call_seconds_bucket{rpc=\"Query\",le=\"0.002\"} 100\n"
+              "locus_call_seconds_bucket{rpc=\"Query\",le=\"+Inf\"} 100\n"),
+      samples(
+          "locus_calls_total{rpc=\"Query\",code=\"OK\"} 198\n"
+          "locus_calls_total{rpc=\"Query\",code=\"NOT_FOUND\"} 2\nlocus_calls_total{rpc=\"GetScene\",code=\"OK\"} 0\n"
+          "locus_call_seconds_bucket{rpc=\"Query\",le=\"0.001\"} 100\n"
+          "locus_call_seconds_bucket{rpc=\"Query\",le=\"0.002\"} 200\n"
+          "locus_call_seconds_bucket{rpc=\"Query\",le=\"+Inf\"} 200\n"),
+      1);
+  ASSERT_EQ(figures.rpcs.size(), 1u);
+  EXPECT_EQ(figures.rpcs[0], (Json{{"rpc", "Query"}, {"per_s", 100}, {"p50_ms", 1.5}, {"p99_ms", 1.99}}));
+}
+
+TEST(TopFiguresTest, BeyondTheHighestBoundTheBoundIsAllThatIsKnown) {
+  const TopFigures figures = top_figures({},
+                                         samples("locus_calls_total{rpc=\"Query\",code=\"OK\"} 1\n"
+                                                 "locus_call_seconds_bucket{rpc=\"Query\",le=\"2\"} 0\n"
+                                                 "locus_call_seconds_bucket{rpc=\"Query\",le=\"+Inf\"} 1\n"),
+                                         1);
+  EXPECT_EQ(figures.rpcs[0]["p99_ms"], 2000);
+}
+
+TEST(TopFiguresTest, ACounterThatFellHasNoRate) {
+  const TopFigures figures = top_figures(samples("locus_queries_total{kind=\"ray\"} 1000\n"),
+                                         samples("locus_queries_total{kind=\"ray\"} 5\n"), 1);
+  EXPECT_EQ(figures.queries[0]["per_s"], nullptr);
+  EXPECT_EQ(figures.queries[0]["us_each"], nullptr);
+}
+
+TEST(TopFiguresTest, ASceneThatIsNewHasNotMovedYet) {
+  EXPECT_EQ(top_figures({}, samples("locus_scene_revision{scene=\"arena\"} 70\n"), 1).scenes[0]["revisions_per_s"], 0);
+}
+
+TEST(TopFiguresTest, AnEmptyPageIsAServerWithoutAnything) {
+  const TopFigures figures = top_figures({}, {}, 1);
+  EXPECT_TRUE(figures.rpcs.empty() && figures.queries.empty() && figures.scenes.empty());
+  EXPECT_EQ(figures.server["ready"], false);
+}
+
+}  // namespace
+}  // namespace locus::cli

@@ -1,0 +1,73 @@
+// What tests of generated meshes ask of any of them. Functions without state.
+#ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_GENERATE_MESH_FACTS_H_
+#define LOCUS_TESTS_CLIENT_CLI_LEVELS_GENERATE_MESH_FACTS_H_
+
+#include <openssl/evp.h>
+
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <string>
+#include <unordered_set>
+
+#include "client/cli/levels/import/imported_mesh.h"
+
+namespace locus::cli::testing {
+
+using Point = std::array<double, 3>;
+
+inline Point vertex(const ImportedMesh& mesh, uint32_t number) {
+  return {mesh.vertices[3 * number], mesh.vertices[3 * number + 1], mesh.vertices[3 * number + 2]};
+}
+
+inline Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+inline double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline Point cross(const Point& a, const Point& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// Its length is twice the area.
+inline Point normal(const ImportedMesh& mesh, size_t triangle) {
+  const Point a = vertex(mesh, mesh.indices[3 * triangle]);
+  return cross(minus(vertex(mesh, mesh.indices[3 * triangle + 1]), a),
+               minus(vertex(mesh, mesh.indices[3 * triangle + 2]), a));
+}
+
+// Directed edges that occur twice: none in a mesh whose triangles agree about their outside.
+inline size_t repeated_edges(const ImportedMesh& mesh, std::unordered_set<uint64_t>& edges) {
+  size_t repeated = 0;
+  for (size_t i = 0; i < mesh.indices.size(); ++i) {
+    const uint32_t next = mesh.indices[i % 3 == 2 ? i - 2 : i + 1];
+    if (!edges.insert(uint64_t{mesh.indices[i]} << 32 | next).second) ++repeated;
+  }
+  return repeated;
+}
+
+// Directed edges without their opposite: the border.
+inline size_t open_edges(const std::unordered_set<uint64_t>& edges) {
+  size_t open = 0;
+  for (const uint64_t edge : edges) open += edges.count(edge << 32 | edge >> 32) == 0 ? 1 : 0;
+  return open;
+}
+
+// SHA-256 of the vertices' and the indices' bytes, in hexadecimal.
+inline std::string bytes_hash(const ImportedMesh& mesh) {
+  std::string bytes(mesh.vertices.size() * sizeof(float) + mesh.indices.size() * sizeof(uint32_t), 0);
+  std::memcpy(bytes.data(), mesh.vertices.data(), mesh.vertices.size() * sizeof(float));
+  std::memcpy(bytes.data() + mesh.vertices.size() * sizeof(float), mesh.indices.data(),
+              mesh.indices.size() * sizeof(uint32_t));
+  std::array<unsigned char, 32> hash{};
+  EVP_Digest(bytes.data(), bytes.size(), hash.data(), nullptr, EVP_sha256(), nullptr);
+  std::string text;
+  for (const unsigned char byte : hash) {
+    std::array<char, 3> digits{};
+    std::snprintf(digits.data(), digits.size(), "%02x", byte);
+    text += digits.data();
+  }
+  return text;
+}
+
+}  // namespace locus::cli::testing
+
+#endif  // LOCUS_TESTS_CLIENT_CLI_LEVELS_GENERATE_MESH_FACTS_H_

@@ -1,0 +1,109 @@
+#include "client/cli/rows/scene_rows.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace locus::cli {
+namespace {
+
+// What both kinds of runs have, for one thing.
+template <class Run>
+void fill_shared(Run& run, uint64_t id) {
+  run.add_ids(id);
+  for (const float part : {0.f, 0.f, 0.f, 1.f}) run.add_rotations(part);
+  run.add_layers(1);
+  run.add_groups(0);
+  run.add_tags(0);
+}
+
+// A ball, a box, a capsule, a point and an instance.
+v1::DumpSceneResponse one_of_each() {
+  v1::DumpSceneResponse piece;
+  for (uint64_t id = 1; id <= 4; ++id) {
+    v1::Insert& run = *piece.add_objects();
+    fill_shared(run, id);
+    for (const double part : {0.1, 2.0, 3.0}) run.add_positions_f64(part);
+  }
+  piece.mutable_objects(0)->mutable_ball()->add_radii(0.5f);
+  piece.mutable_objects(2)->mutable_capsule()->add_radii(0.25f);
+  for (const float part : {1.f, 2.f, 3.f}) {
+    piece.mutable_objects(1)->mutable_box()->add_half_extents(part);
+    piece.mutable_objects(2)->mutable_capsule()->add_half_axes(part);
+  }
+  piece.mutable_objects(3)->mutable_point();
+  v1::Placement& place = *piece.add_instances();
+  place.set_mesh("crate");
+  fill_shared(place, 5);
+  for (const double part : {4.0, 5.0, 6.0}) place.add_translations(part);
+  place.add_scales(2);
+  return piece;
+}
+
+absl::Status read(const v1::DumpSceneResponse& piece) {
+  return for_each_thing(piece, [](const SceneThing&) { return absl::OkStatus(); });
+}
+
+TEST(SceneRowsTest, ThingsComeInOrderWithWhatTheyHave) {
+  std::vector<SceneThing> things;
+  ASSERT_TRUE(for_each_thing(one_of_each(), [&](const SceneThing& thing) {
+                things.push_back(thing);
+                return absl::OkStatus();
+              }).ok());
+  ASSERT_EQ(things.size(), 5u);
+  const std::vector<ThingKind> kinds = {ThingKind::kBall, ThingKind::kBox, ThingKind::kCapsule, ThingKind::kPoint,
+                                        ThingKind::kInstance};
+  for (size_t i = 0; i < things.size(); ++i) {
+    EXPECT_EQ(things[i].id, i + 1);
+    EXPECT_EQ(things[i].kind, kinds[i]);
+  }
+  EXPECT_EQ(things[0].at[0], 0.1);
+  EXPECT_EQ(things[1].size[2], 3);
+  EXPECT_EQ(things[2].radius, 0.25f);
+  EXPECT_EQ(things[4].mesh, "crate");
+  EXPECT_EQ(things[4].scale, 2);
+}
+
+TEST(SceneRowsTest, ReadingEndsWithTheFirstFailure) {
+  int taken = 0;
+  EXPECT_EQ(
+      for_each_thing(one_of_each(),
+                     [&](const SceneThing&) { return ++taken == 2 ? absl::AbortedError("enough") : absl::OkStatus(); }),
+      absl::AbortedError("enough"));
+  EXPECT_EQ(taken, 2);
+}
+
+TEST(SceneRowsTest, ColumnsOfAnotherLengthAreDataLoss) {
+  const v1::DumpSceneResponse whole = one_of_each();
+  ASSERT_TRUE(read(whole).ok());
+  std::vector<v1::DumpSceneResponse> damaged(9, whole);
+  damaged[0].mutable_objects(0)->add_positions_f64(0);
+  damaged[1].mutable_objects(0)->clear_rotations();
+  damaged[2].mutable_objects(0)->add_layers(0);
+  damaged[3].mutable_objects(0)->mutable_ball()->clear_radii();
+  damaged[4].mutable_objects(1)->mutable_box()->add_half_extents(0);
+  damaged[5].mutable_objects(2)->mutable_capsule()->clear_radii();
+  damaged[6].mutable_objects(3)->clear_point();
+  damaged[7].mutable_instances(0)->clear_scales();
+  damaged[8].mutable_instances(0)->clear_tags();
+  for (const v1::DumpSceneResponse& piece : damaged) EXPECT_TRUE(absl::IsDataLoss(read(piece)));
+}
+
+TEST(SceneRowsTest, RowsHaveOnlyKeysOfTheirKinds) {
+  for (const Things things : {Things::kAll, Things::kObjects, Things::kInstances}) {
+    const std::vector<std::string>& keys = thing_keys(things);
+    ASSERT_TRUE(for_each_thing(one_of_each(), [&](const SceneThing& thing) {
+                  if (!is_among(things, thing.kind)) return absl::OkStatus();
+                  size_t next = 0;
+                  const Json row = thing_row(thing, things);
+                  for (const auto& [key, value] : row.items()) {
+                    const auto found = std::find(keys.begin() + static_cast<ptrdiff_t>(next), keys.end(), key);
+                    EXPECT_NE(found, keys.end()) << key << " is unknown or out of order";
+                    next = static_cast<size_t>(found - keys.begin());
+                  }
+                  return absl::OkStatus();
+                }).ok());
+  }
+}
+
+}  // namespace
+}  // namespace locus::cli

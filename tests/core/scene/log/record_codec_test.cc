@@ -1,0 +1,205 @@
+// Records of batches and static changes: there and back, and back from damaged bytes.
+#include "core/scene/log/record_codec.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/scene/scene_writer.h"
+#include "tests/support/damaged_bytes.h"
+#include "tests/support/random_updates.h"
+#include "tests/support/scene_fixture.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::string encoded(const UpdateBatch& batch) {
+  std::string bytes;
+  encode_batch(batch, bytes);
+  return bytes;
+}
+
+// NaNs are numbers like others here.
+template <class T>
+bool same(absl::Span<const T> a, absl::Span<const T> b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+template <class Columns>
+bool same_pose(const Columns& a, const Columns& b) {
+  return same(a.ids, b.ids) && same(a.positions, b.positions) && same(a.positions_f64, b.positions_f64) &&
+         same(a.rotations, b.rotations);
+}
+template <class Columns>
+bool same_labels(const Columns& a, const Columns& b) {
+  return same(a.layers, b.layers) && same(a.groups, b.groups) && same(a.tags, b.tags);
+}
+bool same_insert(const InsertColumns& a, const InsertColumns& b) {
+  const bool round = a.kind == ShapeKind::kBall || a.kind == ShapeKind::kCapsule;
+  const bool long_one = a.kind == ShapeKind::kBox || a.kind == ShapeKind::kCapsule;
+  return a.kind == b.kind && same_pose(a, b) && same_labels(a, b) &&
+         same(round ? a.radii : absl::Span<const float>(), b.radii) &&
+         same(long_one ? a.extents : absl::Span<const float>(), b.extents);
+}
+bool same_move(const MoveColumns& a, const MoveColumns& b) { return a.teleport == b.teleport && same_pose(a, b); }
+bool same_relabel(const RelabelColumns& a, const RelabelColumns& b) { return same(a.ids, b.ids) && same_labels(a, b); }
+
+template <class List, class Same>
+bool all_same(const List& a, const List& b, const Same& is_same) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), is_same);
+}
+
+// `b` may lack what `a` has to no purpose.
+bool same_batch(const UpdateBatch& a, const UpdateBatch& b) {
+  return a.frame == b.frame && a.tick == b.tick && a.clear == b.clear && same(a.remove_ids, b.remove_ids) &&
+         same(a.remove_groups, b.remove_groups) && all_same(a.inserts, b.inserts, same_insert) &&
+         all_same(a.moves, b.moves, same_move) && all_same(a.relabels, b.relabels, same_relabel) &&
+         a.upsert == b.upsert && a.all_or_nothing == b.all_or_nothing && a.restart_ticks == b.restart_ticks &&
+         a.writer == b.writer && a.batch == b.batch;
+}
+
+class RecordCodecTest : public SceneFixture {};
+
+TEST_F(RecordCodecTest, RandomBatchesComeBackAsTheyWere) {
+  Random random(1);
+  RandomUpdates updates(random, 40);
+  for (uint64_t i = 0; i < scaled_count(2000); ++i) {
+    Columns columns;
+    const UpdateBatch batch = updates.draw(columns, 20);
+    const std::string bytes = encoded(batch);
+    EXPECT_EQ(bytes.size() % 8, 0u);
+    const absl::StatusOr<Record> record = Record::decode(bytes);
+    ASSERT_TRUE(record.ok()) << record.status();
+    ASSERT_TRUE(same_batch(batch, std::get<UpdateBatch>(record->content()))) << i;
+  }
+}
+
+TEST_F(RecordCodecTest, ColumnsAreSpansOfTheBytesThemselves) {
+  const std::string bytes = encoded(with(points({1, 2}, {0, 0, 0, 1, 1, 1})));
+  const absl::StatusOr<Record> record = Record::decode(bytes);
+  ASSERT_TRUE(record.ok());
+  const auto* ids = reinterpret_cast<const char*>(std::get<UpdateBatch>(record->content()).inserts[0].ids.data());
+  EXPECT_GE(ids, bytes.data());
+  EXPECT_LT(ids, bytes.data() + bytes.size());
+}
+
+TEST_F(RecordCodecTest, BytesAtAnyAddressAreReadAndTheRecordMayBeMoved) {
+  const UpdateBatch batch = with(points({1, 2}, {0, 0, 0, 1, 1, 1}));
+  const std::string bytes = encoded(batch);
+  for (size_t shift = 0; shift < 8; ++shift) {
+    const std::string shifted = std::string(shift, 'x') + bytes;
+    absl::StatusOr<Record> record = Record::decode(absl::string_view(shifted).substr(shift));
+    ASSERT_TRUE(record.ok()) << record.status();
+    const Record moved = *std::move(record);
+    EXPECT_TRUE(same_batch(batch, std::get<UpdateBatch>(moved.content()))) << shift;
+  }
+}
+
+TEST_F(RecordCodecTest, JoinedBatchesStayApart) {
+  const UpdateBatch first = numbered(with(move_to({1}, {1, 0, 0})), 3, 1);
+  const UpdateBatch second = numbered(with(move_to({2}, {2, 0, 0})), 3, 2);
+  const UpdateBatch* const both[] = {&first, &second};
+  std::string bytes;
+  encode_joined(both, bytes);
+  const absl::StatusOr<Record> record = Record::decode(bytes);
+  ASSERT_TRUE(record.ok()) << record.status();
+  const auto& joined = std::get<Record::Joined>(record->content());
+  ASSERT_EQ(joined.batches.size(), 2u);
+  EXPECT_TRUE(same_batch(first, joined.batches[0]));
+  EXPECT_TRUE(same_batch(second, joined.batches[1]));
+}
+
+TEST_F(RecordCodecTest, BatchesThatCannotHaveBeenJoinedAreRefused) {
+  const UpdateBatch first = with(move_to({1}, {1, 0, 0})), second = with(points({2}, {2, 0, 0}));
+  const UpdateBatch* const both[] = {&first, &second};
+  std::string bytes;
+  encode_joined(both, bytes);
+  EXPECT_EQ(Record::decode(bytes).status(), absl::DataLossError("batch 1 cannot have been joined"));
+}
+
+TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesContents) {
+  PlacementColumns chosen = placement({}, {1, 2, 3, 4, 5, 6});
+  chosen.scales = columns_.floats({2});
+  chosen.tags = columns_.ids({7, 8});
+  StaticChange change = placing(placement({5}, {9, 9, 9}));
+  change.place.push_back(chosen);
+  change.remove_ids = columns_.ids({3});
+  change.remove_groups = columns_.ids({4, 4});
+  std::string bytes;
+  encode_change(change, {5, kChosenIdBit | 1, kChosenIdBit | 2}, bytes);
+  absl::StatusOr<Record> record = Record::decode(bytes);
+  ASSERT_TRUE(record.ok()) << record.status();
+  const auto& read = std::get<Record::Change>(record->content());
+  EXPECT_THAT(read.change.remove_ids, ElementsAre(3));
+  EXPECT_THAT(read.change.remove_groups, ElementsAre(4, 4));
+  EXPECT_THAT(read.meshes, ElementsAre(mesh_->sha256(), mesh_->sha256()));
+  ASSERT_EQ(read.change.place.size(), 2u);
+  EXPECT_THAT(read.change.place[0].ids, ElementsAre(5));
+  EXPECT_THAT(read.change.place[1].ids, ElementsAre(kChosenIdBit | 1, kChosenIdBit | 2));
+  EXPECT_THAT(read.change.place[1].translations, ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(read.change.place[1].scales, ElementsAre(2));
+  EXPECT_THAT(read.change.place[1].tags, ElementsAre(7, 8));
+  EXPECT_TRUE(read.change.place[1].rotations.empty());
+}
+
+TEST_F(RecordCodecTest, WhatIsWrongIsNamed) {
+  std::string bytes = encoded(with(points({1}, {0, 0, 0})));
+  EXPECT_EQ(Record::decode("").status(), absl::DataLossError("the kind is cut off"));
+  EXPECT_EQ(Record::decode(bytes + std::string(8, '\0')).status(), absl::DataLossError("a record has bytes too many"));
+  EXPECT_THAT(Record::decode(absl::string_view(bytes).substr(0, 60)).status().message(), HasSubstr("is cut off"));
+  std::string later = bytes;
+  later[4] = 9;
+  EXPECT_THAT(Record::decode(later).status().message(), HasSubstr("version 9 is not known, 1 is"));
+  bytes[0] ^= 1;
+  EXPECT_EQ(Record::decode(bytes).status(), absl::DataLossError("the kind of a record is not known"));
+}
+
+TEST_F(RecordCodecTest, ABatchOfWrongFormIsRefusedWithTheFieldThatIs) {
+  UpdateBatch wrong = with(points({1, 2, 3}, {0, 0, 0, 1, 1, 1}));
+  const absl::Status status = Record::decode(encoded(wrong)).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(status.message(), HasSubstr("inserts[0].positions"));
+}
+
+// What is found in damaged bytes, if anything, can be applied like anything else.
+TEST_F(RecordCodecTest, DamagedBytesNeverHarm) {
+  Random random(2);
+  RandomUpdates updates(random, 40);
+  SceneWriter writer(1, Winding::kCounterClockwise, StaticSet::empty());
+  uint64_t refused = 0, taken = 0;
+  for (uint64_t i = 0; i < scaled_count(60000); ++i) {
+    Columns columns;
+    std::string bytes;
+    if (random.chance(0.2)) {
+      encode_change(placing(placement({5, 6}, {9, 9, 9, 1, 1, 1})), {5, 6}, bytes);
+    } else if (random.chance(0.2)) {
+      const UpdateBatch batch = with(move_to({1, 2}, {1, 0, 0, 2, 0, 0}));
+      const UpdateBatch* const both[] = {&batch, &batch};
+      encode_joined(both, bytes);
+    } else {
+      encode_batch(updates.draw(columns, 5), bytes);
+    }
+    const std::string wrong = damaged(bytes, random);
+    absl::StatusOr<Record> record = Record::decode(wrong);
+    ++(record.ok() ? taken : refused);
+    if (!record.ok()) {
+      EXPECT_EQ(record.status().code(), absl::StatusCode::kDataLoss) << record.status();
+    } else if (const auto* batch = std::get_if<UpdateBatch>(&record->content()); batch != nullptr) {
+      writer.apply(*batch).IgnoreError();
+    } else if (auto* change = std::get_if<Record::Change>(&record->content()); change != nullptr) {
+      for (PlacementColumns& place : change->change.place) place.mesh = mesh_;
+      StaticSet::empty()
+          ->apply(
+              change->change, [](Id) { return false; }, 0)
+          .IgnoreError();
+    }
+  }
+  EXPECT_NE(refused, 0u);
+  EXPECT_NE(taken, 0u);
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,112 @@
+#include "core/scene/log/tree_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/base/instruction_set.h"
+#include "core/index/bvh/triangle_bvh.h"
+#include "tests/support/damaged_bytes.h"
+#include "tests/support/generated_meshes.h"
+#include "tests/support/scene_search.h"
+
+namespace locus::test {
+namespace {
+
+absl::StatusOr<TriangleBvh> restore(const std::string& bytes, const std::vector<Triangle>& triangles) {
+  const AlignedBytes aligned(bytes);
+  const absl::StatusOr<TreeOutline> outline = decode_outline(aligned);
+  if (!outline.ok()) return outline.status();
+  const auto triangle = [&](uint32_t number) { return triangles[number]; };
+  return TriangleBvh::restore(*outline, static_cast<uint32_t>(triangles.size()), triangle);
+}
+
+std::string encoded(const std::vector<Triangle>& triangles) {
+  return encode_outline(TriangleBvh::build(triangles)->outline());
+}
+
+TEST(TreeCodecTest, AnOutlineComesBackAndTakesFiveBytesATriangle) {
+  for (const std::vector<Triangle>& triangles : {bumpy_sphere(40, 0.05, 6), box_city(1, 1)}) {
+    const TriangleBvh built = *TriangleBvh::build(triangles);
+    const std::string bytes = encode_outline(built.outline());
+    EXPECT_LT(bytes.size(), 5 * triangles.size() + 64);
+    const AlignedBytes aligned(bytes);
+    const absl::StatusOr<TreeOutline> outline = decode_outline(aligned);
+    ASSERT_TRUE(outline.ok()) << outline.status();
+    EXPECT_EQ(outline->numbers, built.outline().numbers);
+    EXPECT_EQ(outline->block_sizes, built.outline().block_sizes);
+    EXPECT_EQ(outline->nodes, built.outline().nodes);
+  }
+}
+
+TEST(TreeCodecTest, TheOutlineOfAnotherBuilderIsRefused) {
+  std::string bytes = encoded(box_city(1, 1));
+  ++bytes[8];
+  EXPECT_EQ(restore(bytes, box_city(1, 1)).status().code(), absl::StatusCode::kFailedPrecondition);
+}
+
+// Why an outline does not say on which one it was made.
+TEST(TreeCodecTest, EveryInstructionSetMakesTheSameOutline) {
+  const std::string bytes = encoded(bumpy_sphere(40, 0.05, 6));
+  for (const std::string& name : instruction_sets()) {
+    ASSERT_TRUE(use_instruction_set(name).ok());
+    EXPECT_EQ(encoded(bumpy_sphere(40, 0.05, 6)), bytes) << name;
+  }
+  ASSERT_TRUE(use_instruction_set("").ok());
+}
+
+class DamagedOutlineTest : public ::testing::Test {
+ protected:
+  DamagedOutlineTest() : scene_(make_scene<Triangle>(random_scene(random_), random_)) {
+    number_in_order(scene_.values);
+    oracle_ = make_list(scene_.values);
+    bytes_ = encoded(scene_.values);
+  }
+
+  // Whether a tree comes of them; if so, one that answers right.
+  bool is_taken(const std::string& bytes) {
+    const absl::StatusOr<TriangleBvh> tree = restore(bytes, scene_.values);
+    if (!tree.ok()) return false;
+    EXPECT_EQ(IndexJudge<TriangleBvh>(*tree, oracle_).difference(scene_), "");
+    return true;
+  }
+
+  Random random_{3};
+  TestScene<Triangle> scene_;
+  ListIndex<Triangle> oracle_;
+  std::string bytes_;
+};
+
+// Kind, builder and count, then the numbers.
+TEST_F(DamagedOutlineTest, NumbersThatChangedPlacesAreTakenAndAnswersStayRight) {
+  constexpr size_t kNumbers = 24;
+  ASSERT_GT(scene_.values.size(), 20u);
+  for (uint64_t i = 0; i < scaled_count(300); ++i) {
+    std::string wrong = bytes_;
+    for (size_t swaps = 1 + random_.below(9); swaps > 0; --swaps) {
+      const size_t one = random_.below(scene_.values.size()), other = random_.below(scene_.values.size());
+      if (one == other) continue;
+      char* const numbers = &wrong[kNumbers];
+      std::swap_ranges(numbers + 4 * one, numbers + 4 * one + 4, numbers + 4 * other);
+    }
+    ASSERT_TRUE(is_taken(wrong));
+  }
+}
+
+TEST_F(DamagedOutlineTest, AnyBytesAreRefusedOrAnswersStayRight) {
+  uint64_t refused = 0;
+  for (uint64_t i = 0; i < scaled_count(20'000); ++i) refused += is_taken(damaged(bytes_, random_)) ? 0 : 1;
+  EXPECT_GT(refused, scaled_count(10'000));
+}
+
+// If this fails, the builder makes other trees than it did: raise kBvhBuilderVersion and put the new number here, so
+// that data directories with outlines of the trees before get the new ones.
+TEST(TreeCodecTest, TheBuilderOfThisVersionMakesTheseTrees) {
+  uint64_t hash = 14'695'981'039'346'656'037u;  // FNV-1a
+  for (const char byte : encoded(box_city(9, 3))) hash = (hash ^ static_cast<uint8_t>(byte)) * 1'099'511'628'211u;
+  EXPECT_EQ(kBvhBuilderVersion, 1u);
+  EXPECT_EQ(hash, 2'252'812'711'579'794'862u);
+}
+
+}  // namespace
+}  // namespace locus::test

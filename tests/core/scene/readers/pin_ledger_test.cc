@@ -1,0 +1,207 @@
+// Through a scene: what readers may hold of it, and what becomes of updates meanwhile.
+#include "core/scene/readers/pin_ledger.h"
+
+#include <atomic>
+#include <optional>
+#include <thread>
+
+#include "core/scene/snapshot/snapshot_bytes.h"
+#include "tests/support/scene_fixture.h"
+
+namespace locus::test {
+namespace {
+
+class PinLedgerTest : public SceneFixture {
+ protected:
+  static constexpr Scene::Deadline kNow = Scene::Deadline::min();
+
+  // Four times what all objects take.
+  static constexpr uint64_t kObjects = 2'000;
+  static constexpr uint64_t kBudget = 4 * 300 * kObjects;
+  static SceneSpec bounded(uint64_t budget) {
+    SceneSpec spec;
+    spec.pinned_bytes = budget;
+    return spec;
+  }
+
+  explicit PinLedgerTest(uint64_t budget = kBudget) : SceneFixture(bounded(budget)) {
+    std::vector<float> positions;
+    for (Id id = 1; id <= kObjects; ++id) {
+      all_.push_back(id);
+      positions.insert(positions.end(), {float(id % 50), float(id / 50), 0});
+    }
+    apply(with(points(all_, positions)));
+  }
+
+  // Moves all objects: nothing of the revision before remains.
+  UpdateBatch step() {
+    return with(move_to(all_, std::vector<float>(3 * all_.size(), float(scene_.latest()->revision))));
+  }
+  // Where it need not wait.
+  absl::Status step_now() { return scene_.apply(step(), kNow).status(); }
+
+  SnapshotPin pin(const View& view = {}) { return *scene_.pin(view, kNow); }
+
+  // Pins a revision, replaces it, and so on until a pin is told to end.
+  std::vector<SnapshotPin> pin_too_much() {
+    std::vector<SnapshotPin> pins;
+    while (pins.empty() || pins.front().status().ok()) {
+      pins.push_back(pin());
+      EXPECT_TRUE(step_now().ok());
+    }
+    return pins;
+  }
+
+  std::vector<Id> all_;
+};
+
+class PinLedgerDefaultTest : public PinLedgerTest {
+ protected:
+  PinLedgerDefaultTest() : PinLedgerTest(0) {}
+};
+
+TEST_F(PinLedgerTest, WhoReadsTheLatestRevisionHoldsNothingBack) {
+  const SnapshotPin latest = pin();
+  EXPECT_EQ(scene_.status().pinned_bytes, 0u);
+  EXPECT_EQ(scene_.status().max_pinned_bytes, kBudget);
+}
+
+TEST_F(PinLedgerTest, WhatReadersHoldIsCountedOnce) {
+  const SnapshotPin first = pin(), again = pin();
+  EXPECT_TRUE(step_now().ok());
+  const SnapshotPin second = pin();
+  EXPECT_TRUE(step_now().ok());
+  EXPECT_EQ(scene_.status().pinned_bytes,
+            bytes_apart_from(*first, *second) + bytes_apart_from(*second, *scene_.latest()));
+}
+
+TEST_F(PinLedgerTest, AReaderWithinTheBudgetIsNeverToldToEndHoweverMuchIsReplaced) {
+  const SnapshotPin reader = pin();
+  while (scene_.latest()->replaced_bytes - reader->replaced_bytes < 10 * kBudget) ASSERT_TRUE(step_now().ok());
+  EXPECT_TRUE(reader.status().ok());
+  EXPECT_LE(scene_.status().pinned_bytes, kBudget);
+  EXPECT_EQ(reader->objects.find(1)->shape.position.x, 1);
+}
+
+TEST_F(PinLedgerTest, TheOldestAreToldToEndAndNoMoreThanItTakes) {
+  const std::vector<SnapshotPin> pins = pin_too_much();
+  ASSERT_GE(pins.size(), 3u);
+  for (size_t i = 1; i < pins.size(); ++i) EXPECT_TRUE(pins[i].status().ok()) << i;
+}
+
+TEST_F(PinLedgerTest, AllWhoReadThatRevisionAreToldToEnd) {
+  const SnapshotPin first = pin();
+  const std::vector<SnapshotPin> pins = pin_too_much();
+  EXPECT_FALSE(first.status().ok());
+  EXPECT_FALSE(pins.front().status().ok());
+}
+
+TEST_F(PinLedgerTest, WhoIsToldToEndLearnsTheLimit) {
+  const absl::Status status = pin_too_much().front().status();
+  expect_refusal(status, absl::StatusCode::kResourceExhausted, Reason::kLimit, "");
+  const Refusal refusal = *refusal_of(status);
+  EXPECT_EQ(refusal.limit, "pinned_bytes");
+  EXPECT_EQ(refusal.limit_value, kBudget);
+  EXPECT_GT(refusal.asked, kBudget);
+  EXPECT_GT(refusal.retry_after_ms, 0u);
+  EXPECT_NE(status.message().find("Ask again, in smaller batches"), absl::string_view::npos) << status;
+}
+
+TEST_F(PinLedgerTest, UpdatesWaitUntilThoseToldToEndHave) {
+  std::vector<SnapshotPin> pins = pin_too_much();
+  const uint64_t before = revision();
+  const absl::Status status = step_now();
+  EXPECT_EQ(status.code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(refusal_of(status)->limit, "pinned_bytes");
+  EXPECT_EQ(refusal_of(status)->limit_value, kBudget);
+  EXPECT_EQ(revision(), before);
+  std::vector<SnapshotPin> others;
+  for (size_t i = 1; i < pins.size(); ++i) others.push_back(std::move(pins[i]));
+  pins.clear();
+  EXPECT_TRUE(step_now().ok());
+}
+
+TEST_F(PinLedgerTest, QueriesAreServedMeanwhile) {
+  const std::vector<SnapshotPin> pins = pin_too_much();
+  const SnapshotPin latest = pin();
+  EXPECT_EQ(latest->revision, revision());
+  EXPECT_TRUE(latest.status().ok());
+}
+
+TEST_F(PinLedgerTest, AWaitingUpdateGoesOnWhenTheReaderEnds) {
+  std::vector<SnapshotPin> pins = pin_too_much();
+  const uint64_t before = revision();
+  std::thread writer([&, batch = step()] { EXPECT_TRUE(scene_.apply(batch).ok()); });
+  EXPECT_EQ(revision(), before);
+  pins.clear();
+  writer.join();
+  EXPECT_EQ(revision(), before + 1);
+  EXPECT_EQ(scene_.status().pinned_bytes, 0u);
+}
+
+TEST_F(PinLedgerTest, AStaticChangeWaitsLikeAnUpdate) {
+  std::vector<SnapshotPin> pins = pin_too_much();
+  const uint64_t before = revision();
+  std::thread writer([&] { EXPECT_TRUE(scene_.change_instances(placing(placement({kObjects + 1}, {0, 0, 0}))).ok()); });
+  EXPECT_EQ(revision(), before);
+  pins.clear();
+  writer.join();
+  EXPECT_EQ(revision(), before + 1);
+}
+
+TEST_F(PinLedgerTest, ClosingWakesAWaitingUpdate) {
+  const std::vector<SnapshotPin> pins = pin_too_much();
+  std::thread writer([&, batch = step()] {
+    expect_refusal(scene_.apply(batch).status(), absl::StatusCode::kNotFound, Reason::kNotFound, "scene");
+  });
+  scene_.close();
+  writer.join();
+}
+
+TEST_F(PinLedgerTest, WhoPinsAnOlderRevisionHoldsWhatItKeeps) {
+  EXPECT_TRUE(step_now().ok());
+  EXPECT_TRUE(step_now().ok());
+  const SnapshotPin old = pin({View::Kind::kExactly, 1, 0});
+  EXPECT_EQ(scene_.status().pinned_bytes, bytes_apart_from(*old, *scene_.latest()));
+}
+
+TEST_F(PinLedgerTest, OnlyWhoWasToldToEndIsCutOffAndOnlyOnce) {
+  std::vector<SnapshotPin> pins = pin_too_much();
+  int first = 0, last = 0;
+  pins.front().when_stuck([&first] { ++first; });
+  pins.back().when_stuck([&last] { ++last; });
+  scene_.cut_off_readers();
+  scene_.cut_off_readers();
+  EXPECT_EQ(first, 1);
+  EXPECT_EQ(last, 0);
+}
+
+TEST_F(PinLedgerTest, WhoIsGoneIsNotCutOff) {
+  int cut = 0;
+  {
+    SnapshotPin reader = pin();
+    reader.when_stuck([&cut] { ++cut; });
+  }
+  const std::vector<SnapshotPin> pins = pin_too_much();
+  scene_.cut_off_readers();
+  EXPECT_EQ(cut, 0);
+}
+
+TEST_F(PinLedgerTest, APinMayOutliveItsScene) {
+  std::optional<SnapshotPin> reader;
+  {
+    const Scene scene("short", SceneSpec(), 1, StaticSet::empty());
+    reader.emplace(*scene.pin({}, kNow));
+  }
+  EXPECT_EQ((*reader)->epoch, 1u);
+}
+
+TEST_F(PinLedgerDefaultTest, TheBudgetFollowsTheSceneWhereItIsLarge) {
+  EXPECT_EQ(scene_.status().max_pinned_bytes, limits::kPinnedBytes);
+  PinLedger ledger(0);
+  const uint64_t large = limits::kPinnedBytes;
+  EXPECT_EQ(ledger.use(*scene_.latest(), large).budget, limits::kPinnedShare * large);
+}
+
+}  // namespace
+}  // namespace locus::test

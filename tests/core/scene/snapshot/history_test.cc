@@ -1,0 +1,143 @@
+// What a scene keeps of its past, and when it forgets.
+#include "core/scene/snapshot/history.h"
+
+#include "tests/support/scene_fixture.h"
+
+namespace locus::test {
+namespace {
+
+class HistoryTest : public ::testing::Test {
+ protected:
+  static SceneSpec spec(uint32_t ticks, uint64_t bytes) {
+    SceneSpec spec;
+    spec.history = {ticks, bytes};
+    return spec;
+  }
+
+  // A scene of 1000 points that all move at every tick.
+  static void live(Scene& scene, uint64_t ticks, uint64_t stride = 1) {
+    std::vector<uint64_t> ids(1000);
+    for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
+    UpdateBatch batch;
+    batch.upsert = true;
+    for (uint64_t tick = 1; tick <= ticks; ++tick) {
+      const float place[3] = {static_cast<float>(tick), 0, 0};
+      InsertColumns insert;
+      insert.ids = ids;
+      insert.positions = place;
+      batch.inserts = {insert};
+      batch.tick = scene.latest()->tick + stride;
+      ASSERT_TRUE(scene.apply(batch).ok());
+    }
+  }
+  static uint32_t recorded(const Scene& scene) { return scene.status().recorded_ticks; }
+};
+
+TEST_F(HistoryTest, IsOffByDefault) {
+  Scene scene("scene", {}, 1, StaticSet::empty());
+  live(scene, 5);
+  EXPECT_EQ(recorded(scene), 0u);
+  EXPECT_EQ(scene.status().history_bytes, 0u);
+  EXPECT_EQ(scene.latest()->history, nullptr);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 5u);
+}
+
+TEST_F(HistoryTest, KeepsAsManyTicksAsItIsTold) {
+  Scene scene("scene", spec(4, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 20);
+  EXPECT_EQ(recorded(scene), 4u);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 16u);
+}
+
+TEST_F(HistoryTest, CountsTicksThatWereLeftOut) {
+  Scene scene("scene", spec(10, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 20, 5);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 90u);
+  live(scene, 1, 1000);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 100u);
+}
+
+TEST_F(HistoryTest, KeepsNoMoreThanTheBytesItIsGiven) {
+  constexpr uint64_t kBytes = 1'000'000;
+  Scene scene("scene", spec(1000, kBytes), 1, StaticSet::empty());
+  live(scene, 100);
+  EXPECT_GT(recorded(scene), 2u);
+  EXPECT_LT(recorded(scene), 50u);
+  EXPECT_LE(scene.status().history_bytes, kBytes);
+  EXPECT_GT(scene.status().history_bytes, kBytes / 2);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 100 - recorded(scene));
+}
+
+TEST_F(HistoryTest, KeepsNothingWhereOneTickIsTooMuch) {
+  Scene scene("scene", spec(10, 1000), 1, StaticSet::empty());
+  live(scene, 5);
+  EXPECT_EQ(recorded(scene), 0u);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 5u);
+}
+
+TEST_F(HistoryTest, ATickThatChangesNothingCostsNextToNothing) {
+  Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 1);
+  const uint64_t before = scene.status().history_bytes;
+  for (uint64_t tick = 2; tick <= 11; ++tick) {
+    UpdateBatch batch;
+    batch.tick = tick;
+    ASSERT_TRUE(scene.apply(batch).ok());
+  }
+  EXPECT_EQ(recorded(scene), 11u);
+  EXPECT_LT(scene.status().history_bytes - before, 10'000u);
+}
+
+TEST_F(HistoryTest, RestartingTicksForgetsEverything) {
+  Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 5);
+  UpdateBatch restart;
+  restart.restart_ticks = true;
+  restart.tick = 2;
+  const uint64_t before = scene.latest()->revision;
+  EXPECT_EQ(scene.apply(restart)->revision, before + 1);
+  EXPECT_EQ(recorded(scene), 0u);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 2u);
+  live(scene, 3);
+  EXPECT_EQ(scene.latest()->oldest_tick(), 2u);
+  EXPECT_EQ(scene.latest()->tick, 5u);
+}
+
+TEST_F(HistoryTest, RestartingAtTheSameTickForgetsTooAndIsARevision) {
+  Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 5);
+  UpdateBatch restart;
+  restart.restart_ticks = true;
+  const uint64_t before = scene.latest()->revision;
+  EXPECT_EQ(scene.apply(restart)->revision, before + 1);
+  EXPECT_EQ(recorded(scene), 0u);
+  EXPECT_EQ(scene.apply(restart)->revision, before + 1);
+}
+
+// Whatever room there was: what a batch does goes by batches alone, so that a log of them does the same again.
+TEST_F(HistoryTest, RestartingIsARevisionEvenWhereNothingCouldBeKept) {
+  Scene scene("scene", spec(100, 1), 1, StaticSet::empty());
+  live(scene, 5);
+  EXPECT_EQ(recorded(scene), 0u);
+  UpdateBatch restart;
+  restart.restart_ticks = true;
+  const uint64_t before = scene.latest()->revision;
+  EXPECT_EQ(scene.apply(restart)->revision, before + 1);
+  EXPECT_EQ(scene.apply(restart)->revision, before + 1);
+}
+
+TEST_F(HistoryTest, ARefusedBatchEndsNoTick) {
+  Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 5);
+  const uint64_t unknown = 5000;
+  UpdateBatch batch;
+  batch.tick = 9;
+  batch.all_or_nothing = true;
+  batch.remove_ids = {&unknown, 1};
+  EXPECT_FALSE(scene.apply(batch).ok());
+  EXPECT_EQ(recorded(scene), 5u);
+  EXPECT_EQ(scene.latest()->tick, 5u);
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,256 @@
+// Static changes: removes and places as one revision or not at all.
+#include "core/scene/statics/static_set.h"
+
+#include <limits>
+#include <thread>
+
+#include "core/base/limits.h"
+#include "tests/support/scene_fixture.h"
+
+namespace locus::test {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+class StaticSetTest : public SceneFixture {
+ protected:
+  InstanceChange change(const StaticChange& what) {
+    const absl::StatusOr<InstanceChange> changed = scene_.change_instances(what);
+    EXPECT_TRUE(changed.ok()) << changed.status();
+    return changed.ok() ? *changed : InstanceChange{};
+  }
+
+  // Also expects that the scene stays at the very same snapshot.
+  void expect_refused(const StaticChange& what, Reason reason, const std::string& field, std::optional<uint32_t> index,
+                      absl::StatusCode code = absl::StatusCode::kInvalidArgument) {
+    const SnapshotPtr before = scene_.latest();
+    expect_refusal(scene_.change_instances(what).status(), code, reason, field, index);
+    EXPECT_EQ(scene_.latest(), before);
+  }
+
+  StaticChange removing_instances(std::vector<Id> ids) {
+    StaticChange what;
+    what.remove_ids = columns_.ids(std::move(ids));
+    return what;
+  }
+
+  const Instance* instance(Id id) const { return scene_.latest()->statics->find(id); }
+};
+
+TEST_F(StaticSetTest, PlacesWithDefaults) {
+  const InstanceChange changed = change(placing(placement({5, 6}, {1, 2, 3, 4, 5, 6})));
+  EXPECT_EQ(changed.placed, (std::vector<Id>{5, 6}));
+  EXPECT_EQ(changed.revision, 1u);
+  EXPECT_EQ(changed.epoch, kEpoch);
+  ASSERT_NE(instance(6), nullptr);
+  EXPECT_EQ(instance(6)->transform.translation, (Vec3d{4, 5, 6}));
+  EXPECT_EQ(instance(6)->transform.quaternion, Quaternion{});
+  EXPECT_EQ(instance(6)->transform.scale, 1);
+  EXPECT_EQ(instance(6)->layers, kDefaultLayers);
+  EXPECT_EQ(instance(6)->group, 0u);
+  EXPECT_EQ(instance(6)->tag, 0u);
+  EXPECT_EQ(instance(6)->mesh, mesh_);
+}
+
+TEST_F(StaticSetTest, OneEntryOfAColumnIsForAll) {
+  PlacementColumns place = placement({5, 6}, {1, 2, 3});
+  place.scales = columns_.floats({2});
+  place.rotations = columns_.floats({0, 0, 1, 0});
+  place.layers = columns_.words({4});
+  place.groups = columns_.ids({7});
+  place.tags = columns_.ids({8});
+  change(placing(place));
+  for (const Id id : {5, 6}) {
+    EXPECT_EQ(instance(id)->transform.translation, (Vec3d{1, 2, 3}));
+    EXPECT_EQ(instance(id)->transform.scale, 2);
+    EXPECT_EQ(instance(id)->transform.quaternion, (Quaternion{0, 0, 1, 0}));
+    EXPECT_EQ(instance(id)->layers, 4u);
+    EXPECT_EQ(instance(id)->group, 7u);
+    EXPECT_EQ(instance(id)->tag, 8u);
+  }
+}
+
+TEST_F(StaticSetTest, ColumnsOfOtherLengthsAreRefused) {
+  expect_refused(placing(placement({1, 2}, {1, 2, 3, 4})), Reason::kColumnLength, "place[0].translations", {});
+  expect_refused(placing(placement({1, 2}, {})), Reason::kColumnLength, "place[0].translations", {});
+  PlacementColumns place = placement({1, 2}, {1, 2, 3, 4, 5, 6});
+  place.rotations = columns_.floats({0, 0, 0});
+  expect_refused(placing(place), Reason::kColumnLength, "place[0].rotations", {});
+  place.rotations = {};
+  place.scales = columns_.floats({1, 1, 1});
+  expect_refused(placing(place), Reason::kColumnLength, "place[0].scales", {});
+}
+
+TEST_F(StaticSetTest, ChosenIdsHaveBit63AndAreReturnedInOrder) {
+  const std::vector<Id> placed = change(placing(placement({}, {1, 0, 0, 2, 0, 0}))).placed;
+  ASSERT_EQ(placed.size(), 2u);
+  EXPECT_NE(placed[0], placed[1]);
+  for (const Id id : placed) EXPECT_NE(id & kChosenIdBit, 0u);
+  EXPECT_EQ(instance(placed[1])->transform.translation.x, 2);
+}
+
+TEST_F(StaticSetTest, ChosenIdsAreNotUsedAgainAfterARemove) {
+  const Id first = change(placing(placement({}, {0, 0, 0}))).placed[0];
+  change(removing_instances({first}));
+  EXPECT_NE(change(placing(placement({}, {0, 0, 0}))).placed[0], first);
+}
+
+TEST_F(StaticSetTest, ChosenIdsAvoidThoseOfObjects) {
+  apply(with(points({kChosenIdBit | ((uint64_t{1} << 24) + 1)}, {0, 0, 0})));
+  const Id placed = change(placing(placement({}, {0, 0, 0}))).placed[0];
+  EXPECT_FALSE(object(placed).has_value());
+}
+
+TEST_F(StaticSetTest, RemovesAndPlacesAreOneRevision) {
+  change(placing(placement({5, 6}, {0, 0, 0})));
+  StaticChange what = placing(placement({6, 7}, {9, 9, 9}));
+  what.remove_ids = columns_.ids({5, 6});
+  EXPECT_EQ(change(what).revision, 2u);
+  EXPECT_EQ(instance(5), nullptr);
+  EXPECT_EQ(instance(6)->transform.translation, (Vec3d{9, 9, 9}));
+  EXPECT_EQ(scene_.latest()->statics->size(), 2u);
+}
+
+TEST_F(StaticSetTest, RemovesWholeGroupsOfInstancesAndNoObjects) {
+  PlacementColumns place = placement({1, 2, 3}, {0, 0, 0});
+  place.groups = columns_.ids({7, 8, 7});
+  change(placing(place));
+  InsertColumns insert = points({10}, {0, 0, 0});
+  insert.groups = columns_.ids({7});
+  apply(with(insert));
+  StaticChange what;
+  what.remove_groups = columns_.ids({7, 99});
+  change(what);
+  EXPECT_EQ(scene_.latest()->statics->size(), 1u);
+  EXPECT_NE(instance(2), nullptr);
+  EXPECT_TRUE(object(10).has_value());
+}
+
+TEST_F(StaticSetTest, GroupZeroIsRefused) {
+  change(placing(placement({1}, {0, 0, 0})));
+  StaticChange what;
+  what.remove_groups = columns_.ids({7, 0});
+  expect_refused(what, Reason::kOutOfRange, "remove_groups", 1);
+}
+
+TEST_F(StaticSetTest, AnUnknownIdRefusesAllRemovesAndPlaces) {
+  change(placing(placement({1}, {0, 0, 0})));
+  StaticChange what = placing(placement({2}, {0, 0, 0}));
+  what.remove_ids = columns_.ids({1, 3});
+  expect_refused(what, Reason::kUnknownId, "remove_ids", 1);
+}
+
+TEST_F(StaticSetTest, TheIdOfAnObjectIsNoInstanceToRemove) {
+  apply(with(points({4}, {0, 0, 0})));
+  expect_refused(removing_instances({4}), Reason::kUnknownId, "remove_ids", 0);
+}
+
+TEST_F(StaticSetTest, TakenIdsAreRefused) {
+  change(placing(placement({1}, {0, 0, 0})));
+  apply(with(points({4}, {0, 0, 0})));
+  expect_refused(placing(placement({2, 1}, {0, 0, 0})), Reason::kDuplicateId, "place[0].ids", 1);
+  expect_refused(placing(placement({4}, {0, 0, 0})), Reason::kDuplicateId, "place[0].ids", 0);
+}
+
+TEST_F(StaticSetTest, AnIdPlacedTwiceIsRefused) {
+  StaticChange what = placing(placement({2}, {0, 0, 0}));
+  what.place.push_back(placement({3, 2}, {0, 0, 0}));
+  expect_refused(what, Reason::kDuplicateId, "place[1].ids", 1);
+}
+
+TEST_F(StaticSetTest, IdZeroIsRefused) {
+  expect_refused(placing(placement({1, 0}, {0, 0, 0})), Reason::kOutOfRange, "place[0].ids", 1);
+}
+
+TEST_F(StaticSetTest, TranslationsMustBeFiniteAndWithinTheWorld) {
+  expect_refused(placing(placement({1, 2}, {0, 0, 0, kNan, 0, 0})), Reason::kNotFinite, "place[0].translations", 1);
+  expect_refused(placing(placement({1}, {0, -2e9, 0})), Reason::kOutOfRange, "place[0].translations", 0);
+}
+
+TEST_F(StaticSetTest, ScalesMustBeFiniteAndPositive) {
+  PlacementColumns place = placement({1, 2}, {0, 0, 0});
+  place.scales = columns_.floats({1, 0});
+  expect_refused(placing(place), Reason::kOutOfRange, "place[0].scales", 1);
+  place.scales = columns_.floats({-1, 1});
+  expect_refused(placing(place), Reason::kOutOfRange, "place[0].scales", 0);
+  place.scales = columns_.floats({1, kInfinity});
+  expect_refused(placing(place), Reason::kNotFinite, "place[0].scales", 1);
+}
+
+TEST_F(StaticSetTest, APlacedMeshMustNotReachFarBeyondTheWorld) {
+  PlacementColumns place = placement({1, 2}, {0, 0, 0});
+  place.scales = columns_.floats({1, 3e9f});
+  expect_refused(placing(place), Reason::kOutOfRange, "place[0].scales", 1);
+}
+
+TEST_F(StaticSetTest, RotationsMustBeFiniteAndOfUnitLength) {
+  PlacementColumns place = placement({1, 2}, {0, 0, 0});
+  place.rotations = columns_.floats({0, 0, 0, 1, 0, 0, 0, 0.99f});
+  expect_refused(placing(place), Reason::kOutOfRange, "place[0].rotations", 1);
+  place.rotations = columns_.floats({0, 0, kInfinity, 1, 0, 0, 0, 1});
+  expect_refused(placing(place), Reason::kNotFinite, "place[0].rotations", 0);
+}
+
+TEST_F(StaticSetTest, TooManyInstancesNameTheLimit) {
+  const StaticChange what = placing(placement({}, std::vector<double>(3 * (size_t{limits::kMaxInstances} + 1))));
+  expect_refused(what, Reason::kLimit, "place[0]", {}, absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refusal_of(scene_.change_instances(what).status())->limit, "instances");
+}
+
+TEST_F(StaticSetTest, AnObjectInsertedDuringTheBuildKeepsItsId) {
+  // The change and the insert race for the id: one of them must lose, whoever it is.
+  for (Id id = 1; id <= 50; ++id) {
+    const StaticChange what = placing(placement({100 + id, id}, {0, 0, 0}));
+    const UpdateBatch batch = with(points({id}, {0, 0, 0}));
+    absl::Status placed;
+    std::thread builder([&] { placed = scene_.change_instances(what).status(); });
+    const UpdateAck ack = apply(batch);
+    builder.join();
+    EXPECT_NE(placed.ok(), ack.applied == 1) << id;
+    EXPECT_NE(instance(id) != nullptr, object(id).has_value()) << id;
+    if (!placed.ok())
+      expect_refusal(placed, absl::StatusCode::kInvalidArgument, Reason::kDuplicateId, "place[0].ids", 1);
+  }
+}
+
+TEST_F(StaticSetTest, ConcurrentChangesAllHappen) {
+  std::vector<StaticChange> changes;
+  for (Id id = 1; id <= 16; ++id) changes.push_back(placing(placement({id}, {double(id), 0, 0})));
+  std::vector<std::thread> threads;
+  for (const StaticChange& what : changes)
+    threads.emplace_back([&] { EXPECT_TRUE(scene_.change_instances(what).ok()); });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(revision(), 16u);
+  EXPECT_EQ(scene_.latest()->statics->size(), 16u);
+  EXPECT_EQ(scene_.status().pending_changes, 0u);
+}
+
+TEST_F(StaticSetTest, UsesCountInstancesOfAMesh) {
+  const auto other = make_mesh("other", 2);
+  StaticChange what = placing(placement({1, 2}, {0, 0, 0}));
+  what.place.push_back(placement({3}, {0, 0, 0}));
+  what.place[1].mesh = other;
+  change(what);
+  EXPECT_EQ(scene_.latest()->statics->uses(mesh_.get()), 2u);
+  EXPECT_EQ(scene_.latest()->statics->uses(other.get()), 1u);
+  EXPECT_EQ(scene_.latest()->statics->triangle_count(), 3u);
+  change(removing_instances({3}));
+  EXPECT_EQ(scene_.latest()->statics->uses(other.get()), 0u);
+}
+
+TEST_F(StaticSetTest, BoundsHoldTheScaledTurnedAndMovedMesh) {
+  PlacementColumns place = placement({1}, {100, 0, 0});
+  place.scales = columns_.floats({10});
+  place.rotations = columns_.floats({0, 0, 1, 0});  // half a turn about z: x and y change sign
+  change(placing(place));
+  const Aabbd bounds = instance(1)->bounds;
+  EXPECT_NEAR(bounds.min.x, 90, 1e-6);
+  EXPECT_NEAR(bounds.max.x, 100, 1e-6);
+  EXPECT_NEAR(bounds.min.y, -10, 1e-6);
+  EXPECT_LE(bounds.min.x, 90);
+  EXPECT_GE(bounds.max.x, 100);
+}
+
+}  // namespace
+}  // namespace locus::test

@@ -1,0 +1,388 @@
+// What becomes of the items of a batch, asked of a scene: order, refused items, kept and default columns, rounding.
+#include "core/scene/updates/batch_application.h"
+
+#include <limits>
+
+#include "core/base/limits.h"
+#include "core/scene/scene_writer.h"
+#include "tests/support/random.h"
+#include "tests/support/scene_fixture.h"
+
+namespace locus::test {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+class BatchApplicationTest : public SceneFixture {
+ protected:
+  // Applies a batch of which one item is refused, and says which.
+  ItemError only_error(const UpdateBatch& batch) {
+    const UpdateAck ack = apply(batch);
+    EXPECT_EQ(ack.refused, 1u);
+    if (ack.errors.size() != 1) ADD_FAILURE() << ack.errors.size() << " errors";
+    return ack.errors.empty() ? ItemError{} : ack.errors[0];
+  }
+
+  void expect_error(const UpdateBatch& batch, const std::string& field, uint32_t index, Id id, Reason reason) {
+    const ItemError error = only_error(batch);
+    EXPECT_EQ(error.field, field);
+    EXPECT_EQ(error.index, index);
+    EXPECT_EQ(error.id, id);
+    EXPECT_EQ(error.reason, reason);
+  }
+
+  InsertColumns boxes(std::vector<Id> ids, std::vector<float> half_extents) {
+    InsertColumns insert = points(std::move(ids), {0, 0, 0});
+    insert.kind = ShapeKind::kBox;
+    insert.extents = columns_.floats(std::move(half_extents));
+    return insert;
+  }
+};
+
+TEST_F(BatchApplicationTest, InsertsTakeOneEntryForAllOrOneEach) {
+  InsertColumns insert = balls({1, 2}, {3, 4});
+  insert.tags = columns_.ids({9});
+  EXPECT_EQ(apply(with(insert)).applied, 2u);
+  EXPECT_EQ(object(1)->shape.radius, 3);
+  EXPECT_EQ(object(2)->shape.radius, 4);
+  EXPECT_EQ(object(1)->tag, 9u);
+  EXPECT_EQ(object(2)->tag, 9u);
+}
+
+TEST_F(BatchApplicationTest, AbsentColumnsOfInsertsAreTheDefaults) {
+  apply(with(points({1}, {1, 2, 3})));
+  EXPECT_EQ(object(1)->group, 0u);
+  EXPECT_EQ(object(1)->tag, 0u);
+  EXPECT_EQ(object(1)->layers, kDefaultLayers);
+  EXPECT_EQ(object(1)->shape.rotation, Quaternion{});
+}
+
+TEST_F(BatchApplicationTest, AppliesRemovesThenInsertsThenMovesThenRelabels) {
+  apply(with(points({1}, {0, 0, 0})));
+  UpdateBatch batch = with(points({1}, {5, 5, 5}));
+  batch.remove_ids = columns_.ids({1});
+  batch.moves.push_back(move_to({1}, {6, 6, 6}));
+  RelabelColumns relabel;
+  relabel.ids = columns_.ids({1});
+  relabel.tags = columns_.ids({42});
+  batch.relabels.push_back(relabel);
+  const UpdateAck ack = apply(batch);
+  EXPECT_EQ(ack.applied, 4u);
+  EXPECT_EQ(ack.revision, 2u);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{6, 6, 6}));
+  EXPECT_EQ(object(1)->tag, 42u);
+}
+
+TEST_F(BatchApplicationTest, ClearComesBeforeRemoves) {
+  apply(with(points({1, 2}, {0, 0, 0})));
+  UpdateBatch batch = removing({1});
+  batch.clear = true;
+  expect_error(batch, "remove_ids", 0, 1, Reason::kUnknownId);
+  EXPECT_TRUE(ids().empty());
+}
+
+TEST_F(BatchApplicationTest, ClearAndInsertOfAKnownIdIsNoDuplicate) {
+  apply(with(balls({1, 2}, {1})));
+  UpdateBatch batch = with(points({2}, {3, 3, 3}));
+  batch.clear = true;
+  EXPECT_EQ(apply(batch).refused, 0u);
+  EXPECT_EQ(ids(), (std::vector<Id>{2}));
+  EXPECT_EQ(object(2)->shape.kind, ShapeKind::kPoint);
+  EXPECT_EQ(scene_.latest()->objects.size(), 1u);
+}
+
+TEST_F(BatchApplicationTest, ClearLeavesInstances) {
+  ASSERT_TRUE(scene_.change_instances(placing(placement({8}, {0, 0, 0}))).ok());
+  UpdateBatch batch;
+  batch.clear = true;
+  apply(batch);
+  EXPECT_NE(scene_.latest()->statics->find(8), nullptr);
+}
+
+TEST_F(BatchApplicationTest, OfTwoMovesOfOneObjectTheLaterStays) {
+  apply(with(points({1}, {0, 0, 0})));
+  EXPECT_EQ(apply(with(move_to({1, 1}, {1, 1, 1, 2, 2, 2}))).applied, 2u);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{2, 2, 2}));
+}
+
+TEST_F(BatchApplicationTest, TheSecondInsertOfAnIdInOneBatchIsRefused) {
+  expect_error(with(points({1, 1}, {1, 1, 1, 2, 2, 2})), "inserts[0].ids", 1, 1, Reason::kDuplicateId);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
+}
+
+TEST_F(BatchApplicationTest, InsertOfAKnownIdIsRefused) {
+  apply(with(points({1}, {1, 1, 1})));
+  expect_error(with(points({2, 1}, {2, 2, 2})), "inserts[0].ids", 1, 1, Reason::kDuplicateId);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
+  EXPECT_TRUE(object(2).has_value());
+}
+
+TEST_F(BatchApplicationTest, UpsertReplacesShapeAndLabels) {
+  InsertColumns first = balls({1}, {2});
+  first.tags = columns_.ids({5});
+  first.groups = columns_.ids({6});
+  apply(with(first));
+  UpdateBatch batch = with(points({1}, {3, 3, 3}));
+  batch.upsert = true;
+  EXPECT_EQ(apply(batch).applied, 1u);
+  Object expected;
+  expected.id = 1;
+  expected.shape.position = {3, 3, 3};
+  EXPECT_EQ(*object(1), expected);
+}
+
+TEST_F(BatchApplicationTest, TheIdOfAnInstanceIsRefusedEvenByUpsert) {
+  ASSERT_TRUE(scene_.change_instances(placing(placement({8}, {0, 0, 0}))).ok());
+  UpdateBatch batch = with(points({8}, {0, 0, 0}));
+  batch.upsert = true;
+  expect_error(batch, "inserts[0].ids", 0, 8, Reason::kDuplicateId);
+}
+
+TEST_F(BatchApplicationTest, IdZeroIsRefused) {
+  expect_error(with(points({0}, {0, 0, 0})), "inserts[0].ids", 0, 0, Reason::kOutOfRange);
+}
+
+TEST_F(BatchApplicationTest, MovesOfInstancesAndUnknownIdsAreRefused) {
+  ASSERT_TRUE(scene_.change_instances(placing(placement({8}, {0, 0, 0}))).ok());
+  expect_error(with(move_to({8}, {0, 0, 0})), "moves[0].ids", 0, 8, Reason::kUnknownId);
+  expect_error(with(move_to({3}, {0, 0, 0})), "moves[0].ids", 0, 3, Reason::kUnknownId);
+}
+
+TEST_F(BatchApplicationTest, RemovesOfUnknownIdsAreRefusedTheSecondOfTwoIncluded) {
+  apply(with(points({1}, {0, 0, 0})));
+  expect_error(removing({1, 1}), "remove_ids", 1, 1, Reason::kUnknownId);
+  EXPECT_TRUE(ids().empty());
+}
+
+TEST_F(BatchApplicationTest, AMoveAfterARemoveInOneBatchIsRefused) {
+  apply(with(points({1}, {0, 0, 0})));
+  UpdateBatch batch = removing({1});
+  batch.moves.push_back(move_to({1}, {1, 1, 1}));
+  expect_error(batch, "moves[0].ids", 0, 1, Reason::kUnknownId);
+}
+
+TEST_F(BatchApplicationTest, RelabelOfAnUnknownIdIsRefused) {
+  RelabelColumns relabel;
+  relabel.ids = columns_.ids({4});
+  expect_error(with(relabel), "relabels[0].ids", 0, 4, Reason::kUnknownId);
+}
+
+TEST_F(BatchApplicationTest, PositionsMustBeFinite) {
+  expect_error(with(points({1, 2}, {0, 0, 0, 0, kNan, 0})), "inserts[0].positions", 1, 2, Reason::kNotFinite);
+  expect_error(with(points({3}, {0, 0, kInfinity})), "inserts[0].positions", 0, 3, Reason::kNotFinite);
+  expect_error(with(move_to({1}, {kNan, 0, 0})), "moves[0].positions", 0, 1, Reason::kNotFinite);
+  EXPECT_EQ(object(1)->shape.position, Vec3d{});
+}
+
+TEST_F(BatchApplicationTest, TheSumOfFrameAndOffsetMustLieWithinTheWorld) {
+  UpdateBatch batch = with(points({1, 2}, {0, 0, 0, 1, 0, 0}));
+  batch.frame = {1e9, 0, 0};
+  expect_error(batch, "inserts[0].positions", 1, 2, Reason::kOutOfRange);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{1e9, 0, 0}));
+}
+
+TEST_F(BatchApplicationTest, AbsolutePositionsAreNamedAndIgnoreTheFrame) {
+  InsertColumns insert;
+  insert.ids = columns_.ids({1, 2});
+  insert.positions_f64 = columns_.doubles({0.1, 0.2, 0.3, 2e9, 0, 0});
+  UpdateBatch batch = with(insert);
+  batch.frame = {1000, 0, 0};
+  expect_error(batch, "inserts[0].positions_f64", 1, 2, Reason::kOutOfRange);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{0.1, 0.2, 0.3}));
+}
+
+TEST_F(BatchApplicationTest, PositionsAreFramePlusOffsetRoundedOnceToDouble) {
+  UpdateBatch batch = with(points({1}, {0.1f, -0.1f, 0}));
+  batch.frame = {0.7, 123456789.125, 0.3};
+  apply(batch);
+  // The exact values of the two floats are written out; each sum is rounded once.
+  EXPECT_EQ(object(1)->shape.position.x, 0.7 + 0.100000001490116119384765625);
+  EXPECT_EQ(object(1)->shape.position.y, 123456789.125 - 0.100000001490116119384765625);
+  EXPECT_EQ(object(1)->shape.position.z, 0.3);
+}
+
+TEST_F(BatchApplicationTest, RadiiMustBeFiniteAndNotNegative) {
+  expect_error(with(balls({1, 2}, {0, -1})), "inserts[0].ball.radii", 1, 2, Reason::kOutOfRange);
+  expect_error(with(balls({3}, {kNan})), "inserts[0].ball.radii", 0, 3, Reason::kNotFinite);
+  expect_error(with(balls({3}, {2e9f})), "inserts[0].ball.radii", 0, 3, Reason::kOutOfRange);
+  EXPECT_EQ(ids(), (std::vector<Id>{1}));
+}
+
+TEST_F(BatchApplicationTest, HalfExtentsMustBeFiniteAndNotNegative) {
+  expect_error(with(boxes({1, 2}, {0, 0, 0, 1, -1, 1})), "inserts[0].box.half_extents", 1, 2, Reason::kOutOfRange);
+  expect_error(with(boxes({3}, {1, 1, kInfinity})), "inserts[0].box.half_extents", 0, 3, Reason::kNotFinite);
+}
+
+TEST_F(BatchApplicationTest, HalfAxesMayBeNegative) {
+  InsertColumns capsules = balls({1, 2}, {1});
+  capsules.kind = ShapeKind::kCapsule;
+  capsules.extents = columns_.floats({-1, -2, -3, 0, kNan, 0});
+  expect_error(with(capsules), "inserts[0].capsule.half_axes", 1, 2, Reason::kNotFinite);
+  EXPECT_EQ(object(1)->shape.size, (Vec3f{-1, -2, -3}));
+}
+
+TEST_F(BatchApplicationTest, CapsuleRadiiAreNamedAsSuch) {
+  InsertColumns capsules = balls({1}, {-1});
+  capsules.kind = ShapeKind::kCapsule;
+  capsules.extents = columns_.floats({0, 0, 1});
+  expect_error(with(capsules), "inserts[0].capsule.radii", 0, 1, Reason::kOutOfRange);
+}
+
+TEST_F(BatchApplicationTest, RotationsOffUnitLengthAreRefused) {
+  InsertColumns insert = points({1, 2}, {0, 0, 0});
+  insert.rotations = columns_.floats({0, 0, 0, 1.0009f, 0, 0, 0, 1.0011f});
+  expect_error(with(insert), "inserts[0].rotations", 1, 2, Reason::kOutOfRange);
+  EXPECT_EQ(object(1)->shape.rotation, Quaternion{});
+}
+
+TEST_F(BatchApplicationTest, RotationsMustBeFinite) {
+  apply(with(points({1}, {0, 0, 0})));
+  MoveColumns move = move_to({1}, {5, 0, 0});
+  move.rotations = columns_.floats({0, kNan, 0, 1});
+  expect_error(with(move), "moves[0].rotations", 0, 1, Reason::kNotFinite);
+  EXPECT_EQ(object(1)->shape.position, Vec3d{});
+}
+
+TEST_F(BatchApplicationTest, RotationsAreStoredNormalised) {
+  InsertColumns insert = points({1}, {0, 0, 0});
+  insert.rotations = columns_.floats({0.6f, 0, 0, 0.8005f});
+  apply(with(insert));
+  EXPECT_LT(unit_deviation(object(1)->shape.rotation), 1e-7);
+}
+
+TEST_F(BatchApplicationTest, AStoredRotationComesBackBitForBitWhenItIsSentAgain) {
+  Random random(17);
+  for (int i = 0; i < 2000; ++i) {
+    InsertColumns insert = points({1}, {0, 0, 0});
+    const Vec3d v = random.unit_vector();
+    insert.rotations = columns_.floats({float(v.x * 0.8), float(v.y * 0.8), float(v.z * 0.8), 0.6f});
+    UpdateBatch batch = with(insert);
+    batch.upsert = true;
+    apply(batch);
+    const Quaternion stored = object(1)->shape.rotation;
+    MoveColumns move = move_to({1}, {0, 0, 0});
+    move.rotations = columns_.floats({stored.x, stored.y, stored.z, stored.w});
+    apply(with(move));
+    ASSERT_EQ(object(1)->shape.rotation, stored) << "seed 17, case " << i;
+  }
+}
+
+TEST_F(BatchApplicationTest, AMoveWithoutRotationKeepsIt) {
+  InsertColumns insert = points({1}, {0, 0, 0});
+  insert.rotations = columns_.floats({0, 0, 1, 0});
+  apply(with(insert));
+  apply(with(move_to({1}, {1, 0, 0})));
+  EXPECT_EQ(object(1)->shape.rotation, (Quaternion{0, 0, 1, 0}));
+}
+
+TEST_F(BatchApplicationTest, AMoveKeepsShapeAndLabels) {
+  InsertColumns insert = balls({1}, {2});
+  insert.tags = columns_.ids({5});
+  apply(with(insert));
+  apply(with(move_to({1}, {1, 0, 0})));
+  EXPECT_EQ(object(1)->shape.kind, ShapeKind::kBall);
+  EXPECT_EQ(object(1)->shape.radius, 2);
+  EXPECT_EQ(object(1)->tag, 5u);
+}
+
+TEST_F(BatchApplicationTest, RelabelKeepsWhatHasNoColumn) {
+  InsertColumns insert = balls({1}, {2});
+  insert.layers = columns_.words({4});
+  insert.groups = columns_.ids({5});
+  insert.tags = columns_.ids({6});
+  apply(with(insert));
+  RelabelColumns relabel;
+  relabel.ids = columns_.ids({1});
+  relabel.layers = columns_.words({0});
+  apply(with(relabel));
+  EXPECT_EQ(object(1)->layers, 0u);
+  EXPECT_EQ(object(1)->group, 5u);
+  EXPECT_EQ(object(1)->tag, 6u);
+  EXPECT_EQ(object(1)->shape.radius, 2);
+}
+
+TEST_F(BatchApplicationTest, RemoveGroupsRemovesEveryObjectOfThem) {
+  InsertColumns insert = points({1, 2, 3, 4}, {0, 0, 0});
+  insert.groups = columns_.ids({7, 8, 7, 0});
+  apply(with(insert));
+  UpdateBatch batch;
+  batch.remove_groups = columns_.ids({7, 99});
+  EXPECT_EQ(apply(batch).applied, 2u);
+  EXPECT_EQ(ids(), (std::vector<Id>{2, 4}));
+}
+
+TEST_F(BatchApplicationTest, GroupZeroIsNoGroupToRemove) {
+  apply(with(points({1}, {0, 0, 0})));
+  UpdateBatch batch;
+  batch.remove_groups = columns_.ids({3, 0});
+  expect_error(batch, "remove_groups", 1, 0, Reason::kOutOfRange);
+  EXPECT_EQ(ids(), (std::vector<Id>{1}));
+}
+
+TEST_F(BatchApplicationTest, OneThousandErrorsAreListedAndAllAreCounted) {
+  std::vector<Id> unknown(2500);
+  for (size_t i = 0; i < unknown.size(); ++i) unknown[i] = 10 + i;
+  const UpdateAck ack = apply(removing(unknown));
+  EXPECT_EQ(ack.refused, 2500u);
+  ASSERT_EQ(ack.errors.size(), 1000u);
+  EXPECT_EQ(ack.errors.back().index, 999u);
+  EXPECT_EQ(ack.errors.back().id, 1009u);
+}
+
+TEST_F(BatchApplicationTest, ErrorsAreListedInOrderOfApplication) {
+  UpdateBatch batch = with(points({0}, {0, 0, 0}));
+  batch.inserts.push_back(points({5, 0}, {0, 0, 0}));
+  batch.moves.push_back(move_to({6}, {0, 0, 0}));
+  batch.remove_ids = columns_.ids({7});
+  const UpdateAck ack = apply(batch);
+  ASSERT_EQ(ack.errors.size(), 4u);
+  EXPECT_EQ(ack.errors[0].field, "remove_ids");
+  EXPECT_EQ(ack.errors[1].field, "inserts[0].ids");
+  EXPECT_EQ(ack.errors[2].field, "inserts[1].ids");
+  EXPECT_EQ(ack.errors[2].index, 1u);
+  EXPECT_EQ(ack.errors[3].field, "moves[0].ids");
+}
+
+TEST_F(BatchApplicationTest, AllOrNothingRefusesTheBatchByItsFirstError) {
+  apply(with(points({1}, {0, 0, 0})));
+  UpdateBatch batch = with(points({2, 3, 1}, {1, 1, 1, kNan, 1, 1, 2, 2, 2}));
+  batch.all_or_nothing = true;
+  batch.tick = 9;
+  const SnapshotPtr before = scene_.latest();
+  expect_refusal(scene_.apply(batch).status(), absl::StatusCode::kInvalidArgument, Reason::kNotFinite,
+                 "inserts[0].positions", 1);
+  EXPECT_EQ(scene_.latest(), before);
+}
+
+TEST_F(BatchApplicationTest, AllOrNothingWithoutErrorsIsApplied) {
+  UpdateBatch batch = with(points({2, 3}, {1, 1, 1}));
+  batch.all_or_nothing = true;
+  EXPECT_EQ(apply(batch).applied, 2u);
+}
+
+TEST_F(BatchApplicationTest, TooManyObjectsRefuseTheBatchAndNameTheLimit) {
+  SceneWriter writer(kEpoch, Winding::kCounterClockwise, StaticSet::empty(), 3);
+  ASSERT_TRUE(writer.apply(with(points({1, 2}, {0, 0, 0}))).ok());
+  const absl::Status status = writer.apply(with(points({3, 4}, {0, 0, 0}))).status();
+  expect_refusal(status, absl::StatusCode::kResourceExhausted, Reason::kLimit, "inserts");
+  EXPECT_EQ(refusal_of(status)->limit, "objects");
+  EXPECT_EQ(refusal_of(status)->limit_value, 3);
+  EXPECT_EQ(refusal_of(status)->asked, 4);
+  EXPECT_EQ(writer.published()->objects.size(), 2u);
+}
+
+TEST_F(BatchApplicationTest, RemovedAndReplacedObjectsMakeRoomWithinTheBatch) {
+  SceneWriter writer(kEpoch, Winding::kCounterClockwise, StaticSet::empty(), 2);
+  ASSERT_TRUE(writer.apply(with(points({1, 2}, {0, 0, 0}))).ok());
+  UpdateBatch replace = with(points({3, 2}, {1, 1, 1}));
+  replace.remove_ids = columns_.ids({1});
+  replace.upsert = true;
+  EXPECT_TRUE(writer.apply(replace).ok());
+  UpdateBatch anew = with(points({7, 8}, {1, 1, 1}));
+  anew.clear = true;
+  EXPECT_TRUE(writer.apply(anew).ok());
+}
+
+}  // namespace
+}  // namespace locus::test

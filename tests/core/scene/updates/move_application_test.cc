@@ -1,0 +1,100 @@
+// Batches of moves alone, which take a way of their own: what it says and does is what BatchApplication says and does.
+#include "core/scene/updates/move_application.h"
+
+#include <limits>
+
+#include "tests/support/random.h"
+#include "tests/support/scene_fixture.h"
+
+namespace locus::test {
+namespace {
+
+class MoveApplicationTest : public SceneFixture {
+ protected:
+  void SetUp() override { apply(with(points({1, 2, 3}, {1, 1, 1, 2, 2, 2, 3, 3, 3}))); }
+};
+
+std::string ack_text(const UpdateAck& ack) {
+  std::string text = std::to_string(ack.applied) + " applied, " + std::to_string(ack.refused) + " refused";
+  for (const ItemError& error : ack.errors)
+    text += "; " + error.field + " " + std::to_string(error.index) + " " + std::to_string(error.id) + " " +
+            std::to_string(static_cast<int>(error.reason));
+  return text;
+}
+
+TEST_F(MoveApplicationTest, ServesMovesAlone) {
+  EXPECT_TRUE(MoveApplication::serves(with(move_to({1}, {0, 0, 0}))));
+  EXPECT_FALSE(MoveApplication::serves(UpdateBatch()));
+  UpdateBatch both = with(move_to({1}, {0, 0, 0}));
+  both.relabels.emplace_back();
+  EXPECT_FALSE(MoveApplication::serves(both));
+}
+
+TEST_F(MoveApplicationTest, OfSeveralMovesOfOneObjectTheLastCountsAndAllAreApplied) {
+  const UpdateAck ack = apply(with(move_to({1, 2, 1}, {5, 5, 5, 6, 6, 6, 7, 7, 7})));
+  EXPECT_EQ(ack.applied, 3u);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{7, 7, 7}));
+  EXPECT_EQ(object(2)->shape.position, (Vec3d{6, 6, 6}));
+}
+
+TEST_F(MoveApplicationTest, AMoveThereAndBackMakesNoRevision) {
+  const uint64_t before = revision();
+  EXPECT_EQ(apply(with(move_to({1, 1}, {5, 5, 5, 1, 1, 1}))).revision, before);
+}
+
+TEST_F(MoveApplicationTest, ATurnAloneIsAChangeAndIsKeptByLaterMoves) {
+  MoveColumns turn = move_to({2}, {2, 2, 2});
+  turn.rotations = columns_.floats({0, 0, 1, 0});
+  const uint64_t before = revision();
+  EXPECT_EQ(apply(with(turn)).revision, before + 1);
+  EXPECT_EQ(apply(with(turn)).revision, before + 1);
+  apply(with(move_to({2}, {4, 4, 4})));
+  EXPECT_EQ(object(2)->shape.rotation, (Quaternion{0, 0, 1, 0}));
+  EXPECT_EQ(object(2)->shape.position, (Vec3d{4, 4, 4}));
+}
+
+TEST_F(MoveApplicationTest, AllOrNothingRefusesTheBatchAndChangesNothing) {
+  UpdateBatch batch = with(move_to({1, 99}, {5, 5, 5, 6, 6, 6}));
+  batch.all_or_nothing = true;
+  const uint64_t before = revision();
+  expect_refusal(scene_.apply(batch).status(), absl::StatusCode::kInvalidArgument, Reason::kUnknownId, "moves[0].ids",
+                 1);
+  EXPECT_EQ(revision(), before);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
+}
+
+TEST_F(MoveApplicationTest, ComesToWhatTheGeneralWayComesTo) {
+  Random random(5);
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  Scene other("other", {}, kEpoch, StaticSet::empty());
+  ASSERT_TRUE(other.apply(with(points({1, 2, 3}, {1, 1, 1, 2, 2, 2, 3, 3, 3}))).ok());
+  for (int round = 0; round < 500; ++round) {
+    Columns columns;
+    UpdateBatch batch;
+    for (uint64_t list = 0; list <= random.below(2); ++list) {
+      std::vector<Id> ids;
+      std::vector<float> positions, rotations;
+      for (uint64_t i = 0; i <= random.below(5); ++i) {
+        ids.push_back(random.below(5));
+        for (int axis = 0; axis < 3; ++axis)
+          positions.push_back(random.chance(0.03) ? kNan : random.chance(0.03) ? 2e9f : random.float_between(-4, 4));
+        for (const float part : {0.0f, 0.0f, random.chance(0.1) ? 3.0f : 1.0f, 0.0f}) rotations.push_back(part);
+      }
+      MoveColumns move;
+      move.ids = columns.ids(ids);
+      move.positions = columns.floats(positions);
+      if (random.chance(0.3)) move.rotations = columns.floats(rotations);
+      batch.moves.push_back(move);
+    }
+    const absl::StatusOr<UpdateAck> fast = scene_.apply(batch);
+    batch.relabels.emplace_back();  // of nothing: sends the same batch the general way
+    const absl::StatusOr<UpdateAck> general = other.apply(batch);
+    ASSERT_TRUE(fast.ok() && general.ok());
+    ASSERT_EQ(ack_text(*fast), ack_text(*general)) << "seed 5, round " << round;
+    ASSERT_EQ(fast->revision, general->revision) << "seed 5, round " << round;
+    for (const Id id : {1, 2, 3}) ASSERT_EQ(object(id), other.latest()->objects.find(id));
+  }
+}
+
+}  // namespace
+}  // namespace locus::test

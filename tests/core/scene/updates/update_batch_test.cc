@@ -1,0 +1,178 @@
+// The form of update batches: which column lengths, frames and numbers are refused, and how the refusal names them.
+#include "core/scene/updates/update_batch.h"
+
+#include <limits>
+
+#include "core/base/limits.h"
+#include "gtest/gtest.h"
+#include "tests/support/columns.h"
+
+namespace locus::test {
+namespace {
+
+class UpdateFormTest : public ::testing::Test {
+ protected:
+  UpdateFormTest() {
+    batch_.inserts.emplace_back();
+    insert().ids = columns_.ids({1, 2, 3});
+    insert().positions = columns_.floats(std::vector<float>(9));
+    batch_.moves.emplace_back();
+    batch_.moves[0].ids = columns_.ids({1, 2, 3});
+    batch_.moves[0].positions = columns_.floats(std::vector<float>(9));
+    batch_.relabels.emplace_back();
+    batch_.relabels[0].ids = columns_.ids({1, 2, 3});
+  }
+
+  InsertColumns& insert() { return batch_.inserts[0]; }
+
+  // The field of the refusal, empty when the form is right.
+  std::string refused_field(Reason reason = Reason::kColumnLength) {
+    const absl::Status status = check_form(batch_);
+    if (status.ok()) return "";
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    const std::optional<Refusal> refusal = refusal_of(status);
+    EXPECT_EQ(refusal->reason, reason) << status;
+    return refusal->field;
+  }
+
+  // Lets `column` have each length from 0 to 3 * width + 1 and returns those that are accepted, in entries; expects the
+  // others to be refused as `field`.
+  template <class T>
+  std::vector<size_t> accepted(absl::Span<const T>& column, size_t width, const std::string& field) {
+    const absl::Span<const T> before = column;
+    std::vector<size_t> lengths;
+    for (size_t length = 0; length <= 3 * width + 1; ++length) {
+      column = columns_.keep(std::vector<T>(length));
+      const std::string refused = refused_field();
+      if (refused.empty()) {
+        EXPECT_EQ(length % width, 0u);
+        lengths.push_back(length / width);
+      } else {
+        EXPECT_EQ(refused, field);
+      }
+    }
+    column = before;
+    return lengths;
+  }
+
+  Columns columns_;
+  UpdateBatch batch_;
+};
+
+using Lengths = std::vector<size_t>;
+
+TEST_F(UpdateFormTest, AnEmptyBatchIsFine) {
+  batch_ = {};
+  EXPECT_EQ(refused_field(), "");
+}
+
+TEST_F(UpdateFormTest, AnEmptyListIsFine) {
+  batch_ = {};
+  batch_.inserts.resize(1);
+  batch_.moves.resize(1);
+  batch_.relabels.resize(1);
+  EXPECT_EQ(refused_field(), "");
+}
+
+TEST_F(UpdateFormTest, PositionsHaveOneEntryEachOrOneForAll) {
+  EXPECT_EQ(accepted(insert().positions, 3, "inserts[0].positions"), (Lengths{1, 3}));
+}
+
+TEST_F(UpdateFormTest, AbsolutePositionsHaveOneEntryEachOrOneForAll) {
+  batch_.moves[0].positions = {};
+  batch_.moves[0].positions_f64 = columns_.doubles({1, 2});
+  EXPECT_EQ(refused_field(), "moves[0].positions_f64");
+  batch_.moves[0].positions_f64 = columns_.doubles({1, 2, 3});
+  EXPECT_EQ(refused_field(), "");
+}
+
+TEST_F(UpdateFormTest, MovedPositionsHaveOneEntryEachOrOneForAll) {
+  EXPECT_EQ(accepted(batch_.moves[0].positions, 3, "moves[0].positions"), (Lengths{1, 3}));
+}
+
+TEST_F(UpdateFormTest, BothKindsOfPositionsAreRefused) {
+  insert().positions_f64 = columns_.doubles(std::vector<double>(9));
+  EXPECT_EQ(refused_field(Reason::kMalformed), "inserts[0].positions_f64");
+}
+
+TEST_F(UpdateFormTest, RotationsMayBeAbsent) {
+  EXPECT_EQ(accepted(insert().rotations, 4, "inserts[0].rotations"), (Lengths{0, 1, 3}));
+  EXPECT_EQ(accepted(batch_.moves[0].rotations, 4, "moves[0].rotations"), (Lengths{0, 1, 3}));
+}
+
+TEST_F(UpdateFormTest, LabelsMayBeAbsent) {
+  EXPECT_EQ(accepted(insert().layers, 1, "inserts[0].layers"), (Lengths{0, 1, 3}));
+  EXPECT_EQ(accepted(insert().groups, 1, "inserts[0].groups"), (Lengths{0, 1, 3}));
+  EXPECT_EQ(accepted(insert().tags, 1, "inserts[0].tags"), (Lengths{0, 1, 3}));
+}
+
+TEST_F(UpdateFormTest, NewLabelsMayBeAbsent) {
+  EXPECT_EQ(accepted(batch_.relabels[0].layers, 1, "relabels[0].layers"), (Lengths{0, 1, 3}));
+  EXPECT_EQ(accepted(batch_.relabels[0].groups, 1, "relabels[0].groups"), (Lengths{0, 1, 3}));
+  EXPECT_EQ(accepted(batch_.relabels[0].tags, 1, "relabels[0].tags"), (Lengths{0, 1, 3}));
+}
+
+TEST_F(UpdateFormTest, BallsNeedRadii) {
+  insert().kind = ShapeKind::kBall;
+  EXPECT_EQ(accepted(insert().radii, 1, "inserts[0].ball.radii"), (Lengths{1, 3}));
+}
+
+TEST_F(UpdateFormTest, BoxesNeedHalfExtents) {
+  insert().kind = ShapeKind::kBox;
+  EXPECT_EQ(accepted(insert().extents, 3, "inserts[0].box.half_extents"), (Lengths{1, 3}));
+}
+
+TEST_F(UpdateFormTest, CapsulesNeedRadiiAndHalfAxes) {
+  insert().kind = ShapeKind::kCapsule;
+  insert().extents = columns_.floats({0, 0, 1});
+  EXPECT_EQ(accepted(insert().radii, 1, "inserts[0].capsule.radii"), (Lengths{1, 3}));
+  insert().radii = columns_.floats({1});
+  EXPECT_EQ(accepted(insert().extents, 3, "inserts[0].capsule.half_axes"), (Lengths{1, 3}));
+}
+
+TEST_F(UpdateFormTest, TheSecondListIsNamedAsSuch) {
+  batch_.moves.push_back(batch_.moves[0]);
+  batch_.moves[1].positions = {};
+  EXPECT_EQ(refused_field(), "moves[1].positions");
+}
+
+TEST_F(UpdateFormTest, AFrameMustBeFinite) {
+  batch_.frame.y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refused_field(Reason::kNotFinite), "frame");
+  batch_.frame.y = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(refused_field(Reason::kNotFinite), "frame");
+}
+
+TEST_F(UpdateFormTest, AFrameMustLieWithinTheWorld) {
+  batch_.frame.z = -1e9;
+  EXPECT_EQ(refused_field(), "");
+  batch_.frame.z = std::nextafter(-1e9, -2e9);
+  EXPECT_EQ(refused_field(Reason::kOutOfRange), "frame");
+}
+
+TEST_F(UpdateFormTest, AWriterNeedsABatchNumber) {
+  batch_.writer = 7;
+  EXPECT_EQ(refused_field(Reason::kMalformed), "batch");
+}
+
+TEST_F(UpdateFormTest, ABatchNumberNeedsAWriter) {
+  batch_.batch = 1;
+  EXPECT_EQ(refused_field(Reason::kMalformed), "writer");
+}
+
+TEST_F(UpdateFormTest, TooManyItemsNameTheLimit) {
+  batch_ = {};
+  batch_.remove_ids = columns_.ids(std::vector<uint64_t>(limits::kMaxUpdateItems - 1));
+  batch_.remove_groups = columns_.ids({1});
+  EXPECT_EQ(refused_field(), "");
+  batch_.relabels.emplace_back();
+  batch_.relabels[0].ids = columns_.ids({1});
+  EXPECT_EQ(refused_field(Reason::kLimit), "batch");
+  const Refusal refusal = refusal_of(check_form(batch_)).value();
+  EXPECT_EQ(refusal.limit, "update_items");
+  EXPECT_EQ(refusal.limit_value, limits::kMaxUpdateItems);
+  EXPECT_EQ(refusal.asked, limits::kMaxUpdateItems + 1.0);
+}
+
+}  // namespace
+}  // namespace locus::test
