@@ -19,12 +19,12 @@ static_assert(kNumbersPerMessage % 3 == 0, "messages end between triples");
 using Writer = grpc::ClientWriterInterface<v1::UploadMeshRequest>;
 
 absl::Status check(const MeshColumns& mesh) {
-  constexpr size_t kMost = std::numeric_limits<uint32_t>::max();
+  constexpr size_t kMax = std::numeric_limits<uint32_t>::max();
   for (const auto& [name, size] : {std::pair("vertices", mesh.vertices.size()), {"indices", mesh.indices.size()}}) {
     if (size % 3 != 0) {
       return absl::InvalidArgumentError(absl::StrCat(name, " has ", size, " numbers: give three for each entry"));
     }
-    if (size / 3 > kMost) return absl::InvalidArgumentError(absl::StrCat(name, " has too many numbers to count"));
+    if (size / 3 > kMax) return absl::InvalidArgumentError(absl::StrCat(name, " has too many numbers to count"));
   }
   return absl::OkStatus();
 }

@@ -43,28 +43,28 @@ inline constexpr uint32_t kMaxNearest = 65536;             // k of a query for w
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;  // clients refuse 4 MiB by default
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
-inline constexpr uint32_t kRecentRevisions = 64;                // kept for `exactly` views ...
-inline constexpr uint64_t kRecentBytes = 2u << 20;              // ... while what they replaced takes at most this much
-inline constexpr uint64_t kPinnedBytes = uint64_t{256} << 20;   // that batches may keep from being freed, per scene ...
-inline constexpr uint32_t kPinnedShare = 4;                     // ... or so often what the scene itself takes
-inline constexpr uint64_t kLeastPinnedBytes = 1u << 20;         // where that is set
-inline constexpr uint64_t kSnapshotAfterBytes = 64u << 20;      // of a scene's log
-inline constexpr uint64_t kLeastSnapshotAfterBytes = 1u << 16;  // where that is set
-inline constexpr uint32_t kDefaultWaitMs = 1000;                // at_least without a deadline
-inline constexpr uint32_t kTestsBetweenChecks = 4096;           // primitive tests between two looks at the deadline
+inline constexpr uint32_t kRecentRevisions = 64;               // kept for `exactly` views ...
+inline constexpr uint64_t kRecentBytes = 2u << 20;             // ... while what they replaced takes at most this much
+inline constexpr uint64_t kPinnedBytes = uint64_t{256} << 20;  // that batches may keep from being freed, per scene ...
+inline constexpr uint32_t kPinnedShare = 4;                    // ... or so often what the scene itself takes
+inline constexpr uint64_t kMinPinnedBytes = 1u << 20;          // where that is set
+inline constexpr uint64_t kSnapshotAfterBytes = 64u << 20;     // of a scene's log
+inline constexpr uint64_t kMinSnapshotAfterBytes = 1u << 16;   // where that is set
+inline constexpr uint32_t kDefaultWaitMs = 1000;               // at_least without a deadline
+inline constexpr uint32_t kTestsBetweenChecks = 4096;          // primitive tests between two looks at the deadline
 
 inline constexpr uint32_t kMaxHistoryTicks = 1u << 14;                 // per scene
 inline constexpr uint64_t kDefaultHistoryBytes = uint64_t{256} << 20;  // per scene that keeps any ...
 inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;        // ... and the most it may be given
 
-inline constexpr uint32_t kReceiveBytes = 32u << 20;          // one message
-inline constexpr uint32_t kMaxStreams = 1024;                 // open update and query streams
-inline constexpr uint32_t kMaxCalls = 256;                    // calls in work at once, streams apart
-inline constexpr uint32_t kMaxThreads = 256;                  // that work on one batch
-inline constexpr uint32_t kMaxWaitingBatches = 1024;          // that wait for a helping thread; more work alone
-inline constexpr uint64_t kLeastMemory = uint64_t{64} << 20;  // bytes that a server may be told to get along with ...
-inline constexpr uint64_t kMostMemory = uint64_t{1} << 50;    // ... and the most it may be promised
-inline constexpr uint32_t kMaxDrainGraceS = 3600;             // for calls in work when the server is told to end
+inline constexpr uint32_t kReceiveBytes = 32u << 20;        // one message
+inline constexpr uint32_t kMaxStreams = 1024;               // open update and query streams
+inline constexpr uint32_t kMaxCalls = 256;                  // calls in work at once, streams apart
+inline constexpr uint32_t kMaxThreads = 256;                // that work on one batch
+inline constexpr uint32_t kMaxWaitingBatches = 1024;        // that wait for a helping thread; more work alone
+inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;  // bytes that a server may be told to get along with ...
+inline constexpr uint64_t kMaxMemory = uint64_t{1} << 50;   // ... and the most it may be promised
+inline constexpr uint32_t kMaxDrainGraceS = 3600;           // for calls in work when the server is told to end
 inline constexpr uint32_t kMaxListenAddresses = 16;
 inline constexpr uint32_t kMaxPageSize = 1000;  // scenes or meshes a page
 

@@ -58,19 +58,19 @@ bool is_size(const std::string& text, uint64_t least, uint64_t most) {
 }
 
 std::string check_memory(const std::string& text) {
-  const bool good = is_size(text, limits::kLeastMemory, limits::kMostMemory);
+  const bool good = is_size(text, limits::kMinMemory, limits::kMaxMemory);
   return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 64MiB .. 1PiB");
 }
 
 std::string check_pinned(const std::string& text) {
-  const bool good = is_size(text, limits::kLeastPinnedBytes, limits::kMostMemory);
+  const bool good = is_size(text, limits::kMinPinnedBytes, limits::kMaxMemory);
   return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 1MiB .. 1PiB");
 }
 
 std::string check_snapshot_after(const std::string& text) {
   uint64_t bytes = 0;
   const bool good =
-      absl::SimpleAtoi(text, &bytes) && bytes >= limits::kLeastSnapshotAfterBytes && bytes <= limits::kMostMemory;
+      absl::SimpleAtoi(text, &bytes) && bytes >= limits::kMinSnapshotAfterBytes && bytes <= limits::kMaxMemory;
   return good ? "" : absl::StrCat(text, " bytes is not in 64KiB .. 1PiB");
 }
 

@@ -105,13 +105,13 @@ class HotCall final : private IoLoop::Resident {
     bool fit_to_keep() {
       if (bytes_since_look_ < kLookEvery) return true;
       bytes_since_look_ = 0;
-      return request_.SpaceUsedLong() + response_.SpaceUsedLong() <= kMostKept;
+      return request_.SpaceUsedLong() + response_.SpaceUsedLong() <= kMaxKept;
     }
 
    private:
     friend class HotCall;
     static constexpr size_t kLookEvery = 1u << 20;
-    static constexpr size_t kMostKept = 1u << 20;
+    static constexpr size_t kMaxKept = 1u << 20;
 
     HotCall* call_ = nullptr;
     Request request_;

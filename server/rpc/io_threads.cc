@@ -14,7 +14,7 @@ namespace {
 
 using std::chrono::system_clock;
 
-constexpr uint32_t kMostThreads = 16;
+constexpr uint32_t kMaxThreads = 16;
 
 }  // namespace
 
@@ -102,7 +102,7 @@ void IoLoop::drain_residents(bool) {
 
 uint32_t IoThreads::count_for(uint32_t cores) {
   if (cores <= 1) return 1;
-  return std::clamp(cores / 2, 2u, kMostThreads);
+  return std::clamp(cores / 2, 2u, kMaxThreads);
 }
 
 IoThreads::IoThreads(grpc::ServerBuilder& builder, uint32_t count)

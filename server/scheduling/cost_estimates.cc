@@ -11,11 +11,11 @@ namespace {
 constexpr double kBlockNanoseconds = 500;
 // Before anything is known: what scenes of 100,000 triangles and 10,000 objects take. In the order of CostKind.
 constexpr std::array<double, 8> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000};
-constexpr double kLeast = 1, kMost = 1e12;
+constexpr double kMin = 1, kMax = 1e12;
 constexpr size_t kProbes = 8;
 // So many queries weigh as much as all that was learned before.
 constexpr double kForgetQueries = 2048;
-constexpr double kLeastWeight = 1.0 / 64, kMostWeight = 0.5;
+constexpr double kMinWeight = 1.0 / 64, kMaxWeight = 0.5;
 
 uint64_t mixed(uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -73,17 +73,17 @@ uint64_t CostEstimates::nanoseconds(uint64_t scene, const QueryBatch& batch) con
   double sum = 0;
   for (const QueryBlock& block : batch.blocks)
     sum += kBlockNanoseconds + static_cast<double>(query_count(block)) * nanoseconds_a_query(scene, block);
-  return static_cast<uint64_t>(std::min(sum, kMost));
+  return static_cast<uint64_t>(std::min(sum, kMax));
 }
 
 void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds) {
   const auto queries = static_cast<double>(query_count(block));
   if (queries == 0) return;
-  const double seen = std::clamp(static_cast<double>(nanoseconds) / queries, kLeast, kMost);
+  const double seen = std::clamp(static_cast<double>(nanoseconds) / queries, kMin, kMax);
   const Place place = place_of(scene, block);
   std::atomic<uint64_t>& at = entries_[find(place)];
   uint64_t before = at.load(std::memory_order_relaxed);
-  const double weight = std::clamp(queries / kForgetQueries, kLeastWeight, kMostWeight);
+  const double weight = std::clamp(queries / kForgetQueries, kMinWeight, kMaxWeight);
   const double known = nanoseconds_of(before);
   const double now = tag_of(before) == place.tag ? known + (seen - known) * weight : seen;
   at.compare_exchange_strong(before, packed(place.tag, now), std::memory_order_relaxed);

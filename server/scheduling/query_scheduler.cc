@@ -17,7 +17,7 @@ constexpr uint32_t kLongestRetryMs = 10'000;
 // Of the work done while both classes wait, large jobs get a part in so many.
 constexpr uint64_t kLargeShare = 5;
 // Withdrawn tickets that may stay in line until their turn comes.
-constexpr uint32_t kMostTombstones = 256;
+constexpr uint32_t kMaxTombstones = 256;
 
 constexpr const char* kJobLimits[kJobClasses] = {"small_batches", "large_batches"};
 constexpr const char* kWorkLimits[kJobClasses] = {"small_batch_work_ms", "large_batch_work_ms"};
@@ -213,7 +213,7 @@ void QueryScheduler::take_in() {
     queue_of(*ticket).push_back(ticket->client, ticket);
     ticket->in_line = true;
   }
-  if (tombstones_.load(std::memory_order_relaxed) > kMostTombstones) drop_withdrawn();
+  if (tombstones_.load(std::memory_order_relaxed) > kMaxTombstones) drop_withdrawn();
 }
 
 void QueryScheduler::drop_withdrawn() {

@@ -20,8 +20,8 @@ constexpr size_t kRoom = limits::kDefaultReplyBytes - kFrameBytes;
 // A vertex or a triangle: three numbers of four bytes.
 constexpr size_t kTripleBytes = 12;
 // A part's name, the triangle it begins at, and the tags and lengths of both and of the part.
-constexpr size_t kMostPartBytes = limits::kMaxLabelLength + 16;
-static_assert(kMostPartBytes <= kRoom);
+constexpr size_t kMaxPartBytes = limits::kMaxLabelLength + 16;
+static_assert(kMaxPartBytes <= kRoom);
 // Indices that are unpacked before they go into a piece.
 constexpr uint64_t kIndicesAtOnce = 3 << 14;
 
@@ -34,11 +34,11 @@ class Pieces {
   }
 
   void add(const MeshPart& part) {
-    make_room(kMostPartBytes);
+    make_room(kMaxPartBytes);
     v1::MeshPart* out = piece_.add_parts();
     out->set_name(part.name);
     out->set_first_triangle(part.first_triangle);
-    used_ += kMostPartBytes;
+    used_ += kMaxPartBytes;
   }
 
   // Appends triples to the column that `mutable_column` returns of the piece in hand.

@@ -14,8 +14,8 @@ namespace {
 
 // Things a piece. One thing takes at most its columns, the frame of a run of its own, and a mesh's name.
 constexpr size_t kThingsPerPiece = 16384;
-constexpr size_t kMostBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
-static_assert(kThingsPerPiece * kMostBytesPerThing <= limits::kDefaultReplyBytes);
+constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
+static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
 
 template <class Message>
 void add_position(const Vec3d& position, Message* to) {

@@ -35,12 +35,12 @@ using std::chrono::system_clock;
 constexpr int kSpareThreads = 64;
 // Of the memory limit, and never too little for a few of the largest messages.
 constexpr uint64_t kNetworkShare = 8;
-constexpr size_t kLeastNetworkBytes = size_t{256} << 20;
+constexpr size_t kMinNetworkBytes = size_t{256} << 20;
 // A caller whose machine is gone would otherwise keep its streams for ever.
 constexpr int kPingEveryMs = 30'000;
 constexpr int kPingAnswerMs = 10'000;
 // Callers may ping that often too, to notice when this server is gone.
-constexpr int kLeastPingIntervalMs = 5'000;
+constexpr int kMinPingIntervalMs = 5'000;
 // For statuses on their way and for health watchers, once no call is in work.
 constexpr milliseconds kLastWords{500};
 
@@ -84,7 +84,7 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   const int calls = static_cast<int>(config.max_calls);
   quota.SetMaxThreads(2 * calls + kSpareThreads);
   // What connections hold of messages under way: who sends and never reads is cut off when it is used up.
-  quota.Resize(std::max(kLeastNetworkBytes, static_cast<size_t>(config.memory_limit / kNetworkShare)));
+  quota.Resize(std::max(kMinNetworkBytes, static_cast<size_t>(config.memory_limit / kNetworkShare)));
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
   builder.SetMaxSendMessageSize(-1);
@@ -93,7 +93,7 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kLeastPingIntervalMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
   // Two daemons on one port would share its calls at random; the second is to fail instead.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
 }

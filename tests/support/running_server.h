@@ -56,7 +56,7 @@ inline server::ServerConfig test_config() {
   config.listen = {"127.0.0.1:0"};
   config.http_listen = "";
   config.threads = 2;
-  config.memory_limit = limits::kMostMemory;
+  config.memory_limit = limits::kMaxMemory;
   config.log_level = server::LogLevel::kError;
   return config;
 }

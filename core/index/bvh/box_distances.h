@@ -27,8 +27,8 @@ class BoxDistances {
     const double raised = std::sqrt(squared) * (1 + kRounding) + pad_;
     const double result = raised * raised * (1 + kRounding);
     // Squares below this are no longer floats of full precision.
-    constexpr double kLeast = 0x1p-100, kMost = std::numeric_limits<float>::max();
-    return result > kMost ? std::numeric_limits<float>::infinity() : static_cast<float>(std::max(result, kLeast));
+    constexpr double kMin = 0x1p-100, kMax = std::numeric_limits<float>::max();
+    return result > kMax ? std::numeric_limits<float>::infinity() : static_cast<float>(std::max(result, kMin));
   }
 
   void to_boxes(const float (&bounds)[6][kTreeWidth], float (&away)[kTreeWidth]) const {

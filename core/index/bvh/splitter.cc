@@ -10,7 +10,7 @@ namespace {
 using limits::kMaxBvhBins;
 
 // Up to so many references are sorted instead of binned.
-constexpr size_t kMostSorted = 32;
+constexpr size_t kMaxSorted = 32;
 // References between two looks at the cancel flag.
 constexpr size_t kReferencesBetweenChecks = 1u << 16;
 // Of a reference beside a block. Of cuts that leave as many blocks at best, whose cost is equal else, those are good
@@ -100,7 +100,7 @@ class Orders {
   // A reference's place is the number of those before it: all pairs are compared, along all axes at once and without a
   // branch.
   explicit Orders(BoxReferences<S> references) {
-    std::array<Quad<S>, kMostSorted> centers, places;
+    std::array<Quad<S>, kMaxSorted> centers, places;
     for (size_t i = 0; i < references.size(); ++i) {
       const Quad<S> center = references[i].center();
       Quad<S> place = Quad<S>::all(0);
@@ -121,20 +121,20 @@ class Orders {
   size_t at(size_t axis, size_t place) const { return order_[axis][place]; }
 
   void apply(size_t axis, BoxReferences<S> references) const {
-    std::array<BoxReference<S>, kMostSorted> ordered;
+    std::array<BoxReference<S>, kMaxSorted> ordered;
     for (size_t i = 0; i < references.size(); ++i) ordered[i] = references[at(axis, i)];
     std::copy_n(ordered.begin(), references.size(), references.begin());
   }
 
  private:
-  std::array<std::array<uint8_t, kMostSorted>, 3> order_;
+  std::array<std::array<uint8_t, kMaxSorted>, 3> order_;
 };
 
 // Sweeps one axis from both sides; keeps the cheapest cut in `best`, whose bin is the left part's length.
 template <class S>
 void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, size_t axis, Split<S>& best) {
   const size_t count = references.size();
-  std::array<S, kMostSorted> right_cost;
+  std::array<S, kMaxSorted> right_cost;
   QuadBox<S> sum = QuadBox<S>::empty();
   for (size_t i = count - 1; i > 0; --i) {
     sum.add(references[orders.at(axis, i)].box());
@@ -257,7 +257,7 @@ Extent<S> extent_of(BoxReferences<S> references) {
 template <class S>
 Halves<S> Splitter<S>::split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const {
   const auto count = static_cast<uint32_t>(references.size());
-  Halves<S> halves = count <= kMostSorted ? split_sorted(references) : split_binned(references, extent, options_);
+  Halves<S> halves = count <= kMaxSorted ? split_sorted(references) : split_binned(references, extent, options_);
   const bool found = halves.left_count != 0;
   if (found && balanced_levels(std::max(halves.left_count, count - halves.left_count)) <= levels) return halves;
   return halve(references, extent.centers);

@@ -57,7 +57,7 @@ struct BrickPlace {
 };
 
 struct Brick {
-  static constexpr uint32_t kMostRecent = 128;
+  static constexpr uint32_t kMaxRecent = 128;
 
   // What every query reads comes first.
   uint32_t number = 0;                      // in the list of bricks, from its first version to its last
@@ -68,12 +68,12 @@ struct Brick {
   uint32_t recent_count = 0;  // this version's share of the log
   uint32_t recent_gone_count = 0;
   BrickPlace place;
-  std::array<uint64_t, kMostRecent / 64 + 1> recent_gone{};
+  std::array<uint64_t, kMaxRecent / 64 + 1> recent_gone{};
   static constexpr size_t kGoneInPlace = 20;
   absl::InlinedVector<uint64_t, kGoneInPlace> gone;
 
   // How many values the log of changes holds: by the number of sorted ones, so that it stays a part of the memory.
-  uint32_t recent_room() const { return std::clamp(sorted->count() / 2, 16u, kMostRecent); }
+  uint32_t recent_room() const { return std::clamp(sorted->count() / 2, 16u, kMaxRecent); }
   uint32_t size() const { return sorted->count() - gone_count + recent_count - recent_gone_count; }
   bool is_gone(uint32_t slot) const { return !gone.empty() && (gone[slot / 64] >> (slot % 64) & 1) != 0; }
   bool is_recent_gone(uint32_t slot) const { return (recent_gone[slot / 64] >> (slot % 64) & 1) != 0; }

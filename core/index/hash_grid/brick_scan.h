@@ -157,7 +157,7 @@ class BallCull {
 // The rows of cells, numbered within the brick, of its sorted block: those that hold values, and rows that follow on
 // each other as one.
 inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
-  static_assert(GridRows::kMost == 1 << (2 * kBrickBits));
+  static_assert(GridRows::kMax == 1 << (2 * kBrickBits));
   const GridBlock& sorted = *brick.sorted;
   GridRows rows;
   rows.x = sorted.column(0), rows.y = sorted.column(1), rows.z = sorted.column(2), rows.reach = sorted.column(3);
@@ -189,17 +189,17 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   return rows;
 }
 
-// fn(rows) for these, or parts of them of at most kMostValues; false once fn() was.
+// fn(rows) for these, or parts of them of at most kMaxValues; false once fn() was.
 template <class Fn>
 bool for_each_part(const GridRows& rows, const Fn& fn) {
   uint32_t values = 0;
   for (uint32_t row = 0; row < rows.count; ++row) values += rows.end[row] - rows.begin[row];
-  if (values <= GridRows::kMostValues) return values == 0 || fn(rows);
+  if (values <= GridRows::kMaxValues) return values == 0 || fn(rows);
   GridRows part = rows;
   part.count = 1;
   for (uint32_t row = 0; row < rows.count; ++row) {
     for (part.begin[0] = rows.begin[row]; part.begin[0] < rows.end[row]; part.begin[0] = part.end[0]) {
-      part.end[0] = std::min(rows.end[row], part.begin[0] + GridRows::kMostValues);
+      part.end[0] = std::min(rows.end[row], part.begin[0] + GridRows::kMaxValues);
       if (!fn(part)) return false;
     }
   }
@@ -211,7 +211,7 @@ template <class Cull, class Visit>
 bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work& work, const Cull& cull,
                const Visit& visit) {
   return for_each_part(all, [&](const GridRows& rows) {
-    uint32_t slots[GridRows::kMostValues + GridBlock::kLanes];
+    uint32_t slots[GridRows::kMaxValues + GridBlock::kLanes];
     const uint32_t kept = cull(rows, slots);
     work.cells += rows.count;
     for (uint32_t i = 0; i < kept; ++i) block.prefetch_entry(slots[i]);

@@ -61,7 +61,7 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
 
 bool cell_exponent_serves(absl::Span<const SampledValue> sample, size_t population, int exponent) {
   const double others = mean_others_per_cell(sample, population, exponent);
-  return others >= kFewestServing && others <= kMostServing;
+  return others >= kFewestServing && others <= kMaxServing;
 }
 
 }  // namespace locus::internal

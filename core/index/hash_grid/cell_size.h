@@ -16,7 +16,7 @@ inline constexpr double kMaxMeanPerCell = 24;     // values that share the cell 
 inline constexpr double kMeanPerCellMargin = 12;  // ... or so many more than at the smallest sensible cell
 
 inline constexpr double kFewestServing = 6;  // a choice is kept while as many share a cell, at least ...
-inline constexpr double kMostServing = 64;   // ... and at most
+inline constexpr double kMaxServing = 64;    // ... and at most
 
 struct SampledValue {
   Vec3d position;

@@ -103,7 +103,7 @@ void NearCandidates::collect_recent(const Brick& brick, const GridNear& near, Wo
   const GridKernels& kernels = active_grid_kernels();
   const auto source = static_cast<uint32_t>(sources_.size());
   sources_.push_back({brick.recent.get(), brick.number});
-  float keys[GridRows::kMostValues + GridBlock::kLanes];
+  float keys[GridRows::kMaxValues + GridBlock::kLanes];
   size_t next = 0;
   const auto cull = [&](const GridRows& rows, uint32_t* slots) {
     next = 0;
@@ -120,8 +120,8 @@ void NearCandidates::collect_recent(const Brick& brick, const GridNear& near, Wo
 void NearCandidates::collect_rows(const GridBlock& block, uint32_t brick, const GridRows& rows, const GridNear& near) {
   const GridKernels& kernels = active_grid_kernels();
   sources_.push_back({&block, brick});
-  uint32_t slots[GridRows::kMostValues + GridBlock::kLanes];
-  float keys[GridRows::kMostValues + GridBlock::kLanes];
+  uint32_t slots[GridRows::kMaxValues + GridBlock::kLanes];
+  float keys[GridRows::kMaxValues + GridBlock::kLanes];
   for_each_part(rows, [&](const GridRows& part) {
     add(slots, keys, kernels.collect_near(part, near, slots, keys));
     return true;
@@ -140,14 +140,14 @@ void NearCandidates::add(const uint32_t* slots, const float* keys, uint32_t coun
 
 void NearCandidates::sort() {
   const auto count = static_cast<uint32_t>(candidates_.size());
-  if (count > kMostSorted) {
+  if (count > kMaxSorted) {
     std::sort(candidates_.begin(), candidates_.end(),
               [](const Candidate& a, const Candidate& b) { return a.key < b.key; });
     return;
   }
   // By the bits of the keys, which are not negative; the lowest make room for the candidate's number.
-  int32_t numbers[kMostSorted];
-  Candidate given[kMostSorted];
+  int32_t numbers[kMaxSorted];
+  Candidate given[kMaxSorted];
   for (uint32_t i = 0; i < count; ++i) {
     given[i] = candidates_[i];
     numbers[i] = (std::bit_cast<int32_t>(given[i].key) & ~kNumberBits) | static_cast<int32_t>(i);

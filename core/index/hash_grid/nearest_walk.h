@@ -72,7 +72,7 @@ class NearCandidates {
     const GridBlock* block;
     uint32_t brick;
   };
-  static constexpr int32_t kNumberBits = kMostSorted - 1;
+  static constexpr int32_t kNumberBits = kMaxSorted - 1;
 
   GridRef value(const Candidate& candidate) const {
     const Source& source = sources_[candidate.source];
@@ -85,7 +85,7 @@ class NearCandidates {
   // By their keys, which become a little smaller: none becomes greater than a later one's.
   void sort();
 
-  absl::InlinedVector<Candidate, kMostSorted> candidates_;
+  absl::InlinedVector<Candidate, kMaxSorted> candidates_;
   absl::InlinedVector<Source, 8> sources_;
 };
 

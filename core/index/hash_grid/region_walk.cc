@@ -23,7 +23,7 @@ void RegionSteps::find_bricks(const GridRegion& region) {
   piece_count_ = slot_count_ = 0;
   Work work;
   is_small_ =
-      region.grid->for_few_bricks(region.bounds, kMostBricks, work, [&](const Brick& brick, const KeyRange& cells) {
+      region.grid->for_few_bricks(region.bounds, kMaxBricks, work, [&](const Brick& brick, const KeyRange& cells) {
         brick.prefetch_head();
         pieces_[piece_count_].brick = &brick;
         pieces_[piece_count_++].cells = cells;
@@ -70,7 +70,7 @@ template <class CullOf>
 void RegionSteps::cull(const CullOf& cull_of) {
   Work work;
   const auto keep = [this](const GridRef& value) {
-    if (slot_count_ == kMostValues) return false;
+    if (slot_count_ == kMaxValues) return false;
     slots_[slot_count_++] = value.slot();
     return true;
   };

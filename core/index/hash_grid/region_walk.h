@@ -47,8 +47,8 @@ class RegionSteps {
   void visit(Work& work, const Visit& visit) const;
 
  private:
-  static constexpr size_t kMostBricks = 8;
-  static constexpr size_t kMostValues = 256;
+  static constexpr size_t kMaxBricks = 8;
+  static constexpr size_t kMaxValues = 256;
 
   struct Piece {
     const Brick* brick;
@@ -64,8 +64,8 @@ class RegionSteps {
   bool is_small_ = false;  // all there is to find fits here
   uint32_t piece_count_ = 0, slot_count_ = 0;
   uint64_t cells_ = 0;
-  std::array<Piece, kMostBricks> pieces_;
-  std::array<uint32_t, kMostValues> slots_;
+  std::array<Piece, kMaxBricks> pieces_;
+  std::array<uint32_t, kMaxValues> slots_;
 };
 
 template <class Visit>

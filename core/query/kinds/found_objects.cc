@@ -25,9 +25,9 @@ void sort_by_moving(std::vector<FoundObject>& found) {
 
 constexpr size_t kFew = 12;
 // Of so many one share of the ids holds a few at most, unless they are uneven.
-constexpr size_t kMostSpread = 1024;
+constexpr size_t kMaxSpread = 1024;
 constexpr int kShareBits = 8;
-constexpr uint32_t kMostOfAShare = 16;
+constexpr uint32_t kMaxOfAShare = 16;
 
 }  // namespace
 
@@ -53,7 +53,7 @@ void FoundObjects::keep_lowest() {
 // Comparing ids in no order costs a mispredicted branch every other time: shares of the ids are as good as sorted
 // without.
 void FoundObjects::sort() {
-  if (found_.size() <= kFew || (found_.size() <= kMostSpread && spread())) return sort_by_moving(found_);
+  if (found_.size() <= kFew || (found_.size() <= kMaxSpread && spread())) return sort_by_moving(found_);
   std::sort(found_.begin(), found_.end(), lower_id);
 }
 
@@ -73,7 +73,7 @@ bool FoundObjects::spread() {
     share = before;
     before += count;
   }
-  if (largest > kMostOfAShare) return false;
+  if (largest > kMaxOfAShare) return false;
   spread_.resize(std::max(spread_.size(), found_.size()));
   for (const FoundObject& one : found_) spread_[shares[(one.id - lowest) >> shift]++] = one;
   std::copy_n(spread_.begin(), found_.size(), found_.begin());

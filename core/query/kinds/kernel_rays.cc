@@ -12,7 +12,7 @@ namespace {
 
 // Rows of kAll that a ray gets of one mesh by the kernels; a ray that may have more goes triangle by triangle. Bounds
 // memory.
-constexpr uint32_t kMostRows = 128;
+constexpr uint32_t kMaxRows = 128;
 
 // An instance that a ray has come to.
 struct Stop {
@@ -35,7 +35,7 @@ class Round {
       for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
-    most_ = std::min(kMostRows, rays.front().request.max_results + 1);  // one more tells whether there are more
+    most_ = std::min(kMaxRows, rays.front().request.max_results + 1);  // one more tells whether there are more
     rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * most_);
   }
 

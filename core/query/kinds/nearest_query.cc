@@ -20,10 +20,10 @@ class NearestRows {
  public:
   explicit NearestRows(const NearestRequest& request)
       : count_(request.count),
-        in_order_(request.count <= kMostInOrder),
+        in_order_(request.count <= kMaxInOrder),
         farthest_(request.max_distance),
         limit_(squared_limit_of(farthest_)) {
-    rows_.reserve(std::min<size_t>(count_, kMostInOrder));
+    rows_.reserve(std::min<size_t>(count_, kMaxInOrder));
   }
 
   // Nothing beyond it is wanted; a row exactly there may be, if its id is lower.
@@ -51,7 +51,7 @@ class NearestRows {
 
  private:
   // Few rows are kept in order, since objects are offered nearly in order; more are a heap with the last on top.
-  static constexpr size_t kMostInOrder = 32;
+  static constexpr size_t kMaxInOrder = 32;
 
   const Hit& last() const { return in_order_ ? rows_.back() : rows_.front(); }
   void insert(const Hit& row) {

@@ -111,8 +111,8 @@ Progress BatchRun::work(uint64_t nanoseconds) {
 // What is in no piece yet may wait for those before it; the first of all pieces may not.
 bool BatchRun::can_begin() const {
   if (control_.stopped()) return false;
-  if (!left_.empty()) return pieces_.size() < 2 * kMostPieces || left_.front() == pieces_.begin();
-  return next_block_ < blocks_.size() && pieces_.size() < kMostPieces;
+  if (!left_.empty()) return pieces_.size() < 2 * kMaxPieces || left_.front() == pieces_.begin();
+  return next_block_ < blocks_.size() && pieces_.size() < kMaxPieces;
 }
 
 BatchRun::Pieces::iterator BatchRun::begin_piece() {

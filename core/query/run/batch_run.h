@@ -3,7 +3,7 @@
 // batch cut by max_work apart).
 //
 // Threads: work() may be called by any number of threads at once; everything else before the first or after the last
-// call. Memory: rows wait for their turn in at most kMostPieces pieces, each of at most a reply.
+// call. Memory: rows wait for their turn in at most kMaxPieces pieces, each of at most a reply.
 #ifndef LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 #define LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 
@@ -52,7 +52,7 @@ struct QueryCost {
 class BatchRun {
  public:
   // Pieces that wait for those before them, or are in work.
-  static constexpr size_t kMostPieces = 16;
+  static constexpr size_t kMaxPieces = 16;
 
   // `snapshot`, `batch` and `answer` are borrowed; `batch` has passed check_batch(). OUT_OF_RANGE for a time that is
   // not kept, unless its block clamps.

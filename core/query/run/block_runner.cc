@@ -16,7 +16,7 @@ constexpr uint64_t kPieceWork = 16'384;
 constexpr uint64_t kCallWork = 65'536;
 // Rays of a call. The most are for rays that turn out dear behind cheap ones: at 4,096 triangles each they take 3 ms,
 // and those that keep many hits twice that. Twice as many would not be answered measurably faster.
-constexpr uint64_t kLeastRaysAtOnce = 8, kMostRaysAtOnce = 128, kMostRaysOfManyHits = 64;
+constexpr uint64_t kMinRaysAtOnce = 8, kMaxRaysAtOnce = 128, kMaxRaysOfManyHits = 64;
 
 }  // namespace
 
@@ -136,9 +136,9 @@ size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end
 // As many rays in the next call as should be little work, if they are like these.
 void BlockRunner::pace_rays(size_t rays, uint64_t work) {
   const bool many_hits = std::get<RayColumns>(block_.kind).mode == RayMode::kAll;
-  const uint64_t most = many_hits ? kMostRaysOfManyHits : kMostRaysAtOnce;
+  const uint64_t most = many_hits ? kMaxRaysOfManyHits : kMaxRaysAtOnce;
   const uint64_t fit = kCallWork * rays / std::max<uint64_t>(work, 1);
-  const uint64_t next = std::clamp<uint64_t>(std::min<uint64_t>(fit, 4 * rays), kLeastRaysAtOnce, most);
+  const uint64_t next = std::clamp<uint64_t>(std::min<uint64_t>(fit, 4 * rays), kMinRaysAtOnce, most);
   place_.rays_at_once.store(static_cast<uint32_t>(next), std::memory_order_relaxed);
 }
 

@@ -15,7 +15,7 @@ enum Flag : uint32_t {
 };
 
 // What a list takes at least: its kind and the lengths of its columns.
-constexpr size_t kLeastList = 32;
+constexpr size_t kMinList = 32;
 
 uint32_t flag(bool set, Flag flag) { return set ? flag : 0u; }
 
@@ -91,7 +91,7 @@ RelabelColumns read_relabel(ByteReader& reader) {
 
 template <class Columns, class Read>
 void read_lists(ByteReader& reader, const char* what, std::vector<Columns>& lists, const Read& read) {
-  const uint64_t count = reader.count(kLeastList, what);
+  const uint64_t count = reader.count(kMinList, what);
   lists.reserve(count);
   for (uint64_t i = 0; i < count && reader.good(); ++i) lists.push_back(read(reader));
 }

@@ -16,7 +16,7 @@ static_assert(kNumbersPerChunk * sizeof(float) + 64 <= UpdateLog::kMaxChunkBytes
 // A chunk of parts ends after the one that takes it beyond this.
 constexpr size_t kPartsChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kPartsChunk + limits::kMaxLabelLength + 64 <= UpdateLog::kMaxChunkBytes);
-constexpr size_t kLeastPart = 2 * 8;
+constexpr size_t kMinPart = 2 * 8;
 
 }  // namespace
 
@@ -115,7 +115,7 @@ void MeshReader::read_header(ByteReader& reader) {
 }
 
 void MeshReader::read_parts(ByteReader& reader) {
-  while (reader.good() && reader.left() >= kLeastPart) {
+  while (reader.good() && reader.left() >= kMinPart) {
     MeshPart& part = parts_.emplace_back();
     part.first_triangle =
         static_cast<uint32_t>(reader.number_upto(limits::kMaxMeshTriangles, "the first triangle of a part"));

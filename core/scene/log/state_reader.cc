@@ -12,8 +12,8 @@
 namespace locus {
 namespace {
 
-constexpr size_t kLeastWriter = 8 * 8;
-constexpr size_t kLeastError = 3 * 8;
+constexpr size_t kMinWriter = 8 * 8;
+constexpr size_t kMinError = 3 * 8;
 
 UpdateAck read_ack(ByteReader& reader) {
   UpdateAck ack;
@@ -23,7 +23,7 @@ UpdateAck read_ack(ByteReader& reader) {
   const ByteReader::Pair counts = reader.pair("the counts of an ack");
   ack.applied = counts.first;
   ack.refused = counts.second;
-  const uint64_t errors = reader.count(kLeastError, "the number of errors of an ack");
+  const uint64_t errors = reader.count(kMinError, "the number of errors of an ack");
   if (errors > limits::kMaxListedItemErrors) reader.fail("the number of errors of an ack", "is out of range");
   for (uint64_t i = 0; i < errors && reader.good(); ++i) {
     ItemError& error = ack.errors.emplace_back();
@@ -79,13 +79,13 @@ struct ShapeColumns {
     rotations = reader.shared_column<float>(n, 4, "rotations");
     sizes = reader.shared_column<float>(n, 3, "sizes");
     radii = reader.shared_column<float>(n, 1, "radii");
-    constexpr double kMost = limits::kMaxCoordinate;
+    constexpr double kMax = limits::kMaxCoordinate;
     if (!all_within(kinds, 0, static_cast<double>(ShapeKind::kCapsule)))
       reader.fail("the kind of a shape", "is unknown");
-    if (!all_within(positions, -kMost, kMost)) reader.fail("a position", "is out of range");
+    if (!all_within(positions, -kMax, kMax)) reader.fail("a position", "is out of range");
     if (!all_unit(rotations)) reader.fail("a rotation", "is not of unit length");
-    if (!all_within(sizes, -kMost, kMost)) reader.fail("a size", "is out of range");
-    if (!all_within(radii, 0, kMost)) reader.fail("a radius", "is out of range");
+    if (!all_within(sizes, -kMax, kMax)) reader.fail("a size", "is out of range");
+    if (!all_within(radii, 0, kMax)) reader.fail("a radius", "is out of range");
   }
 };
 
@@ -131,7 +131,7 @@ void StateReader::read_header(ByteReader& reader) {
 }
 
 void StateReader::read_writers(ByteReader& reader) {
-  while (reader.good() && reader.left() >= kLeastWriter) {
+  while (reader.good() && reader.left() >= kMinWriter) {
     WriterTable::Writer writer;
     writer.number = reader.number("a writer");
     writer.batch = reader.number("the last batch of a writer");

@@ -14,10 +14,10 @@ namespace {
 
 // A chunk of writers ends after the one that takes it beyond this.
 constexpr size_t kWritersChunk = UpdateLog::kMaxChunkBytes / 2;
-static_assert(kWritersChunk + size_t{limits::kMaxListedItemErrors} * kMostBytesOfError + 1024 <=
+static_assert(kWritersChunk + size_t{limits::kMaxListedItemErrors} * kMaxBytesOfError + 1024 <=
               UpdateLog::kMaxChunkBytes);
-static_assert(kObjectsPerChunk * kMostBytesOfObject + 1024 <= UpdateLog::kMaxChunkBytes);
-static_assert(kInstancesPerChunk * kMostBytesOfInstance + 1024 <= UpdateLog::kMaxChunkBytes);
+static_assert(kObjectsPerChunk * kMaxBytesOfObject + 1024 <= UpdateLog::kMaxChunkBytes);
+static_assert(kInstancesPerChunk * kMaxBytesOfInstance + 1024 <= UpdateLog::kMaxChunkBytes);
 
 void write_ack(const UpdateAck& ack, ByteWriter& writer) {
   writer.number(ack.epoch);

@@ -42,11 +42,11 @@ void TickMoves::add_fast(const GridRef& before, const Start& start, Vec3d to, do
     return;
   }
   fast_.insert(at, {handle, start.reach, length, centers});
-  if (fast_.size() > kMostFast) list_fewer();
+  if (fast_.size() > kMaxFast) list_fewer();
 }
 
 void TickMoves::list_fewer() {
-  while (fast_.size() > kMostFast / 2) {
+  while (fast_.size() > kMaxFast / 2) {
     fast_length_ *= 2;
     std::erase_if(fast_, [this](const FastMover& mover) {
       if (mover.length > fast_length_) return false;

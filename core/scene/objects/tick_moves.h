@@ -29,7 +29,7 @@ struct Displacement {
 
 class TickMoves {
  public:
-  static constexpr size_t kMostFast = 64;
+  static constexpr size_t kMaxFast = 64;
 
   // A new tick begins. Objects that move farther than `fast_length` in it are fast.
   void start_tick(double fast_length);

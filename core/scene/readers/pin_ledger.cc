@@ -14,7 +14,7 @@ namespace {
 constexpr uint64_t kCountShare = 64;
 // What a revision holds and a later one does not takes at most so many times what is known to be replaced in between:
 // the maps that find it are not known. Measured: up to 2.2 times.
-constexpr uint64_t kMostOfReplaced = 4;
+constexpr uint64_t kMaxOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 
 absl::Status told_to_end(uint64_t revision, uint64_t budget, uint64_t held) {
@@ -88,8 +88,8 @@ bool PinLedger::may_exceed(const SceneSnapshot& latest) const {
   if (pinned_.empty() || pinned_.begin()->first >= latest.revision) return false;
   const uint64_t since_count = latest.replaced_bytes - counted_at_;
   const uint64_t since_oldest = latest.replaced_bytes - pinned_.begin()->second.replaced_bytes;
-  return since_count >= budget_ / kCountShare && kMostOfReplaced * since_oldest > budget_ &&
-         counted_ + kMostOfReplaced * (late_bytes_ + since_count) > budget_;
+  return since_count >= budget_ / kCountShare && kMaxOfReplaced * since_oldest > budget_ &&
+         counted_ + kMaxOfReplaced * (late_bytes_ + since_count) > budget_;
 }
 
 std::vector<PinLedger::Holding> PinLedger::pinned_before(const SceneSnapshot& latest) const {

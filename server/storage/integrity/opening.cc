@@ -16,10 +16,10 @@
 namespace locus::server {
 namespace {
 
-constexpr uint64_t kMostReserve = uint64_t{64} << 20;
+constexpr uint64_t kMaxReserve = uint64_t{64} << 20;
 constexpr uint64_t kReserveShare = 20;
 constexpr uint64_t kBufferShare = 16;
-constexpr uint64_t kLeastBuffer = uint64_t{256} << 10;
+constexpr uint64_t kMinBuffer = uint64_t{256} << 10;
 
 absl::Status nothing_opens(const StorageOptions& options, absl::string_view why) {
   return absl::DataLossError(
@@ -173,8 +173,8 @@ StorageOptions settled(StorageOptions options) {
   while (!std::filesystem::exists(place, failed) && place.has_relative_path()) place = place.parent_path();
   const std::filesystem::space_info space = std::filesystem::space(place, failed);
   const uint64_t capacity = failed ? ~uint64_t{0} : uint64_t{space.capacity};
-  if (!options.reserve_bytes) options.reserve_bytes = std::min(kMostReserve, capacity / kReserveShare);
-  options.log_buffer_bytes = std::max(kLeastBuffer, std::min(options.log_buffer_bytes, capacity / kBufferShare));
+  if (!options.reserve_bytes) options.reserve_bytes = std::min(kMaxReserve, capacity / kReserveShare);
+  options.log_buffer_bytes = std::max(kMinBuffer, std::min(options.log_buffer_bytes, capacity / kBufferShare));
   return options;
 }
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr absl::string_view kUnfinished = ".new";
 // Of an outline, more than any has: what is larger was not written here, and is not read.
-constexpr uint64_t kMostBytes = uint64_t{8} * limits::kMaxMeshTriangles;
+constexpr uint64_t kMaxBytes = uint64_t{8} * limits::kMaxMeshTriangles;
 
 std::string name_of(const Sha256& sha256) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
@@ -44,7 +44,7 @@ std::optional<std::string> OutlineFiles::read(const Sha256& sha256) const {
   const std::string name = name_of(sha256);
   std::string bytes;
   uint64_t size = 0;
-  if (!env_.GetFileSize(path_of(name), &size).ok() || size > kMostBytes) return std::nullopt;
+  if (!env_.GetFileSize(path_of(name), &size).ok() || size > kMaxBytes) return std::nullopt;
   if (!rocksdb::ReadFileToString(&env_, path_of(name), &bytes).ok()) return std::nullopt;
   const std::optional<absl::string_view> found = unsealed(name, bytes);
   if (!found) return std::nullopt;

@@ -18,7 +18,7 @@ constexpr size_t kFooterBytes = 53;
 constexpr size_t kTrailerBytes = 5;  // how it is compressed, and a checksum
 constexpr char kXxh3 = 4;
 constexpr absl::string_view kProperties = "rocksdb.properties";
-constexpr uint64_t kMostBytes = uint64_t{16} << 20;
+constexpr uint64_t kMaxBytes = uint64_t{16} << 20;
 
 struct Handle {
   uint64_t offset = 0;
@@ -60,7 +60,7 @@ class Tail {
 
  private:
   bool read(uint64_t offset, uint64_t size, std::string& bytes) {
-    if (size > kMostBytes || offset > size_ || size > size_ - offset) return false;
+    if (size > kMaxBytes || offset > size_ || size > size_ - offset) return false;
     bytes.resize(size);
     rocksdb::Slice found;
     const rocksdb::IOStatus status = file_.Read(offset, size, rocksdb::IOOptions(), &found, bytes.data(), nullptr);
@@ -70,7 +70,7 @@ class Tail {
   }
 
   bool read_block(const Handle& handle, std::string& bytes) {
-    if (handle.size > kMostBytes || !read(handle.offset, handle.size + kTrailerBytes, bytes)) return false;
+    if (handle.size > kMaxBytes || !read(handle.offset, handle.size + kTrailerBytes, bytes)) return false;
     uint32_t said = 0;
     std::memcpy(&said, bytes.data() + handle.size + 1, sizeof(said));
     const auto last = static_cast<uint8_t>(bytes[handle.size]);

@@ -80,10 +80,10 @@ class SortedRebuild : public Contender {
       low_ = min(low_, position);
       high = max(high, position);
     }
-    constexpr float kLeast = 1e-3f;
+    constexpr float kMin = 1e-3f;
     const Vec3f size = high - low_;
-    const double volume = double{size.x + kLeast} * double{size.y + kLeast} * double{size.z + kLeast};
-    cell_ = std::max(static_cast<float>(std::cbrt(4 * volume / static_cast<double>(positions_.size()))), kLeast);
+    const double volume = double{size.x + kMin} * double{size.y + kMin} * double{size.z + kMin};
+    cell_ = std::max(static_cast<float>(std::cbrt(4 * volume / static_cast<double>(positions_.size()))), kMin);
     per_cell_ = 1 / cell_;
     for (int axis = 0; axis < 3; ++axis) last_[axis] = static_cast<int>(size[axis] * per_cell_);
     begins_.assign(

@@ -116,14 +116,14 @@ class CrowdCases {
   };
 
   void note_refusals(const std::string& name, const Crowd& crowd, double seconds) const {
-    constexpr double kMostSeconds = 0.005;
+    constexpr double kMaxSeconds = 0.005;
     if (crowd.refusals.empty() || crowd.calm_answers == 0) {
       run_.note(absl::StrCat(name, ": nothing was refused"));
     } else {
       const double p99 = percentile(crowd.refusals, 0.99);
       run_.note(absl::StrFormat("%s: %d calls refused, p50 %.2f ms, p99 %.2f ms, to be shown 5: %s", name,
                                 crowd.refusals.size(), 1e3 * median(crowd.refusals), 1e3 * p99,
-                                p99 < kMostSeconds ? "shown" : "MISSED"));
+                                p99 < kMaxSeconds ? "shown" : "MISSED"));
       run_.note(absl::StrFormat(
           "%s: processor time a refusal: client %.1f us, server %.1f us; together they computed "
           "on %.2f cores, in the calm on %.2f",

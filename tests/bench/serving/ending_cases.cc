@@ -12,7 +12,7 @@ namespace locus::bench::serving {
 namespace {
 
 constexpr uint32_t kObjects = 100'000;
-constexpr double kMostMs = 5;
+constexpr double kMaxMs = 5;
 constexpr double kSettled = 0.05;  // a server without work is left so long before it is looked at
 constexpr const char* kDeadline = "deadline/1ms";
 constexpr const char* kCancel = "cancel/1000";
@@ -125,21 +125,21 @@ class EndingCases {
   }
 
   void add(const std::string& name, const std::vector<double>& after) {
-    constexpr double kLeastMs = 0.01;
+    constexpr double kMinMs = 0.01;
     if (!wrong_.empty())
       run_.disagree(absl::StrCat(name, ": ", wrong_.size(), " calls ended otherwise: ", wrong_.front().ToString()));
     if (refused_ != 0) run_.note(absl::StrCat(name, ": ", refused_, " calls were refused and do not count"));
     wrong_.clear();
     refused_ = 0;
     if (after.empty()) return;
-    const double worst = std::max(kLeastMs, percentile(after, 0.99));
+    const double worst = std::max(kMinMs, percentile(after, 0.99));
     const std::vector<double> ours(1, worst), whole(1, whole_ms_);
     add_cell(run_, cell_of(name, "ms computed", hash_of_number(kObjects)), "whole_job", ours, whole, Better::kLess);
     const double most = *std::max_element(after.begin(), after.end());
     run_.note(absl::StrFormat(
         "%s: the server computes for another %.2f ms (p50), %.2f (p99), %.2f (most) of a job of "
         "%.0f, to be shown 5: %s",
-        name, percentile(after, 0.5), percentile(after, 0.99), most, whole_ms_, worst < kMostMs ? "shown" : "MISSED"));
+        name, percentile(after, 0.5), percentile(after, 0.99), most, whole_ms_, worst < kMaxMs ? "shown" : "MISSED"));
   }
 
   const ServingRun& run_;

@@ -103,17 +103,17 @@ class GuestCases {
 
   // Waits for connections to close, a moment after their calls.
   static Held held(const Daemon& daemon, int64_t files) {
-    constexpr double kMostSeconds = 5, kPatience = 0.02;
-    for (double waited = 0; waited < kMostSeconds && daemon.process().open_files() > files; waited += kPatience)
+    constexpr double kMaxSeconds = 5, kPatience = 0.02;
+    for (double waited = 0; waited < kMaxSeconds && daemon.process().open_files() > files; waited += kPatience)
       sleep_seconds(kPatience);
     return {daemon.process().open_files(), daemon.process().resident_bytes()};
   }
 
   // Memory that was freed is kept for the next guests: so it may not grow from the first time on.
   void note_left_behind(const std::string& name, const LeftBehind& left) const {
-    constexpr double kMostGrowth = 1.1;
+    constexpr double kMaxGrowth = 1.1;
     const bool returned = left.last.files <= left.before.files &&
-                          static_cast<double>(left.last.bytes) <= kMostGrowth * static_cast<double>(left.first.bytes);
+                          static_cast<double>(left.last.bytes) <= kMaxGrowth * static_cast<double>(left.first.bytes);
     run_.note(absl::StrFormat(
         "%s: open files %d before and %d after; memory %.1f MiB before, %.1f with them, %.1f after the first time and "
         "%.1f after the last: %s",

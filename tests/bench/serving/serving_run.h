@@ -55,10 +55,10 @@ template <class Run>
 size_t passes_of_a_chunk(const ServingRun& run, const Run& pass) {
   if (run.options.quick) return 1;
   constexpr double kChunkSeconds = 0.1;
-  constexpr double kMostPasses = 100;
+  constexpr double kMaxPasses = 100;
   const double start = wall_seconds();
   pass(size_t{1});
-  return static_cast<size_t>(std::clamp(kChunkSeconds / (wall_seconds() - start), 1.0, kMostPasses));
+  return static_cast<size_t>(std::clamp(kChunkSeconds / (wall_seconds() - start), 1.0, kMaxPasses));
 }
 
 }  // namespace locus::bench::serving

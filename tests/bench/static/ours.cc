@@ -19,7 +19,7 @@ namespace {
 constexpr size_t kBatch = 1024;      // rays given to the kernels at once
 constexpr size_t kRegionBatch = 16;  // balls or boxes given at once
 constexpr size_t kAllBatch = 256;    // rays of which all hits are asked, and how many of each
-constexpr uint32_t kMostRows = 128;
+constexpr uint32_t kMaxRows = 128;
 
 using AskKernel = void (*)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
 
@@ -95,11 +95,11 @@ void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<con
   std::array<KernelRay, kAllBatch> batch;
   std::array<KernelHit, kAllBatch> hits;
   std::transform(rays.begin(), rays.end(), batch.begin(), kernel_ray);
-  kernels.all(tree.tree(), batch.data(), hits.data(), rays.size(), rows, kMostRows);
+  kernels.all(tree.tree(), batch.data(), hits.data(), rays.size(), rows, kMaxRows);
   size_t used = 0;
-  for (size_t i = 0; i < rays.size(); ++i, rows += kMostRows) {
+  for (size_t i = 0; i < rays.size(); ++i, rows += kMaxRows) {
     if (used > kSpareIds) used = 0;
-    const bool settled = hits[i].verdict != KernelVerdict::kUndecided && hits[i].number < kMostRows &&
+    const bool settled = hits[i].verdict != KernelVerdict::kUndecided && hits[i].number < kMaxRows &&
                          kernels_hold(rays[i], tree.tree().magnitude);
     if (settled)
       std::transform(rows, rows + hits[i].number, ids.begin() + used, [](const KernelRow& row) { return row.number; });
@@ -174,7 +174,7 @@ void Ours::ray_ids(absl::Span<const RayQuery> rays, absl::Span<uint32_t> ids, ui
     for (const RayQuery& ray : rays) *counts++ = all_by_triangles(tree, ray, ids.data());
     return;
   }
-  const auto rows = std::make_unique_for_overwrite<KernelRow[]>(std::min(rays.size(), kAllBatch) * kMostRows);
+  const auto rows = std::make_unique_for_overwrite<KernelRow[]>(std::min(rays.size(), kAllBatch) * kMaxRows);
   for (size_t begin = 0; begin < rays.size(); begin += kAllBatch)
     find_all(tree, *kernels, rays.subspan(begin, kAllBatch), ids, counts + begin, rows.get());
 }

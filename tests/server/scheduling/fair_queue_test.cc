@@ -106,15 +106,15 @@ TEST(FairQueueTest, SharesAreEqualByWorkNotByTurns) {
   std::mt19937 random(1);
   for (int client = 1; client <= 5; ++client) queue.push_back(static_cast<uint64_t>(client), client * 1000);
   std::map<int, double> had;
-  constexpr uint64_t kMost = 100;
+  constexpr uint64_t kMax = 100;
   for (int i = 0; i < 10'000; ++i) {
     const int client = queue.turn(kTurn) / 1000;
     // Client 5 takes its time.
-    const uint64_t cost = random() % (client == 5 ? kMost : 5);
+    const uint64_t cost = random() % (client == 5 ? kMax : 5);
     queue.correct(static_cast<uint64_t>(client), static_cast<int64_t>(cost) - static_cast<int64_t>(kTurn));
     had[client] += static_cast<double>(cost);
   }
-  for (const auto& [client, cost] : had) EXPECT_NEAR(cost, had[1], double{kMost + kTurn}) << client;
+  for (const auto& [client, cost] : had) EXPECT_NEAR(cost, had[1], double{kMax + kTurn}) << client;
 }
 
 }  // namespace

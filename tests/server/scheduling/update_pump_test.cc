@@ -245,7 +245,7 @@ TEST_F(UpdatePumpTest, ARefusedBatchDoesNotHoldUpTheNext) {
 
 // A reader that was told to end and does not: its scene waits, others do not, and the pump's thread is free.
 TEST_F(UpdatePumpTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
-  const ScenePtr pinned = make_scene(OverloadPolicy::kEveryBatch, limits::kLeastPinnedBytes);
+  const ScenePtr pinned = make_scene(OverloadPolicy::kEveryBatch, limits::kMinPinnedBytes);
   std::vector<uint64_t> ids(50'000);
   for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
   UpdatePump pump(by_threads());

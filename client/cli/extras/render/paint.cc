@@ -10,7 +10,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kMostHaze = 0.45;  // at the furthest hit
+constexpr double kMaxHaze = 0.45;  // at the furthest hit
 constexpr Light kHaze = {0.09, 0.12, 0.18};
 
 template <class ColourOfPixel>
@@ -57,7 +57,7 @@ class Shader {
   // Distance takes a part of the light, so that near and far tell apart where they overlap.
   Light hazy(Light light, float t) const {
     const double range = depths_.max - depths_.min;
-    const double haze = range > 0 ? kMostHaze * (double{t} - depths_.min) / range : 0;
+    const double haze = range > 0 ? kMaxHaze * (double{t} - depths_.min) / range : 0;
     return light * (1 - haze) + kHaze * haze;
   }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr int kSections = 16;
 constexpr int kCuts = kSections - 1;  // of each side
 constexpr int kSides = 6;             // lower and upper of each axis: side = 2 axis + (1 if upper)
-constexpr int kMostRounds = 16;       // sixteen to this power is beyond what doubles tell apart
+constexpr int kMaxRounds = 16;        // sixteen to this power is beyond what doubles tell apart
 constexpr double kFlat = 1e-4;        // against the longest side
 constexpr double kWidening = 1e-6;    // for slabs are rounded to floats when they are sent
 
@@ -115,7 +115,7 @@ absl::StatusOr<Aabbd> thing_bounds(const client::Client& client, const std::stri
                                    const client::Revision& revision, uint64_t id, const Aabbd& scene_bounds) {
   if (absl::Status there = check_there(client, scene, revision, id); !there.ok()) return there;
   Aabbd box = widened(scene_bounds);
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMaxRounds; ++round) {
     const absl::StatusOr<std::vector<bool>> reached = ask_slabs(client, scene, revision, id, box);
     if (!reached.ok()) return reached.status();
     const bool seen = std::find(reached->begin(), reached->end(), true) != reached->end();

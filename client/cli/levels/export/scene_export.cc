@@ -9,7 +9,7 @@
 namespace locus::cli {
 namespace {
 
-float drawn(float size) { return std::max(size, kLeastDrawnSize); }
+float drawn(float size) { return std::max(size, kMinDrawnSize); }
 
 Json facts_of(const SceneThing& thing) {
   Json facts = {{"id", id_json(thing.id)}};

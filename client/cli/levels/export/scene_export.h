@@ -2,7 +2,7 @@
 // thread.
 //
 // Instances draw their mesh, which is written once; objects draw the unit shape of their kind, scaled. A size of 0 is
-// drawn as kLeastDrawnSize, since editors cannot work with things that have none.
+// drawn as kMinDrawnSize, since editors cannot work with things that have none.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 
@@ -18,7 +18,7 @@
 
 namespace locus::cli {
 
-inline constexpr float kLeastDrawnSize = 1e-6f;
+inline constexpr float kMinDrawnSize = 1e-6f;
 // Half the size of the mark that stands for a point.
 inline constexpr float kPointMarkSize = 0.05f;
 

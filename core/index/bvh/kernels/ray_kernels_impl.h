@@ -18,8 +18,8 @@
 namespace locus {
 namespace {
 
-constexpr uint32_t kMostFlights = 32;    // rays on their way at once
-constexpr uint32_t kMostPackets = 2;     // of rays that go together, likewise
+constexpr uint32_t kMaxFlights = 32;     // rays on their way at once
+constexpr uint32_t kMaxPackets = 2;      // of rays that go together, likewise
 constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; their numbers fit a byte
 
 // A ray on its way. Waiting nodes and blocks start no later than the limit; below them stands kNoChild.
@@ -42,7 +42,7 @@ static inline uint32_t step_at(uint32_t reference) { return (reference >> 31) + 
 
 // Who is to take which step.
 struct Agenda {
-  uint8_t flights[kSteps][kMostFlights];
+  uint8_t flights[kSteps][kMaxFlights];
   uint32_t counts[kSteps] = {};
 
   inline void add(uint32_t flight, uint32_t step) { flights[step][counts[step]++] = static_cast<uint8_t>(flight); }
@@ -70,7 +70,7 @@ class Voyage {
   // ahead, is to find the steps of several rays there instead, none of which waits for another.
   inline void run() {
     Agenda now;
-    for (uint32_t flight = 0; flight < kMostFlights && next_ != count_; ++flight) start(flight, now);
+    for (uint32_t flight = 0; flight < kMaxFlights && next_ != count_; ++flight) start(flight, now);
     while (!now.empty()) {
       Agenda then;
       for (uint32_t i = 0; i < now.counts[kNode]; ++i) open_node(now.flights[kNode][i]);
@@ -245,7 +245,7 @@ class Voyage {
                                  reinterpret_cast<const char*>(tree_.nodes)};
   const uint64_t sizes_[3] = {sizeof(TriangleNode), sizeof(TriangleBlock), 0};
   uint32_t next_ = 0;
-  Met met_[kMostFlights];
+  Met met_[kMaxFlights];
 };
 
 // Answers the groups of eight that go together; lists the other rays in `rest` and returns how many they are.
@@ -266,10 +266,10 @@ static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, c
     }
     return false;
   };
-  Packet<kAny> packets[kMostPackets];
-  Packet<kAny>* under_way[kMostPackets];
+  Packet<kAny> packets[kMaxPackets];
+  Packet<kAny>* under_way[kMaxPackets];
   uint32_t packet_count = 0;
-  while (packet_count < kMostPackets && start_next(packets[packet_count])) {
+  while (packet_count < kMaxPackets && start_next(packets[packet_count])) {
     under_way[packet_count] = &packets[packet_count];
     ++packet_count;
   }
@@ -289,7 +289,7 @@ static inline void trace(const TriangleTree& tree, const KernelRay* rays, Kernel
                          KeptRows kept) {
   PreparedRays prepared[kPreparedRays / kTreeWidth];
   uint8_t rest[kPreparedRays];
-  Flight flights[kMostFlights];
+  Flight flights[kMaxFlights];
   while (count != 0) {
     const auto now = static_cast<uint32_t>(count < kPreparedRays ? count : kPreparedRays);
     for (uint32_t i = 0; i < now; i += kTreeWidth) prepare(rays + i, now - i, tree.magnitude, prepared[i / kTreeWidth]);

@@ -18,14 +18,14 @@ namespace {
 // Whether eight rays may go together: in one octant and along one axis, which they must have in common, and close
 // enough to gain by it: their directions within a cone, their starts within a small part of everything.
 static inline bool go_together(const PreparedRays& rays, float magnitude) {
-  constexpr float kMostSpread = 0.03f;
+  constexpr float kMaxSpread = 0.03f;
   const auto apart = [&](uint32_t column, float most) {
     const Floats8 off = size_of(Floats8::load(rays.columns[column]) - Floats8::all(rays.columns[column][0]));
     return at_most(off, Floats8::all(most)) != 255u;
   };
   for (uint32_t column = kFromX; column <= kFromZ; ++column)
-    if (apart(column, kMostSpread * magnitude)) return false;
-  if (apart(kShearX, kMostSpread) || apart(kShearY, kMostSpread)) return false;
+    if (apart(column, kMaxSpread * magnitude)) return false;
+  if (apart(kShearX, kMaxSpread) || apart(kShearY, kMaxSpread)) return false;
   // As the whole numbers they are: as floats they are denormal, and equal where the host takes those for zero.
   const PreparedRay first(rays, 0);
   uint32_t different = 0;
@@ -87,7 +87,7 @@ class Packet {
   }
 
  private:
-  static constexpr uint32_t kMostCandidates = 4;
+  static constexpr uint32_t kMaxCandidates = 4;
   static constexpr float kNever = -1;  // the limit of a ray that looks for nothing more
 
   struct Waiting {
@@ -269,7 +269,7 @@ class Packet {
       }
       kept_[i] = kept;
     }
-    if (kept_[i] == kMostCandidates) settle_kept(i);
+    if (kept_[i] == kMaxCandidates) settle_kept(i);
     candidates_[i][kept_[i]++] = candidate;
   }
 
@@ -325,7 +325,7 @@ class Packet {
   uint32_t top_;
   alignas(32) float limits_[kTreeWidth];
   uint32_t kept_[kTreeWidth];
-  Candidate candidates_[kTreeWidth][kMostCandidates];
+  Candidate candidates_[kTreeWidth][kMaxCandidates];
   Waiting waiting_[kTreeStack];
 };
 

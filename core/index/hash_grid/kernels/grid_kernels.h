@@ -14,12 +14,12 @@ namespace locus {
 
 inline constexpr float kCullSlack = 0x1p-20f;
 inline constexpr float kDiagonal = 1.73206f;  // the corners of a value's bounds, in reaches: the root of 3, and more
-inline constexpr uint32_t kMostSorted = 64;
+inline constexpr uint32_t kMaxSorted = 64;
 
 // Some rows of consecutive values of one block.
 struct GridRows {
-  static constexpr uint32_t kMost = 16;         // rows
-  static constexpr uint32_t kMostValues = 512;  // of all rows of one call
+  static constexpr uint32_t kMax = 16;         // rows
+  static constexpr uint32_t kMaxValues = 512;  // of all rows of one call
 
   const float* x;
   const float* y;
@@ -27,8 +27,8 @@ struct GridRows {
   const float* reach;
   const uint64_t* gone;  // one bit a value, and 64 more; null where none is gone
   uint32_t count;
-  uint32_t begin[kMost];
-  uint32_t end[kMost];
+  uint32_t begin[kMax];
+  uint32_t end[kMax];
 };
 
 struct GridBox {
@@ -56,13 +56,13 @@ struct GridNear {
 struct GridKernels {
   const char* name;
   // Each writes the slots, in order, of values that reach the box, the line or the ball, and returns how many. There is
-  // room for kMostValues and a vector.
+  // room for kMaxValues and a vector.
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
   // Likewise, and each one's key, which is none too large.
   uint32_t (*collect_near)(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys);
-  // Sorts at most kMostSorted numbers, of which no two are equal.
+  // Sorts at most kMaxSorted numbers, of which no two are equal.
   void (*sort_few)(int32_t* numbers, uint32_t count);
 };
 

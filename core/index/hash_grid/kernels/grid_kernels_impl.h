@@ -97,7 +97,7 @@ inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slot
 // The vectors of all rows, one after the other: few loops of unknown length are more than one.
 struct RowVectors {
   static constexpr uint32_t kUsual = 4;  // of a row
-  static constexpr uint32_t kMost = GridRows::kMostValues / kLanes + GridRows::kMost + kUsual;
+  static constexpr uint32_t kMax = GridRows::kMaxValues / kLanes + GridRows::kMax + kUsual;
 
   explicit RowVectors(const GridRows& rows) {
     for (uint32_t row = 0; row < rows.count; ++row) {
@@ -113,8 +113,8 @@ struct RowVectors {
   }
 
   uint32_t count = 0;
-  uint32_t slot[kMost];
-  uint32_t lanes[kMost];
+  uint32_t slot[kMax];
+  uint32_t lanes[kMax];
 };
 
 // Writes the slots of all values of the rows that keep(slot) has a bit for.
@@ -202,7 +202,7 @@ uint32_t collect_near(const GridRows& rows, const GridNear& near, uint32_t* slot
 
 void sort_few(int32_t* numbers, uint32_t count) {
   if (count == 0) return;
-  int32_t given[kMostSorted + kLanes];
+  int32_t given[kMaxSorted + kLanes];
   std::memcpy(given, numbers, count * sizeof(int32_t));
   for (uint32_t i = 0; i < kLanes; ++i) given[count + i] = INT32_MAX;
   for (uint32_t i = 0; i < count; ++i) {

@@ -79,7 +79,7 @@ TEST_F(TickMovesTest, WhereManyAreFastFewAreListedAndTheRestCount) {
   for (uint32_t handle = 0; handle < 200; ++handle) move(handle, {handle < 190 ? 10.0 + handle : 5000, 0, 0});
   const Displacement& displacement = moves_.displacement();
   ASSERT_NE(displacement.fast, nullptr);
-  EXPECT_LE(displacement.fast->size(), TickMoves::kMostFast);
+  EXPECT_LE(displacement.fast->size(), TickMoves::kMaxFast);
   EXPECT_GE(displacement.fast->size(), 10u);
   EXPECT_LT(displacement.reach, 5000);
   const size_t rest = std::min<size_t>(190, static_cast<size_t>(displacement.reach) - 9);

@@ -137,7 +137,7 @@ TEST_F(SceneExportTest, ShapesWithoutSizeAreStillDrawn) {
   ASSERT_TRUE(scene.add(thing(ThingKind::kBox, 4, {5, 0, 0})).ok());
   const GlbFile file = written(scene);
   EXPECT_EQ(file.json["meshes"].size(), 3u) << "marker, ball and box";
-  EXPECT_EQ(file.node("object 4")["scale"][2].get<float>(), kLeastDrawnSize);
+  EXPECT_EQ(file.node("object 4")["scale"][2].get<float>(), kMinDrawnSize);
   EXPECT_EQ(file.node("object 3")["mesh"], file.node("object 2")["mesh"]) << "a capsule without an axis is a ball";
   expect_bounds({5 - kPointMarkSize, -kPointMarkSize, -kPointMarkSize},
                 {5 + kPointMarkSize, kPointMarkSize, kPointMarkSize});

@@ -54,7 +54,7 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
       for (uint64_t& word : columns.gone) word = some_gone ? random.next() & random.next() : 0;
       if (some_gone) rows.gone = columns.gone.data();
       uint32_t at = 0;
-      while (rows.count < GridRows::kMost && at < columns.count) {
+      while (rows.count < GridRows::kMax && at < columns.count) {
         const auto begin = static_cast<uint32_t>(at + random.below(12));
         const auto end = std::min(columns.count, static_cast<uint32_t>(begin + 1 + random.below(30)));
         if (begin >= end) break;
@@ -64,7 +64,7 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
           if ((columns.gone[slot / 64] >> (slot % 64) & 1) == 0) asked.insert(slot);
         at = end;
       }
-      uint32_t slots[GridRows::kMostValues + 8];
+      uint32_t slots[GridRows::kMaxValues + 8];
       const uint32_t count = ask(rows, slots);
       ASSERT_TRUE(std::is_sorted(slots, slots + count));
       const std::set<uint32_t> kept(slots, slots + count);
@@ -145,7 +145,7 @@ TEST_P(GridKernelsTest, CollectValuesByTheSquaredDistanceOfTheirBoundsAndSayIt) 
   };
   const auto keep = [&](uint32_t slot) { return std::min(verdict(4, key_of(slot)), verdict(key_of(slot), 50)); };
   const auto ask = [&](const GridRows& rows, uint32_t* slots) {
-    float keys[GridRows::kMostValues + 8];
+    float keys[GridRows::kMaxValues + 8];
     const uint32_t count = active_grid_kernels().collect_near(rows, near, slots, keys);
     for (uint32_t i = 0; i < count; ++i) EXPECT_NEAR(double{keys[i]}, key_of(slots[i]), 1e-4);
     return count;
@@ -162,15 +162,15 @@ TEST_P(GridKernelsTest, CollectFromLongRowsAndEmptyOnes) {
   rows.begin[1] = 3, rows.end[1] = 499;
   rows.begin[2] = rows.end[2] = 499;
   const GridNear everything{{}, 0, -1, 1e9f};
-  uint32_t slots[GridRows::kMostValues + 8];
-  float keys[GridRows::kMostValues + 8];
+  uint32_t slots[GridRows::kMaxValues + 8];
+  float keys[GridRows::kMaxValues + 8];
   ASSERT_EQ(active_grid_kernels().collect_near(rows, everything, slots, keys), 496u);
   for (uint32_t i = 0; i < 496; ++i) EXPECT_EQ(slots[i], i + 3);
 }
 
 TEST_P(GridKernelsTest, SortAnyNumberOfDifferentNumbers) {
   Random random(6);
-  for (uint32_t count = 0; count <= kMostSorted; ++count) {
+  for (uint32_t count = 0; count <= kMaxSorted; ++count) {
     std::vector<int32_t> numbers;
     for (uint32_t i = 0; i < count; ++i)
       numbers.push_back(static_cast<int32_t>(random.next() & 0x7FFFFF00u) | static_cast<int32_t>(i));
