@@ -7,14 +7,14 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "core/base/planted_bug.h"
-#include "core/scene/updates/batch_application.h"
+#include "core/scene/updates/batch_applier.h"
 
 namespace locus {
 
 SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics, size_t max_objects,
                          const HistoryOptions& history)
     : epoch_(epoch), max_objects_(max_objects), winding_(winding), statics_(std::move(statics)), recorder_(history) {
-  if (recorder_.on()) objects_.follow_lives();
+  if (recorder_.on()) objects_.track_lifetimes();
   published_ = freeze();
 }
 
@@ -34,7 +34,7 @@ absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding windi
 }
 
 void SceneWriter::end_replay() {
-  make_pending_moves();
+  flush_coalesced_moves();
   replaying_ = false;
   published_ = freeze();
 }
@@ -55,7 +55,7 @@ SnapshotPtr SceneWriter::freeze() {
 
 SnapshotPtr SceneWriter::next_revision() {
   ++revision_;
-  published_ = sees_nobody() ? nullptr : freeze();
+  published_ = defer_snapshots() ? nullptr : freeze();
   return published_;
 }
 
@@ -79,13 +79,13 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch
   if (*known) return Applied{old_ack(batch), nullptr};
   const bool jumps = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
                                                    [](const MoveColumns& move) { return move.teleport; });
-  absl::StatusOr<Applied> result = MoveApplication::serves(batch) && !jumps ? apply_moves(batch) : apply_changes(batch);
+  absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !jumps ? apply_moves(batch) : apply_changes(batch);
   if (result.ok()) writers_.record(batch.writer, batch.batch, result->ack);
   return result;
 }
 
 template <class Application>
-absl::Status SceneWriter::book(const UpdateBatch& batch, Application& application, Applied& result) {
+absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Application& application, Applied& result) {
   result.ack.applied = application.applied();
   result.ack.refused = application.refused();
   result.ack.errors = std::move(application.errors());
@@ -99,8 +99,8 @@ absl::Status SceneWriter::book(const UpdateBatch& batch, Application& applicatio
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch& batch) {
   Applied result;
   moves_.run(objects_, batch);
-  if (absl::Status status = book(batch, moves_, result); !status.ok()) return status;
-  result.snapshot = commit_moves(batch);
+  if (absl::Status status = fill_ack(batch, moves_, result); !status.ok()) return status;
+  result.snapshot = publish_moves(batch);
   UpdateAck reached = ack_now();
   result.ack.epoch = reached.epoch;
   result.ack.revision = reached.revision;
@@ -110,18 +110,18 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatch& batch) {
   Applied result;
-  make_pending_moves();
-  BatchApplication application(objects_, *statics_, batch, recorder_.on() ? Lives::kTold : Lives::kAlike);
+  flush_coalesced_moves();
+  BatchApplier application(objects_, *statics_, batch, recorder_.on() ? TrackLifetimes::kYes : TrackLifetimes::kNo);
   application.run();
   if (application.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
                        static_cast<double>(application.object_count()), 0);
-  if (absl::Status status = book(batch, application, result); !status.ok()) return status;
-  const BatchApplication::Difference difference = application.difference();
+  if (absl::Status status = fill_ack(batch, application, result); !status.ok()) return status;
+  const BatchApplier::Difference difference = application.difference();
   const bool forgets_now = forgets(batch);
   start_tick(batch);
-  replaced_bytes_ += objects_.apply(difference.gone, difference.come, difference.reborn);
-  commit(batch, !difference.empty() || forgets_now, result);
+  replaced_bytes_ += objects_.apply(difference.removed, difference.added, difference.replaced);
+  publish_changes(batch, !difference.empty() || forgets_now, result);
   return result;
 }
 
@@ -145,35 +145,35 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);
-  if (any_new != nullptr) joined.snapshot = commit_moves(*any_new);
+  if (any_new != nullptr) joined.snapshot = publish_moves(*any_new);
   for (size_t i = 0; i < batches.size(); ++i)
-    if (is_new[i]) settle(*batches[i], *joined.acks[i]);
+    if (is_new[i]) record_ack(*batches[i], *joined.acks[i]);
   for (size_t i = 0; i < batches.size(); ++i)
     if (!is_new[i] && joined.acks[i].ok()) joined.acks[i] = old_ack(*batches[i]);
   return joined;
 }
 
-bool SceneWriter::make_moves() {
-  if (sees_nobody()) return pending_moves_.add(moves_.moves(), objects_);
+bool SceneWriter::apply_staged_moves() {
+  if (defer_snapshots()) return coalesced_moves_.add(moves_.moves(), objects_);
   if (moves_.changes()) replaced_bytes_ += objects_.move(moves_.moves());
   return moves_.changes();
 }
 
-void SceneWriter::make_pending_moves() {
-  if (!pending_moves_.empty()) objects_.move(pending_moves_.moves());
-  pending_moves_.clear();
+void SceneWriter::flush_coalesced_moves() {
+  if (!coalesced_moves_.empty()) objects_.move(coalesced_moves_.moves());
+  coalesced_moves_.clear();
 }
 
-SnapshotPtr SceneWriter::commit_moves(const UpdateBatch& batch) {
+SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch) {
   Applied all;
   start_tick(batch);
-  const bool changes = make_moves();
-  commit(batch, changes, all);
+  const bool changes = apply_staged_moves();
+  publish_changes(batch, changes, all);
   moves_.clear();
   return std::move(all.snapshot);
 }
 
-void SceneWriter::settle(const UpdateBatch& batch, UpdateAck& ack) {
+void SceneWriter::record_ack(const UpdateBatch& batch, UpdateAck& ack) {
   ack.epoch = epoch_;
   ack.revision = revision_;
   ack.tick = tick_;
@@ -204,7 +204,7 @@ void SceneWriter::start_tick(const UpdateBatch& batch) {
   objects_.start_tick(tick, recorder_.oldest_tick(tick));
 }
 
-void SceneWriter::commit(const UpdateBatch& batch, bool changes, Applied& result) {
+void SceneWriter::publish_changes(const UpdateBatch& batch, bool changes, Applied& result) {
   const uint64_t tick = tick_of(batch);
   if (changes || tick != tick_) {
     tick_ = tick;

@@ -12,9 +12,9 @@
 #include "core/scene/log/scene_state.h"
 #include "core/scene/objects/object_store.h"
 #include "core/scene/snapshot/scene_snapshot.h"
-#include "core/scene/updates/batch_application.h"
-#include "core/scene/updates/move_application.h"
-#include "core/scene/updates/pending_moves.h"
+#include "core/scene/updates/batch_applier.h"
+#include "core/scene/updates/coalesced_moves.h"
+#include "core/scene/updates/move_applier.h"
 #include "core/scene/updates/update_batch.h"
 #include "core/scene/updates/writer_table.h"
 
@@ -69,18 +69,18 @@ class SceneWriter {
   UpdateAck ack_now() const;
   // What the batch came to, into the ack; refuses it if it is all_or_nothing and an item is wrong.
   template <class Application>
-  static absl::Status book(const UpdateBatch& batch, Application& application, Applied& result);
+  static absl::Status fill_ack(const UpdateBatch& batch, Application& application, Applied& result);
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
   // What the moves at hand come to, at the tick of `batch`; null when that is nothing.
-  SnapshotPtr commit_moves(const UpdateBatch& batch);
+  SnapshotPtr publish_moves(const UpdateBatch& batch);
   // Whether snapshots can wait: what was published is what the past is made of.
-  bool sees_nobody() const { return replaying_ && !recorder_.on(); }
+  bool defer_snapshots() const { return replaying_ && !recorder_.on(); }
   // Makes the moves at hand; whether they change anything.
-  bool make_moves();
+  bool apply_staged_moves();
   // Makes those that were put off.
-  void make_pending_moves();
+  void flush_coalesced_moves();
   // Where an applied batch became visible, into its ack, which is remembered.
-  void settle(const UpdateBatch& batch, UpdateAck& ack);
+  void record_ack(const UpdateBatch& batch, UpdateAck& ack);
   // Of a batch that was applied before.
   UpdateAck old_ack(const UpdateBatch& batch) const;
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
@@ -90,7 +90,7 @@ class SceneWriter {
   // What the batch means to the past, before anything of it is applied: the end of the tick before, or of all.
   void start_tick(const UpdateBatch& batch);
   // Applies the tick; the next revision if that changes anything or `changes` says so, and the ack's last part.
-  void commit(const UpdateBatch& batch, bool changes, Applied& result);
+  void publish_changes(const UpdateBatch& batch, bool changes, Applied& result);
 
   uint64_t epoch_;
   size_t max_objects_;
@@ -99,8 +99,8 @@ class SceneWriter {
   Winding winding_;
   std::shared_ptr<const StaticSet> statics_;
   ObjectStore objects_;
-  MoveApplication moves_;
-  PendingMoves pending_moves_;  // put off; only where sees_nobody()
+  MoveApplier moves_;
+  CoalescedMoves coalesced_moves_;  // put off; only where defer_snapshots()
   WriterTable writers_;
   HistoryRecorder recorder_;
   uint64_t replaced_bytes_ = 0;  // of objects and statics so far

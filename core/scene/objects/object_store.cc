@@ -14,12 +14,12 @@ constexpr uint32_t kNewLife = ~0u;
 
 // For each of `inserted` the number among `removed` of the object that lives on as it; kNewLife where none does.
 std::vector<uint32_t> lives_that_go_on(absl::Span<const Object> removed, absl::Span<const Object> inserted,
-                                       const absl::flat_hash_set<Id>& reborn) {
+                                       const absl::flat_hash_set<Id>& replaced) {
   std::vector<uint32_t> before(inserted.size(), kNewLife);
   if (removed.empty() || inserted.empty()) return before;
   absl::flat_hash_map<Id, uint32_t> numbers;
   for (uint32_t i = 0; i < removed.size(); ++i)
-    if (!reborn.contains(removed[i].id)) numbers.emplace(removed[i].id, i);
+    if (!replaced.contains(removed[i].id)) numbers.emplace(removed[i].id, i);
   for (size_t i = 0; i < inserted.size(); ++i)
     if (const auto found = numbers.find(inserted[i].id); found != numbers.end()) before[i] = found->second;
   return before;
@@ -43,7 +43,7 @@ void ObjectStore::free_handle(uint32_t handle) {
   if (moves_ == nullptr) {
     free_handles_.push_back(handle);
   } else {
-    resting_.push_back({handle, tick_});
+    quarantined_handles_.push_back({handle, tick_});
   }
 }
 
@@ -52,8 +52,9 @@ void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   LOCUS_CHECK(moves_ != nullptr);
   tick_ = tick;
   moves_->start_tick(grid_.cell_size());
-  for (; !resting_.empty() && resting_.front().tick <= oldest_tick; resting_.pop_front())
-    free_handles_.push_back(resting_.front().handle);
+  for (; !quarantined_handles_.empty() && quarantined_handles_.front().tick <= oldest_tick;
+       quarantined_handles_.pop_front())
+    free_handles_.push_back(quarantined_handles_.front().handle);
 }
 
 size_t ObjectStore::move(const GridMoves& moves) {
@@ -80,15 +81,15 @@ GridItem ObjectStore::begin_life(const Object& object) {
   return grid_item_of(object, handle);
 }
 
-GridItem ObjectStore::go_on(const Object& object, uint32_t handle) {
+GridItem ObjectStore::continue_life(const Object& object, uint32_t handle) {
   if (moves_ != nullptr) moves_->moved(grid_.at(handle), object.shape.position);
   return grid_item_of(object, handle);
 }
 
 size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
-                          const absl::flat_hash_set<Id>& reborn) {
+                          const absl::flat_hash_set<Id>& replaced) {
   const std::vector<uint32_t> leaving = handles_of(removed);
-  const std::vector<uint32_t> before = lives_that_go_on(removed, inserted, reborn);
+  const std::vector<uint32_t> before = lives_that_go_on(removed, inserted, replaced);
   std::vector<uint8_t> ends(removed.size(), 1);
   for (const uint32_t number : before)
     if (number != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[number], uint8_t{0}), 1);
@@ -99,7 +100,7 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   items.reserve(inserted.size());
   for (size_t i = 0; i < inserted.size(); ++i) {
     if (i + kAhead < inserted.size()) handles_.prefetch(inserted[i + kAhead].id);
-    items.push_back(before[i] == kNewLife ? begin_life(inserted[i]) : go_on(inserted[i], leaving[before[i]]));
+    items.push_back(before[i] == kNewLife ? begin_life(inserted[i]) : continue_life(inserted[i], leaving[before[i]]));
   }
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) free_handle(leaving[i]);

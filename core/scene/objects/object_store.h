@@ -28,7 +28,7 @@ class ObjectStore {
   explicit ObjectStore(const HashGridOptions& options) : grid_(options) {}
 
   // From now on, before the first object comes: keeps what questions about the past need.
-  void follow_lives() { moves_ = std::make_unique<TickMoves>(); }
+  void track_lifetimes() { moves_ = std::make_unique<TickMoves>(); }
   // For a store that follows lives: `tick` begins; nothing asks sets from before `oldest_tick` any more.
   void start_tick(uint64_t tick, uint64_t oldest_tick);
   // How far objects moved since then; none for a store that does not follow lives.
@@ -51,7 +51,7 @@ class ObjectStore {
   // its id, and lives on unless it is among the `reborn`. All removed ones must be here, no inserted one may remain
   // here. O(n) and the bricks that are touched. Returns the bytes of what the sets so far hold and later ones will not.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
-               const absl::flat_hash_set<Id>& reborn = {});
+               const absl::flat_hash_set<Id>& replaced = {});
   // Returns as apply().
   size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
@@ -78,19 +78,19 @@ class ObjectStore {
   void free_handle(uint32_t handle);
   std::vector<uint32_t> handles_of(absl::Span<const Object> objects) const;
   GridItem begin_life(const Object& object);
-  GridItem go_on(const Object& object, uint32_t handle);
+  GridItem continue_life(const Object& object, uint32_t handle);
 
   HashGrid grid_;
   PersistentIdTable<> handles_;
   std::vector<uint32_t> free_handles_;
   uint32_t next_handle_ = 0;
-  struct Resting {
+  struct QuarantinedHandle {
     uint32_t handle;
     uint64_t tick;
   };
-  std::deque<Resting> resting_;       // of lives that ended, ascending by tick
-  uint64_t tick_ = 0;                 // as start_tick() said
-  std::unique_ptr<TickMoves> moves_;  // null unless lives are followed
+  std::deque<QuarantinedHandle> quarantined_handles_;  // of lives that ended, ascending by tick
+  uint64_t tick_ = 0;                                  // as start_tick() said
+  std::unique_ptr<TickMoves> moves_;                   // null unless lives are followed
 };
 
 }  // namespace locus

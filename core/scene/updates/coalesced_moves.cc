@@ -1,9 +1,9 @@
-#include "core/scene/updates/pending_moves.h"
+#include "core/scene/updates/coalesced_moves.h"
 
 namespace locus {
 
-bool PendingMoves::differs(const GridMove& move, const Quaternion* rotation, const GridMove* before,
-                           const GridRef& stored) const {
+bool CoalescedMoves::differs(const GridMove& move, const Quaternion* rotation, const GridMove* before,
+                             const GridRef& stored) const {
   const Vec3d& position = before != nullptr ? before->position : stored.entry().position;
   if (!(move.position == position)) return true;
   if (rotation == nullptr) return false;
@@ -11,7 +11,7 @@ bool PendingMoves::differs(const GridMove& move, const Quaternion* rotation, con
   return !(*rotation == (turned ? rotations_[before->rotation] : stored.form().rotation));
 }
 
-bool PendingMoves::add(const GridMoves& batch, const ObjectStore& store) {
+bool CoalescedMoves::add(const GridMoves& batch, const ObjectStore& store) {
   if (numbers_.size() < store.handle_count()) numbers_.resize(store.handle_count());
   bool changes = false;
   for (const GridMove& move : batch.moves) {

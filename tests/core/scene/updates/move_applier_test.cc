@@ -1,5 +1,5 @@
-// Batches of moves alone, which take a way of their own: what it says and does is what BatchApplication says and does.
-#include "core/scene/updates/move_application.h"
+// Batches of moves alone, which take a way of their own: what it says and does is what BatchApplier says and does.
+#include "core/scene/updates/move_applier.h"
 
 #include <limits>
 
@@ -9,7 +9,7 @@
 namespace locus::test {
 namespace {
 
-class MoveApplicationTest : public SceneFixture {
+class MoveApplierTest : public SceneFixture {
  protected:
   void SetUp() override { apply(with(points({1, 2, 3}, {1, 1, 1, 2, 2, 2, 3, 3, 3}))); }
 };
@@ -22,27 +22,27 @@ std::string ack_text(const UpdateAck& ack) {
   return text;
 }
 
-TEST_F(MoveApplicationTest, ServesMovesAlone) {
-  EXPECT_TRUE(MoveApplication::serves(with(move_to({1}, {0, 0, 0}))));
-  EXPECT_FALSE(MoveApplication::serves(UpdateBatch()));
+TEST_F(MoveApplierTest, ServesMovesAlone) {
+  EXPECT_TRUE(MoveApplier::serves(with(move_to({1}, {0, 0, 0}))));
+  EXPECT_FALSE(MoveApplier::serves(UpdateBatch()));
   UpdateBatch both = with(move_to({1}, {0, 0, 0}));
   both.relabels.emplace_back();
-  EXPECT_FALSE(MoveApplication::serves(both));
+  EXPECT_FALSE(MoveApplier::serves(both));
 }
 
-TEST_F(MoveApplicationTest, OfSeveralMovesOfOneObjectTheLastCountsAndAllAreApplied) {
+TEST_F(MoveApplierTest, OfSeveralMovesOfOneObjectTheLastCountsAndAllAreApplied) {
   const UpdateAck ack = apply(with(move_to({1, 2, 1}, {5, 5, 5, 6, 6, 6, 7, 7, 7})));
   EXPECT_EQ(ack.applied, 3u);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{7, 7, 7}));
   EXPECT_EQ(object(2)->shape.position, (Vec3d{6, 6, 6}));
 }
 
-TEST_F(MoveApplicationTest, AMoveThereAndBackMakesNoRevision) {
+TEST_F(MoveApplierTest, AMoveThereAndBackMakesNoRevision) {
   const uint64_t before = revision();
   EXPECT_EQ(apply(with(move_to({1, 1}, {5, 5, 5, 1, 1, 1}))).revision, before);
 }
 
-TEST_F(MoveApplicationTest, ATurnAloneIsAChangeAndIsKeptByLaterMoves) {
+TEST_F(MoveApplierTest, ATurnAloneIsAChangeAndIsKeptByLaterMoves) {
   MoveColumns turn = move_to({2}, {2, 2, 2});
   turn.rotations = columns_.floats({0, 0, 1, 0});
   const uint64_t before = revision();
@@ -53,7 +53,7 @@ TEST_F(MoveApplicationTest, ATurnAloneIsAChangeAndIsKeptByLaterMoves) {
   EXPECT_EQ(object(2)->shape.position, (Vec3d{4, 4, 4}));
 }
 
-TEST_F(MoveApplicationTest, AllOrNothingRefusesTheBatchAndChangesNothing) {
+TEST_F(MoveApplierTest, AllOrNothingRefusesTheBatchAndChangesNothing) {
   UpdateBatch batch = with(move_to({1, 99}, {5, 5, 5, 6, 6, 6}));
   batch.all_or_nothing = true;
   const uint64_t before = revision();
@@ -63,7 +63,7 @@ TEST_F(MoveApplicationTest, AllOrNothingRefusesTheBatchAndChangesNothing) {
   EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
 }
 
-TEST_F(MoveApplicationTest, ComesToWhatTheGeneralWayComesTo) {
+TEST_F(MoveApplierTest, ComesToWhatTheGeneralWayComesTo) {
   Random random(5);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   Scene other("other", {}, kEpoch, StaticSet::empty());

@@ -1,5 +1,5 @@
 // What becomes of the items of a batch, asked of a scene: order, refused items, kept and default columns, rounding.
-#include "core/scene/updates/batch_application.h"
+#include "core/scene/updates/batch_applier.h"
 
 #include <limits>
 
@@ -14,7 +14,7 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-class BatchApplicationTest : public SceneFixture {
+class BatchApplierTest : public SceneFixture {
  protected:
   // Applies a batch of which one item is refused, and says which.
   ItemError only_error(const UpdateBatch& batch) {
@@ -40,7 +40,7 @@ class BatchApplicationTest : public SceneFixture {
   }
 };
 
-TEST_F(BatchApplicationTest, InsertsTakeOneEntryForAllOrOneEach) {
+TEST_F(BatchApplierTest, InsertsTakeOneEntryForAllOrOneEach) {
   InsertColumns insert = balls({1, 2}, {3, 4});
   insert.tags = columns_.ids({9});
   EXPECT_EQ(apply(with(insert)).applied, 2u);
@@ -50,7 +50,7 @@ TEST_F(BatchApplicationTest, InsertsTakeOneEntryForAllOrOneEach) {
   EXPECT_EQ(object(2)->tag, 9u);
 }
 
-TEST_F(BatchApplicationTest, AbsentColumnsOfInsertsAreTheDefaults) {
+TEST_F(BatchApplierTest, AbsentColumnsOfInsertsAreTheDefaults) {
   apply(with(points({1}, {1, 2, 3})));
   EXPECT_EQ(object(1)->group, 0u);
   EXPECT_EQ(object(1)->tag, 0u);
@@ -58,7 +58,7 @@ TEST_F(BatchApplicationTest, AbsentColumnsOfInsertsAreTheDefaults) {
   EXPECT_EQ(object(1)->shape.rotation, Quaternion{});
 }
 
-TEST_F(BatchApplicationTest, AppliesRemovesThenInsertsThenMovesThenRelabels) {
+TEST_F(BatchApplierTest, AppliesRemovesThenInsertsThenMovesThenRelabels) {
   apply(with(points({1}, {0, 0, 0})));
   UpdateBatch batch = with(points({1}, {5, 5, 5}));
   batch.remove_ids = columns_.ids({1});
@@ -74,7 +74,7 @@ TEST_F(BatchApplicationTest, AppliesRemovesThenInsertsThenMovesThenRelabels) {
   EXPECT_EQ(object(1)->tag, 42u);
 }
 
-TEST_F(BatchApplicationTest, ClearComesBeforeRemoves) {
+TEST_F(BatchApplierTest, ClearComesBeforeRemoves) {
   apply(with(points({1, 2}, {0, 0, 0})));
   UpdateBatch batch = removing({1});
   batch.clear = true;
@@ -82,7 +82,7 @@ TEST_F(BatchApplicationTest, ClearComesBeforeRemoves) {
   EXPECT_TRUE(ids().empty());
 }
 
-TEST_F(BatchApplicationTest, ClearAndInsertOfAKnownIdIsNoDuplicate) {
+TEST_F(BatchApplierTest, ClearAndInsertOfAKnownIdIsNoDuplicate) {
   apply(with(balls({1, 2}, {1})));
   UpdateBatch batch = with(points({2}, {3, 3, 3}));
   batch.clear = true;
@@ -92,7 +92,7 @@ TEST_F(BatchApplicationTest, ClearAndInsertOfAKnownIdIsNoDuplicate) {
   EXPECT_EQ(scene_.latest()->objects.size(), 1u);
 }
 
-TEST_F(BatchApplicationTest, ClearLeavesInstances) {
+TEST_F(BatchApplierTest, ClearLeavesInstances) {
   ASSERT_TRUE(scene_.change_instances(placing(placement({8}, {0, 0, 0}))).ok());
   UpdateBatch batch;
   batch.clear = true;
@@ -100,25 +100,25 @@ TEST_F(BatchApplicationTest, ClearLeavesInstances) {
   EXPECT_NE(scene_.latest()->statics->find(8), nullptr);
 }
 
-TEST_F(BatchApplicationTest, OfTwoMovesOfOneObjectTheLaterStays) {
+TEST_F(BatchApplierTest, OfTwoMovesOfOneObjectTheLaterStays) {
   apply(with(points({1}, {0, 0, 0})));
   EXPECT_EQ(apply(with(move_to({1, 1}, {1, 1, 1, 2, 2, 2}))).applied, 2u);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{2, 2, 2}));
 }
 
-TEST_F(BatchApplicationTest, TheSecondInsertOfAnIdInOneBatchIsRefused) {
+TEST_F(BatchApplierTest, TheSecondInsertOfAnIdInOneBatchIsRefused) {
   expect_error(with(points({1, 1}, {1, 1, 1, 2, 2, 2})), "inserts[0].ids", 1, 1, Reason::kDuplicateId);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
 }
 
-TEST_F(BatchApplicationTest, InsertOfAKnownIdIsRefused) {
+TEST_F(BatchApplierTest, InsertOfAKnownIdIsRefused) {
   apply(with(points({1}, {1, 1, 1})));
   expect_error(with(points({2, 1}, {2, 2, 2})), "inserts[0].ids", 1, 1, Reason::kDuplicateId);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
   EXPECT_TRUE(object(2).has_value());
 }
 
-TEST_F(BatchApplicationTest, UpsertReplacesShapeAndLabels) {
+TEST_F(BatchApplierTest, UpsertReplacesShapeAndLabels) {
   InsertColumns first = balls({1}, {2});
   first.tags = columns_.ids({5});
   first.groups = columns_.ids({6});
@@ -132,57 +132,57 @@ TEST_F(BatchApplicationTest, UpsertReplacesShapeAndLabels) {
   EXPECT_EQ(*object(1), expected);
 }
 
-TEST_F(BatchApplicationTest, TheIdOfAnInstanceIsRefusedEvenByUpsert) {
+TEST_F(BatchApplierTest, TheIdOfAnInstanceIsRefusedEvenByUpsert) {
   ASSERT_TRUE(scene_.change_instances(placing(placement({8}, {0, 0, 0}))).ok());
   UpdateBatch batch = with(points({8}, {0, 0, 0}));
   batch.upsert = true;
   expect_error(batch, "inserts[0].ids", 0, 8, Reason::kDuplicateId);
 }
 
-TEST_F(BatchApplicationTest, IdZeroIsRefused) {
+TEST_F(BatchApplierTest, IdZeroIsRefused) {
   expect_error(with(points({0}, {0, 0, 0})), "inserts[0].ids", 0, 0, Reason::kOutOfRange);
 }
 
-TEST_F(BatchApplicationTest, MovesOfInstancesAndUnknownIdsAreRefused) {
+TEST_F(BatchApplierTest, MovesOfInstancesAndUnknownIdsAreRefused) {
   ASSERT_TRUE(scene_.change_instances(placing(placement({8}, {0, 0, 0}))).ok());
   expect_error(with(move_to({8}, {0, 0, 0})), "moves[0].ids", 0, 8, Reason::kUnknownId);
   expect_error(with(move_to({3}, {0, 0, 0})), "moves[0].ids", 0, 3, Reason::kUnknownId);
 }
 
-TEST_F(BatchApplicationTest, RemovesOfUnknownIdsAreRefusedTheSecondOfTwoIncluded) {
+TEST_F(BatchApplierTest, RemovesOfUnknownIdsAreRefusedTheSecondOfTwoIncluded) {
   apply(with(points({1}, {0, 0, 0})));
   expect_error(removing({1, 1}), "remove_ids", 1, 1, Reason::kUnknownId);
   EXPECT_TRUE(ids().empty());
 }
 
-TEST_F(BatchApplicationTest, AMoveAfterARemoveInOneBatchIsRefused) {
+TEST_F(BatchApplierTest, AMoveAfterARemoveInOneBatchIsRefused) {
   apply(with(points({1}, {0, 0, 0})));
   UpdateBatch batch = removing({1});
   batch.moves.push_back(move_to({1}, {1, 1, 1}));
   expect_error(batch, "moves[0].ids", 0, 1, Reason::kUnknownId);
 }
 
-TEST_F(BatchApplicationTest, RelabelOfAnUnknownIdIsRefused) {
+TEST_F(BatchApplierTest, RelabelOfAnUnknownIdIsRefused) {
   RelabelColumns relabel;
   relabel.ids = columns_.ids({4});
   expect_error(with(relabel), "relabels[0].ids", 0, 4, Reason::kUnknownId);
 }
 
-TEST_F(BatchApplicationTest, PositionsMustBeFinite) {
+TEST_F(BatchApplierTest, PositionsMustBeFinite) {
   expect_error(with(points({1, 2}, {0, 0, 0, 0, kNan, 0})), "inserts[0].positions", 1, 2, Reason::kNotFinite);
   expect_error(with(points({3}, {0, 0, kInfinity})), "inserts[0].positions", 0, 3, Reason::kNotFinite);
   expect_error(with(move_to({1}, {kNan, 0, 0})), "moves[0].positions", 0, 1, Reason::kNotFinite);
   EXPECT_EQ(object(1)->shape.position, Vec3d{});
 }
 
-TEST_F(BatchApplicationTest, TheSumOfFrameAndOffsetMustLieWithinTheWorld) {
+TEST_F(BatchApplierTest, TheSumOfFrameAndOffsetMustLieWithinTheWorld) {
   UpdateBatch batch = with(points({1, 2}, {0, 0, 0, 1, 0, 0}));
   batch.frame = {1e9, 0, 0};
   expect_error(batch, "inserts[0].positions", 1, 2, Reason::kOutOfRange);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{1e9, 0, 0}));
 }
 
-TEST_F(BatchApplicationTest, AbsolutePositionsAreNamedAndIgnoreTheFrame) {
+TEST_F(BatchApplierTest, AbsolutePositionsAreNamedAndIgnoreTheFrame) {
   InsertColumns insert;
   insert.ids = columns_.ids({1, 2});
   insert.positions_f64 = columns_.doubles({0.1, 0.2, 0.3, 2e9, 0, 0});
@@ -192,7 +192,7 @@ TEST_F(BatchApplicationTest, AbsolutePositionsAreNamedAndIgnoreTheFrame) {
   EXPECT_EQ(object(1)->shape.position, (Vec3d{0.1, 0.2, 0.3}));
 }
 
-TEST_F(BatchApplicationTest, PositionsAreFramePlusOffsetRoundedOnceToDouble) {
+TEST_F(BatchApplierTest, PositionsAreFramePlusOffsetRoundedOnceToDouble) {
   UpdateBatch batch = with(points({1}, {0.1f, -0.1f, 0}));
   batch.frame = {0.7, 123456789.125, 0.3};
   apply(batch);
@@ -202,19 +202,19 @@ TEST_F(BatchApplicationTest, PositionsAreFramePlusOffsetRoundedOnceToDouble) {
   EXPECT_EQ(object(1)->shape.position.z, 0.3);
 }
 
-TEST_F(BatchApplicationTest, RadiiMustBeFiniteAndNotNegative) {
+TEST_F(BatchApplierTest, RadiiMustBeFiniteAndNotNegative) {
   expect_error(with(balls({1, 2}, {0, -1})), "inserts[0].ball.radii", 1, 2, Reason::kOutOfRange);
   expect_error(with(balls({3}, {kNan})), "inserts[0].ball.radii", 0, 3, Reason::kNotFinite);
   expect_error(with(balls({3}, {2e9f})), "inserts[0].ball.radii", 0, 3, Reason::kOutOfRange);
   EXPECT_EQ(ids(), (std::vector<Id>{1}));
 }
 
-TEST_F(BatchApplicationTest, HalfExtentsMustBeFiniteAndNotNegative) {
+TEST_F(BatchApplierTest, HalfExtentsMustBeFiniteAndNotNegative) {
   expect_error(with(boxes({1, 2}, {0, 0, 0, 1, -1, 1})), "inserts[0].box.half_extents", 1, 2, Reason::kOutOfRange);
   expect_error(with(boxes({3}, {1, 1, kInfinity})), "inserts[0].box.half_extents", 0, 3, Reason::kNotFinite);
 }
 
-TEST_F(BatchApplicationTest, HalfAxesMayBeNegative) {
+TEST_F(BatchApplierTest, HalfAxesMayBeNegative) {
   InsertColumns capsules = balls({1, 2}, {1});
   capsules.kind = ShapeKind::kCapsule;
   capsules.extents = columns_.floats({-1, -2, -3, 0, kNan, 0});
@@ -222,21 +222,21 @@ TEST_F(BatchApplicationTest, HalfAxesMayBeNegative) {
   EXPECT_EQ(object(1)->shape.size, (Vec3f{-1, -2, -3}));
 }
 
-TEST_F(BatchApplicationTest, CapsuleRadiiAreNamedAsSuch) {
+TEST_F(BatchApplierTest, CapsuleRadiiAreNamedAsSuch) {
   InsertColumns capsules = balls({1}, {-1});
   capsules.kind = ShapeKind::kCapsule;
   capsules.extents = columns_.floats({0, 0, 1});
   expect_error(with(capsules), "inserts[0].capsule.radii", 0, 1, Reason::kOutOfRange);
 }
 
-TEST_F(BatchApplicationTest, RotationsOffUnitLengthAreRefused) {
+TEST_F(BatchApplierTest, RotationsOffUnitLengthAreRefused) {
   InsertColumns insert = points({1, 2}, {0, 0, 0});
   insert.rotations = columns_.floats({0, 0, 0, 1.0009f, 0, 0, 0, 1.0011f});
   expect_error(with(insert), "inserts[0].rotations", 1, 2, Reason::kOutOfRange);
   EXPECT_EQ(object(1)->shape.rotation, Quaternion{});
 }
 
-TEST_F(BatchApplicationTest, RotationsMustBeFinite) {
+TEST_F(BatchApplierTest, RotationsMustBeFinite) {
   apply(with(points({1}, {0, 0, 0})));
   MoveColumns move = move_to({1}, {5, 0, 0});
   move.rotations = columns_.floats({0, kNan, 0, 1});
@@ -244,14 +244,14 @@ TEST_F(BatchApplicationTest, RotationsMustBeFinite) {
   EXPECT_EQ(object(1)->shape.position, Vec3d{});
 }
 
-TEST_F(BatchApplicationTest, RotationsAreStoredNormalised) {
+TEST_F(BatchApplierTest, RotationsAreStoredNormalised) {
   InsertColumns insert = points({1}, {0, 0, 0});
   insert.rotations = columns_.floats({0.6f, 0, 0, 0.8005f});
   apply(with(insert));
   EXPECT_LT(unit_deviation(object(1)->shape.rotation), 1e-7);
 }
 
-TEST_F(BatchApplicationTest, AStoredRotationComesBackBitForBitWhenItIsSentAgain) {
+TEST_F(BatchApplierTest, AStoredRotationComesBackBitForBitWhenItIsSentAgain) {
   Random random(17);
   for (int i = 0; i < 2000; ++i) {
     InsertColumns insert = points({1}, {0, 0, 0});
@@ -268,7 +268,7 @@ TEST_F(BatchApplicationTest, AStoredRotationComesBackBitForBitWhenItIsSentAgain)
   }
 }
 
-TEST_F(BatchApplicationTest, AMoveWithoutRotationKeepsIt) {
+TEST_F(BatchApplierTest, AMoveWithoutRotationKeepsIt) {
   InsertColumns insert = points({1}, {0, 0, 0});
   insert.rotations = columns_.floats({0, 0, 1, 0});
   apply(with(insert));
@@ -276,7 +276,7 @@ TEST_F(BatchApplicationTest, AMoveWithoutRotationKeepsIt) {
   EXPECT_EQ(object(1)->shape.rotation, (Quaternion{0, 0, 1, 0}));
 }
 
-TEST_F(BatchApplicationTest, AMoveKeepsShapeAndLabels) {
+TEST_F(BatchApplierTest, AMoveKeepsShapeAndLabels) {
   InsertColumns insert = balls({1}, {2});
   insert.tags = columns_.ids({5});
   apply(with(insert));
@@ -286,7 +286,7 @@ TEST_F(BatchApplicationTest, AMoveKeepsShapeAndLabels) {
   EXPECT_EQ(object(1)->tag, 5u);
 }
 
-TEST_F(BatchApplicationTest, RelabelKeepsWhatHasNoColumn) {
+TEST_F(BatchApplierTest, RelabelKeepsWhatHasNoColumn) {
   InsertColumns insert = balls({1}, {2});
   insert.layers = columns_.words({4});
   insert.groups = columns_.ids({5});
@@ -302,7 +302,7 @@ TEST_F(BatchApplicationTest, RelabelKeepsWhatHasNoColumn) {
   EXPECT_EQ(object(1)->shape.radius, 2);
 }
 
-TEST_F(BatchApplicationTest, RemoveGroupsRemovesEveryObjectOfThem) {
+TEST_F(BatchApplierTest, RemoveGroupsRemovesEveryObjectOfThem) {
   InsertColumns insert = points({1, 2, 3, 4}, {0, 0, 0});
   insert.groups = columns_.ids({7, 8, 7, 0});
   apply(with(insert));
@@ -312,7 +312,7 @@ TEST_F(BatchApplicationTest, RemoveGroupsRemovesEveryObjectOfThem) {
   EXPECT_EQ(ids(), (std::vector<Id>{2, 4}));
 }
 
-TEST_F(BatchApplicationTest, GroupZeroIsNoGroupToRemove) {
+TEST_F(BatchApplierTest, GroupZeroIsNoGroupToRemove) {
   apply(with(points({1}, {0, 0, 0})));
   UpdateBatch batch;
   batch.remove_groups = columns_.ids({3, 0});
@@ -320,7 +320,7 @@ TEST_F(BatchApplicationTest, GroupZeroIsNoGroupToRemove) {
   EXPECT_EQ(ids(), (std::vector<Id>{1}));
 }
 
-TEST_F(BatchApplicationTest, OneThousandErrorsAreListedAndAllAreCounted) {
+TEST_F(BatchApplierTest, OneThousandErrorsAreListedAndAllAreCounted) {
   std::vector<Id> unknown(2500);
   for (size_t i = 0; i < unknown.size(); ++i) unknown[i] = 10 + i;
   const UpdateAck ack = apply(removing(unknown));
@@ -330,7 +330,7 @@ TEST_F(BatchApplicationTest, OneThousandErrorsAreListedAndAllAreCounted) {
   EXPECT_EQ(ack.errors.back().id, 1009u);
 }
 
-TEST_F(BatchApplicationTest, ErrorsAreListedInOrderOfApplication) {
+TEST_F(BatchApplierTest, ErrorsAreListedInOrderOfApplication) {
   UpdateBatch batch = with(points({0}, {0, 0, 0}));
   batch.inserts.push_back(points({5, 0}, {0, 0, 0}));
   batch.moves.push_back(move_to({6}, {0, 0, 0}));
@@ -344,7 +344,7 @@ TEST_F(BatchApplicationTest, ErrorsAreListedInOrderOfApplication) {
   EXPECT_EQ(ack.errors[3].field, "moves[0].ids");
 }
 
-TEST_F(BatchApplicationTest, AllOrNothingRefusesTheBatchByItsFirstError) {
+TEST_F(BatchApplierTest, AllOrNothingRefusesTheBatchByItsFirstError) {
   apply(with(points({1}, {0, 0, 0})));
   UpdateBatch batch = with(points({2, 3, 1}, {1, 1, 1, kNan, 1, 1, 2, 2, 2}));
   batch.all_or_nothing = true;
@@ -355,13 +355,13 @@ TEST_F(BatchApplicationTest, AllOrNothingRefusesTheBatchByItsFirstError) {
   EXPECT_EQ(scene_.latest(), before);
 }
 
-TEST_F(BatchApplicationTest, AllOrNothingWithoutErrorsIsApplied) {
+TEST_F(BatchApplierTest, AllOrNothingWithoutErrorsIsApplied) {
   UpdateBatch batch = with(points({2, 3}, {1, 1, 1}));
   batch.all_or_nothing = true;
   EXPECT_EQ(apply(batch).applied, 2u);
 }
 
-TEST_F(BatchApplicationTest, TooManyObjectsRefuseTheBatchAndNameTheLimit) {
+TEST_F(BatchApplierTest, TooManyObjectsRefuseTheBatchAndNameTheLimit) {
   SceneWriter writer(kEpoch, Winding::kCounterClockwise, StaticSet::empty(), 3);
   ASSERT_TRUE(writer.apply(with(points({1, 2}, {0, 0, 0}))).ok());
   const absl::Status status = writer.apply(with(points({3, 4}, {0, 0, 0}))).status();
@@ -372,7 +372,7 @@ TEST_F(BatchApplicationTest, TooManyObjectsRefuseTheBatchAndNameTheLimit) {
   EXPECT_EQ(writer.published()->objects.size(), 2u);
 }
 
-TEST_F(BatchApplicationTest, RemovedAndReplacedObjectsMakeRoomWithinTheBatch) {
+TEST_F(BatchApplierTest, RemovedAndReplacedObjectsMakeRoomWithinTheBatch) {
   SceneWriter writer(kEpoch, Winding::kCounterClockwise, StaticSet::empty(), 2);
   ASSERT_TRUE(writer.apply(with(points({1, 2}, {0, 0, 0}))).ok());
   UpdateBatch replace = with(points({3, 2}, {1, 1, 1}));

@@ -1,4 +1,4 @@
-#include "core/scene/updates/move_application.h"
+#include "core/scene/updates/move_applier.h"
 
 #include <algorithm>
 
@@ -13,24 +13,24 @@ constexpr size_t kItemsAtOnce = 64;
 
 }  // namespace
 
-bool MoveApplication::serves(const UpdateBatch& batch) {
+bool MoveApplier::serves(const UpdateBatch& batch) {
   return !batch.clear && !batch.restart_ticks && batch.remove_ids.empty() && batch.remove_groups.empty() &&
          batch.inserts.empty() && batch.relabels.empty() && !batch.moves.empty();
 }
 
-void MoveApplication::begin(const ObjectStore& objects) {
+void MoveApplier::begin(const ObjectStore& objects) {
   moves_.clear();
   rotations_.clear();
   last_move_.resize(std::max(last_move_.size(), objects.handle_count()));
 }
 
-void MoveApplication::add(const ObjectStore& objects, const UpdateBatch& batch) {
+void MoveApplier::add(const ObjectStore& objects, const UpdateBatch& batch) {
   applied_ = refused_ = 0;
   errors_.clear();
   for (size_t list = 0; list < batch.moves.size(); ++list) run(objects, batch.frame, batch.moves[list], list);
 }
 
-void MoveApplication::finish(const ObjectStore& objects) {
+void MoveApplier::finish(const ObjectStore& objects) {
   changes_ = std::any_of(moves_.begin(), moves_.end(), [&](const GridMove& move) {
     const GridRef now = objects.at(move.handle);
     return !(move.position == now.entry().position) ||
@@ -38,13 +38,13 @@ void MoveApplication::finish(const ObjectStore& objects) {
   });
 }
 
-void MoveApplication::refuse(const char* column, const Item& item, Reason reason) {
+void MoveApplier::refuse(const char* column, const Item& item, Reason reason) {
   ++refused_;
   if (errors_.size() < limits::kMaxListedItemErrors)
     errors_.push_back({absl::StrCat("moves[", item.list, "].", column), item.index, item.id, reason});
 }
 
-inline GridMove& MoveApplication::move_of(uint32_t handle) {
+inline GridMove& MoveApplier::move_of(uint32_t handle) {
   const uint32_t last = last_move_[handle];
   if (last < moves_.size() && moves_[last].handle == handle) return moves_[last];
   last_move_[handle] = static_cast<uint32_t>(moves_.size());
@@ -53,7 +53,7 @@ inline GridMove& MoveApplication::move_of(uint32_t handle) {
   return move;
 }
 
-inline void MoveApplication::move(const PoseReader& poses, uint32_t handle, const Item& item) {
+inline void MoveApplier::move(const PoseReader& poses, uint32_t handle, const Item& item) {
   if (handle == ObjectStore::kNoHandle) return refuse("ids", item, Reason::kUnknownId);
   Vec3d position;
   Quaternion rotation;
@@ -72,7 +72,7 @@ inline void MoveApplication::move(const PoseReader& poses, uint32_t handle, cons
   ++applied_;
 }
 
-void MoveApplication::run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list) {
+void MoveApplier::run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list) {
   const PoseReader poses(frame, columns.positions, columns.positions_f64, columns.rotations);
   moves_.reserve(moves_.size() + columns.ids.size());
   for (size_t begin = 0; begin < columns.ids.size(); begin += kItemsAtOnce) {

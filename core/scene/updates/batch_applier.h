@@ -1,7 +1,7 @@
 // One batch being applied: an overlay of changed objects over the revision before, so that a refused batch leaves no
 // trace and the index hears of each object once.
-#ifndef LOCUS_CORE_SCENE_UPDATES_BATCH_APPLICATION_H_
-#define LOCUS_CORE_SCENE_UPDATES_BATCH_APPLICATION_H_
+#ifndef LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
+#define LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 
 #include <optional>
 #include <string>
@@ -18,13 +18,13 @@ namespace locus {
 
 // Whether it matters that an object ended and another one began under its id in one batch, or that it jumped: only to
 // questions about the past.
-enum class Lives : uint8_t { kAlike, kTold };
+enum class TrackLifetimes : uint8_t { kNo, kYes };
 
-class BatchApplication {
+class BatchApplier {
  public:
   // All three are borrowed for the life of this object. `batch` has passed check_form().
-  BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
-                   Lives lives = Lives::kAlike);
+  BatchApplier(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
+               TrackLifetimes lives = TrackLifetimes::kNo);
 
   // Clear, removes, inserts, moves, relabels: in this order, once.
   void run();
@@ -38,10 +38,10 @@ class BatchApplication {
   // What run() came to: objects that go, as they were, and objects that come, as they are. A changed object is in both,
   // one that ended as it began in neither, unless it was reborn.
   struct Difference {
-    std::vector<Object> gone;
-    std::vector<Object> come;
-    absl::flat_hash_set<Id> reborn;  // where lives are told: new lives under ids of old ones, those that jumped too
-    bool empty() const { return gone.empty() && come.empty(); }
+    std::vector<Object> removed;
+    std::vector<Object> added;
+    absl::flat_hash_set<Id> replaced;  // where lives are told: new lives under ids of old ones, those that jumped too
+    bool empty() const { return removed.empty() && added.empty(); }
   };
   Difference difference();
 
@@ -49,7 +49,7 @@ class BatchApplication {
   std::optional<Object> current(Id id) const;
   void put(const Object& object) { changed_[object.id] = object; }
   void begin_life(Id id) {
-    if (lives_ == Lives::kTold) reborn_.insert(id);
+    if (track_lifetimes_ == TrackLifetimes::kYes) replaced_.insert(id);
   }
   void refuse(std::string field, size_t index, Id id, Reason reason);
   void remove_ids();
@@ -64,8 +64,8 @@ class BatchApplication {
   const ObjectStore& objects_;
   const StaticSet& statics_;
   const UpdateBatch& batch_;
-  const Lives lives_;
-  absl::flat_hash_set<Id> reborn_;
+  const TrackLifetimes track_lifetimes_;
+  absl::flat_hash_set<Id> replaced_;
   size_t count_;                                            // objects there are after what was applied so far
   absl::flat_hash_map<Id, std::optional<Object>> changed_;  // nothing = removed
   uint32_t applied_ = 0;
@@ -75,4 +75,4 @@ class BatchApplication {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_SCENE_UPDATES_BATCH_APPLICATION_H_
+#endif  // LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_

@@ -1,7 +1,7 @@
 // Moves of many batches that nobody has seen yet, so that the grid need hear of each object once: what makes replaying
 // a log sooner done than it took to write it. One thread at a time.
-#ifndef LOCUS_CORE_SCENE_UPDATES_PENDING_MOVES_H_
-#define LOCUS_CORE_SCENE_UPDATES_PENDING_MOVES_H_
+#ifndef LOCUS_CORE_SCENE_UPDATES_COALESCED_MOVES_H_
+#define LOCUS_CORE_SCENE_UPDATES_COALESCED_MOVES_H_
 
 #include <vector>
 
@@ -9,7 +9,7 @@
 
 namespace locus {
 
-class PendingMoves {
+class CoalescedMoves {
  public:
   // Adds a batch's moves, of objects of `store`. Whether any of them changes anything after those before. O(moves).
   bool add(const GridMoves& batch, const ObjectStore& store);
@@ -18,7 +18,7 @@ class PendingMoves {
   // What all came to.
   GridMoves moves() const { return {moves_, rotations_, numbers_}; }
   // Gives the memory back, too.
-  void clear() { *this = PendingMoves(); }
+  void clear() { *this = CoalescedMoves(); }
 
  private:
   // The object's move, or null.
@@ -35,4 +35,4 @@ class PendingMoves {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_SCENE_UPDATES_PENDING_MOVES_H_
+#endif  // LOCUS_CORE_SCENE_UPDATES_COALESCED_MOVES_H_

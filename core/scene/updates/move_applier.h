@@ -1,9 +1,9 @@
 // One batch that only moves objects: the common case at every tick, read straight from its columns into moves of the
-// grid. Like BatchApplication otherwise: nothing changes until the moves are handed to the store.
+// grid. Like BatchApplier otherwise: nothing changes until the moves are handed to the store.
 //
 // Keeps its memory from batch to batch; one thread.
-#ifndef LOCUS_CORE_SCENE_UPDATES_MOVE_APPLICATION_H_
-#define LOCUS_CORE_SCENE_UPDATES_MOVE_APPLICATION_H_
+#ifndef LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_
+#define LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_
 
 #include <vector>
 
@@ -15,7 +15,7 @@
 
 namespace locus {
 
-class MoveApplication {
+class MoveApplier {
  public:
   static bool serves(const UpdateBatch& batch);
 
@@ -68,4 +68,4 @@ class MoveApplication {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_SCENE_UPDATES_MOVE_APPLICATION_H_
+#endif  // LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_

@@ -1,9 +1,9 @@
 // Moves that are put off, beside the same moves made at once.
-#include "core/scene/updates/pending_moves.h"
+#include "core/scene/updates/coalesced_moves.h"
 
 #include <gtest/gtest.h>
 
-#include "core/scene/updates/move_application.h"
+#include "core/scene/updates/move_applier.h"
 #include "tests/support/columns.h"
 #include "tests/support/random.h"
 #include "tests/support/test_scale.h"
@@ -11,9 +11,9 @@
 namespace locus::test {
 namespace {
 
-class PendingMovesTest : public ::testing::Test {
+class CoalescedMovesTest : public ::testing::Test {
  protected:
-  PendingMovesTest() {
+  CoalescedMovesTest() {
     for (ObjectStore* store : {&at_once_, &put_off_}) {
       for (Id id = 1; id <= 5; ++id) {
         Object object;
@@ -48,11 +48,11 @@ class PendingMovesTest : public ::testing::Test {
 
   Columns columns_;
   ObjectStore at_once_, put_off_;
-  MoveApplication moves_;
-  PendingMoves pending_;
+  MoveApplier moves_;
+  CoalescedMoves pending_;
 };
 
-TEST_F(PendingMovesTest, AMoveBackIsAChangeAndAMoveToTheSamePlaceIsNone) {
+TEST_F(CoalescedMovesTest, AMoveBackIsAChangeAndAMoveToTheSamePlaceIsNone) {
   EXPECT_EQ(move(to({1}, {1, 0, 0})), kChanges);
   EXPECT_EQ(move(to({1}, {1, 0, 0})), kNothing);
   EXPECT_EQ(move(to({1}, {0, 0, 0})), kChanges);
@@ -62,7 +62,7 @@ TEST_F(PendingMovesTest, AMoveBackIsAChangeAndAMoveToTheSamePlaceIsNone) {
   EXPECT_EQ(move(to({2}, {0, 0, 0}, {0, 0, 0, 1})), kNothing);
 }
 
-TEST_F(PendingMovesTest, RandomMovesComeToTheSame) {
+TEST_F(CoalescedMovesTest, RandomMovesComeToTheSame) {
   Random random(1);
   for (uint64_t round = 0; round < scaled_count(300); ++round) {
     for (uint64_t i = random.below(6); i > 0; --i) {

@@ -1,4 +1,4 @@
-#include "core/scene/updates/batch_application.h"
+#include "core/scene/updates/batch_applier.h"
 
 #include <cmath>
 
@@ -29,11 +29,15 @@ void read_labels(const Columns& columns, size_t i, Object& object) {
 
 }  // namespace
 
-BatchApplication::BatchApplication(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
-                                   Lives lives)
-    : objects_(objects), statics_(statics), batch_(batch), lives_(lives), count_(batch.clear ? 0 : objects.size()) {}
+BatchApplier::BatchApplier(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
+                           TrackLifetimes lives)
+    : objects_(objects),
+      statics_(statics),
+      batch_(batch),
+      track_lifetimes_(lives),
+      count_(batch.clear ? 0 : objects.size()) {}
 
-void BatchApplication::run() {
+void BatchApplier::run() {
   remove_ids();
   remove_groups();
   for (size_t i = 0; i < batch_.inserts.size(); ++i) insert(batch_.inserts[i], absl::StrCat("inserts[", i, "]"));
@@ -41,19 +45,19 @@ void BatchApplication::run() {
   for (size_t i = 0; i < batch_.relabels.size(); ++i) relabel(batch_.relabels[i], absl::StrCat("relabels[", i, "]"));
 }
 
-std::optional<Object> BatchApplication::current(Id id) const {
+std::optional<Object> BatchApplier::current(Id id) const {
   const auto changed = changed_.find(id);
   if (changed != changed_.end()) return changed->second;
   return batch_.clear ? std::nullopt : objects_.find(id);
 }
 
-void BatchApplication::refuse(std::string field, size_t index, Id id, Reason reason) {
+void BatchApplier::refuse(std::string field, size_t index, Id id, Reason reason) {
   ++refused_;
   if (errors_.size() < limits::kMaxListedItemErrors)
     errors_.push_back({std::move(field), static_cast<uint32_t>(index), id, reason});
 }
 
-void BatchApplication::remove_ids() {
+void BatchApplier::remove_ids() {
   for (size_t i = 0; i < batch_.remove_ids.size(); ++i) {
     const Id id = batch_.remove_ids[i];
     if (!current(id)) {
@@ -66,7 +70,7 @@ void BatchApplication::remove_ids() {
   }
 }
 
-void BatchApplication::remove_groups() {
+void BatchApplier::remove_groups() {
   absl::flat_hash_set<Group> groups;
   for (size_t i = 0; i < batch_.remove_groups.size(); ++i) {
     if (batch_.remove_groups[i] == 0) {
@@ -84,8 +88,7 @@ void BatchApplication::remove_groups() {
   });
 }
 
-bool BatchApplication::read_pose(const PoseReader& poses, uint32_t index, Id id, const std::string& field,
-                                 Shape& shape) {
+bool BatchApplier::read_pose(const PoseReader& poses, uint32_t index, Id id, const std::string& field, Shape& shape) {
   if (const Reason reason = poses.read_position(index, shape.position); reason != Reason::kUnspecified) {
     refuse(absl::StrCat(field, ".", poses.position_column()), index, id, reason);
     return false;
@@ -98,8 +101,8 @@ bool BatchApplication::read_pose(const PoseReader& poses, uint32_t index, Id id,
   return true;
 }
 
-bool BatchApplication::read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field,
-                                  Shape& shape) {
+bool BatchApplier::read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field,
+                              Shape& shape) {
   shape.kind = columns.kind;
   const bool capsule = columns.kind == ShapeKind::kCapsule;
   if (columns.kind == ShapeKind::kBall || capsule) {
@@ -120,7 +123,7 @@ bool BatchApplication::read_shape(const InsertColumns& columns, uint32_t index, 
   return true;
 }
 
-bool BatchApplication::may_insert(Id id, uint32_t index, const std::string& field) {
+bool BatchApplier::may_insert(Id id, uint32_t index, const std::string& field) {
   Reason reason = Reason::kUnspecified;
   const bool known = current(id).has_value();
   if (id == kNoId) reason = Reason::kOutOfRange;
@@ -129,7 +132,7 @@ bool BatchApplication::may_insert(Id id, uint32_t index, const std::string& fiel
   return reason == Reason::kUnspecified;
 }
 
-void BatchApplication::insert(const InsertColumns& columns, const std::string& field) {
+void BatchApplier::insert(const InsertColumns& columns, const std::string& field) {
   const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     Object object;
@@ -147,7 +150,7 @@ void BatchApplication::insert(const InsertColumns& columns, const std::string& f
   }
 }
 
-void BatchApplication::move(const MoveColumns& columns, const std::string& field) {
+void BatchApplier::move(const MoveColumns& columns, const std::string& field) {
   const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     const Id id = columns.ids[i];
@@ -164,7 +167,7 @@ void BatchApplication::move(const MoveColumns& columns, const std::string& field
   }
 }
 
-void BatchApplication::relabel(const RelabelColumns& columns, const std::string& field) {
+void BatchApplier::relabel(const RelabelColumns& columns, const std::string& field) {
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     const std::optional<Object> known = current(columns.ids[i]);
     if (!known) {
@@ -178,22 +181,22 @@ void BatchApplication::relabel(const RelabelColumns& columns, const std::string&
   }
 }
 
-BatchApplication::Difference BatchApplication::difference() {
+BatchApplier::Difference BatchApplier::difference() {
   Difference difference;
-  difference.reborn = std::move(reborn_);
+  difference.replaced = std::move(replaced_);
   const auto lives_on = [&difference](const Object& before, const std::optional<Object>& now) {
-    return now && *now == before && !difference.reborn.contains(before.id);
+    return now && *now == before && !difference.replaced.contains(before.id);
   };
   if (batch_.clear)
     objects_.for_each([&](const Object& object) {
       const auto changed = changed_.find(object.id);
-      if (changed == changed_.end() || !lives_on(object, changed->second)) difference.gone.push_back(object);
+      if (changed == changed_.end() || !lives_on(object, changed->second)) difference.removed.push_back(object);
     });
   for (const auto& [id, object] : changed_) {
     const std::optional<Object> before = objects_.find(id);
     if (before && lives_on(*before, object)) continue;
-    if (before && !batch_.clear) difference.gone.push_back(*before);
-    if (object) difference.come.push_back(*object);
+    if (before && !batch_.clear) difference.removed.push_back(*before);
+    if (object) difference.added.push_back(*object);
   }
   return difference;
 }
