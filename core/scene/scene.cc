@@ -97,7 +97,7 @@ Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLo
       spec_(std::move(spec)),
       writer_(std::move(writer)),
       journal_(log),
-      pins_(std::make_shared<PinLedger>(spec_.pinned_bytes)) {
+      pins_(std::make_shared<ReaderTracker>(spec_.pinned_bytes)) {
   LOCUS_CHECK_NE(writer_.epoch(), uint64_t{0});
   latest_ = writer_.published();
   recent_.push_back(latest_);
@@ -142,7 +142,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
     if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
     const MutexLock lock(writer_mutex_);
     if (absl::Status status = check_open(); !status.ok()) return status;
-    if (pins_->over()) continue;  // through another batch meanwhile
+    if (pins_->over_budget()) continue;  // through another batch meanwhile
     if (absl::Status status = log_each(good); !status.ok()) return status;
     // What is logged is applied, whatever happens.
     auto next = good.begin();
@@ -174,7 +174,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* co
     if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
     const MutexLock lock(writer_mutex_);
     if (absl::Status status = check_open(); !status.ok()) return status;
-    if (pins_->over()) continue;
+    if (pins_->over_budget()) continue;
     if (absl::Status status = log_joined(good); !status.ok()) return status;
     SceneWriter::Joined joined = writer_.apply_joined(good);
     if (joined.snapshot != nullptr) publish(joined.snapshot);
@@ -237,7 +237,7 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 }
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
-  if (absl::Status status = wait_for_readers(PinLedger::kNever); !status.ok()) return status;
+  if (absl::Status status = wait_for_readers(ReaderTracker::kNever); !status.ok()) return status;
   // Building takes a while: no revision is held meanwhile but for its instances.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
   const std::shared_ptr<const StaticSet> statics = latest()->statics;
@@ -273,7 +273,7 @@ void Scene::publish(const SnapshotPtr& snapshot) {
     published_.notify_all();
     tell_watches(snapshot->revision);
   }
-  pins_->judge(*snapshot);
+  pins_->enforce_budget(*snapshot);
 }
 
 void Scene::tell_watches(uint64_t revision) {
@@ -371,7 +371,7 @@ SceneStatus Scene::status() const {
     snapshot = latest_;
   }
   status.memory_bytes = bytes_of(*snapshot);
-  const PinLedger::Use pinned = pins_->use(*snapshot, status.memory_bytes);
+  const ReaderTracker::Use pinned = pins_->use(*snapshot, status.memory_bytes);
   status.pinned_bytes = pinned.held;
   status.max_pinned_bytes = pinned.budget;
   if (snapshot->history != nullptr) {

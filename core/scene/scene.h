@@ -20,7 +20,7 @@
 #include "core/base/mutex.h"
 #include "core/scene/log/scene_journal.h"
 #include "core/scene/log/scene_state.h"
-#include "core/scene/readers/pin_ledger.h"
+#include "core/scene/readers/reader_tracker.h"
 #include "core/scene/scene_writer.h"
 #include "core/scene/snapshot/scene_snapshot.h"
 #include "core/scene/updates/update_batch.h"
@@ -47,7 +47,7 @@ struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
   HistoryOptions history = {};
-  uint64_t pinned_bytes = 0;  // as PinLedger takes it
+  uint64_t pinned_bytes = 0;  // as ReaderTracker takes it
   OverloadPolicy overload = OverloadPolicy::kEveryBatch;
   Durability durability = Durability::kLocal;
 };
@@ -89,23 +89,24 @@ class Scene {
 
   using Deadline = std::chrono::steady_clock::time_point;
 
-  // One batch, one revision (none if it changes nothing). Waits while readers hold more than they may: see PinLedger.
-  // Refuses by check_form(), by writer and batch numbers (BATCH_GAP), by `all_or_nothing`, DEADLINE_EXCEEDED where it
-  // waited until `until`, NOT_FOUND once the scene is closed, or with the log's error; then nothing has changed.
-  absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = PinLedger::kNever)
+  // One batch, one revision (none if it changes nothing). Waits while readers hold more than they may: see
+  // ReaderTracker. Refuses by check_form(), by writer and batch numbers (BATCH_GAP), by `all_or_nothing`,
+  // DEADLINE_EXCEEDED where it waited until `until`, NOT_FOUND once the scene is closed, or with the log's error; then
+  // nothing has changed.
+  absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using Acks = std::vector<absl::StatusOr<UpdateAck>>;
 
   // Several batches one after another, each as apply() does, but logged at once: with one sync. An entry a batch; an
   // error of all is as of apply(), and then nothing has changed.
-  absl::StatusOr<Acks> apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until = PinLedger::kNever)
+  absl::StatusOr<Acks> apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Several batches that may_join(), one after another, as one revision, which their acks share: an entry a batch, with
   // what apply() says of it. An error of all is as of apply(), and then nothing has changed.
-  absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches, Deadline until = PinLedger::kNever)
-      LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches,
+                                    Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Removes and places instances as one revision; builds outside the writer's lock, one change at a time. Waits
   // for readers as apply() does, without an end. NOT_FOUND for a mesh that is not kept: see check_meshes().
@@ -129,8 +130,8 @@ class Scene {
   // Until those who were told to end have, or the scene is closed; DEADLINE_EXCEEDED, naming the limit, from `until`
   // on.
   absl::Status wait_for_readers(Deadline until) const LOCUS_EXCLUDES(mutex_);
-  // For whoever has waited too long: PinLedger::cut_off().
-  void cut_off_readers() { pins_->cut_off(); }
+  // For whoever has waited too long: ReaderTracker::cut_off().
+  void cut_off_readers() { pins_->revoke_overdue(); }
 
   // Tells once that the scene reached a revision or was closed: for whoever may not block in view(). `tell` is called
   // from any thread, at the latest when that revision is published, and under the scene's lock: it must be quick, take
@@ -205,7 +206,7 @@ class Scene {
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
-  const std::shared_ptr<PinLedger> pins_;  // pins may outlive the scene
+  const std::shared_ptr<ReaderTracker> pins_;  // pins may outlive the scene
 };
 
 }  // namespace locus

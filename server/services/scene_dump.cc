@@ -170,7 +170,7 @@ absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneReq
   absl::StatusOr<SnapshotPin> snapshot = wait_for(**scene, to_view(request.view()), caller.wait_until(false), caller);
   if (!snapshot.ok()) return snapshot.status();
   // Its caller may take what is written as slowly as it likes.
-  snapshot->when_stuck([&caller] { caller.cut_off(); });
+  snapshot->on_revoke([&caller] { caller.revoke_overdue(); });
   const auto take = [&](const v1::DumpSceneResponse& piece) {
     return snapshot->status().ok() && caller.stop().ok() && writer.Write(piece);
   };

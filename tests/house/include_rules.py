@@ -93,7 +93,7 @@ INTRINSICS = "immintrin.h"
 KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
 # How an array asks for large pages: advice that changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
-CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/pin_ledger)\.(h|cc)")
+CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/reader_tracker)\.(h|cc)")
 
 # A folder and the folder that holds it, where both are one room that was divided for its size only.
 ONE_ROOM = {"client/cli/levels/import/quake": "client/cli/levels/import"}
@@ -157,7 +157,7 @@ def core_stands_alone(tree):
 
 
 def core_reads_no_clock(tree):
-    return [f"{path}: <chrono> is for core/base/mutex.h, core/scene/scene.* and core/scene/readers/pin_ledger.* only"
+    return [f"{path}: <chrono> is for core/base/mutex.h, core/scene/scene.* and core/scene/readers/reader_tracker.* only"
             for path in tree.code("core") if not CLOCK_FILES.fullmatch(path)
             for _, target in includes(tree.files[path]) if target == "chrono"]
 

@@ -1,4 +1,4 @@
-#include "core/scene/readers/pin_ledger.h"
+#include "core/scene/readers/reader_tracker.h"
 
 #include <algorithm>
 
@@ -17,7 +17,7 @@ constexpr uint64_t kCountShare = 64;
 constexpr uint64_t kMaxOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 
-absl::Status told_to_end(uint64_t revision, uint64_t budget, uint64_t held) {
+absl::Status revoked_status(uint64_t revision, uint64_t budget, uint64_t held) {
   Refusal refusal;
   refusal.reason = Reason::kLimit;
   refusal.limit = "pinned_bytes";
@@ -33,58 +33,58 @@ absl::Status told_to_end(uint64_t revision, uint64_t budget, uint64_t held) {
 
 }  // namespace
 
-SnapshotPin::SnapshotPin(std::shared_ptr<PinLedger> ledger, SnapshotPtr snapshot)
-    : ledger_(std::move(ledger)), snapshot_(std::move(snapshot)), place_(ledger_->add(snapshot_)) {}
+SnapshotPin::SnapshotPin(std::shared_ptr<ReaderTracker> tracker, SnapshotPtr snapshot)
+    : tracker_(std::move(tracker)), snapshot_(std::move(snapshot)), entry_(tracker_->add(snapshot_)) {}
 
 SnapshotPin::~SnapshotPin() {
-  if (ledger_ == nullptr) return;
+  if (tracker_ == nullptr) return;
   // Freed before the writer may go on, and outside the lock: it takes a while.
   snapshot_.reset();
-  ledger_->remove(place_, cut_.get());
+  tracker_->remove(entry_, revocation_.get());
 }
 
 absl::Status SnapshotPin::status() const {
-  const Pinned& pinned = place_->second;
-  if (!pinned.ended.load(std::memory_order_acquire)) return absl::OkStatus();
-  return told_to_end(place_->first, pinned.budget, pinned.held);
+  const Pinned& pinned = entry_->second;
+  if (!pinned.revoked.load(std::memory_order_acquire)) return absl::OkStatus();
+  return revoked_status(entry_->first, pinned.budget, pinned.held);
 }
 
-void SnapshotPin::when_stuck(std::function<void()> cut) {
-  cut_ = std::make_shared<Cut>(&place_->second, std::move(cut));
-  ledger_->add_cut(cut_);
+void SnapshotPin::on_revoke(std::function<void()> revocation) {
+  revocation_ = std::make_shared<Revocation>(&entry_->second, std::move(revocation));
+  tracker_->add_revocation(revocation_);
 }
 
-uint64_t PinLedger::budget_for(uint64_t scene_bytes) const {
+uint64_t ReaderTracker::budget_for(uint64_t scene_bytes) const {
   return fixed_ != 0 ? fixed_ : std::max(limits::kPinnedBytes, limits::kPinnedShare * scene_bytes);
 }
 
-SnapshotPin::Place PinLedger::add(const SnapshotPtr& snapshot) {
+SnapshotPin::Entry ReaderTracker::add(const SnapshotPtr& snapshot) {
   const MutexLock lock(mutex_);
-  const auto [place, added] = pinned_.try_emplace(snapshot->revision);
-  SnapshotPin::Pinned& pinned = place->second;
+  const auto [entry, added] = pinned_.try_emplace(snapshot->revision);
+  SnapshotPin::Pinned& pinned = entry->second;
   ++pinned.pins;
-  if (!added) return place;
+  if (!added) return entry;
   pinned.snapshot = snapshot;
   pinned.replaced_bytes = snapshot->replaced_bytes;
-  if (snapshot->replaced_bytes < judged_at_) late_bytes_ += judged_at_ - snapshot->replaced_bytes;
-  return place;
+  if (snapshot->replaced_bytes < enforced_at_) late_bytes_ += enforced_at_ - snapshot->replaced_bytes;
+  return entry;
 }
 
-void PinLedger::remove(SnapshotPin::Place place, const SnapshotPin::Cut* cut) {
+void ReaderTracker::remove(SnapshotPin::Entry entry, const SnapshotPin::Revocation* revocation) {
   const MutexLock lock(mutex_);
-  if (cut != nullptr) cuts_.remove_if([cut](const auto& one) { return one.get() == cut; });
-  if (--place->second.pins > 0) return;
-  const bool ended = place->second.ended;
-  pinned_.erase(place);
-  if (ended && --ended_ == 0) returned_.notify_all();
+  if (revocation != nullptr) revocations_.remove_if([revocation](const auto& one) { return one.get() == revocation; });
+  if (--entry->second.pins > 0) return;
+  const bool revoked = entry->second.revoked;
+  pinned_.erase(entry);
+  if (revoked && --revoked_ == 0) returned_.notify_all();
 }
 
-void PinLedger::add_cut(std::shared_ptr<SnapshotPin::Cut> cut) {
+void ReaderTracker::add_revocation(std::shared_ptr<SnapshotPin::Revocation> revocation) {
   const MutexLock lock(mutex_);
-  cuts_.push_back(std::move(cut));
+  revocations_.push_back(std::move(revocation));
 }
 
-bool PinLedger::may_exceed(const SceneSnapshot& latest) const {
+bool ReaderTracker::may_exceed(const SceneSnapshot& latest) const {
   if (pinned_.empty() || pinned_.begin()->first >= latest.revision) return false;
   const uint64_t since_count = latest.replaced_bytes - counted_at_;
   const uint64_t since_oldest = latest.replaced_bytes - pinned_.begin()->second.replaced_bytes;
@@ -92,17 +92,17 @@ bool PinLedger::may_exceed(const SceneSnapshot& latest) const {
          counted_ + kMaxOfReplaced * (late_bytes_ + since_count) > budget_;
 }
 
-std::vector<PinLedger::Holding> PinLedger::pinned_before(const SceneSnapshot& latest) const {
+std::vector<ReaderTracker::Holding> ReaderTracker::pinned_before(const SceneSnapshot& latest) const {
   std::vector<Holding> pinned;
-  for (auto place = pinned_.begin(); place != pinned_.lower_bound(latest.revision); ++place)
-    if (SnapshotPtr snapshot = place->second.snapshot.lock(); snapshot != nullptr)
+  for (auto entry = pinned_.begin(); entry != pinned_.lower_bound(latest.revision); ++entry)
+    if (SnapshotPtr snapshot = entry->second.snapshot.lock(); snapshot != nullptr)
       pinned.push_back({std::move(snapshot), 0});
   return pinned;
 }
 
 // What was replaced between two pinned revisions is held by the older one, and by those before it that had it already:
 // so nothing is counted twice.
-uint64_t PinLedger::count(std::vector<Holding>& pinned, const SceneSnapshot& latest) {
+uint64_t ReaderTracker::count(std::vector<Holding>& pinned, const SceneSnapshot& latest) {
   uint64_t held = 0;
   for (size_t i = 0; i < pinned.size(); ++i) {
     const SceneSnapshot& next = i + 1 < pinned.size() ? *pinned[i + 1].snapshot : latest;
@@ -112,11 +112,11 @@ uint64_t PinLedger::count(std::vector<Holding>& pinned, const SceneSnapshot& lat
   return held;
 }
 
-void PinLedger::judge(const SceneSnapshot& latest) {
+void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
   std::vector<Holding> pinned;
   {
     const MutexLock lock(mutex_);
-    judged_at_ = latest.replaced_bytes;
+    enforced_at_ = latest.replaced_bytes;
     if (!may_exceed(latest)) return;
     late_bytes_ = 0;
     pinned = pinned_before(latest);
@@ -135,49 +135,49 @@ void PinLedger::judge(const SceneSnapshot& latest) {
   counted_ = held;
 }
 
-void PinLedger::end(const SceneSnapshot& snapshot, uint64_t held) {
-  const auto place = pinned_.find(snapshot.revision);
-  if (place == pinned_.end() || place->second.ended) return;
-  place->second.budget = budget_;
-  place->second.held = held;
-  place->second.ended.store(true, std::memory_order_release);
-  ++ended_;
+void ReaderTracker::end(const SceneSnapshot& snapshot, uint64_t held) {
+  const auto entry = pinned_.find(snapshot.revision);
+  if (entry == pinned_.end() || entry->second.revoked) return;
+  entry->second.budget = budget_;
+  entry->second.held = held;
+  entry->second.revoked.store(true, std::memory_order_release);
+  ++revoked_;
 }
 
-bool PinLedger::over() const {
+bool ReaderTracker::over_budget() const {
   const MutexLock lock(mutex_);
-  return ended_ > 0 && !closed_;
+  return revoked_ > 0 && !closed_;
 }
 
-uint64_t PinLedger::budget() const {
+uint64_t ReaderTracker::budget() const {
   const MutexLock lock(mutex_);
   return budget_;
 }
 
-bool PinLedger::wait_until_returned(Time until) const {
+bool ReaderTracker::wait_until_returned(Time until) const {
   const MutexLock lock(mutex_);
-  while (ended_ > 0 && !closed_) {
+  while (revoked_ > 0 && !closed_) {
     if (until == kNever)
       returned_.wait(mutex_);
     else if (!returned_.wait_until(mutex_, until))
-      return ended_ == 0 || closed_;
+      return revoked_ == 0 || closed_;
   }
   return true;
 }
 
-void PinLedger::cut_off() {
+void ReaderTracker::revoke_overdue() {
   const MutexLock lock(mutex_);
-  for (const std::shared_ptr<SnapshotPin::Cut>& cut : cuts_)
-    if (cut->first->ended) std::exchange(cut->second, [] {})();
+  for (const std::shared_ptr<SnapshotPin::Revocation>& revocation : revocations_)
+    if (revocation->first->revoked) std::exchange(revocation->second, [] {})();
 }
 
-void PinLedger::close() {
+void ReaderTracker::close() {
   const MutexLock lock(mutex_);
   closed_ = true;
   returned_.notify_all();
 }
 
-PinLedger::Use PinLedger::use(const SceneSnapshot& latest, uint64_t latest_bytes) const {
+ReaderTracker::Use ReaderTracker::use(const SceneSnapshot& latest, uint64_t latest_bytes) const {
   std::vector<Holding> pinned;
   {
     const MutexLock lock(mutex_);

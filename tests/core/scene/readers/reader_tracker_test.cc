@@ -1,5 +1,5 @@
 // Through a scene: what readers may hold of it, and what becomes of updates meanwhile.
-#include "core/scene/readers/pin_ledger.h"
+#include "core/scene/readers/reader_tracker.h"
 
 #include <atomic>
 #include <optional>
@@ -11,7 +11,7 @@
 namespace locus::test {
 namespace {
 
-class PinLedgerTest : public SceneFixture {
+class ReaderTrackerTest : public SceneFixture {
  protected:
   static constexpr Scene::Deadline kNow = Scene::Deadline::min();
 
@@ -24,7 +24,7 @@ class PinLedgerTest : public SceneFixture {
     return spec;
   }
 
-  explicit PinLedgerTest(uint64_t budget = kBudget) : SceneFixture(bounded(budget)) {
+  explicit ReaderTrackerTest(uint64_t budget = kBudget) : SceneFixture(bounded(budget)) {
     std::vector<float> positions;
     for (Id id = 1; id <= kObjects; ++id) {
       all_.push_back(id);
@@ -55,18 +55,18 @@ class PinLedgerTest : public SceneFixture {
   std::vector<Id> all_;
 };
 
-class PinLedgerDefaultTest : public PinLedgerTest {
+class PinLedgerDefaultTest : public ReaderTrackerTest {
  protected:
-  PinLedgerDefaultTest() : PinLedgerTest(0) {}
+  PinLedgerDefaultTest() : ReaderTrackerTest(0) {}
 };
 
-TEST_F(PinLedgerTest, WhoReadsTheLatestRevisionHoldsNothingBack) {
+TEST_F(ReaderTrackerTest, WhoReadsTheLatestRevisionHoldsNothingBack) {
   const SnapshotPin latest = pin();
   EXPECT_EQ(scene_.status().pinned_bytes, 0u);
   EXPECT_EQ(scene_.status().max_pinned_bytes, kBudget);
 }
 
-TEST_F(PinLedgerTest, WhatReadersHoldIsCountedOnce) {
+TEST_F(ReaderTrackerTest, WhatReadersHoldIsCountedOnce) {
   const SnapshotPin first = pin(), again = pin();
   EXPECT_TRUE(step_now().ok());
   const SnapshotPin second = pin();
@@ -75,7 +75,7 @@ TEST_F(PinLedgerTest, WhatReadersHoldIsCountedOnce) {
             bytes_apart_from(*first, *second) + bytes_apart_from(*second, *scene_.latest()));
 }
 
-TEST_F(PinLedgerTest, AReaderWithinTheBudgetIsNeverToldToEndHoweverMuchIsReplaced) {
+TEST_F(ReaderTrackerTest, AReaderWithinTheBudgetIsNeverToldToEndHoweverMuchIsReplaced) {
   const SnapshotPin reader = pin();
   while (scene_.latest()->replaced_bytes - reader->replaced_bytes < 10 * kBudget) ASSERT_TRUE(step_now().ok());
   EXPECT_TRUE(reader.status().ok());
@@ -83,20 +83,20 @@ TEST_F(PinLedgerTest, AReaderWithinTheBudgetIsNeverToldToEndHoweverMuchIsReplace
   EXPECT_EQ(reader->objects.find(1)->shape.position.x, 1);
 }
 
-TEST_F(PinLedgerTest, TheOldestAreToldToEndAndNoMoreThanItTakes) {
+TEST_F(ReaderTrackerTest, TheOldestAreToldToEndAndNoMoreThanItTakes) {
   const std::vector<SnapshotPin> pins = pin_too_much();
   ASSERT_GE(pins.size(), 3u);
   for (size_t i = 1; i < pins.size(); ++i) EXPECT_TRUE(pins[i].status().ok()) << i;
 }
 
-TEST_F(PinLedgerTest, AllWhoReadThatRevisionAreToldToEnd) {
+TEST_F(ReaderTrackerTest, AllWhoReadThatRevisionAreToldToEnd) {
   const SnapshotPin first = pin();
   const std::vector<SnapshotPin> pins = pin_too_much();
   EXPECT_FALSE(first.status().ok());
   EXPECT_FALSE(pins.front().status().ok());
 }
 
-TEST_F(PinLedgerTest, WhoIsToldToEndLearnsTheLimit) {
+TEST_F(ReaderTrackerTest, WhoIsToldToEndLearnsTheLimit) {
   const absl::Status status = pin_too_much().front().status();
   expect_refusal(status, absl::StatusCode::kResourceExhausted, Reason::kLimit, "");
   const Refusal refusal = *refusal_of(status);
@@ -107,7 +107,7 @@ TEST_F(PinLedgerTest, WhoIsToldToEndLearnsTheLimit) {
   EXPECT_NE(status.message().find("Ask again, in smaller batches"), absl::string_view::npos) << status;
 }
 
-TEST_F(PinLedgerTest, UpdatesWaitUntilThoseToldToEndHave) {
+TEST_F(ReaderTrackerTest, UpdatesWaitUntilThoseToldToEndHave) {
   std::vector<SnapshotPin> pins = pin_too_much();
   const uint64_t before = revision();
   const absl::Status status = step_now();
@@ -121,14 +121,14 @@ TEST_F(PinLedgerTest, UpdatesWaitUntilThoseToldToEndHave) {
   EXPECT_TRUE(step_now().ok());
 }
 
-TEST_F(PinLedgerTest, QueriesAreServedMeanwhile) {
+TEST_F(ReaderTrackerTest, QueriesAreServedMeanwhile) {
   const std::vector<SnapshotPin> pins = pin_too_much();
   const SnapshotPin latest = pin();
   EXPECT_EQ(latest->revision, revision());
   EXPECT_TRUE(latest.status().ok());
 }
 
-TEST_F(PinLedgerTest, AWaitingUpdateGoesOnWhenTheReaderEnds) {
+TEST_F(ReaderTrackerTest, AWaitingUpdateGoesOnWhenTheReaderEnds) {
   std::vector<SnapshotPin> pins = pin_too_much();
   const uint64_t before = revision();
   std::thread writer([&, batch = step()] { EXPECT_TRUE(scene_.apply(batch).ok()); });
@@ -139,7 +139,7 @@ TEST_F(PinLedgerTest, AWaitingUpdateGoesOnWhenTheReaderEnds) {
   EXPECT_EQ(scene_.status().pinned_bytes, 0u);
 }
 
-TEST_F(PinLedgerTest, AStaticChangeWaitsLikeAnUpdate) {
+TEST_F(ReaderTrackerTest, AStaticChangeWaitsLikeAnUpdate) {
   std::vector<SnapshotPin> pins = pin_too_much();
   const uint64_t before = revision();
   std::thread writer([&] { EXPECT_TRUE(scene_.change_instances(placing(placement({kObjects + 1}, {0, 0, 0}))).ok()); });
@@ -149,7 +149,7 @@ TEST_F(PinLedgerTest, AStaticChangeWaitsLikeAnUpdate) {
   EXPECT_EQ(revision(), before + 1);
 }
 
-TEST_F(PinLedgerTest, ClosingWakesAWaitingUpdate) {
+TEST_F(ReaderTrackerTest, ClosingWakesAWaitingUpdate) {
   const std::vector<SnapshotPin> pins = pin_too_much();
   std::thread writer([&, batch = step()] {
     expect_refusal(scene_.apply(batch).status(), absl::StatusCode::kNotFound, Reason::kNotFound, "scene");
@@ -158,36 +158,36 @@ TEST_F(PinLedgerTest, ClosingWakesAWaitingUpdate) {
   writer.join();
 }
 
-TEST_F(PinLedgerTest, WhoPinsAnOlderRevisionHoldsWhatItKeeps) {
+TEST_F(ReaderTrackerTest, WhoPinsAnOlderRevisionHoldsWhatItKeeps) {
   EXPECT_TRUE(step_now().ok());
   EXPECT_TRUE(step_now().ok());
   const SnapshotPin old = pin({View::Kind::kExactly, 1, 0});
   EXPECT_EQ(scene_.status().pinned_bytes, bytes_apart_from(*old, *scene_.latest()));
 }
 
-TEST_F(PinLedgerTest, OnlyWhoWasToldToEndIsCutOffAndOnlyOnce) {
+TEST_F(ReaderTrackerTest, OnlyWhoWasToldToEndIsCutOffAndOnlyOnce) {
   std::vector<SnapshotPin> pins = pin_too_much();
   int first = 0, last = 0;
-  pins.front().when_stuck([&first] { ++first; });
-  pins.back().when_stuck([&last] { ++last; });
+  pins.front().on_revoke([&first] { ++first; });
+  pins.back().on_revoke([&last] { ++last; });
   scene_.cut_off_readers();
   scene_.cut_off_readers();
   EXPECT_EQ(first, 1);
   EXPECT_EQ(last, 0);
 }
 
-TEST_F(PinLedgerTest, WhoIsGoneIsNotCutOff) {
+TEST_F(ReaderTrackerTest, WhoIsGoneIsNotCutOff) {
   int cut = 0;
   {
     SnapshotPin reader = pin();
-    reader.when_stuck([&cut] { ++cut; });
+    reader.on_revoke([&cut] { ++cut; });
   }
   const std::vector<SnapshotPin> pins = pin_too_much();
   scene_.cut_off_readers();
   EXPECT_EQ(cut, 0);
 }
 
-TEST_F(PinLedgerTest, APinMayOutliveItsScene) {
+TEST_F(ReaderTrackerTest, APinMayOutliveItsScene) {
   std::optional<SnapshotPin> reader;
   {
     const Scene scene("short", SceneSpec(), 1, StaticSet::empty());
@@ -198,9 +198,9 @@ TEST_F(PinLedgerTest, APinMayOutliveItsScene) {
 
 TEST_F(PinLedgerDefaultTest, TheBudgetFollowsTheSceneWhereItIsLarge) {
   EXPECT_EQ(scene_.status().max_pinned_bytes, limits::kPinnedBytes);
-  PinLedger ledger(0);
+  ReaderTracker tracker(0);
   const uint64_t large = limits::kPinnedBytes;
-  EXPECT_EQ(ledger.use(*scene_.latest(), large).budget, limits::kPinnedShare * large);
+  EXPECT_EQ(tracker.use(*scene_.latest(), large).budget, limits::kPinnedShare * large);
 }
 
 }  // namespace
