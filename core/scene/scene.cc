@@ -271,33 +271,33 @@ void Scene::publish(const SnapshotPtr& snapshot) {
       recent_.pop_front();
     }
     published_.notify_all();
-    tell_watches(snapshot->revision);
+    notify_watches(snapshot->revision);
   }
   pins_->enforce_budget(*snapshot);
 }
 
-void Scene::tell_watches(uint64_t revision) {
+void Scene::notify_watches(uint64_t revision) {
   while (!watches_.empty() && watches_.begin()->first <= revision) {
     Watch& watch = *watches_.begin()->second;
     watches_.erase(watches_.begin());
-    watch.told_ = true;
-    watch.tell_();
+    watch.notified_ = true;
+    watch.notify_();
   }
 }
 
-Scene::Watch::Watch(const Scene& scene, uint64_t revision, std::function<void()> tell)
-    : scene_(scene), tell_(std::move(tell)) {
+Scene::Watch::Watch(const Scene& scene, uint64_t revision, std::function<void()> notify)
+    : scene_(scene), notify_(std::move(notify)) {
   const MutexLock lock(scene_.mutex_);
-  told_ = scene_.closed_ || scene_.latest_->revision >= revision;
-  if (told_)
-    tell_();
+  notified_ = scene_.closed_ || scene_.latest_->revision >= revision;
+  if (notified_)
+    notify_();
   else
     place_ = scene_.watches_.emplace(revision, this);
 }
 
 Scene::Watch::~Watch() {
   const MutexLock lock(scene_.mutex_);
-  if (!told_) scene_.watches_.erase(place_);
+  if (!notified_) scene_.watches_.erase(place_);
 }
 
 SnapshotPtr Scene::latest() const {
@@ -343,7 +343,7 @@ void Scene::close() {
   closed_ = true;
   pins_->close();
   published_.notify_all();
-  tell_watches(std::numeric_limits<uint64_t>::max());
+  notify_watches(std::numeric_limits<uint64_t>::max());
 }
 
 absl::Status Scene::remove() {

@@ -139,7 +139,7 @@ class Scene {
   // waits for a call in work. The scene outlives it.
   class Watch {
    public:
-    Watch(const Scene& scene, uint64_t revision, std::function<void()> tell);
+    Watch(const Scene& scene, uint64_t revision, std::function<void()> notify);
     ~Watch();
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;
@@ -147,10 +147,10 @@ class Scene {
    private:
     friend class Scene;
     const Scene& scene_;
-    const std::function<void()> tell_;
+    const std::function<void()> notify_;
     // Both guarded by the scene's mutex_; the place is of no meaning once told.
     std::multimap<uint64_t, Watch*>::iterator place_;
-    bool told_ = false;
+    bool notified_ = false;
   };
 
   // Keeps no revision but the latest for `exactly` views, until more come: gives memory back when it is short.
@@ -176,7 +176,7 @@ class Scene {
  private:
   void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   // Those who wait for `revision` or an earlier one.
-  void tell_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);
+  void notify_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);
   absl::Status closed_status() const;
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
   absl::Status admit_change(const StaticChange& change) LOCUS_EXCLUDES(mutex_);
