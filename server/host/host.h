@@ -21,7 +21,7 @@
 #include "server/scheduling/memory_budget.h"
 #include "server/scheduling/query_scheduler.h"
 #include "server/scheduling/snapshot_keeper.h"
-#include "server/scheduling/update_pump.h"
+#include "server/scheduling/update_queue.h"
 #include "server/scheduling/worker_pool.h"
 
 namespace locus::server {
@@ -36,7 +36,7 @@ struct Host {
         memory(with.memory_limit, process_memory(registry)),
         pool(with.threads),
         scheduler(scheduler_options(with)),
-        updates(pump_options(with, with_log)),
+        updates(queue_options(with, with_log)),
         calls(with.max_calls),
         streams(with.max_streams) {}
 
@@ -51,8 +51,8 @@ struct Host {
     return options;
   }
   // Threads that wait for a disk need no cores, and one sync serves all of them.
-  static UpdatePumpOptions pump_options(const ServerConfig& config, const UpdateLog* log) {
-    UpdatePumpOptions options;
+  static UpdateQueueOptions queue_options(const ServerConfig& config, const UpdateLog* log) {
+    UpdateQueueOptions options;
     options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
     return options;
   }
@@ -67,7 +67,7 @@ struct Host {
   WorkerPool pool;
   CostEstimates costs;
   QueryScheduler scheduler;
-  UpdatePump updates;
+  UpdateQueue updates;
   SnapshotKeeper snapshots{registry, log, keeper_options(config)};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
   Gate calls;    // in work, streams apart

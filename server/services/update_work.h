@@ -10,7 +10,7 @@
 #include "server/rpc/call_slot.h"
 #include "server/rpc/io_threads.h"
 #include "server/scheduling/memory_budget.h"
-#include "server/scheduling/update_pump.h"
+#include "server/scheduling/update_queue.h"
 
 namespace locus::server {
 

@@ -1,4 +1,4 @@
-#include "server/scheduling/update_pump.h"
+#include "server/scheduling/update_queue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -86,9 +86,9 @@ std::unique_ptr<Points> move(std::vector<uint64_t> ids, float x) {
 }
 
 // A pump whose threads do everything, and a scene with the points 1 to 3.
-class UpdatePumpTest : public testing::Test {
+class UpdateQueueTest : public testing::Test {
  protected:
-  explicit UpdatePumpTest(OverloadPolicy overload = OverloadPolicy::kEveryBatch) : scene_(make_scene(overload)) {
+  explicit UpdateQueueTest(OverloadPolicy overload = OverloadPolicy::kEveryBatch) : scene_(make_scene(overload)) {
     UpdateBatch batch;
     const std::vector<uint64_t> ids = {1, 2, 3};
     const std::vector<float> positions(3, 0.0f);
@@ -98,15 +98,15 @@ class UpdatePumpTest : public testing::Test {
     EXPECT_TRUE(scene_->apply(batch).ok());
   }
 
-  static UpdatePumpOptions by_threads(uint32_t threads = 1) {
-    UpdatePumpOptions options;
+  static UpdateQueueOptions by_threads(uint32_t threads = 1) {
+    UpdateQueueOptions options;
     options.threads = threads;
     options.inline_nanoseconds = 0;
     return options;
   }
 
   // Posts a batch that keeps whoever applies it busy until it is let go.
-  std::unique_ptr<Points> occupy(UpdatePump& pump) {
+  std::unique_ptr<Points> occupy(UpdateQueue& pump) {
     auto held = move({1}, -1);
     held->hold();
     EXPECT_TRUE(pump.post(scene_, *held, WhenFull::kRefuse).ok());
@@ -119,13 +119,13 @@ class UpdatePumpTest : public testing::Test {
   ScenePtr scene_;
 };
 
-class LatestWinsTest : public UpdatePumpTest {
+class LatestWinsTest : public UpdateQueueTest {
  protected:
-  LatestWinsTest() : UpdatePumpTest(OverloadPolicy::kLatestWins) {}
+  LatestWinsTest() : UpdateQueueTest(OverloadPolicy::kLatestWins) {}
 };
 
-TEST_F(UpdatePumpTest, ASmallBatchForAnIdleSceneIsAppliedByWhoBringsIt) {
-  UpdatePump pump({});
+TEST_F(UpdateQueueTest, ASmallBatchForAnIdleSceneIsAppliedByWhoBringsIt) {
+  UpdateQueue pump({});
   const auto update = move({1}, 5);
   EXPECT_EQ(*pump.post(scene_, *update, WhenFull::kRefuse), Posted::kTaken);
   ASSERT_TRUE(update->is_done());
@@ -134,8 +134,8 @@ TEST_F(UpdatePumpTest, ASmallBatchForAnIdleSceneIsAppliedByWhoBringsIt) {
   EXPECT_EQ(pump.stats().applied_inline, 1u);
 }
 
-TEST_F(UpdatePumpTest, ABatchThatLooksAtEveryObjectIsNotAppliedByWhoBringsIt) {
-  UpdatePump pump({});
+TEST_F(UpdateQueueTest, ABatchThatLooksAtEveryObjectIsNotAppliedByWhoBringsIt) {
+  UpdateQueue pump({});
   const auto update = insert({7});
   update->change().clear = true;
   ASSERT_TRUE(pump.post(scene_, *update, WhenFull::kRefuse).ok());
@@ -144,8 +144,8 @@ TEST_F(UpdatePumpTest, ABatchThatLooksAtEveryObjectIsNotAppliedByWhoBringsIt) {
   EXPECT_EQ(pump.stats().applied, 1u);
 }
 
-TEST_F(UpdatePumpTest, WhoBringsABatchNeverWaitsForTheOneBefore) {
-  UpdatePump pump({});
+TEST_F(UpdateQueueTest, WhoBringsABatchNeverWaitsForTheOneBefore) {
+  UpdateQueue pump({});
   const auto held = move({1}, 1);
   held->hold();
   std::thread other([&] { EXPECT_TRUE(pump.post(scene_, *held, WhenFull::kRefuse).ok()); });
@@ -159,8 +159,8 @@ TEST_F(UpdatePumpTest, WhoBringsABatchNeverWaitsForTheOneBefore) {
   EXPECT_EQ(x_of(1), 2);
 }
 
-TEST_F(UpdatePumpTest, BatchesOfASceneAreAppliedInTheOrderOfArrival) {
-  UpdatePump pump(by_threads(3));
+TEST_F(UpdateQueueTest, BatchesOfASceneAreAppliedInTheOrderOfArrival) {
+  UpdateQueue pump(by_threads(3));
   std::vector<std::unique_ptr<Points>> updates;
   for (int i = 0; i < 200; ++i) {
     updates.push_back(move({1}, static_cast<float>(i + 1)));
@@ -171,8 +171,8 @@ TEST_F(UpdatePumpTest, BatchesOfASceneAreAppliedInTheOrderOfArrival) {
   EXPECT_EQ(pump.stats().coalesced, 0u);
 }
 
-TEST_F(UpdatePumpTest, ScenesDoNotWaitForEachOther) {
-  UpdatePump pump(by_threads(2));
+TEST_F(UpdateQueueTest, ScenesDoNotWaitForEachOther) {
+  UpdateQueue pump(by_threads(2));
   const auto held = occupy(pump);
   const ScenePtr other = make_scene();
   const auto update = insert({1});
@@ -183,10 +183,10 @@ TEST_F(UpdatePumpTest, ScenesDoNotWaitForEachOther) {
   EXPECT_TRUE(held->wait().ok());
 }
 
-TEST_F(UpdatePumpTest, AFullMailboxRefusesAtOnceNamingTheLimitAndHoldsStreams) {
-  UpdatePumpOptions options = by_threads();
+TEST_F(UpdateQueueTest, AFullMailboxRefusesAtOnceNamingTheLimitAndHoldsStreams) {
+  UpdateQueueOptions options = by_threads();
   options.max_updates = 2;
-  UpdatePump pump(options);
+  UpdateQueue pump(options);
   const auto held = occupy(pump);
   const auto first = move({1}, 1), second = move({1}, 2), refused = move({1}, 3), streamed = move({1}, 4);
   EXPECT_EQ(*pump.post(scene_, *first, WhenFull::kRefuse), Posted::kTaken);
@@ -206,10 +206,10 @@ TEST_F(UpdatePumpTest, AFullMailboxRefusesAtOnceNamingTheLimitAndHoldsStreams) {
   EXPECT_EQ(x_of(1), 4);
 }
 
-TEST_F(UpdatePumpTest, TheItemsOfAMailboxAreLimitedTooButOneBatchIsAlwaysTaken) {
-  UpdatePumpOptions options = by_threads();
+TEST_F(UpdateQueueTest, TheItemsOfAMailboxAreLimitedTooButOneBatchIsAlwaysTaken) {
+  UpdateQueueOptions options = by_threads();
   options.max_items = 3;
-  UpdatePump pump(options);
+  UpdateQueue pump(options);
   const auto held = occupy(pump);
   const auto large = move({1, 2, 3, 1, 2, 3}, 1), small = move({1}, 2);
   EXPECT_TRUE(pump.post(scene_, *large, WhenFull::kRefuse).ok());
@@ -220,8 +220,8 @@ TEST_F(UpdatePumpTest, TheItemsOfAMailboxAreLimitedTooButOneBatchIsAlwaysTaken) 
   EXPECT_TRUE(large->wait().ok());
 }
 
-TEST_F(UpdatePumpTest, WhatNobodyWantsAnyMoreIsNotApplied) {
-  UpdatePump pump(by_threads());
+TEST_F(UpdateQueueTest, WhatNobodyWantsAnyMoreIsNotApplied) {
+  UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   const auto cancelled = move({1}, 1), wanted = move({2}, 1);
   ASSERT_TRUE(pump.post(scene_, *cancelled, WhenFull::kRefuse).ok());
@@ -233,8 +233,8 @@ TEST_F(UpdatePumpTest, WhatNobodyWantsAnyMoreIsNotApplied) {
   EXPECT_EQ(x_of(1), -1);
 }
 
-TEST_F(UpdatePumpTest, ARefusedBatchDoesNotHoldUpTheNext) {
-  UpdatePump pump(by_threads());
+TEST_F(UpdateQueueTest, ARefusedBatchDoesNotHoldUpTheNext) {
+  UpdateQueue pump(by_threads());
   const auto wrong = move({1}, 1), right = move({1}, 2);
   wrong->change().moves[0].positions = {};
   ASSERT_TRUE(pump.post(scene_, *wrong, WhenFull::kRefuse).ok());
@@ -244,11 +244,11 @@ TEST_F(UpdatePumpTest, ARefusedBatchDoesNotHoldUpTheNext) {
 }
 
 // A reader that was told to end and does not: its scene waits, others do not, and the pump's thread is free.
-TEST_F(UpdatePumpTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
+TEST_F(UpdateQueueTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
   const ScenePtr pinned = make_scene(OverloadPolicy::kEveryBatch, limits::kMinPinnedBytes);
   std::vector<uint64_t> ids(50'000);
   for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
-  UpdatePump pump(by_threads());
+  UpdateQueue pump(by_threads());
   const auto fill = insert(ids);
   ASSERT_TRUE(pump.post(pinned, *fill, WhenFull::kRefuse).ok());
   ASSERT_TRUE(fill->wait().ok());
@@ -270,10 +270,10 @@ TEST_F(UpdatePumpTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
   EXPECT_TRUE(stalled->wait().ok());
 }
 
-TEST_F(UpdatePumpTest, EveryBatchIsDoneBeforeThePumpIsGone) {
+TEST_F(UpdateQueueTest, EveryBatchIsDoneBeforeThePumpIsGone) {
   std::vector<std::unique_ptr<Points>> updates;
   {
-    UpdatePump pump(by_threads(2));
+    UpdateQueue pump(by_threads(2));
     const auto held = occupy(pump);
     for (int i = 0; i < 20; ++i) {
       updates.push_back(move({1}, static_cast<float>(i)));
@@ -286,8 +286,8 @@ TEST_F(UpdatePumpTest, EveryBatchIsDoneBeforeThePumpIsGone) {
   for (const auto& update : updates) EXPECT_TRUE(update->is_done());
 }
 
-TEST_F(UpdatePumpTest, ManyBringBatchesAtOnceAndNoneIsLost) {
-  UpdatePump pump({2});
+TEST_F(UpdateQueueTest, ManyBringBatchesAtOnceAndNoneIsLost) {
+  UpdateQueue pump({2});
   constexpr int kEach = 300;
   std::vector<std::thread> senders;
   for (uint64_t sender = 1; sender <= 3; ++sender)
@@ -308,7 +308,7 @@ TEST_F(UpdatePumpTest, ManyBringBatchesAtOnceAndNoneIsLost) {
 }
 
 TEST_F(LatestWinsTest, MovesThatWaitTogetherBecomeOneRevision) {
-  UpdatePump pump(by_threads());
+  UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   std::vector<std::unique_ptr<Points>> moves;
   for (int i = 1; i <= 10; ++i) {
@@ -327,7 +327,7 @@ TEST_F(LatestWinsTest, MovesThatWaitTogetherBecomeOneRevision) {
 }
 
 TEST_F(LatestWinsTest, NothingOvertakesABatchThatIsMoreThanMoves) {
-  UpdatePump pump(by_threads());
+  UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   const auto before = move({1}, 1), middle = insert({4}), after = move({1, 4}, 2), last = move({1, 4}, 3);
   for (Points* update : {before.get(), middle.get(), after.get(), last.get()})
@@ -342,7 +342,7 @@ TEST_F(LatestWinsTest, NothingOvertakesABatchThatIsMoreThanMoves) {
 }
 
 TEST_F(LatestWinsTest, MovesOfAnotherTickAreAnotherRevision) {
-  UpdatePump pump(by_threads());
+  UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   const auto tick_one = move({1}, 1), tick_two = move({1}, 2);
   tick_one->change().tick = 1;
@@ -355,7 +355,7 @@ TEST_F(LatestWinsTest, MovesOfAnotherTickAreAnotherRevision) {
 }
 
 TEST_F(LatestWinsTest, OneThatWasCancelledMeanwhileIsLeftOut) {
-  UpdatePump pump(by_threads());
+  UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   const auto first = move({1}, 1), cancelled = move({1, 2}, 2);
   for (Points* update : {first.get(), cancelled.get()}) ASSERT_TRUE(pump.post(scene_, *update, WhenFull::kRefuse).ok());
@@ -385,9 +385,9 @@ TEST_F(LoggedPumpTest, OneSyncServesAllThatWaitAndEachIsARevisionOfItsOwn) {
   constexpr uint64_t kBatches = 200;
   std::vector<std::unique_ptr<Points>> batches;
   for (uint64_t i = 1; i <= kBatches; ++i) batches.push_back(insert({i}));
-  UpdatePumpOptions options;
+  UpdateQueueOptions options;
   options.max_updates = kBatches;
-  UpdatePump pump(options);
+  UpdateQueue pump(options);
   const uint64_t before = log_.appends();
   log_.hold();
   for (const auto& batch : batches) ASSERT_TRUE(pump.post(scene_, *batch, WhenFull::kRefuse).ok());
@@ -405,7 +405,7 @@ TEST_F(LoggedPumpTest, OneSyncServesAllThatWaitAndEachIsARevisionOfItsOwn) {
 }
 
 TEST_F(LoggedPumpTest, AFullDiskRefusesUpdatesUntilThereIsRoom) {
-  UpdatePump pump(UpdatePumpOptions{});
+  UpdateQueue pump(UpdateQueueOptions{});
   log_.fail_with(absl::ResourceExhaustedError("full"));
   const auto refused = insert({1});
   ASSERT_TRUE(pump.post(scene_, *refused, WhenFull::kRefuse).ok());

@@ -1,4 +1,4 @@
-#include "server/scheduling/update_pump.h"
+#include "server/scheduling/update_queue.h"
 
 #include <algorithm>
 #include <utility>
@@ -48,13 +48,13 @@ absl::StatusOr<Scene::Acks> apply_all(Scene& scene, absl::Span<const UpdateBatch
 
 }  // namespace
 
-UpdatePump::UpdatePump(const UpdatePumpOptions& options) : options_(options), nanoseconds_an_item_(kFirstGuess) {
+UpdateQueue::UpdateQueue(const UpdateQueueOptions& options) : options_(options), nanoseconds_an_item_(kFirstGuess) {
   LOCUS_CHECK_LE(1u, options.threads);
   LOCUS_CHECK_LE(options.threads, limits::kMaxThreads);
   for (uint32_t i = 0; i < options.threads; ++i) threads_.emplace_back([this] { run(); });
 }
 
-UpdatePump::~UpdatePump() {
+UpdateQueue::~UpdateQueue() {
   {
     const MutexLock lock(mutex_);
     ended_ = true;
@@ -63,59 +63,59 @@ UpdatePump::~UpdatePump() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-UpdatePump::Mailbox& UpdatePump::mailbox_of(const ScenePtr& scene) {
-  std::unique_ptr<Mailbox>& mailbox = mailboxes_[scene.get()];
-  if (mailbox == nullptr) {
-    mailbox = std::make_unique<Mailbox>();
-    mailbox->scene = scene;
+UpdateQueue::SceneQueue& UpdateQueue::mailbox_of(const ScenePtr& scene) {
+  std::unique_ptr<SceneQueue>& scene_queue = scene_queues_[scene.get()];
+  if (scene_queue == nullptr) {
+    scene_queue = std::make_unique<SceneQueue>();
+    scene_queue->scene = scene;
   }
-  return *mailbox;
+  return *scene_queue;
 }
 
-bool UpdatePump::full(const Mailbox& mailbox, uint64_t items) const {
-  if (mailbox.waiting.size() >= options_.max_updates) return true;
-  return !mailbox.waiting.empty() && mailbox.items + items > options_.max_items;
+bool UpdateQueue::full(const SceneQueue& scene_queue, uint64_t items) const {
+  if (scene_queue.waiting.size() >= options_.max_updates) return true;
+  return !scene_queue.waiting.empty() && scene_queue.items + items > options_.max_items;
 }
 
-absl::Status UpdatePump::refuse(const Mailbox& mailbox, uint64_t items) const {
+absl::Status UpdateQueue::refuse(const SceneQueue& scene_queue, uint64_t items) const {
   const double nanoseconds = nanoseconds_an_item_.load(std::memory_order_relaxed);
-  const double drain = static_cast<double>(mailbox.items) * nanoseconds / 2 / 1e6;
+  const double drain = static_cast<double>(scene_queue.items) * nanoseconds / 2 / 1e6;
   const auto retry = static_cast<uint32_t>(std::clamp(drain, double{kRetryAfterMs}, 1000.0));
-  if (mailbox.waiting.size() >= options_.max_updates)
-    return refuse_full("", "waiting_updates", options_.max_updates, static_cast<double>(mailbox.waiting.size() + 1),
+  if (scene_queue.waiting.size() >= options_.max_updates)
+    return refuse_full("", "waiting_updates", options_.max_updates, static_cast<double>(scene_queue.waiting.size() + 1),
                        retry);
   return refuse_full("", "waiting_update_items", static_cast<double>(options_.max_items),
-                     static_cast<double>(mailbox.items + items), retry);
+                     static_cast<double>(scene_queue.items + items), retry);
 }
 
 // What looks at every object may take as long as it likes, and so may the disk.
-bool UpdatePump::fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const {
+bool UpdateQueue::fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const {
   if (waits_for_disk(scene) || batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
   const double nanoseconds = static_cast<double>(items) * nanoseconds_an_item_.load(std::memory_order_relaxed);
   return nanoseconds + kBatchNanoseconds < static_cast<double>(options_.inline_nanoseconds);
 }
 
-absl::StatusOr<Posted> UpdatePump::post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) {
+absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) {
   const uint64_t items = items_of(update.batch());
-  Mailbox* here = nullptr;
+  SceneQueue* here = nullptr;
   {
     const MutexLock lock(mutex_);
-    Mailbox& mailbox = mailbox_of(scene);
-    if (!mailbox.at_work && mailbox.waiting.empty() && fits_inline(*scene, update.batch(), items)) {
-      mailbox.at_work = true;
-      here = &mailbox;
+    SceneQueue& scene_queue = mailbox_of(scene);
+    if (!scene_queue.at_work && scene_queue.waiting.empty() && fits_inline(*scene, update.batch(), items)) {
+      scene_queue.at_work = true;
+      here = &scene_queue;
     } else {
-      const bool no_more = full(mailbox, items);
+      const bool no_more = full(scene_queue, items);
       if (no_more && when_full == WhenFull::kRefuse) {
         ++stats_.refused;
-        return refuse(mailbox, items);
+        return refuse(scene_queue, items);
       }
-      if (mailbox.waiting.empty() && !mailbox.at_work) {
-        ready_.push_back(&mailbox);
+      if (scene_queue.waiting.empty() && !scene_queue.at_work) {
+        ready_.push_back(&scene_queue);
         work_.notify_one();
       }
-      mailbox.waiting.push_back(&update);
-      mailbox.items += items;
+      scene_queue.waiting.push_back(&update);
+      scene_queue.items += items;
       ++stats_.updates;
       stats_.items += items;
       stats_.held += no_more ? 1 : 0;
@@ -126,40 +126,40 @@ absl::StatusOr<Posted> UpdatePump::post(const ScenePtr& scene, PendingUpdate& up
   return Posted::kTaken;
 }
 
-void UpdatePump::apply_here(Mailbox& mailbox, PendingUpdate& update, uint64_t items) {
+void UpdateQueue::apply_here(SceneQueue& scene_queue, PendingUpdate& update, uint64_t items) {
   Group group = {&update};
   const SteadyTime start = steady_clock::now();
-  if (!apply(mailbox, group)) return stall(mailbox, group);
+  if (!apply(scene_queue, group)) return stall(scene_queue, group);
   learn(items, start);
-  std::unique_ptr<Mailbox> empty;
+  std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
   ++stats_.applied_inline;
-  empty = leave(mailbox);
+  empty = leave(scene_queue);
 }
 
-void UpdatePump::run() {
-  while (Mailbox* const mailbox = next()) work_on(*mailbox);
+void UpdateQueue::run() {
+  while (SceneQueue* const scene_queue = next()) work_on(*scene_queue);
 }
 
-UpdatePump::Mailbox* UpdatePump::next() {
+UpdateQueue::SceneQueue* UpdateQueue::next() {
   const MutexLock lock(mutex_);
   while (true) {
     const SteadyTime now = steady_clock::now();
     const auto due = std::find_if(stalled_.begin(), stalled_.end(),
-                                  [now](const Mailbox* mailbox) { return mailbox->retry_at <= now; });
-    Mailbox* mailbox = nullptr;
+                                  [now](const SceneQueue* scene_queue) { return scene_queue->retry_at <= now; });
+    SceneQueue* scene_queue = nullptr;
     if (due != stalled_.end()) {
-      mailbox = *due;
+      scene_queue = *due;
       stalled_.erase(due);
     } else if (!ready_.empty()) {
-      mailbox = ready_.front();
+      scene_queue = ready_.front();
       ready_.pop_front();
     }
-    if (mailbox != nullptr) {
-      mailbox->at_work = true;
-      return mailbox;
+    if (scene_queue != nullptr) {
+      scene_queue->at_work = true;
+      return scene_queue;
     }
-    if (ended_ && mailboxes_.empty()) return nullptr;
+    if (ended_ && scene_queues_.empty()) return nullptr;
     if (stalled_.empty())
       work_.wait(mutex_);
     else
@@ -167,127 +167,127 @@ UpdatePump::Mailbox* UpdatePump::next() {
   }
 }
 
-void UpdatePump::work_on(Mailbox& mailbox) {
+void UpdateQueue::work_on(SceneQueue& scene_queue) {
   Group group;
   uint64_t items = 0;
   {
     const MutexLock lock(mutex_);
-    const uint64_t before = mailbox.items;
-    group = take_group(mailbox);
-    items = before - mailbox.items;
+    const uint64_t before = scene_queue.items;
+    group = take_group(scene_queue);
+    items = before - scene_queue.items;
   }
   const SteadyTime start = steady_clock::now();
-  if (!apply(mailbox, group)) return stall(mailbox, group);
-  if (!waits_for_disk(*mailbox.scene)) learn(items, start);
-  std::unique_ptr<Mailbox> empty;
+  if (!apply(scene_queue, group)) return stall(scene_queue, group);
+  if (!waits_for_disk(*scene_queue.scene)) learn(items, start);
+  std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
-  empty = leave(mailbox);
+  empty = leave(scene_queue);
 }
 
 // Batches that become one revision, or that one sync serves.
-UpdatePump::Group UpdatePump::take_group(Mailbox& mailbox) {
-  const bool joined = joins(*mailbox.scene);
-  const uint64_t most_items = joined ? limits::kMaxUpdateItems : waits_for_disk(*mailbox.scene) ? kItemsASync : 0;
+UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
+  const bool joined = joins(*scene_queue.scene);
+  const uint64_t most_items = joined ? limits::kMaxUpdateItems : waits_for_disk(*scene_queue.scene) ? kItemsASync : 0;
   Group group;
   uint64_t items = 0;
-  while (!mailbox.waiting.empty()) {
-    PendingUpdate* const update = mailbox.waiting.front();
+  while (!scene_queue.waiting.empty()) {
+    PendingUpdate* const update = scene_queue.waiting.front();
     const uint64_t more = items_of(update->batch());
     const bool fits =
         group.empty() || (items + more <= most_items && (!joined || may_join(group.front()->batch(), update->batch())));
     if (!fits) break;
     group.push_back(update);
     items += more;
-    mailbox.waiting.pop_front();
+    scene_queue.waiting.pop_front();
   }
-  mailbox.items -= items;
+  scene_queue.items -= items;
   stats_.items -= items;
   stats_.updates -= group.size();
   return group;
 }
 
 // Who no longer wants it is told so first, and what it waited for where that made it too late.
-void UpdatePump::drop_stopped(const Mailbox& mailbox, Group& group) {
-  const auto stopped = [&mailbox](PendingUpdate* update) {
+void UpdateQueue::drop_stopped(const SceneQueue& scene_queue, Group& group) {
+  const auto stopped = [&scene_queue](PendingUpdate* update) {
     absl::Status status = update->stop();
     if (status.ok()) return false;
-    if (status.code() == mailbox.late.code()) status = mailbox.late;
+    if (status.code() == scene_queue.late.code()) status = scene_queue.late;
     update->done(std::move(status));
     return true;
   };
   group.erase(std::remove_if(group.begin(), group.end(), stopped), group.end());
 }
 
-bool UpdatePump::apply(Mailbox& mailbox, Group& group) {
-  drop_stopped(mailbox, group);
-  mailbox.late = absl::OkStatus();
+bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
+  drop_stopped(scene_queue, group);
+  scene_queue.late = absl::OkStatus();
   if (group.empty()) return true;
   std::vector<const UpdateBatch*> batches;
   for (const PendingUpdate* update : group) batches.push_back(&update->batch());
   // Without waiting for readers, who may take long.
-  absl::StatusOr<Scene::Acks> acks = apply_all(*mailbox.scene, batches);
+  absl::StatusOr<Scene::Acks> acks = apply_all(*scene_queue.scene, batches);
   if (acks.status().code() == absl::StatusCode::kDeadlineExceeded) {
-    mailbox.late = acks.status();
+    scene_queue.late = acks.status();
     return false;
   }
-  count(*mailbox.scene, group.size());
+  count(*scene_queue.scene, group.size());
   for (size_t i = 0; i < group.size(); ++i) group[i]->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
   return true;
 }
 
 // Before those who wait are told, so that who was told finds itself counted.
-void UpdatePump::count(const Scene& scene, size_t updates) {
+void UpdateQueue::count(const Scene& scene, size_t updates) {
   const MutexLock lock(mutex_);
   stats_.applied += updates;
   if (updates > 1 && joins(scene)) stats_.coalesced += updates - 1;
 }
 
 // Readers that were told to end hold too much memory. Their scene waits, other scenes do not.
-void UpdatePump::stall(Mailbox& mailbox, const Group& group) {
+void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
   const SteadyTime now = steady_clock::now();
   ScenePtr too_slow;  // others may be done with the mailbox before its readers are cut off
   {
     const MutexLock lock(mutex_);
-    put_back(mailbox, group);
-    if (mailbox.stalled_at == SteadyTime()) {
-      mailbox.stalled_at = now;
+    put_back(scene_queue, group);
+    if (scene_queue.stalled_at == SteadyTime()) {
+      scene_queue.stalled_at = now;
       ++stats_.stalls;
     }
-    if (now - mailbox.stalled_at > kReadersMayTake) too_slow = mailbox.scene;
-    mailbox.retry_at = now + kLookAgain;
-    mailbox.at_work = false;
-    stalled_.push_back(&mailbox);
+    if (now - scene_queue.stalled_at > kReadersMayTake) too_slow = scene_queue.scene;
+    scene_queue.retry_at = now + kLookAgain;
+    scene_queue.at_work = false;
+    stalled_.push_back(&scene_queue);
     work_.notify_one();
   }
   if (too_slow != nullptr) too_slow->cut_off_readers();
 }
 
-void UpdatePump::put_back(Mailbox& mailbox, const Group& group) {
+void UpdateQueue::put_back(SceneQueue& scene_queue, const Group& group) {
   for (auto update = group.rbegin(); update != group.rend(); ++update) {
     const uint64_t items = items_of((*update)->batch());
-    mailbox.waiting.push_front(*update);
-    mailbox.items += items;
+    scene_queue.waiting.push_front(*update);
+    scene_queue.items += items;
     stats_.items += items;
     ++stats_.updates;
   }
 }
 
-std::unique_ptr<UpdatePump::Mailbox> UpdatePump::leave(Mailbox& mailbox) {
-  mailbox.at_work = false;
-  mailbox.stalled_at = {};
-  if (!mailbox.waiting.empty()) {
-    ready_.push_back(&mailbox);
+std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::leave(SceneQueue& scene_queue) {
+  scene_queue.at_work = false;
+  scene_queue.stalled_at = {};
+  if (!scene_queue.waiting.empty()) {
+    ready_.push_back(&scene_queue);
     work_.notify_one();
     return nullptr;
   }
-  const auto place = mailboxes_.find(mailbox.scene.get());
-  std::unique_ptr<Mailbox> empty = std::move(place->second);
-  mailboxes_.erase(place);
+  const auto place = scene_queues_.find(scene_queue.scene.get());
+  std::unique_ptr<SceneQueue> empty = std::move(place->second);
+  scene_queues_.erase(place);
   if (ended_) work_.notify_all();
   return empty;
 }
 
-void UpdatePump::learn(uint64_t items, SteadyTime start) {
+void UpdateQueue::learn(uint64_t items, SteadyTime start) {
   if (items == 0) return;
   const auto spent = std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start).count();
   const double an_item = static_cast<double>(spent) / static_cast<double>(items);
@@ -297,7 +297,7 @@ void UpdatePump::learn(uint64_t items, SteadyTime start) {
   nanoseconds_an_item_.store(known + (an_item - known) * weight, std::memory_order_relaxed);
 }
 
-UpdatePumpStats UpdatePump::stats() const {
+UpdatePumpStats UpdateQueue::stats() const {
   const MutexLock lock(mutex_);
   return stats_;
 }

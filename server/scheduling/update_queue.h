@@ -5,8 +5,8 @@
 //
 // Threads: every member may be called from any thread; post() takes a lock that is only held for moments. Invariant: of
 // one scene at most one batch is being applied, and none overtakes another.
-#ifndef LOCUS_SERVER_SCHEDULING_UPDATE_PUMP_H_
-#define LOCUS_SERVER_SCHEDULING_UPDATE_PUMP_H_
+#ifndef LOCUS_SERVER_SCHEDULING_UPDATE_QUEUE_H_
+#define LOCUS_SERVER_SCHEDULING_UPDATE_QUEUE_H_
 
 #include <atomic>
 #include <chrono>
@@ -50,7 +50,7 @@ enum class Posted : uint8_t {
   kFull,   // taken, but bring no more until it is done
 };
 
-struct UpdatePumpOptions {
+struct UpdateQueueOptions {
   uint32_t threads = 1;
   uint32_t max_updates = 256;              // that wait in one mailbox
   uint64_t max_items = uint64_t{1} << 20;  // of them; one is taken however many it has
@@ -69,24 +69,24 @@ struct UpdatePumpStats {
   uint64_t stalls = 0;     // times that a scene's readers made its mailbox wait
 };
 
-class UpdatePump {
+class UpdateQueue {
  public:
-  explicit UpdatePump(const UpdatePumpOptions& options);
+  explicit UpdateQueue(const UpdateQueueOptions& options);
   // Until every batch is done.
-  ~UpdatePump();
-  UpdatePump(const UpdatePump&) = delete;
-  UpdatePump& operator=(const UpdatePump&) = delete;
+  ~UpdateQueue();
+  UpdateQueue(const UpdateQueue&) = delete;
+  UpdateQueue& operator=(const UpdateQueue&) = delete;
 
   // `update` is borrowed until done(). An error is a refusal, and done() is not called.
   absl::StatusOr<Posted> post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) LOCUS_EXCLUDES(mutex_);
 
   UpdatePumpStats stats() const LOCUS_EXCLUDES(mutex_);
-  const UpdatePumpOptions& options() const { return options_; }
+  const UpdateQueueOptions& options() const { return options_; }
 
  private:
   using SteadyTime = std::chrono::steady_clock::time_point;
 
-  struct Mailbox {
+  struct SceneQueue {
     ScenePtr scene;
     std::deque<PendingUpdate*> waiting;
     uint64_t items = 0;
@@ -97,32 +97,32 @@ class UpdatePump {
   };
   using Group = std::vector<PendingUpdate*>;
 
-  Mailbox& mailbox_of(const ScenePtr& scene) LOCUS_REQUIRES(mutex_);
-  bool full(const Mailbox& mailbox, uint64_t items) const;
-  absl::Status refuse(const Mailbox& mailbox, uint64_t items) const;
+  SceneQueue& mailbox_of(const ScenePtr& scene) LOCUS_REQUIRES(mutex_);
+  bool full(const SceneQueue& scene_queue, uint64_t items) const;
+  absl::Status refuse(const SceneQueue& scene_queue, uint64_t items) const;
   bool fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const;
-  void apply_here(Mailbox& mailbox, PendingUpdate& update, uint64_t items) LOCUS_EXCLUDES(mutex_);
+  void apply_here(SceneQueue& scene_queue, PendingUpdate& update, uint64_t items) LOCUS_EXCLUDES(mutex_);
 
   void run() LOCUS_EXCLUDES(mutex_);
-  Mailbox* next() LOCUS_EXCLUDES(mutex_);
-  void work_on(Mailbox& mailbox) LOCUS_EXCLUDES(mutex_);
-  Group take_group(Mailbox& mailbox) LOCUS_REQUIRES(mutex_);
-  void put_back(Mailbox& mailbox, const Group& group) LOCUS_REQUIRES(mutex_);
+  SceneQueue* next() LOCUS_EXCLUDES(mutex_);
+  void work_on(SceneQueue& scene_queue) LOCUS_EXCLUDES(mutex_);
+  Group take_group(SceneQueue& scene_queue) LOCUS_REQUIRES(mutex_);
+  void put_back(SceneQueue& scene_queue, const Group& group) LOCUS_REQUIRES(mutex_);
   // Applies and reports. False where the scene's readers hold it up; then `group` has those that still wait.
-  bool apply(Mailbox& mailbox, Group& group) LOCUS_EXCLUDES(mutex_);
+  bool apply(SceneQueue& scene_queue, Group& group) LOCUS_EXCLUDES(mutex_);
   void count(const Scene& scene, size_t updates) LOCUS_EXCLUDES(mutex_);
-  static void drop_stopped(const Mailbox& mailbox, Group& group);
-  void stall(Mailbox& mailbox, const Group& group) LOCUS_EXCLUDES(mutex_);
+  static void drop_stopped(const SceneQueue& scene_queue, Group& group);
+  void stall(SceneQueue& scene_queue, const Group& group) LOCUS_EXCLUDES(mutex_);
   // The mailbox where it is empty: to be freed without the lock, since a deleted scene may go with it.
-  std::unique_ptr<Mailbox> leave(Mailbox& mailbox) LOCUS_REQUIRES(mutex_);
+  std::unique_ptr<SceneQueue> leave(SceneQueue& scene_queue) LOCUS_REQUIRES(mutex_);
   void learn(uint64_t items, SteadyTime start);
 
-  const UpdatePumpOptions options_;
+  const UpdateQueueOptions options_;
   mutable Mutex mutex_;
   ConditionVariable work_;
-  absl::flat_hash_map<const Scene*, std::unique_ptr<Mailbox>> mailboxes_ LOCUS_GUARDED_BY(mutex_);
-  std::deque<Mailbox*> ready_ LOCUS_GUARDED_BY(mutex_);     // with batches, nobody at work, each once
-  std::vector<Mailbox*> stalled_ LOCUS_GUARDED_BY(mutex_);  // the same, until their time to retry
+  absl::flat_hash_map<const Scene*, std::unique_ptr<SceneQueue>> scene_queues_ LOCUS_GUARDED_BY(mutex_);
+  std::deque<SceneQueue*> ready_ LOCUS_GUARDED_BY(mutex_);     // with batches, nobody at work, each once
+  std::vector<SceneQueue*> stalled_ LOCUS_GUARDED_BY(mutex_);  // the same, until their time to retry
   UpdatePumpStats stats_ LOCUS_GUARDED_BY(mutex_);
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::atomic<double> nanoseconds_an_item_;
@@ -131,4 +131,4 @@ class UpdatePump {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_SCHEDULING_UPDATE_PUMP_H_
+#endif  // LOCUS_SERVER_SCHEDULING_UPDATE_QUEUE_H_
