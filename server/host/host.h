@@ -13,11 +13,11 @@
 #include "server/host/memory_use.h"
 #include "server/observability/metrics.h"
 #include "server/observability/slow_queries.h"
+#include "server/scheduling/admission_limiter.h"
 #include "server/scheduling/change_queue.h"
 #include "server/scheduling/clocks.h"
 #include "server/scheduling/cost_estimates.h"
 #include "server/scheduling/drain.h"
-#include "server/scheduling/gate.h"
 #include "server/scheduling/memory_budget.h"
 #include "server/scheduling/query_scheduler.h"
 #include "server/scheduling/snapshot_keeper.h"
@@ -70,10 +70,10 @@ struct Host {
   UpdateQueue updates;
   SnapshotKeeper snapshots{registry, log, keeper_options(config)};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
-  Gate calls;    // in work, streams apart
-  Gate streams;  // open
-  Gate health_watchers{kMaxHealthWatchers};
-  Gate backups{limits::kMaxBackups};
+  AdmissionLimiter calls;    // in work, streams apart
+  AdmissionLimiter streams;  // open
+  AdmissionLimiter health_watchers{kMaxHealthWatchers};
+  AdmissionLimiter backups{limits::kMaxBackups};
   Drain drain;
   std::atomic<bool> recovering{false};  // what the log keeps is being read back
 };

@@ -113,7 +113,7 @@ grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
   const Caller caller(host, context);
   const LogScope scope(caller.trace());
   context.AddTrailingMetadata(kRequestIdMetadata, LogScope::current().request_id);
-  const Gate::Pass pass = host.calls.enter();
+  const AdmissionLimiter::Permit pass = host.calls.enter();
   absl::Status status;
   if (!pass) {
     status = refuse_full("", "calls", host.calls.max(), host.calls.max() + 1.0, kBusyRetryMs);

@@ -190,7 +190,7 @@ class HotCall final : private IoLoop::Resident {
 
   absl::Status admit() {
     Host& host = listener_.host_;
-    Gate& gate = Method::kStream ? host.streams : host.calls;
+    AdmissionLimiter& gate = Method::kStream ? host.streams : host.calls;
     pass_ = gate.enter();
     if (!pass_)
       return refuse_full("", Method::kStream ? "streams" : "calls", gate.max(), gate.max() + 1.0, kRetryAfterMs);
@@ -337,7 +337,7 @@ class HotCall final : private IoLoop::Resident {
   void finish() {
     finishing_ = true;
     // A caller who has its answer may call again at once, and must find room.
-    pass_ = Gate::Pass();
+    pass_ = AdmissionLimiter::Permit();
     // Who failed may ask what happened; to all others it would only cost bytes.
     if (!end_status_.ok()) context_.AddTrailingMetadata(kRequestIdMetadata, caller_->trace().request_id);
     if constexpr (Method::kStream) {
@@ -399,7 +399,7 @@ class HotCall final : private IoLoop::Resident {
   std::optional<OpenStream> open_;
   std::optional<Caller> caller_;
   std::optional<uint64_t> client_;
-  Gate::Pass pass_;
+  AdmissionLimiter::Permit pass_;
   SceneBinding scene_;
   Slots slots_;  // in the order of arrival
   Slot* writing_ = nullptr;

@@ -194,7 +194,7 @@ void remove_leftover_backup(const Host& host) { remove_tree(directory_of(host));
 
 absl::Status back_up(Host& host, const Caller& caller, grpc::ServerWriter<v1::BackupResponse>& writer) {
   if (!can_back_up(host)) return no_data_directory();
-  const Gate::Pass pass = host.backups.enter();
+  const AdmissionLimiter::Permit pass = host.backups.enter();
   if (!pass) return refuse_full("", "backups", host.backups.max(), host.backups.max() + 1.0, kBusyRetryMs);
   const fs::path path = directory_of(host);
   const Directory directory(path);

@@ -78,7 +78,7 @@ bool HealthService::write(State state, grpc::ServerWriter<Empty>& writer) {
 
 grpc::Status HealthService::watch(grpc::ServerContext& context, const Empty& request,
                                   grpc::ServerWriter<Empty>& writer) {
-  const Gate::Pass pass = host_.health_watchers.enter();
+  const AdmissionLimiter::Permit pass = host_.health_watchers.enter();
   if (!pass)
     return to_grpc(refuse_full("", "health_watchers", kMaxHealthWatchers, kMaxHealthWatchers + 1.0, kRetryAfterMs));
   const bool known = is_known(service_of(request));

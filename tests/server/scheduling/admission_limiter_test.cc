@@ -1,4 +1,4 @@
-#include "server/scheduling/gate.h"
+#include "server/scheduling/admission_limiter.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +11,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-TEST(GateTest, NoMorePassesThanMayBeInside) {
-  Gate gate(2);
-  const Gate::Pass first = gate.enter();
+TEST(AdmissionLimiterTest, NoMorePassesThanMayBeInside) {
+  AdmissionLimiter gate(2);
+  const AdmissionLimiter::Permit first = gate.enter();
   {
-    const Gate::Pass second = gate.enter();
+    const AdmissionLimiter::Permit second = gate.enter();
     EXPECT_TRUE(second);
     EXPECT_FALSE(gate.enter());
     EXPECT_EQ(gate.used(), 2u);
@@ -24,24 +24,24 @@ TEST(GateTest, NoMorePassesThanMayBeInside) {
   EXPECT_TRUE(gate.enter());
 }
 
-TEST(GateTest, WaitingEndsWhenTheLastLeaves) {
-  Gate gate(4);
-  Gate::Pass pass = gate.enter();
+TEST(AdmissionLimiterTest, WaitingEndsWhenTheLastLeaves) {
+  AdmissionLimiter gate(4);
+  AdmissionLimiter::Permit pass = gate.enter();
   EXPECT_FALSE(gate.wait_until_empty(Clock::now()));
-  std::thread leaver([moved = std::move(pass)]() mutable { Gate::Pass gone = std::move(moved); });
+  std::thread leaver([moved = std::move(pass)]() mutable { AdmissionLimiter::Permit gone = std::move(moved); });
   EXPECT_TRUE(gate.wait_until_empty(Clock::now() + std::chrono::minutes(1)));
   leaver.join();
 }
 
-TEST(GateTest, ManyThreadsNeverExceedTheMaximum) {
-  Gate gate(3);
+TEST(AdmissionLimiterTest, ManyThreadsNeverExceedTheMaximum) {
+  AdmissionLimiter gate(3);
   std::atomic<int> inside{0};
   std::atomic<bool> exceeded{false};
   std::vector<std::thread> threads;
   for (int i = 0; i < 8; ++i)
     threads.emplace_back([&] {
       for (int round = 0; round < 500; ++round) {
-        const Gate::Pass pass = gate.enter();
+        const AdmissionLimiter::Permit pass = gate.enter();
         if (!pass) continue;
         if (++inside > 3) exceeded = true;
         --inside;

@@ -2,8 +2,8 @@
 // lasts.
 //
 // Threads: every member may be called from any thread. Invariant: never more passes than max().
-#ifndef LOCUS_SERVER_SCHEDULING_GATE_H_
-#define LOCUS_SERVER_SCHEDULING_GATE_H_
+#ifndef LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
+#define LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
 
 #include <chrono>
 #include <cstdint>
@@ -13,36 +13,36 @@
 
 namespace locus::server {
 
-class Gate {
+class AdmissionLimiter {
  public:
   // Leaves the gate when dropped. Must not outlive it.
-  class Pass {
+  class Permit {
    public:
-    Pass() = default;
-    explicit Pass(Gate* gate) : gate_(gate) {}
-    Pass(Pass&& other) noexcept : gate_(std::exchange(other.gate_, nullptr)) {}
-    Pass& operator=(Pass&& other) noexcept {
+    Permit() = default;
+    explicit Permit(AdmissionLimiter* gate) : gate_(gate) {}
+    Permit(Permit&& other) noexcept : gate_(std::exchange(other.gate_, nullptr)) {}
+    Permit& operator=(Permit&& other) noexcept {
       std::swap(gate_, other.gate_);
       return *this;
     }
-    ~Pass() {
+    ~Permit() {
       if (gate_ != nullptr) gate_->leave();
     }
     // False where there was no room.
     explicit operator bool() const { return gate_ != nullptr; }
 
    private:
-    Gate* gate_ = nullptr;
+    AdmissionLimiter* gate_ = nullptr;
   };
 
-  explicit Gate(uint32_t max) : max_(max) {}
+  explicit AdmissionLimiter(uint32_t max) : max_(max) {}
 
   // Never waits.
-  Pass enter() LOCUS_EXCLUDES(mutex_) {
+  Permit enter() LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
-    if (used_ >= max_) return Pass();
+    if (used_ >= max_) return Permit();
     ++used_;
-    return Pass(this);
+    return Permit(this);
   }
 
   uint32_t used() const LOCUS_EXCLUDES(mutex_) {
@@ -73,4 +73,4 @@ class Gate {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_SCHEDULING_GATE_H_
+#endif  // LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
