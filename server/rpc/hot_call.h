@@ -83,7 +83,7 @@ class Listener {
 };
 
 template <class Method>
-class HotCall final : private IoLoop::Resident {
+class HotCall final : private IoLoop::ActiveCall {
  public:
   using Request = typename Method::Request;
   using Response = typename Method::Response;
@@ -125,7 +125,7 @@ class HotCall final : private IoLoop::Resident {
 
   static void listen(Listener<Method>& listener) {
     HotCall& call = *new HotCall(listener);
-    listener.io_.expect();
+    listener.io_.acquire();
     call.context_.AsyncNotifyWhenDone(&call.gone_tag_);
     if constexpr (Method::kStream)
       listener.rpc_.listen(&call.context_, &call.wire_, listener.io_.queue(), &call.accepted_tag_);
@@ -145,10 +145,10 @@ class HotCall final : private IoLoop::Resident {
 
   explicit HotCall(Listener<Method>& listener) : listener_(listener) {}
   ~HotCall() {
-    if (resident_)
-      listener_.io_.leave(*resident_);
+    if (active_call_)
+      listener_.io_.leave(*active_call_);
     else
-      listener_.io_.forgo();
+      listener_.io_.release();
   }
 
   // Everything that happens to a call goes through here. What follows from it is decided once, when it has happened.
@@ -175,7 +175,7 @@ class HotCall final : private IoLoop::Resident {
       return;
     }
     listen(listener_);
-    resident_ = listener_.io_.enter(*this);
+    active_call_ = listener_.io_.enter(*this);
     arrived_ = std::chrono::steady_clock::now();
     caller_.emplace(listener_.host_, context_, &stopped_);
     act([this] {
@@ -393,7 +393,7 @@ class HotCall final : private IoLoop::Resident {
   Tag finished_tag_{*this, &HotCall::finished};
   Tag gone_tag_{*this, &HotCall::gone};
 
-  std::optional<IoLoop::Residents::iterator> resident_;
+  std::optional<IoLoop::ActiveCalls::iterator> active_call_;
   std::atomic<bool> stopped_{false};  // for work on other threads: nobody waits for it
   SteadyTime arrived_;
   std::optional<OpenStream> open_;

@@ -77,27 +77,27 @@ void IoLoop::interrupt() {
 
 void IoLoop::woken(bool) { alarm_set_.store(false); }
 
-void IoLoop::leave(Residents::iterator call) {
-  residents_.erase(call);
-  forgo();
+void IoLoop::leave(ActiveCalls::iterator call) {
+  active_calls_.erase(call);
+  release();
 }
 
-void IoLoop::forgo() {
-  expected_or_resident_.fetch_sub(1);
-  expected_or_resident_.notify_all();
+void IoLoop::release() {
+  expected_or_active_.fetch_sub(1);
+  expected_or_active_.notify_all();
 }
 
 void IoLoop::wait_until_empty(bool running) {
-  for (uint32_t left = expected_or_resident_.load(); left > 0; left = expected_or_resident_.load())
+  for (uint32_t left = expected_or_active_.load(); left > 0; left = expected_or_active_.load())
     if (running)
-      expected_or_resident_.wait(left);
+      expected_or_active_.wait(left);
     else
       turn();
 }
 
 // Residents may leave while they are told.
-void IoLoop::drain_residents(bool) {
-  for (auto resident = residents_.begin(); resident != residents_.end();) (*resident++)->drain();
+void IoLoop::drain_active_calls(bool) {
+  for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();) (*active_call++)->drain();
 }
 
 uint32_t IoThreads::count_for(uint32_t cores) {

@@ -29,30 +29,30 @@ class IoWaker;
 class IoLoop final : private EventSource, public EventLoop {
  public:
   // A call that lives here.
-  class Resident {
+  class ActiveCall {
    public:
     // The server drains.
     virtual void drain() = 0;
 
    protected:
-    ~Resident() = default;
+    ~ActiveCall() = default;
   };
-  using Residents = std::list<Resident*>;
+  using ActiveCalls = std::list<ActiveCall*>;
 
   IoLoop(std::unique_ptr<grpc::ServerCompletionQueue> queue, IoWaker& waker);
 
   grpc::ServerCompletionQueue* queue() { return queue_.get(); }
 
   // A call that gRPC may begin here: expected until it enters, or until gRPC says that it will not come.
-  void expect() { expected_or_resident_.fetch_add(1); }
-  void forgo();
-  Residents::iterator enter(Resident& call) { return residents_.insert(residents_.end(), &call); }
-  void leave(Residents::iterator call);
+  void acquire() { expected_or_active_.fetch_add(1); }
+  void release();
+  ActiveCalls::iterator enter(ActiveCall& call) { return active_calls_.insert(active_calls_.end(), &call); }
+  void leave(ActiveCalls::iterator call);
 
   // Whether no call lives here. For handlers.
-  bool idle() const { return residents_.empty(); }
+  bool idle() const { return active_calls_.empty(); }
   // Whether none does and none can come any more. From any thread.
-  bool empty() const { return expected_or_resident_.load() == 0; }
+  bool empty() const { return expected_or_active_.load() == 0; }
 
  private:
   friend class IoThreads;
@@ -64,17 +64,17 @@ class IoLoop final : private EventSource, public EventLoop {
   // By threads that are `running`, or by taking turns here.
   void wait_until_empty(bool running);
   void woken(bool ok);
-  void drain_residents(bool ok);
+  void drain_active_calls(bool ok);
 
   const std::unique_ptr<grpc::ServerCompletionQueue> queue_;
   IoWaker& waker_;
   std::atomic<bool> wanted_{false};  // to be woken
   std::atomic<bool> alarm_set_{false};
-  std::atomic<uint32_t> expected_or_resident_{0};
+  std::atomic<uint32_t> expected_or_active_{0};
   grpc::Alarm alarm_;  // the waker's
   MemberTag<IoLoop> woken_{*this, &IoLoop::woken};
-  MemberTag<IoLoop> drain_{*this, &IoLoop::drain_residents};
-  Residents residents_;
+  MemberTag<IoLoop> drain_{*this, &IoLoop::drain_active_calls};
+  ActiveCalls active_calls_;
 };
 
 class IoThreads {

@@ -42,7 +42,7 @@ bool EventLoop::turn() {
   if (what == EventSource::Next::kEvent) tag->arrived(ok);
   run_posted();
   run_timers();
-  run_aside();
+  run_deferred();
   return true;
 }
 
@@ -106,19 +106,19 @@ void EventLoop::run_timers() {
 
 // Without work, or with short work only, the lead is just laid down: whoever is up takes it, and that is this thread,
 // in its next turn.
-void EventLoop::run_aside() {
+void EventLoop::run_deferred() {
   bool leads = true;
-  while (!aside_.empty()) {
-    const Aside next = aside_.front();
-    aside_.pop_front();
-    if (leads && next.length == AsideLength::kLong) {
+  while (!deferred_.empty()) {
+    const Deferred next = deferred_.front();
+    deferred_.pop_front();
+    if (leads && next.length == TaskLength::kLong) {
       leave_lead();
       leads = false;
     }
     mutex_.unlock();
-    next.work->run_aside();
+    next.work->run_deferred();
     mutex_.lock();
-    next.work->aside_done();
+    next.work->on_deferred_done();
   }
   if (leads) led_ = false;
 }

@@ -63,15 +63,15 @@ class EventSource {
 };
 
 // Work that a handler sets aside to be done without the lock, by a thread of the loop.
-class AsideWork {
+class DeferredTask {
  public:
-  virtual ~AsideWork() = default;
-  virtual void run_aside() = 0;
+  virtual ~DeferredTask() = default;
+  virtual void run_deferred() = 0;
   // Under the lock, once that has returned. The loop never touches the work again.
-  virtual void aside_done() = 0;
+  virtual void on_deferred_done() = 0;
 };
 // Whether another thread should lead meanwhile, who may have to be woken for that.
-enum class AsideLength : uint8_t { kShort, kLong };
+enum class TaskLength : uint8_t { kShort, kLong };
 
 class EventLoop {
  public:
@@ -90,16 +90,16 @@ class EventLoop {
   void cancel(Timers::iterator timer) { timers_.erase(timer); }
 
   // `work` is done as soon as the handler has returned.
-  void set_aside(AsideWork& work, AsideLength length) { aside_.push_back({&work, length}); }
+  void defer(DeferredTask& work, TaskLength length) { deferred_.push_back({&work, length}); }
 
   // Waits for its turn to lead, then for something to happen, and does what follows from it; false once the source has
   // ended. What every thread of the loop does again and again.
   bool turn() LOCUS_EXCLUDES(mutex_);
 
  private:
-  struct Aside {
-    AsideWork* work;
-    AsideLength length;
+  struct Deferred {
+    DeferredTask* work;
+    TaskLength length;
   };
 
   // How long the leader may sleep; none at the end.
@@ -109,7 +109,7 @@ class EventLoop {
   EventSource::Next next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok);
   void run_posted();
   void run_timers();
-  void run_aside() LOCUS_REQUIRES(mutex_);
+  void run_deferred() LOCUS_REQUIRES(mutex_);
 
   EventSource& source_;
   std::atomic<EventTag*> posted_{nullptr};
@@ -122,7 +122,7 @@ class EventLoop {
   uint32_t followers_ LOCUS_GUARDED_BY(mutex_) = 0;
   // Of handlers, who run under the lock without knowing of it.
   Timers timers_;
-  std::deque<Aside> aside_;
+  std::deque<Deferred> deferred_;
 };
 
 }  // namespace locus::server

@@ -114,12 +114,12 @@ void QueryWork::run() {
   run_ = *std::move(run);
   const uint64_t cost = slot_.host().costs.nanoseconds((*pin_)->epoch, batch_);
   if (!slot_.host().scheduler.runs_inline(cost)) return submit(cost);
-  slot_.io().set_aside(*this, cost < kShortNanoseconds ? AsideLength::kShort : AsideLength::kLong);
+  slot_.io().defer(*this, cost < kShortNanoseconds ? TaskLength::kShort : TaskLength::kLong);
 }
 
-void QueryWork::run_aside() { progress_ = slot_.host().scheduler.run_inline(*this); }
+void QueryWork::run_deferred() { progress_ = slot_.host().scheduler.run_inline(*this); }
 
-void QueryWork::aside_done() {
+void QueryWork::on_deferred_done() {
   if (progress_ == Progress::kDone) return finished(true);
   submit(slot_.host().scheduler.options().inline_nanoseconds);  // it has shown that it takes longer
 }

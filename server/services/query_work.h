@@ -20,7 +20,7 @@
 
 namespace locus::server {
 
-class QueryWork final : private QueryJob, private AsideWork {
+class QueryWork final : private QueryJob, private DeferredTask {
  public:
   explicit QueryWork(CallSlot& slot) : slot_(slot) {}
 
@@ -43,8 +43,8 @@ class QueryWork final : private QueryJob, private AsideWork {
 
   void run();
   // Where it is short.
-  void run_aside() override;
-  void aside_done() override;
+  void run_deferred() override;
+  void on_deferred_done() override;
   // Otherwise.
   void submit(uint64_t nanoseconds);
   Progress work(uint64_t nanoseconds) override { return run_->work(nanoseconds); }

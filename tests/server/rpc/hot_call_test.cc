@@ -38,7 +38,7 @@ enum What : uint64_t {
 };
 
 // Work that can be watched.
-class FakeWork : private server::AsideWork {
+class FakeWork : private server::DeferredTask {
  public:
   explicit FakeWork(CallSlot& slot) : slot_(slot) {}
   ~FakeWork() {
@@ -51,7 +51,7 @@ class FakeWork : private server::AsideWork {
     if (what == kElsewhere || what == kHoldsOthers) {
       thread_ = std::thread([this, &io = slot_.io()] { io.post(returned_); });
     } else if (what == kAside) {
-      slot_.io().set_aside(*this, server::AsideLength::kLong);
+      slot_.io().defer(*this, server::TaskLength::kLong);
     } else if (what == kHeld) {
       place_ = held_.insert(held_.end(), this);
     } else {
@@ -71,8 +71,8 @@ class FakeWork : private server::AsideWork {
     slot_.answered(status);
   }
   void returned(bool) { slot_.answered(absl::OkStatus()); }
-  void run_aside() override {}
-  void aside_done() override { slot_.answered(absl::OkStatus()); }
+  void run_deferred() override {}
+  void on_deferred_done() override { slot_.answered(absl::OkStatus()); }
 
   static inline std::list<FakeWork*> held_;
 

@@ -63,11 +63,11 @@ class Call final : public EventTag {
   std::function<void()> then_;
 };
 
-class Work final : public AsideWork {
+class Work final : public DeferredTask {
  public:
   Work(std::function<void()> run, std::function<void()> done) : run_(std::move(run)), done_(std::move(done)) {}
-  void run_aside() override { run_(); }
-  void aside_done() override { done_(); }
+  void run_deferred() override { run_(); }
+  void on_deferred_done() override { done_(); }
 
  private:
   std::function<void()> run_, done_;
@@ -113,8 +113,8 @@ TEST(EventLoopTest, LongWorkSetAsideLeavesTheLeadToAnother) {
   const auto run = [&meet] { meet.arrive_and_wait(); };
   Work one(run, [&all] { all.count_down(); }), other(run, [&all] { all.count_down(); });
   Served served(2);
-  Call first([&] { served.loop.set_aside(one, AsideLength::kLong); });
-  Call second([&] { served.loop.set_aside(other, AsideLength::kLong); });
+  Call first([&] { served.loop.defer(one, TaskLength::kLong); });
+  Call second([&] { served.loop.defer(other, TaskLength::kLong); });
   served.source.put(first);
   served.source.put(second);
   all.wait();
@@ -129,8 +129,8 @@ TEST(EventLoopTest, WithAsManyLongWorksAsThreadsEventsWaitForTheFirstToEnd) {
   Work one(run, [&all] { all.count_down(); }), other(run, [&all] { all.count_down(); });
   std::atomic<bool> arrived{false};
   Served served(2);
-  Call first([&] { served.loop.set_aside(one, AsideLength::kLong); });
-  Call second([&] { served.loop.set_aside(other, AsideLength::kLong); });
+  Call first([&] { served.loop.defer(one, TaskLength::kLong); });
+  Call second([&] { served.loop.defer(other, TaskLength::kLong); });
   Call third([&] { arrived = true, all.count_down(); });
   served.source.put(first);
   served.source.put(second);
@@ -152,7 +152,7 @@ TEST(EventLoopTest, ShortWorkSetAsideKeepsTheLead) {
       [&all] { all.count_down(); });
   std::atomic<bool> arrived{false};
   Served served(2);
-  Call first([&] { served.loop.set_aside(work, AsideLength::kShort); });
+  Call first([&] { served.loop.defer(work, TaskLength::kShort); });
   Call second([&] { arrived = true, all.count_down(); });
   served.source.put(first);
   begun.wait();
@@ -168,7 +168,7 @@ TEST(EventLoopTest, ATimerThatIsSetByWhoDoesNotLeadWakesTheLeader) {
   Served served(2);
   Work work([] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); },
             [&] { served.loop.at(steady_clock::now(), [&rung] { rung.count_down(); }); });
-  Call first([&] { served.loop.set_aside(work, AsideLength::kLong); });
+  Call first([&] { served.loop.defer(work, TaskLength::kLong); });
   served.source.put(first);
   rung.wait();
 }
@@ -226,7 +226,7 @@ TEST(EventLoopTest, HandlersNeverRunAtOnceAndNothingIsLost) {
                          [this] { step.arrived(true); });
           return;
         default:
-          return served.loop.set_aside(work, random() % 2 == 0 ? AsideLength::kShort : AsideLength::kLong);
+          return served.loop.defer(work, random() % 2 == 0 ? TaskLength::kShort : TaskLength::kLong);
       }
     }
     Served& served;
