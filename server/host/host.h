@@ -20,7 +20,7 @@
 #include "server/scheduling/drain.h"
 #include "server/scheduling/memory_budget.h"
 #include "server/scheduling/query_scheduler.h"
-#include "server/scheduling/snapshot_keeper.h"
+#include "server/scheduling/snapshotter.h"
 #include "server/scheduling/update_queue.h"
 #include "server/scheduling/worker_pool.h"
 
@@ -56,7 +56,7 @@ struct Host {
     options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
     return options;
   }
-  static SnapshotKeeperOptions keeper_options(const ServerConfig& config);
+  static SnapshotterOptions snapshotter_options(const ServerConfig& config);
 
   const ServerConfig config;
   UpdateLog* const log;
@@ -68,7 +68,7 @@ struct Host {
   CostEstimates costs;
   QueryScheduler scheduler;
   UpdateQueue updates;
-  SnapshotKeeper snapshots{registry, log, keeper_options(config)};
+  Snapshotter snapshots{registry, log, snapshotter_options(config)};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
   AdmissionLimiter calls;    // in work, streams apart
   AdmissionLimiter streams;  // open

@@ -181,8 +181,8 @@ void log_snapshot(const Scene& scene, const absl::StatusOr<uint64_t>& bytes) {
 
 absl::Status recover_all(Host& host, const std::atomic<bool>& stop) { return Recovery(host, stop).run(); }
 
-SnapshotKeeperOptions Host::keeper_options(const ServerConfig& config) {
-  SnapshotKeeperOptions options;
+SnapshotterOptions Host::snapshotter_options(const ServerConfig& config) {
+  SnapshotterOptions options;
   options.log_bytes = config.snapshot_after;
   options.tell = log_snapshot;
   return options;

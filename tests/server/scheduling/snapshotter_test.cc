@@ -1,4 +1,4 @@
-#include "server/scheduling/snapshot_keeper.h"
+#include "server/scheduling/snapshotter.h"
 
 #include <gtest/gtest.h>
 
@@ -15,17 +15,17 @@ namespace {
 
 using std::chrono::milliseconds;
 
-class SnapshotKeeperTest : public testing::Test {
+class SnapshotterTest : public testing::Test {
  protected:
-  SnapshotKeeperTest() {
+  SnapshotterTest() {
     const absl::StatusOr<Registry::CreatedScene> created = registry_.create_scene("arena", {}, 5, "", false);
     EXPECT_TRUE(created.ok()) << created.status();
     scene_ = created->scene;
   }
 
   // One that looks all the time at scenes with more than a few records.
-  SnapshotKeeperOptions eager() {
-    SnapshotKeeperOptions options;
+  SnapshotterOptions eager() {
+    SnapshotterOptions options;
     options.log_bytes = 2'000;
     options.look_every = milliseconds(1);
     options.retry_after = milliseconds(1);
@@ -48,7 +48,7 @@ class SnapshotKeeperTest : public testing::Test {
     }
   }
 
-  void wait_for_snapshots(const SnapshotKeeper& keeper, uint64_t count) {
+  void wait_for_snapshots(const Snapshotter& keeper, uint64_t count) {
     while (keeper.stats().written < count) std::this_thread::yield();
   }
 
@@ -69,8 +69,8 @@ class SnapshotKeeperTest : public testing::Test {
   std::unique_ptr<test::MemoryLog> crashed_;
 };
 
-TEST_F(SnapshotKeeperTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn) {
-  const SnapshotKeeper keeper(registry_, &log_, eager());
+TEST_F(SnapshotterTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn) {
+  const Snapshotter keeper(registry_, &log_, eager());
   apply(200);
   wait_for_snapshots(keeper, 1);
   EXPECT_GT(keeper.stats().bytes, 0u);
@@ -83,14 +83,14 @@ TEST_F(SnapshotKeeperTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn)
   EXPECT_EQ(again->latest()->objects.size(), 250u);
 }
 
-TEST_F(SnapshotKeeperTest, FewRecordsAreLeftAlone) {
+TEST_F(SnapshotterTest, FewRecordsAreLeftAlone) {
   apply(3);
   std::atomic<bool> told{false};
-  SnapshotKeeperOptions options = eager();
+  SnapshotterOptions options = eager();
   options.log_bytes = scene_->log_position().bytes;
   options.tell = [&told](const Scene&, const absl::StatusOr<uint64_t>&) { told = true; };
   {
-    const SnapshotKeeper keeper(registry_, &log_, options);
+    const Snapshotter keeper(registry_, &log_, options);
     std::this_thread::sleep_for(milliseconds(20));
     EXPECT_EQ(keeper.stats().written, 0u);
     // One more, and it is due: so it did look.
@@ -100,10 +100,10 @@ TEST_F(SnapshotKeeperTest, FewRecordsAreLeftAlone) {
   EXPECT_TRUE(told);
 }
 
-TEST_F(SnapshotKeeperTest, AFullDiskIsToldOfAndTriedAgain) {
+TEST_F(SnapshotterTest, AFullDiskIsToldOfAndTriedAgain) {
   apply(200);
   log_.fail_with(absl::ResourceExhaustedError("full"));
-  const SnapshotKeeper keeper(registry_, &log_, eager());
+  const Snapshotter keeper(registry_, &log_, eager());
   while (keeper.stats().failed < 2) std::this_thread::yield();
   EXPECT_EQ(keeper.stats().written, 0u);
   EXPECT_GE(told_failures_, 1u);
@@ -112,9 +112,9 @@ TEST_F(SnapshotKeeperTest, AFullDiskIsToldOfAndTriedAgain) {
   EXPECT_EQ(recovered()->latest()->objects.size(), 200u);
 }
 
-TEST_F(SnapshotKeeperTest, WithoutALogItDoesNothing) {
+TEST_F(SnapshotterTest, WithoutALogItDoesNothing) {
   Registry registry;
-  const SnapshotKeeper keeper(registry, nullptr, eager());
+  const Snapshotter keeper(registry, nullptr, eager());
   EXPECT_EQ(keeper.stats().written, 0u);
 }
 

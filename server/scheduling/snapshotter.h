@@ -3,8 +3,8 @@
 //
 // Threads: a thread of its own, below those that serve; stats() from any. Nobody waits for it: a scene goes on while
 // its snapshot is written.
-#ifndef LOCUS_SERVER_SCHEDULING_SNAPSHOT_KEEPER_H_
-#define LOCUS_SERVER_SCHEDULING_SNAPSHOT_KEEPER_H_
+#ifndef LOCUS_SERVER_SCHEDULING_SNAPSHOTTER_H_
+#define LOCUS_SERVER_SCHEDULING_SNAPSHOTTER_H_
 
 #include <chrono>
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace locus::server {
 
-struct SnapshotKeeperOptions {
+struct SnapshotterOptions {
   // Of records since the last snapshot: a scene with more gets another. For a scene that takes more than that itself,
   // as much as it takes, so that snapshots never write more than the log does. Lower it for a faster restart.
   uint64_t log_bytes = limits::kSnapshotAfterBytes;
@@ -37,14 +37,14 @@ struct SnapshotKeeperStats {
   uint64_t failed = 0;
 };
 
-class SnapshotKeeper {
+class Snapshotter {
  public:
   // Both outlive it. Without a log it does nothing.
-  SnapshotKeeper(const Registry& registry, UpdateLog* log, SnapshotKeeperOptions options);
+  Snapshotter(const Registry& registry, UpdateLog* log, SnapshotterOptions options);
   // Gives up a snapshot that is being written: the one before is still there.
-  ~SnapshotKeeper();
-  SnapshotKeeper(const SnapshotKeeper&) = delete;
-  SnapshotKeeper& operator=(const SnapshotKeeper&) = delete;
+  ~Snapshotter();
+  Snapshotter(const Snapshotter&) = delete;
+  Snapshotter& operator=(const Snapshotter&) = delete;
 
   SnapshotKeeperStats stats() const LOCUS_EXCLUDES(mutex_);
 
@@ -60,7 +60,7 @@ class SnapshotKeeper {
 
   const Registry& registry_;
   UpdateLog* const log_;
-  const SnapshotKeeperOptions options_;
+  const SnapshotterOptions options_;
   mutable Mutex mutex_;
   ConditionVariable end_;
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
@@ -70,4 +70,4 @@ class SnapshotKeeper {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_SCHEDULING_SNAPSHOT_KEEPER_H_
+#endif  // LOCUS_SERVER_SCHEDULING_SNAPSHOTTER_H_

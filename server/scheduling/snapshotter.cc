@@ -1,4 +1,4 @@
-#include "server/scheduling/snapshot_keeper.h"
+#include "server/scheduling/snapshotter.h"
 
 #include <algorithm>
 #include <optional>
@@ -19,12 +19,12 @@ constexpr uint64_t kObjectBytes = 80;
 
 }  // namespace
 
-SnapshotKeeper::SnapshotKeeper(const Registry& registry, UpdateLog* log, SnapshotKeeperOptions options)
+Snapshotter::Snapshotter(const Registry& registry, UpdateLog* log, SnapshotterOptions options)
     : registry_(registry), log_(log), options_(std::move(options)) {
   if (log_ != nullptr) thread_ = std::thread([this] { run(); });
 }
 
-SnapshotKeeper::~SnapshotKeeper() {
+Snapshotter::~Snapshotter() {
   if (log_ == nullptr) return;
   {
     const MutexLock lock(mutex_);
@@ -34,30 +34,30 @@ SnapshotKeeper::~SnapshotKeeper() {
   thread_.join();
 }
 
-SnapshotKeeperStats SnapshotKeeper::stats() const {
+SnapshotKeeperStats Snapshotter::stats() const {
   const MutexLock lock(mutex_);
   return stats_;
 }
 
-bool SnapshotKeeper::ended() const {
+bool Snapshotter::ended() const {
   const MutexLock lock(mutex_);
   return ended_;
 }
 
-bool SnapshotKeeper::wait_for(std::chrono::milliseconds time) {
+bool Snapshotter::wait_for(std::chrono::milliseconds time) {
   const steady_clock::time_point until = steady_clock::now() + time;
   const MutexLock lock(mutex_);
   while (!ended_ && steady_clock::now() < until) end_.wait_until(mutex_, until);
   return !ended_;
 }
 
-void SnapshotKeeper::run() {
+void Snapshotter::run() {
   take_batch_priority(BatchPriority::kNice);
   bool good = true;
   while (wait_for(good ? options_.look_every : options_.retry_after)) good = look_at_all();
 }
 
-bool SnapshotKeeper::look_at_all() {
+bool Snapshotter::look_at_all() {
   std::string after;
   while (true) {
     const std::vector<ScenePtr> scenes = registry_.list_scenes(after, limits::kMaxPageSize);
@@ -79,13 +79,13 @@ bool SnapshotKeeper::look_at_all() {
   }
 }
 
-bool SnapshotKeeper::due(const Scene& scene) const {
+bool Snapshotter::due(const Scene& scene) const {
   if (scene.log_key() == 0) return false;
   const uint64_t takes = kObjectBytes * scene.latest()->objects.size();
   return scene.log_position().bytes > std::max(options_.log_bytes, takes);
 }
 
-absl::StatusOr<uint64_t> SnapshotKeeper::write(Scene& scene) {
+absl::StatusOr<uint64_t> Snapshotter::write(Scene& scene) {
   const FrozenScene frozen = scene.freeze();
   StateWriter writer(frozen);
   const auto next = [&]() -> absl::StatusOr<std::optional<std::string>> {
