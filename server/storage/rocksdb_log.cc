@@ -40,10 +40,10 @@ RocksdbLog::RocksdbLog(const StorageOptions& options, OpenedDirectory opened)
       lock_(std::move(opened.lock)),
       database_(std::move(opened.database)),
       findings_(std::move(opened.findings)),
-      closed_in_order_(opened.high_water.closed),
+      closed_in_order_(opened.durable_marker.closed),
       outlines_(*options.env, options.path),
-      high_water_file_(std::move(opened.high_water_file)),
-      high_water_(std::move(opened.high_water)) {}
+      durable_marker_file_(std::move(opened.durable_marker_file)),
+      durable_marker_(std::move(opened.durable_marker)) {}
 
 RocksdbLog::~RocksdbLog() {
   if (!keeper_.joinable()) return;  // it never began
@@ -78,12 +78,13 @@ void RocksdbLog::list_stored() {
       place->damage = stored.damage;
       place->damage_found = found.damage;
     }
-    place->row_seal = found.row_seal;
+    place->row_checksum = found.row_checksum;
     place->copied = stored.copied = found.copied;
-    place->written = {found.last, found.chain};
+    place->written = {found.last, found.running_checksum};
     place->synced = place->written;  // all that is there was synced before it was read
     // What must be there stays what it was where it is not.
-    if (found.last < found.promised) place->synced.sequence = place->written.sequence = found.promised;
+    if (found.last < found.expected_sequence)
+      place->synced.sequence = place->written.sequence = found.expected_sequence;
     scenes_.add(std::move(place));
   }
   std::sort(stored_scenes_.begin(), stored_scenes_.end(),
@@ -107,8 +108,8 @@ absl::Status RocksdbLog::begin() {
     MutexLock lock(catalogue_mutex_);
     MutexLock high_water_lock(high_water_mutex_);
     const CatalogueRow said = findings_.catalogue.value_or(CatalogueRow());
-    catalogue_ = Catalogue(std::move(findings_.rows), std::max(said.generation, high_water_.catalogue),
-                           std::max(said.next_scene, high_water_.next_scene));
+    catalogue_ = Catalogue(std::move(findings_.rows), std::max(said.generation, durable_marker_.catalogue),
+                           std::max(said.next_scene, durable_marker_.next_scene));
     next_scene_ = catalogue_.totals().next_scene;
     rocksdb::WriteBatch batch;
     for (const std::string& key : findings_.pending) {
@@ -132,7 +133,7 @@ absl::Status RocksdbLog::begin() {
   look_at_the_disk();
   write_high_water(false);
   if (high_water_failed_)
-    return absl::UnavailableError(absl::StrCat("writing ", options_.path, "/", HighWaterFile::kName));
+    return absl::UnavailableError(absl::StrCat("writing ", options_.path, "/", DurableMarkerFile::kName));
   keeper_ = std::thread([this] { keep(); });
   return absl::OkStatus();
 }
@@ -168,13 +169,13 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
     LOCUS_CHECK_EQ(entry.epoch, entries.front().epoch);
     const std::string record_key = log_key(key, ++at.sequence);
     const std::string head = record_head(entry);
-    at.chain = record_checksum(record_key, head, entry.bytes, at.chain);
-    const std::string seal = ByteWriter().u64(at.chain).take();
+    at.running_checksum = record_checksum(record_key, head, entry.bytes, at.running_checksum);
+    const std::string seal = ByteWriter().u64(at.running_checksum).take();
     const rocksdb::Slice key_part(record_key);
     const rocksdb::Slice parts[] = {head, slice_of(entry.bytes), seal};
     LOCUS_CHECK(batch.Put(database_->log(), rocksdb::SliceParts(&key_part, 1), rocksdb::SliceParts(parts, 3)).ok());
   }
-  for (uint64_t doubtful = at.sequence + 1; doubtful <= start->doubtful_end; ++doubtful)
+  for (uint64_t doubtful = at.sequence + 1; doubtful <= start->possibly_written_end; ++doubtful)
     LOCUS_CHECK(batch.Delete(database_->log(), log_key(key, doubtful)).ok());
   const bool synced = level == AckLevel::kLocal;
   if (absl::Status status = database_->write(batch, synced && options_.sync); !status.ok()) {
@@ -203,20 +204,20 @@ absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) cons
         Reason::kOutOfRange, "from", std::nullopt,
         absl::StrCat("the records up to ", row.snapshot_sequence, " are in the snapshot: read that"));
   if (from > last) return absl::OkStatus();
-  const absl::StatusOr<uint64_t> chain = chain_of(row, from - 1);
-  if (!chain.ok()) return chain.status();
-  absl::Status status = read_records(*database_, key, from, last, *chain, sink);
+  const absl::StatusOr<uint64_t> running_checksum = chain_of(row, from - 1);
+  if (!running_checksum.ok()) return running_checksum.status();
+  absl::Status status = read_records(*database_, key, from, last, *running_checksum, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(
       absl::StrCat("scene '", row.name, "' is damaged: ", status.message(), remedy(options_.path)));
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequence) const {
-  if (sequence == row.snapshot_sequence) return row.chain;
+  if (sequence == row.snapshot_sequence) return row.running_checksum;
   rocksdb::PinnableSlice value;
   const rocksdb::Status status =
       database_->db().Get(reading_options(), database_->log(), log_key(row.key, sequence), &value);
-  if (status.ok() && value.size() >= kRecordOverhead) return seal_of(view_of(value));
+  if (status.ok() && value.size() >= kRecordOverhead) return stored_checksum(view_of(value));
   if (status.ok() || status.IsNotFound())
     return absl::DataLossError(
         absl::StrCat("scene '", row.name, "' is damaged: record ", sequence, " is missing", remedy(options_.path)));
@@ -236,19 +237,19 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
     return refuse_argument(Reason::kAlreadyExists, "path", std::nullopt,
                            absl::StrCat(path, " or ", unfinished, " is there already: name a directory that is not"));
   MutexLock lock(catalogue_mutex_);
-  HighWater high_water;
+  DurableMarker durable_marker;
   {
     // Taken before the copy, and so never more than what is in it; after a sync, so that it is nearly as much.
     const auto written = scenes_.written();
     if (absl::Status status = database_->sync(); !status.ok()) return status;
     scenes_.on_disk(written);
-    scenes_.describe(0, high_water);
+    scenes_.describe(0, durable_marker);
     // Here the scenes go on: what follows in the copy is another history.
-    for (Mark& mark : high_water.marks) mark.copied = true;
+    for (SceneMarker& scene_marker : durable_marker.scene_markers) scene_marker.copied = true;
   }
   {
     MutexLock high_water_lock(high_water_mutex_);
-    high_water.catalogue_damage = high_water_.catalogue_damage;
+    durable_marker.catalogue_damage = durable_marker_.catalogue_damage;
   }
   rocksdb::Status status = env.CreateDir(unfinished);
   rocksdb::Checkpoint* made = nullptr;
@@ -256,7 +257,7 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   const std::unique_ptr<rocksdb::Checkpoint> checkpoint(made);
   if (status.ok()) status = checkpoint->CreateCheckpoint(absl::StrCat(unfinished, "/", kDatabaseFolder));
   if (!status.ok()) return disk_error(absl::StrCat("backing up to ", path), status);
-  if (absl::Status written = HighWaterFile(env, unfinished).replace(high_water); !written.ok()) return written;
+  if (absl::Status written = DurableMarkerFile(env, unfinished).replace(durable_marker); !written.ok()) return written;
   status = env.RenameFile(unfinished, path);
   if (status.ok()) status = sync_folder(env, path);
   return status.ok() ? absl::OkStatus() : disk_error(absl::StrCat("backing up to ", path), status);
@@ -269,7 +270,7 @@ absl::Status RocksdbLog::room_for(absl::string_view what, uint64_t bytes) {
     return refuse_full_disk(what, *options_.reserve_bytes, free);
   if (high_water_failed_)
     return absl::UnavailableError(
-        absl::StrCat(options_.path, "/", HighWaterFile::kName, " cannot be written; writing goes on when it can"));
+        absl::StrCat(options_.path, "/", DurableMarkerFile::kName, " cannot be written; writing goes on when it can"));
   return absl::OkStatus();
 }
 
@@ -281,10 +282,10 @@ void RocksdbLog::look_at_the_disk() {
 
 void RocksdbLog::write_high_water(bool closed) {
   MutexLock lock(high_water_mutex_);
-  scenes_.describe(database_->db().GetLatestSequenceNumber(), high_water_);
-  describe_file_list(*database_, high_water_);
-  high_water_.closed = closed;
-  high_water_failed_ = !high_water_file_->write(high_water_).ok();
+  scenes_.describe(database_->db().GetLatestSequenceNumber(), durable_marker_);
+  describe_file_list(*database_, durable_marker_);
+  durable_marker_.closed = closed;
+  high_water_failed_ = !durable_marker_file_->write(durable_marker_).ok();
 }
 
 void RocksdbLog::wake_keeper(bool synced) {
@@ -305,7 +306,7 @@ void RocksdbLog::wake_keeper(bool synced) {
 void RocksdbLog::keep() {
   SteadyTime look = std::chrono::steady_clock::now();
   while (true) {
-    bool marks = false;
+    bool scene_markers = false;
     bool sync = false;
     {
       MutexLock lock(keeper_mutex_);
@@ -315,17 +316,17 @@ void RocksdbLog::keep() {
       if (!ended_) keeper_wakes_.wait_until(keeper_mutex_, until);
       if (ended_) return;
       const SteadyTime now = std::chrono::steady_clock::now();
-      marks = marks_due_ && *marks_due_ <= now;
+      scene_markers = marks_due_ && *marks_due_ <= now;
       sync = sync_due_ && *sync_due_ <= now;
-      if (marks) marks_due_.reset();
+      if (scene_markers) marks_due_.reset();
       if (sync) sync_due_.reset();
     }
     if (sync) {
       const auto written = scenes_.written();
       if (database_->sync().ok()) scenes_.on_disk(written);
-      marks = true;
+      scene_markers = true;
     }
-    if (marks || high_water_failed_) write_high_water(false);
+    if (scene_markers || high_water_failed_) write_high_water(false);
     if (const SteadyTime now = std::chrono::steady_clock::now(); look <= now) {
       look = now + kKeeperPause;
       look_after();

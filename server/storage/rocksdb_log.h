@@ -118,8 +118,8 @@ class RocksdbLog final : public UpdateLog {
   Mutex adding_mesh_;  // one mesh at a time, so that content is written once; before catalogue_mutex_
 
   Mutex high_water_mutex_;
-  std::unique_ptr<HighWaterFile> high_water_file_ LOCUS_GUARDED_BY(high_water_mutex_);
-  HighWater high_water_ LOCUS_GUARDED_BY(high_water_mutex_);
+  std::unique_ptr<DurableMarkerFile> durable_marker_file_ LOCUS_GUARDED_BY(high_water_mutex_);
+  DurableMarker durable_marker_ LOCUS_GUARDED_BY(high_water_mutex_);
   std::atomic<bool> high_water_failed_ = false;
 
   std::atomic<uint64_t> free_bytes_ = ~uint64_t{0};

@@ -62,14 +62,14 @@ absl::StatusOr<SceneRow> RocksdbLog::row_of(SceneKey scene) const {
 
 uint64_t RocksdbLog::seal_of_row(SceneKey scene) const {
   const auto row = catalogue_.rows().find(scene_key(scene));
-  return row == catalogue_.rows().end() ? 0 : seal_of(row->second);
+  return row == catalogue_.rows().end() ? 0 : stored_checksum(row->second);
 }
 
 absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending,
                                                  const std::string& prefix, ChunkSource source) {
   ChunkList list;
   rocksdb::WriteBatch batch;
-  LOCUS_CHECK(batch.Put(database_->meta(), pending, sealed(pending, "")).ok());
+  LOCUS_CHECK(batch.Put(database_->meta(), pending, with_checksum(pending, "")).ok());
   absl::Status status;
   while (status.ok()) {
     const absl::StatusOr<std::optional<std::string>> chunk = source();
@@ -80,7 +80,7 @@ absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* fa
     if (!status.ok()) break;
     if (*chunk) {
       const std::string key = chunk_key(prefix, static_cast<uint32_t>(list.chunks));
-      const std::string value = sealed(key, **chunk);
+      const std::string value = with_checksum(key, **chunk);
       list.add(value);
       LOCUS_CHECK(batch.Put(family, key, value).ok());
     }
@@ -118,7 +118,7 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
   row.spec = std::string(spec);
   row.epoch = epoch;
   row.snapshot_number = new_number();
-  row.chain = checksum(scene_key(row.key));
+  row.running_checksum = checksum(scene_key(row.key));
   const std::string pending = pending_snapshot_key(row.key, row.snapshot_number);
   const std::string prefix = snapshot_prefix(row.key, row.snapshot_number);
   absl::StatusOr<ChunkList> chunks = put_chunks(database_->snapshot(), pending, prefix, state);
@@ -144,7 +144,7 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
     auto place = std::make_shared<SceneState>();
     place->key = row.key;
     place->name = row.name;
-    place->written = place->synced = {0, row.chain};
+    place->written = place->synced = {0, row.running_checksum};
     SceneState& scene = *place;
     scenes_.add(std::move(place));
     scenes_.set_row(scene, row, seal_of_row(row.key), catalogue_.totals());
@@ -220,12 +220,12 @@ absl::Status RocksdbLog::put_snapshot(const ScenePlace& place, uint64_t before, 
   if (!row.ok()) return row.status();
   if (row->snapshot_number != before)
     return absl::AbortedError(absl::StrCat("another snapshot of scene '", row->name, "' was written meanwhile"));
-  const absl::StatusOr<uint64_t> chain = chain_of(*row, sequence);
-  if (!chain.ok()) return chain.status();
+  const absl::StatusOr<uint64_t> running_checksum = chain_of(*row, sequence);
+  if (!running_checksum.ok()) return running_checksum.status();
   const std::string dropped = snapshot_prefix(key, before);
   row->snapshot_number = snapshot.number;
   row->snapshot_sequence = sequence;
-  row->chain = *chain;
+  row->running_checksum = *running_checksum;
   row->snapshot = snapshot.chunks;
   rocksdb::WriteBatch batch;
   LOCUS_CHECK(batch.Delete(database_->meta(), pending_snapshot_key(key, snapshot.number)).ok());

@@ -37,7 +37,7 @@ DirectoryReport report_of(const Findings& findings) {
     scene.key = found.key;
     scene.name = found.name;
     scene.last_sequence = found.last;
-    scene.promised = found.promised;
+    scene.expected_sequence = found.expected_sequence;
     scene.log_bytes = found.log_bytes;
     scene.damage = found.damage;
     if (!found.row) continue;
@@ -57,16 +57,16 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
   const StorageOptions options = settled(given);
   const DatabaseOptions wanted = database_options_of(options);
   if (!options.env->FileExists(wanted.folder).ok() &&
-      !options.env->FileExists(absl::StrCat(options.path, "/", HighWaterFile::kName)).ok())
+      !options.env->FileExists(absl::StrCat(options.path, "/", DurableMarkerFile::kName)).ok())
     return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
   std::unique_ptr<DirectoryLock> lock;
   if (absl::Status status = take_lock(options, lock); !status.ok()) return status;
 
   DirectoryReport report;
-  const absl::StatusOr<HighWater> high_water = HighWaterFile::read(*options.env, options.path);
-  if (absl::IsUnavailable(high_water.status())) return high_water.status();
-  if (high_water.ok()) {
-    const absl::Status list = check_file_list(*options.env, wanted.folder, *high_water);
+  const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
+  if (absl::IsUnavailable(durable_marker.status())) return durable_marker.status();
+  if (durable_marker.ok()) {
+    const absl::Status list = check_file_list(*options.env, wanted.folder, *durable_marker);
     if (!list.ok() && !absl::IsDataLoss(list)) return list;
     report.damage = std::string(list.message());
     if (!list.ok()) return report;
@@ -79,10 +79,10 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
     return report;
   }
   const absl::StatusOr<Findings> findings =
-      judge(*database, high_water.ok() ? &*high_water : nullptr, Depth::kEverything);
+      judge(*database, durable_marker.ok() ? &*durable_marker : nullptr, Depth::kEverything);
   if (!findings.ok()) return findings.status();
   report = report_of(*findings);
-  report.closed_in_order = high_water.ok() && high_water->closed;
+  report.closed_in_order = durable_marker.ok() && durable_marker->closed;
   return report;
 }
 

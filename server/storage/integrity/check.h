@@ -19,8 +19,8 @@ struct SceneReport {
   std::string name;
   uint64_t epoch = 0;
   uint64_t snapshot_sequence = 0;
-  uint64_t last_sequence = 0;  // records are there without a gap up to here ...
-  uint64_t promised = 0;       // ... and must be up to here at least
+  uint64_t last_sequence = 0;      // records are there without a gap up to here ...
+  uint64_t expected_sequence = 0;  // ... and must be up to here at least
   uint64_t snapshot_chunks = 0;
   uint64_t snapshot_bytes = 0;
   uint64_t log_bytes = 0;

@@ -31,7 +31,7 @@ absl::Status read_meta(const Database& database, Findings& found) {
   const std::unique_ptr<rocksdb::Iterator> at(database.db().NewIterator(reading_options(), database.meta()));
   for (at->SeekToFirst(); at->Valid(); at->Next()) {
     const absl::string_view key = view_of(at->key());
-    const std::optional<absl::string_view> bytes = unsealed(key, view_of(at->value()));
+    const std::optional<absl::string_view> bytes = verified(key, view_of(at->value()));
     if (!bytes || key == kFamilyMark) continue;
     if (key == kFormatKey) {
       const uint32_t format = ByteReader(*bytes).u32();
@@ -53,7 +53,7 @@ absl::Status read_meta(const Database& database, Findings& found) {
   return read_error("reading the catalogue", at->status());
 }
 
-Standing compare(const Findings& found, const HighWater& must) {
+Standing compare(const Findings& found, const DurableMarker& must) {
   CatalogueRow sums;
   Catalogue::add_sums(found.rows, sums);
   const CatalogueRow said = found.catalogue.value_or(CatalogueRow());
@@ -66,12 +66,12 @@ Standing compare(const Findings& found, const HighWater& must) {
 }
 
 // What is wrong with the scene's row, apart from its log.
-std::string row_damage(const SceneFinding& scene, const Mark* mark, const Standing& standing) {
+std::string row_damage(const SceneFinding& scene, const SceneMarker* scene_marker, const Standing& standing) {
   if (standing.whole && standing.later) return "";
-  if (mark == nullptr)
+  if (scene_marker == nullptr)
     return standing.whole ? "it was deleted, and is back" : "it is not in HIGH_WATER, and the catalogue is not whole";
   if (!scene.row) return "its entry in the catalogue is lost";
-  if (mark->row_seal != scene.row_seal) return "its entry in the catalogue is of another time";
+  if (scene_marker->row_checksum != scene.row_checksum) return "its entry in the catalogue is of another time";
   return "";
 }
 
@@ -81,27 +81,27 @@ std::string damage_of(const absl::Status& status, absl::Status& disk) {
   return std::string(status.message());
 }
 
-std::string log_damage(SceneFinding& scene, const Mark* mark, const HighWater& must, const Database& database,
-                       absl::Status& disk) {
+std::string log_damage(SceneFinding& scene, const SceneMarker* scene_marker, const DurableMarker& must,
+                       const Database& database, absl::Status& disk) {
   const SceneRow& row = *scene.row;
   uint64_t chain_at = 0;
-  const bool marked = mark != nullptr && mark->sequence >= row.snapshot_sequence;
-  if (marked) scene.promised = mark->sequence;
-  const RecordScan scan = scan_records(database, row, scene.promised, chain_at);
+  const bool marked = scene_marker != nullptr && scene_marker->sequence >= row.snapshot_sequence;
+  if (marked) scene.expected_sequence = scene_marker->sequence;
+  const RecordScan scan = scan_records(database, row, scene.expected_sequence, chain_at);
   scene.last = scan.last;
-  scene.chain = scan.chain;
+  scene.running_checksum = scan.running_checksum;
   scene.log_bytes = scan.bytes;
   if (!scan.error.ok()) return damage_of(scan.error, disk);
   if (scan.beyond != 0)
     return absl::StrCat(count_of(scan.beyond - scan.last - 1, "record"), " from ", scan.last + 1,
                         " on missing, before ", count_of(scan.after, "other"));
-  if (scan.last < scene.promised)
-    return absl::StrCat("the last ", count_of(scene.promised - scan.last, "acknowledged record"), " from ",
+  if (scan.last < scene.expected_sequence)
+    return absl::StrCat("the last ", count_of(scene.expected_sequence - scan.last, "acknowledged record"), " from ",
                         scan.last + 1, " on missing");
-  if (marked && chain_at != mark->chain)
-    return absl::StrCat("record ", mark->sequence, " is not the one that was written");
+  if (marked && chain_at != scene_marker->running_checksum)
+    return absl::StrCat("record ", scene_marker->sequence, " is not the one that was written");
   const uint64_t gap_end = database.wal_watch().gap_end();
-  if (gap_end > must.covered_sequence && !must.closed && !database.wal_watch().has_records_after_gap(scene.key))
+  if (gap_end > must.flushed_sequence && !must.closed && !database.wal_watch().has_records_after_gap(scene.key))
     return absl::StrCat("part of the log before the crash cannot be read, and records after ", scan.last,
                         " may have stood there");
   return "";
@@ -114,21 +114,21 @@ std::string deep_damage(const SceneFinding& scene, const Database& database, abs
   absl::Status status =
       read_chunks(database, database.snapshot(), snapshot_prefix(row.key, row.snapshot_number), row.snapshot, nowhere);
   if (!status.ok()) return absl::StrCat("its snapshot: ", damage_of(status, disk));
-  status = read_records(database, row.key, row.snapshot_sequence + 1, scene.last, row.chain,
+  status = read_records(database, row.key, row.snapshot_sequence + 1, scene.last, row.running_checksum,
                         [](const LogRecord&) { return absl::OkStatus(); });
   return damage_of(status, disk);
 }
 
-absl::Status judge_scene(SceneFinding& scene, const Mark* mark, const HighWater* must, const Standing& standing,
-                         const Database& database, Depth depth) {
+absl::Status judge_scene(SceneFinding& scene, const SceneMarker* scene_marker, const DurableMarker* must,
+                         const Standing& standing, const Database& database, Depth depth) {
   absl::Status disk;
-  if (mark != nullptr) scene.promised = mark->sequence;
-  scene.copied = mark != nullptr && mark->copied;
-  scene.damage = mark != nullptr ? mark->damage : "";
-  std::string more = must == nullptr ? std::string(kNoHighWater) : row_damage(scene, mark, standing);
+  if (scene_marker != nullptr) scene.expected_sequence = scene_marker->sequence;
+  scene.copied = scene_marker != nullptr && scene_marker->copied;
+  scene.damage = scene_marker != nullptr ? scene_marker->damage : "";
+  std::string more = must == nullptr ? std::string(kNoHighWater) : row_damage(scene, scene_marker, standing);
   // The numbers are wanted of a damaged scene, too.
   if (scene.row) {
-    std::string log = log_damage(scene, mark, must == nullptr ? HighWater() : *must, database, disk);
+    std::string log = log_damage(scene, scene_marker, must == nullptr ? DurableMarker() : *must, database, disk);
     if (more.empty()) more = std::move(log);
     if (more.empty() && depth == Depth::kEverything) more = deep_damage(scene, database, disk);
   }
@@ -136,35 +136,35 @@ absl::Status judge_scene(SceneFinding& scene, const Mark* mark, const HighWater*
   return disk;
 }
 
-absl::Status find_scenes(const HighWater* must, const Standing& standing, const Database& database, Depth depth,
+absl::Status find_scenes(const DurableMarker* must, const Standing& standing, const Database& database, Depth depth,
                          Findings& found) {
   std::map<SceneKey, SceneFinding> scenes;
-  std::map<SceneKey, const Mark*> marks;
+  std::map<SceneKey, const SceneMarker*> scene_markers;
   for (const auto& [key, value] : found.rows) {
     if (key[0] != kSceneTag) continue;
-    std::optional<SceneRow> row = decode_scene(*unsealed(key, value));
+    std::optional<SceneRow> row = decode_scene(*verified(key, value));
     if (!row) continue;
     SceneFinding& scene = scenes[row->key];
     scene.key = row->key;
     scene.name = row->name;
-    scene.row_seal = seal_of(value);
+    scene.row_checksum = stored_checksum(value);
     scene.row = std::move(row);
   }
   if (must != nullptr) {
-    for (const Mark& mark : must->marks) {
-      marks[mark.scene] = &mark;
-      if (scenes.contains(mark.scene)) continue;
+    for (const SceneMarker& scene_marker : must->scene_markers) {
+      scene_markers[scene_marker.scene] = &scene_marker;
+      if (scenes.contains(scene_marker.scene)) continue;
       // Deleted after HIGH_WATER was written, and rightly so.
-      if (standing.whole && standing.later && mark.damage.empty()) continue;
-      SceneFinding& scene = scenes[mark.scene];
-      scene.key = mark.scene;
-      scene.name = mark.name;
+      if (standing.whole && standing.later && scene_marker.damage.empty()) continue;
+      SceneFinding& scene = scenes[scene_marker.scene];
+      scene.key = scene_marker.scene;
+      scene.name = scene_marker.name;
     }
   }
   for (auto& [key, scene] : scenes) {
-    const auto mark = marks.find(key);
-    absl::Status disk =
-        judge_scene(scene, mark == marks.end() ? nullptr : mark->second, must, standing, database, depth);
+    const auto scene_marker = scene_markers.find(key);
+    absl::Status disk = judge_scene(scene, scene_marker == scene_markers.end() ? nullptr : scene_marker->second, must,
+                                    standing, database, depth);
     if (!disk.ok()) return disk;
     found.scenes.push_back(std::move(scene));
   }
@@ -178,11 +178,11 @@ absl::Status find_meshes(const Database& database, Depth depth, Findings& found)
     MeshFinding& mesh = found.meshes.emplace_back();
     mesh.name = row->first.substr(1);
     mesh.damage = found.catalogue_damage;
-    const absl::string_view sha256 = *unsealed(row->first, row->second);
+    const absl::string_view sha256 = *verified(row->first, row->second);
     if (sha256.size() == mesh.sha256.size()) std::copy(sha256.begin(), sha256.end(), mesh.sha256.begin());
     const auto content = found.rows.find(content_key(mesh.sha256));
     const std::optional<ContentRow> list =
-        content == found.rows.end() ? std::nullopt : decode_content(*unsealed(content->first, content->second));
+        content == found.rows.end() ? std::nullopt : decode_content(*verified(content->first, content->second));
     if (list) mesh.content = *list;
     if (!list && mesh.damage.empty()) mesh.damage = "its content is lost";
     if (!mesh.damage.empty() || depth == Depth::kKeys) continue;
@@ -195,15 +195,15 @@ absl::Status find_meshes(const Database& database, Depth depth, Findings& found)
 
 }  // namespace
 
-absl::StatusOr<Findings> judge(const Database& database, const HighWater* high_water, Depth depth) {
+absl::StatusOr<Findings> judge(const Database& database, const DurableMarker* durable_marker, Depth depth) {
   Findings found;
   if (absl::Status status = read_meta(database, found); !status.ok()) return status;
   Standing standing;
-  if (high_water != nullptr) standing = compare(found, *high_water);
-  if (high_water == nullptr) {
+  if (durable_marker != nullptr) standing = compare(found, *durable_marker);
+  if (durable_marker == nullptr) {
     found.catalogue_damage = std::string(kNoHighWater);
-  } else if (!high_water->catalogue_damage.empty()) {
-    found.catalogue_damage = high_water->catalogue_damage;
+  } else if (!durable_marker->catalogue_damage.empty()) {
+    found.catalogue_damage = durable_marker->catalogue_damage;
   } else if (!standing.meshes) {
     found.catalogue_damage =
         "the catalogue of meshes is not the one that was written: names may be missing, or be back";
@@ -211,7 +211,7 @@ absl::StatusOr<Findings> judge(const Database& database, const HighWater* high_w
     found.catalogue_damage =
         "the catalogue of scenes is not the one that was written: names may be missing, or be back";
   }
-  absl::Status disk = find_scenes(high_water, standing, database, depth, found);
+  absl::Status disk = find_scenes(durable_marker, standing, database, depth, found);
   if (disk.ok()) disk = find_meshes(database, depth, found);
   if (!disk.ok()) return disk;
   return found;

@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/scene/log/update_log.h"
-#include "server/storage/integrity/high_water.h"
+#include "server/storage/integrity/durable_marker.h"
 #include "server/storage/rocksdb/catalogue.h"
 #include "server/storage/rocksdb/database.h"
 #include "server/storage/rocksdb/rows.h"
@@ -20,13 +20,13 @@ struct SceneFinding {
   SceneKey key = 0;
   std::string name;
   std::optional<SceneRow> row;  // nothing where it is lost
-  uint64_t row_seal = 0;
+  uint64_t row_checksum = 0;
   uint64_t last = 0;  // of the records that are there without a gap ...
-  uint64_t chain = 0;
+  uint64_t running_checksum = 0;
   uint64_t log_bytes = 0;
-  uint64_t promised = 0;  // ... and how far they must go at least
-  bool copied = false;    // as of Mark
-  std::string damage;     // what is wrong, empty where nothing is
+  uint64_t expected_sequence = 0;  // ... and how far they must go at least
+  bool copied = false;             // as of Mark
+  std::string damage;              // what is wrong, empty where nothing is
 };
 
 struct MeshFinding {
@@ -51,7 +51,7 @@ enum class Depth : uint8_t { kKeys, kEverything };
 
 // UNAVAILABLE where the disk fails, and FAILED_PRECONDITION for a format of another version. `high_water` is null where
 // it was lost; then everything is damaged.
-absl::StatusOr<Findings> judge(const Database& database, const HighWater* high_water, Depth depth);
+absl::StatusOr<Findings> judge(const Database& database, const DurableMarker* durable_marker, Depth depth);
 
 // What to do about damage, as the end of a message.
 std::string remedy(const std::string& path);

@@ -59,9 +59,9 @@ absl::Status make_folder(rocksdb::Env& env, const std::string& path) {
 }
 
 // Whether there never was a database here, or its making did not come to an end.
-absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<HighWater>& high_water) {
-  if (high_water.ok()) return high_water->catalogue == 0;
-  if (!absl::IsNotFound(high_water.status())) return false;
+absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<DurableMarker>& durable_marker) {
+  if (durable_marker.ok()) return durable_marker->catalogue == 0;
+  if (!absl::IsNotFound(durable_marker.status())) return false;
   const std::string folder = database_options_of(options).folder;
   for (const std::string& name : files_in(*options.env, folder)) {
     if (name != "." && name != "..") return false;
@@ -71,42 +71,43 @@ absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<
 
 absl::Status make_new(const StorageOptions& options, OpenedDirectory& opened) {
   // First of all: from now on an empty database is known to be one that was never finished.
-  if (absl::Status status = opened.high_water_file->replace(opened.high_water); !status.ok()) return status;
+  if (absl::Status status = opened.durable_marker_file->replace(opened.durable_marker); !status.ok()) return status;
   const DatabaseOptions wanted = database_options_of(options);
   rocksdb::Status status = Database::open(wanted, OpenMode::kCreate, opened.database);
   if (!status.ok()) return open_error(options, status);
   Database& database = *opened.database;
   const Catalogue catalogue(Catalogue::Rows(), 0, 1);
   rocksdb::WriteBatch batch;
-  status = batch.Put(database.meta(), slice_of(kFormatKey), sealed(kFormatKey, ByteWriter().u32(kFormat).view()));
+  status =
+      batch.Put(database.meta(), slice_of(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
   if (!status.ok()) return disk_error("the format", status);
   catalogue.add_to(batch, database.meta(), CatalogueChange());
   if (absl::Status written = database.write(batch, true); !written.ok()) return written;
-  opened.high_water.catalogue = 1;
-  describe_file_list(database, opened.high_water);
-  return opened.high_water_file->replace(opened.high_water);
+  opened.durable_marker.catalogue = 1;
+  describe_file_list(database, opened.durable_marker);
+  return opened.durable_marker_file->replace(opened.durable_marker);
 }
 
 // Takes over what was judged of a damaged directory, so that the next one to open it finds the same.
-void remember(const Findings& findings, HighWater& high_water) {
-  std::vector<Mark> marks;
+void remember(const Findings& findings, DurableMarker& durable_marker) {
+  std::vector<SceneMarker> scene_markers;
   for (const SceneFinding& scene : findings.scenes) {
-    Mark& mark = marks.emplace_back();
-    for (const Mark& before : high_water.marks) {
-      if (before.scene == scene.key) mark = before;
+    SceneMarker& scene_marker = scene_markers.emplace_back();
+    for (const SceneMarker& before : durable_marker.scene_markers) {
+      if (before.scene == scene.key) scene_marker = before;
     }
-    mark.scene = scene.key;
-    mark.name = scene.name;
-    mark.damage = scene.damage;
-    high_water.next_scene = std::max(high_water.next_scene, scene.key + 1);
+    scene_marker.scene = scene.key;
+    scene_marker.name = scene.name;
+    scene_marker.damage = scene.damage;
+    durable_marker.next_scene = std::max(durable_marker.next_scene, scene.key + 1);
   }
-  high_water.marks = std::move(marks);
-  high_water.catalogue_damage = findings.catalogue_damage;
+  durable_marker.scene_markers = std::move(scene_markers);
+  durable_marker.catalogue_damage = findings.catalogue_damage;
   if (findings.catalogue) {
-    high_water.next_scene = std::max(high_water.next_scene, findings.catalogue->next_scene);
-    high_water.catalogue = std::max(high_water.catalogue, findings.catalogue->generation);
+    durable_marker.next_scene = std::max(durable_marker.next_scene, findings.catalogue->next_scene);
+    durable_marker.catalogue = std::max(durable_marker.catalogue, findings.catalogue->generation);
   }
-  high_water.catalogue = std::max<uint64_t>(high_water.catalogue, 1);
+  durable_marker.catalogue = std::max<uint64_t>(durable_marker.catalogue, 1);
 }
 
 bool is_sound(const Findings& findings) {
@@ -116,17 +117,17 @@ bool is_sound(const Findings& findings) {
 }
 
 // Judges, and writes down what is damaged before anything else happens.
-absl::Status judge_and_remember(const Database& database, const HighWater* must, OpenedDirectory& opened) {
+absl::Status judge_and_remember(const Database& database, const DurableMarker* must, OpenedDirectory& opened) {
   absl::StatusOr<Findings> findings = judge(database, must, Depth::kKeys);
   if (!findings.ok()) return findings.status();
   opened.findings = *std::move(findings);
   if (is_sound(opened.findings)) return absl::OkStatus();
-  remember(opened.findings, opened.high_water);
-  return opened.high_water_file->replace(opened.high_water);
+  remember(opened.findings, opened.durable_marker);
+  return opened.durable_marker_file->replace(opened.durable_marker);
 }
 
 // What a strict opening refused.
-absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& why, const HighWater* must,
+absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& why, const DurableMarker* must,
                           OpenedDirectory& opened) {
   const DatabaseOptions wanted = database_options_of(options);
   {
@@ -192,16 +193,16 @@ absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
   if (options.env->FileExists(repaired).ok())
     return absl::FailedPreconditionError(absl::StrCat(
         "a repair of ", options.path, " did not come to its end: run `locusd repair ", options.path, "` again"));
-  opened.high_water_file = std::make_unique<HighWaterFile>(*options.env, options.path);
-  absl::StatusOr<HighWater> high_water = HighWaterFile::read(*options.env, options.path);
-  if (absl::IsUnavailable(high_water.status())) return high_water.status();
-  const absl::StatusOr<bool> fresh = is_new(options, high_water);
-  if (high_water.ok()) opened.high_water = *high_water;
-  const HighWater* must = high_water.ok() ? &*high_water : nullptr;
+  opened.durable_marker_file = std::make_unique<DurableMarkerFile>(*options.env, options.path);
+  absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
+  if (absl::IsUnavailable(durable_marker.status())) return durable_marker.status();
+  const absl::StatusOr<bool> fresh = is_new(options, durable_marker);
+  if (durable_marker.ok()) opened.durable_marker = *durable_marker;
+  const DurableMarker* must = durable_marker.ok() ? &*durable_marker : nullptr;
   if (*fresh) {
     if (absl::Status status = make_new(options, opened); !status.ok()) return status;
-    high_water = opened.high_water;
-    must = &*high_water;
+    durable_marker = opened.durable_marker;
+    must = &*durable_marker;
   } else {
     const DatabaseOptions wanted = database_options_of(options);
     if (must != nullptr) {
@@ -215,7 +216,7 @@ absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
       if (!says_damage(status)) return open_error(options, status);
       absl::Status found = open_damaged(options, status, must, opened);
       if (!found.ok()) return found;
-      must = &opened.high_water;
+      must = &opened.durable_marker;
     }
   }
   absl::Status judged = judge_and_remember(*opened.database, must, opened);
@@ -224,29 +225,30 @@ absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
   return opened;
 }
 
-absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder, const HighWater& high_water) {
+absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder,
+                             const DurableMarker& durable_marker) {
   std::string current;
   const rocksdb::Status status = rocksdb::ReadFileToString(&env, absl::StrCat(database_folder, "/CURRENT"), &current);
   if (status.IsNotFound() || status.IsPathNotFound()) return absl::DataLossError("its database is missing");
   if (!status.ok()) return disk_error("reading CURRENT", status);
   current = std::string(absl::StripSuffix(current, "\n"));
-  if (current != high_water.manifest) return absl::OkStatus();
+  if (current != durable_marker.manifest) return absl::OkStatus();
   uint64_t size = 0;
-  if (!env.GetFileSize(absl::StrCat(database_folder, "/", current), &size).ok() || size < high_water.manifest_bytes)
+  if (!env.GetFileSize(absl::StrCat(database_folder, "/", current), &size).ok() || size < durable_marker.manifest_bytes)
     return absl::DataLossError(absl::StrCat("RocksDB's list of its files, ", current, ", has ", size, " of ",
-                                            high_water.manifest_bytes, " bytes"));
+                                            durable_marker.manifest_bytes, " bytes"));
   return absl::OkStatus();
 }
 
-void describe_file_list(const Database& database, HighWater& high_water) {
+void describe_file_list(const Database& database, DurableMarker& durable_marker) {
   std::vector<std::string> names;
   uint64_t bytes = 0;
   if (!database.db().GetLiveFiles(names, &bytes, false).ok()) return;
   for (const std::string& name : names) {
     const absl::string_view plain = absl::StripPrefix(name, "/");
     if (!absl::StartsWith(plain, "MANIFEST")) continue;
-    high_water.manifest = std::string(plain);
-    high_water.manifest_bytes = bytes;
+    durable_marker.manifest = std::string(plain);
+    durable_marker.manifest_bytes = bytes;
   }
 }
 

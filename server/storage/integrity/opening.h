@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "rocksdb/env.h"
-#include "server/storage/integrity/high_water.h"
+#include "server/storage/integrity/durable_marker.h"
 #include "server/storage/integrity/judge.h"
 #include "server/storage/rocksdb/database.h"
 #include "server/storage/rocksdb/storage_options.h"
@@ -37,8 +37,8 @@ class DirectoryLock {
 struct OpenedDirectory {
   std::unique_ptr<DirectoryLock> lock;
   std::unique_ptr<Database> database;
-  std::unique_ptr<HighWaterFile> high_water_file;
-  HighWater high_water;  // as it was found, with what damage was found since
+  std::unique_ptr<DurableMarkerFile> durable_marker_file;
+  DurableMarker durable_marker;  // as it was found, with what damage was found since
   Findings findings;
 };
 
@@ -50,9 +50,10 @@ DatabaseOptions database_options_of(const StorageOptions& options);
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options);
 
 // How the database's list of its files compares with HIGH_WATER: DATA_LOSS where it is not there, or shorter.
-absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder, const HighWater& high_water);
+absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder,
+                             const DurableMarker& durable_marker);
 // The list's name and length now, of what is on the disk.
-void describe_file_list(const Database& database, HighWater& high_water);
+void describe_file_list(const Database& database, DurableMarker& durable_marker);
 
 // A repair that did not come to its end leaves this folder in the data directory.
 inline constexpr absl::string_view kRepairedFolder = "repaired";

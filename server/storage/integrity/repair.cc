@@ -56,7 +56,7 @@ absl::Status copy_chunks(const Database& source, rocksdb::ColumnFamilyHandle* fr
   uint32_t index = 0;
   return read_chunks(source, from, prefix, list, [&](absl::string_view chunk) {
     const std::string key = chunk_key(prefix, index++);
-    copy.put(to, key, sealed(key, chunk));
+    copy.put(to, key, with_checksum(key, chunk));
     return copy.write_if_large();
   });
 }
@@ -64,13 +64,14 @@ absl::Status copy_chunks(const Database& source, rocksdb::ColumnFamilyHandle* fr
 // Records as far as they are sound; `last` and `chain` say how far that was.
 absl::Status copy_records(const Database& source, const SceneRow& row, Position& last, Copy& copy) {
   absl::Status failed;
-  last = {row.snapshot_sequence, row.chain};
+  last = {row.snapshot_sequence, row.running_checksum};
   const absl::Status read =
-      read_records(source, row.key, row.snapshot_sequence + 1, 0, row.chain, [&](const LogRecord& record) {
+      read_records(source, row.key, row.snapshot_sequence + 1, 0, row.running_checksum, [&](const LogRecord& record) {
         const std::string key = log_key(row.key, record.sequence);
         const std::string head = record_head(record.entry);
-        last = {record.sequence, record_checksum(key, head, record.entry.bytes, last.chain)};
-        copy.put(copy.target().log(), key, absl::StrCat(head, record.entry.bytes, ByteWriter().u64(last.chain).view()));
+        last = {record.sequence, record_checksum(key, head, record.entry.bytes, last.running_checksum)};
+        copy.put(copy.target().log(), key,
+                 absl::StrCat(head, record.entry.bytes, ByteWriter().u64(last.running_checksum).view()));
         failed = copy.write_if_large();
         return failed;
       });
@@ -81,7 +82,7 @@ absl::Status copy_records(const Database& source, const SceneRow& row, Position&
 // What the new directory will say of itself.
 struct Result {
   Catalogue::Rows rows;
-  HighWater high_water;
+  DurableMarker durable_marker;
 };
 
 void keep_row(const std::string& key, const std::string& value, Result& result, Copy& copy) {
@@ -89,7 +90,7 @@ void keep_row(const std::string& key, const std::string& value, Result& result, 
   copy.put(copy.target().meta(), key, value);
 }
 
-absl::Status copy_scene(const Database& source, const SceneFinding& found, const HighWater* must, Copy& copy,
+absl::Status copy_scene(const Database& source, const SceneFinding& found, const DurableMarker* must, Copy& copy,
                         Result& result, RepairReport& report) {
   SceneRepair repaired;
   repaired.key = found.key;
@@ -97,7 +98,7 @@ absl::Status copy_scene(const Database& source, const SceneFinding& found, const
   repaired.damage = found.damage;
   bool marked = must == nullptr;
   if (must != nullptr) {
-    for (const Mark& mark : must->marks) marked = marked || mark.scene == found.key;
+    for (const SceneMarker& scene_marker : must->scene_markers) marked = marked || scene_marker.scene == found.key;
   }
   const bool damaged = !found.damage.empty();
   repaired.deleted = damaged && !marked && must->catalogue_damage.empty();
@@ -115,16 +116,16 @@ absl::Status copy_scene(const Database& source, const SceneFinding& found, const
     if (absl::Status status = copy_records(source, row, last, copy); !status.ok()) return status;
     if (damaged) ++row.epoch;
     const std::string key = scene_key(row.key);
-    const std::string value = sealed(key, encode(row));
+    const std::string value = with_checksum(key, encode(row));
     keep_row(key, value, result, copy);
-    result.high_water.marks.push_back(
-        {row.key, row.name, last.sequence, last.chain, seal_of(value), found.copied && !damaged, ""});
+    result.durable_marker.scene_markers.push_back({row.key, row.name, last.sequence, last.running_checksum,
+                                                   stored_checksum(value), found.copied && !damaged, ""});
     repaired.epoch = row.epoch;
     repaired.kept_to = last.sequence;
   }
-  if (!repaired.deleted && last.sequence < found.promised) {
+  if (!repaired.deleted && last.sequence < found.expected_sequence) {
     repaired.lost_from = last.sequence + 1;
-    repaired.lost_to = found.promised;
+    repaired.lost_to = found.expected_sequence;
   }
   if (damaged) report.scenes.push_back(std::move(repaired));
   return absl::OkStatus();
@@ -142,15 +143,15 @@ absl::Status copy_mesh(const Database& source, const MeshFinding& found, Copy& c
   }
   if (!status.ok() && !absl::IsDataLoss(status)) return status;
   if (status.ok()) {
-    keep_row(content, sealed(content, encode(found.content)), result, copy);
+    keep_row(content, with_checksum(content, encode(found.content)), result, copy);
     const std::string key = mesh_key(found.name);
-    keep_row(key, sealed(key, content.substr(1)), result, copy);
+    keep_row(key, with_checksum(key, content.substr(1)), result, copy);
   }
   if (!found.damage.empty()) report.meshes.push_back({found.name, found.damage, !status.ok()});
   return absl::OkStatus();
 }
 
-absl::Status make_copy(const Database& source, const Findings& findings, const HighWater* must,
+absl::Status make_copy(const Database& source, const Findings& findings, const DurableMarker* must,
                        const StorageOptions& options, const std::string& folder, RepairReport& report) {
   DatabaseOptions wanted = database_options_of(options);
   wanted.folder = absl::StrCat(folder, "/", kDatabaseFolder);
@@ -160,10 +161,10 @@ absl::Status make_copy(const Database& source, const Findings& findings, const H
   if (!opened.ok()) return disk_error("making the repaired database", opened);
   Copy copy(*target);
   Result result;
-  HighWater& high_water = result.high_water;
-  if (must != nullptr) high_water.next_scene = must->next_scene;
+  DurableMarker& durable_marker = result.durable_marker;
+  if (must != nullptr) durable_marker.next_scene = must->next_scene;
   for (const SceneFinding& scene : findings.scenes) {
-    high_water.next_scene = std::max(high_water.next_scene, scene.key + 1);
+    durable_marker.next_scene = std::max(durable_marker.next_scene, scene.key + 1);
     if (absl::Status status = copy_scene(source, scene, must, copy, result, report); !status.ok()) return status;
   }
   for (const MeshFinding& mesh : findings.meshes) {
@@ -171,16 +172,16 @@ absl::Status make_copy(const Database& source, const Findings& findings, const H
   }
   const uint64_t generation =
       std::max(must == nullptr ? 0 : must->catalogue, findings.catalogue ? findings.catalogue->generation : 0);
-  const Catalogue catalogue(result.rows, generation, high_water.next_scene);
-  copy.put(target->meta(), std::string(kFormatKey), sealed(kFormatKey, ByteWriter().u32(kFormat).view()));
+  const Catalogue catalogue(result.rows, generation, durable_marker.next_scene);
+  copy.put(target->meta(), std::string(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
   catalogue.add_to(copy.batch(), target->meta(), CatalogueChange());
   if (absl::Status status = copy.write(true); !status.ok()) return status;
-  high_water.catalogue = generation + 1;
-  high_water.mesh_sum = catalogue.totals().mesh_sum;
-  high_water.closed = true;
-  high_water.covered_sequence = target->db().GetLatestSequenceNumber();
-  describe_file_list(*target, high_water);
-  return HighWaterFile(*options.env, folder).replace(high_water);
+  durable_marker.catalogue = generation + 1;
+  durable_marker.mesh_sum = catalogue.totals().mesh_sum;
+  durable_marker.closed = true;
+  durable_marker.flushed_sequence = target->db().GetLatestSequenceNumber();
+  describe_file_list(*target, durable_marker);
+  return DurableMarkerFile(*options.env, folder).replace(durable_marker);
 }
 
 // From here on repaired/ is what the directory is to be.
@@ -192,7 +193,7 @@ absl::Status put_in_place(const StorageOptions& options, std::string& kept_at) {
   rocksdb::Status status = rocksdb::ReadFileToString(&env, ready.string(), &kept_at);
   if (status.ok()) status = env.CreateDirIfMissing(kept_at);
   if (!status.ok()) return disk_error("ending the repair", status);
-  for (const absl::string_view name : {kDatabaseFolder, HighWaterFile::kName}) {
+  for (const absl::string_view name : {kDatabaseFolder, DurableMarkerFile::kName}) {
     const std::string part(name);
     if (!fs::exists(repaired / part)) continue;  // it is in place already
     absl::Status done = moved(here / part, fs::path(kept_at) / part);
@@ -232,7 +233,7 @@ absl::Status open_salvage(const StorageOptions& options, const std::string& fold
       absl::StrCat("nothing of ", options.path, " can be read (", status.ToString(), "): restore a backup"));
 }
 
-absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& options, const HighWater* must,
+absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& options, const DurableMarker* must,
                                                       const std::string& folder) {
   const DatabaseOptions wanted = database_options_of(options);
   std::unique_ptr<Database> database;
@@ -258,8 +259,8 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   }
   std::error_code failed;
   fs::remove_all(folder, failed);
-  const absl::StatusOr<HighWater> high_water = HighWaterFile::read(*options.env, options.path);
-  const HighWater* must = high_water.ok() ? &*high_water : nullptr;
+  const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
+  const DurableMarker* must = durable_marker.ok() ? &*durable_marker : nullptr;
   {
     const auto source = open_source(options, must, folder);
     if (!source.ok()) return source.status();

@@ -63,21 +63,21 @@ absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneState& scene, ui
                   refusal);
   }
   scene.begun_at = database_sequence;
-  return Start{scene.written, scene.doubtful_end};
+  return Start{scene.written, scene.possibly_written_end};
 }
 
 void SceneTable::end_append(SceneState& scene, Position written, bool synced) {
   MutexLock lock(mutex_);
   scene.begun_at.reset();
   scene.written = written;
-  scene.doubtful_end = 0;
+  scene.possibly_written_end = 0;
   if (synced) scene.synced = written;
 }
 
 void SceneTable::fail_append(SceneState& scene, uint64_t last) {
   MutexLock lock(mutex_);
   scene.begun_at.reset();
-  scene.doubtful_end = std::max(scene.doubtful_end, last);
+  scene.possibly_written_end = std::max(scene.possibly_written_end, last);
 }
 
 std::vector<std::pair<ScenePlace, Position>> SceneTable::written() const {
@@ -100,13 +100,13 @@ void SceneTable::set_catalogue(const CatalogueRow& totals) {
   totals_ = totals;
 }
 
-void SceneTable::set_row(SceneState& scene, const SceneRow& row, uint64_t row_seal, const CatalogueRow& totals) {
+void SceneTable::set_row(SceneState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals) {
   MutexLock lock(mutex_);
   if (scene.epoch != row.epoch) scene.copied = false;
   scene.epoch = row.epoch;
-  scene.row_seal = row_seal;
+  scene.row_checksum = row_checksum;
   // The snapshot holds these records, and is on the disk.
-  if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.chain};
+  if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.running_checksum};
   totals_ = totals;
 }
 
@@ -120,27 +120,27 @@ void SceneTable::remove(SceneKey scene, const CatalogueRow& totals) {
   totals_ = totals;
 }
 
-void SceneTable::describe(uint64_t database_sequence, HighWater& high_water) const {
+void SceneTable::describe(uint64_t database_sequence, DurableMarker& durable_marker) const {
   MutexLock lock(mutex_);
-  high_water.catalogue = totals_.generation;
-  high_water.next_scene = totals_.next_scene;
-  high_water.mesh_sum = totals_.mesh_sum;
-  high_water.marks.clear();
+  durable_marker.catalogue = totals_.generation;
+  durable_marker.next_scene = totals_.next_scene;
+  durable_marker.mesh_sum = totals_.mesh_sum;
+  durable_marker.scene_markers.clear();
   bool all_synced = true;
   for (const auto& [key, scene] : scenes_) {
     // An append that is at work has a number above the one it began at, and is not in the marks.
     if (scene->begun_at) database_sequence = std::min(database_sequence, *scene->begun_at);
     all_synced = all_synced && scene->synced.sequence == scene->written.sequence;
-    Mark& mark = high_water.marks.emplace_back();
-    mark.scene = key;
-    mark.name = scene->name;
-    mark.sequence = scene->synced.sequence;
-    mark.chain = scene->synced.chain;
-    mark.row_seal = scene->row_seal;
-    mark.copied = scene->copied;
-    mark.damage = scene->damage_found;
+    SceneMarker& scene_marker = durable_marker.scene_markers.emplace_back();
+    scene_marker.scene = key;
+    scene_marker.name = scene->name;
+    scene_marker.sequence = scene->synced.sequence;
+    scene_marker.running_checksum = scene->synced.running_checksum;
+    scene_marker.row_checksum = scene->row_checksum;
+    scene_marker.copied = scene->copied;
+    scene_marker.damage = scene->damage_found;
   }
-  if (all_synced) high_water.covered_sequence = database_sequence;
+  if (all_synced) durable_marker.flushed_sequence = database_sequence;
 }
 
 }  // namespace locus::server

@@ -16,7 +16,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
 #include "core/scene/log/update_log.h"
-#include "server/storage/integrity/high_water.h"
+#include "server/storage/integrity/durable_marker.h"
 #include "server/storage/rocksdb/rows.h"
 
 namespace locus::server {
@@ -24,7 +24,7 @@ namespace locus::server {
 // A record by its number, and its checksum.
 struct Position {
   uint64_t sequence = 0;
-  uint64_t chain = 0;
+  uint64_t running_checksum = 0;
 };
 
 // A scene's place in the log. The table's lock guards all but `writing`.
@@ -34,12 +34,12 @@ struct SceneState {
   absl::Status damage;
   std::string damage_found;  // the same for HIGH_WATER
   uint64_t epoch = 0;
-  uint64_t row_seal = 0;
+  uint64_t row_checksum = 0;
   bool copied = false;
   Position written;
   Position synced;
   // Records up to here failed to be appended, and may turn up: the next append deletes those that it does not replace.
-  uint64_t doubtful_end = 0;
+  uint64_t possibly_written_end = 0;
   // An append is at work; RocksDB's number of the last write before it.
   std::optional<uint64_t> begun_at;
   bool deleted = false;
@@ -52,7 +52,7 @@ class SceneTable {
  public:
   struct Start {
     Position written;
-    uint64_t doubtful_end = 0;
+    uint64_t possibly_written_end = 0;
   };
 
   void add(ScenePlace scene) LOCUS_EXCLUDES(mutex_);
@@ -77,13 +77,13 @@ class SceneTable {
   // A change of the catalogue has come to the disk: its totals, and the row of `scene` if the change was of one;
   // without a row the scene is gone.
   void set_catalogue(const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
-  void set_row(SceneState& scene, const SceneRow& row, uint64_t row_seal, const CatalogueRow& totals)
+  void set_row(SceneState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals)
       LOCUS_EXCLUDES(mutex_);
   void remove(SceneKey scene, const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
 
   // All that HIGH_WATER says of scenes and the catalogue, over what it said before. `database_sequence` is RocksDB's
   // number of the last write, asked for before this.
-  void describe(uint64_t database_sequence, HighWater& high_water) const LOCUS_EXCLUDES(mutex_);
+  void describe(uint64_t database_sequence, DurableMarker& durable_marker) const LOCUS_EXCLUDES(mutex_);
 
  private:
   mutable Mutex mutex_;

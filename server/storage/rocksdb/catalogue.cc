@@ -26,12 +26,12 @@ uint64_t& Catalogue::sum_of(absl::string_view key, CatalogueRow& totals) {
 }
 
 void Catalogue::add_sums(const Rows& rows, CatalogueRow& totals) {
-  for (const auto& [key, value] : rows) sum_of(key, totals) += seal_of(value);
+  for (const auto& [key, value] : rows) sum_of(key, totals) += stored_checksum(value);
 }
 
 std::optional<absl::string_view> Catalogue::find(absl::string_view key) const {
   const auto row = rows_.find(key);
-  return row == rows_.end() ? std::nullopt : unsealed(key, row->second);
+  return row == rows_.end() ? std::nullopt : verified(key, row->second);
 }
 
 CatalogueRow Catalogue::after(const CatalogueChange& change) const {
@@ -40,15 +40,15 @@ CatalogueRow Catalogue::after(const CatalogueChange& change) const {
   if (change.next_scene != 0) totals.next_scene = change.next_scene;
   for (const CatalogueChange::Row& row : change.rows) {
     uint64_t& sum = sum_of(row.key, totals);
-    if (const auto before = rows_.find(row.key); before != rows_.end()) sum -= seal_of(before->second);
-    if (row.value) sum += seal_of(sealed(row.key, *row.value));
+    if (const auto before = rows_.find(row.key); before != rows_.end()) sum -= stored_checksum(before->second);
+    if (row.value) sum += stored_checksum(with_checksum(row.key, *row.value));
   }
   return totals;
 }
 
 void Catalogue::add_to(rocksdb::WriteBatch& batch, rocksdb::ColumnFamilyHandle* meta,
                        const CatalogueChange& change) const {
-  for (const std::string& key : doubtful_) {
+  for (const std::string& key : possibly_written_) {
     if (const auto row = rows_.find(key); row != rows_.end()) {
       put(batch, meta, key, row->second);
     } else {
@@ -57,28 +57,28 @@ void Catalogue::add_to(rocksdb::WriteBatch& batch, rocksdb::ColumnFamilyHandle* 
   }
   for (const CatalogueChange::Row& row : change.rows) {
     if (row.value) {
-      put(batch, meta, row.key, sealed(row.key, *row.value));
+      put(batch, meta, row.key, with_checksum(row.key, *row.value));
     } else {
       LOCUS_CHECK(batch.Delete(meta, row.key).ok());
     }
   }
-  put(batch, meta, kCatalogueKey, sealed(kCatalogueKey, encode(after(change))));
+  put(batch, meta, kCatalogueKey, with_checksum(kCatalogueKey, encode(after(change))));
 }
 
 void Catalogue::apply(const CatalogueChange& change) {
   totals_ = after(change);
   for (const CatalogueChange::Row& row : change.rows) {
     if (row.value) {
-      rows_[row.key] = sealed(row.key, *row.value);
+      rows_[row.key] = with_checksum(row.key, *row.value);
     } else {
       rows_.erase(row.key);
     }
   }
-  doubtful_.clear();
+  possibly_written_.clear();
 }
 
 void Catalogue::fail(const CatalogueChange& change) {
-  for (const CatalogueChange::Row& row : change.rows) doubtful_.insert(row.key);
+  for (const CatalogueChange::Row& row : change.rows) possibly_written_.insert(row.key);
 }
 
 }  // namespace locus::server

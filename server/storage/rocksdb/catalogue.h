@@ -60,7 +60,7 @@ class Catalogue {
 
   Rows rows_;
   CatalogueRow totals_;
-  std::set<std::string, std::less<>> doubtful_;  // keys that failed changes touched
+  std::set<std::string, std::less<>> possibly_written_;  // keys that failed changes touched
 };
 
 }  // namespace locus::server

@@ -195,11 +195,11 @@ absl::Status Database::recover() {
 
 rocksdb::Status Database::renew() {
   rocksdb::WriteBatch batch;
-  const absl::string_view mark(kFamilyMark);
-  const std::string value = sealed(mark, "");
+  const absl::string_view scene_marker(kFamilyMark);
+  const std::string value = with_checksum(scene_marker, "");
   rocksdb::Status status;
   for (rocksdb::ColumnFamilyHandle* family : families_) {
-    if (status.ok()) status = batch.Put(family, rocksdb::Slice(mark.data(), mark.size()), value);
+    if (status.ok()) status = batch.Put(family, rocksdb::Slice(scene_marker.data(), scene_marker.size()), value);
   }
   rocksdb::WriteOptions past_the_log;
   past_the_log.disableWAL = true;

@@ -35,7 +35,7 @@ void OutlineFiles::keep(const Sha256& sha256, absl::string_view bytes) {
   const std::string name = name_of(sha256);
   const std::string unfinished = absl::StrCat(path_of(name), kUnfinished);
   rocksdb::Status status = env_.CreateDirIfMissing(folder_);
-  if (status.ok()) status = rocksdb::WriteStringToFile(&env_, sealed(name, bytes), unfinished);
+  if (status.ok()) status = rocksdb::WriteStringToFile(&env_, with_checksum(name, bytes), unfinished);
   if (status.ok()) status = env_.RenameFile(unfinished, path_of(name));
   if (!status.ok()) env_.DeleteFile(unfinished).PermitUncheckedError();
 }
@@ -46,7 +46,7 @@ std::optional<std::string> OutlineFiles::read(const Sha256& sha256) const {
   uint64_t size = 0;
   if (!env_.GetFileSize(path_of(name), &size).ok() || size > kMaxBytes) return std::nullopt;
   if (!rocksdb::ReadFileToString(&env_, path_of(name), &bytes).ok()) return std::nullopt;
-  const std::optional<absl::string_view> found = unsealed(name, bytes);
+  const std::optional<absl::string_view> found = verified(name, bytes);
   if (!found) return std::nullopt;
   bytes.resize(found->size());
   return bytes;

@@ -51,8 +51,8 @@ rocksdb::ReadOptions reading_options() {
 RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t sequence, uint64_t& chain_at) {
   RecordScan found;
   found.last = row.snapshot_sequence;
-  found.chain = row.chain;
-  if (sequence == row.snapshot_sequence) chain_at = row.chain;
+  found.running_checksum = row.running_checksum;
+  if (sequence == row.snapshot_sequence) chain_at = row.running_checksum;
   Walk walk(database, database.log(), log_key(row.key, row.snapshot_sequence + 1), end_of(scene_prefix(row.key)));
   for (; walk.more(); walk.next()) {
     const uint64_t at = sequence_of(walk.key());
@@ -67,17 +67,17 @@ RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t 
       return found;
     }
     found.last = at;
-    found.chain = seal_of(value);
+    found.running_checksum = stored_checksum(value);
     found.bytes += value.size() - kRecordOverhead;
-    if (at == sequence) chain_at = found.chain;
+    if (at == sequence) chain_at = found.running_checksum;
   }
   if (!walk.status().ok())
     found.error = read_error(absl::StrCat("reading the record after ", found.last), walk.status());
   return found;
 }
 
-absl::Status read_records(const Database& database, SceneKey scene, uint64_t from, uint64_t last, uint64_t chain,
-                          RecordSink sink) {
+absl::Status read_records(const Database& database, SceneKey scene, uint64_t from, uint64_t last,
+                          uint64_t running_checksum, RecordSink sink) {
   Walk walk(database, database.log(), log_key(scene, from), end_of(scene_prefix(scene)));
   LogRecord record;
   for (record.sequence = from; walk.more(); walk.next(), ++record.sequence) {
@@ -86,8 +86,8 @@ absl::Status read_records(const Database& database, SceneKey scene, uint64_t fro
     const absl::string_view value = walk.value();
     const std::optional<LogEntry> entry = decode_record(value);
     if (!entry) return damaged(absl::StrCat("record ", record.sequence, " is no record"));
-    chain = record_checksum(walk.key(), value.substr(0, kRecordHeadBytes), entry->bytes, chain);
-    if (chain != seal_of(value))
+    running_checksum = record_checksum(walk.key(), value.substr(0, kRecordHeadBytes), entry->bytes, running_checksum);
+    if (running_checksum != stored_checksum(value))
       return damaged(absl::StrCat("record ", record.sequence, " is not the one that was written"));
     record.entry = *entry;
     if (absl::Status status = sink(record); !status.ok()) return status;
@@ -104,7 +104,7 @@ absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* 
   for (; walk.more(); walk.next()) {
     if (walk.key() != chunk_key(prefix, static_cast<uint32_t>(found.chunks)))
       return damaged(absl::StrCat("chunk ", found.chunks, " is missing"));
-    const std::optional<absl::string_view> bytes = unsealed(walk.key(), walk.value());
+    const std::optional<absl::string_view> bytes = verified(walk.key(), walk.value());
     if (!bytes) return damaged(absl::StrCat("chunk ", found.chunks, " is not the one that was written"));
     found.add(walk.value());
     if (absl::Status status = sink(*bytes); !status.ok()) return status;

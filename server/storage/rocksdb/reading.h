@@ -23,8 +23,8 @@ rocksdb::ReadOptions reading_options();
 
 // What one look over a scene's records finds without judging their bytes.
 struct RecordScan {
-  uint64_t last = 0;   // up to here none is missing
-  uint64_t chain = 0;  // the checksum of that one
+  uint64_t last = 0;              // up to here none is missing
+  uint64_t running_checksum = 0;  // the checksum of that one
   uint64_t bytes = 0;
   uint64_t beyond = 0;  // the first that comes after a missing one, or 0
   uint64_t after = 0;   // how many there are from there on
@@ -37,8 +37,8 @@ RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t 
 
 // The records from number `from` on, which must go up to `last` at least, until `sink` fails; `chain` is the checksum
 // of the one before.
-absl::Status read_records(const Database& database, SceneKey scene, uint64_t from, uint64_t last, uint64_t chain,
-                          RecordSink sink);
+absl::Status read_records(const Database& database, SceneKey scene, uint64_t from, uint64_t last,
+                          uint64_t running_checksum, RecordSink sink);
 
 // The chunks whose keys begin with `prefix`, which must be those that `list` was made of.
 absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* family, const std::string& prefix,

@@ -56,21 +56,21 @@ std::string chunk_key(absl::string_view prefix, uint32_t index) {
   return ByteWriter().bytes(prefix).big_u32(index).take();
 }
 
-std::string sealed(absl::string_view key, absl::string_view bytes) {
+std::string with_checksum(absl::string_view key, absl::string_view bytes) {
   std::string value;
   value.reserve(bytes.size() + kSealBytes);
   value.append(bytes.data(), bytes.size());
   return value.append(ByteWriter().u64(checksum(bytes, checksum(key))).view());
 }
 
-std::optional<absl::string_view> unsealed(absl::string_view key, absl::string_view value) {
+std::optional<absl::string_view> verified(absl::string_view key, absl::string_view value) {
   if (value.size() < kSealBytes) return std::nullopt;
   const absl::string_view bytes = value.substr(0, value.size() - kSealBytes);
-  if (seal_of(value) != checksum(bytes, checksum(key))) return std::nullopt;
+  if (stored_checksum(value) != checksum(bytes, checksum(key))) return std::nullopt;
   return bytes;
 }
 
-uint64_t seal_of(absl::string_view value) {
+uint64_t stored_checksum(absl::string_view value) {
   return value.size() < kSealBytes ? 0 : ByteReader(value.substr(value.size() - kSealBytes)).u64();
 }
 
@@ -80,7 +80,12 @@ std::string encode(const ContentRow& row) {
 
 std::string encode(const SceneRow& row) {
   ByteWriter out;
-  out.u64(row.key).string(row.name).string(row.spec).u64(row.epoch).u64(row.snapshot_sequence).u64(row.chain);
+  out.u64(row.key)
+      .string(row.name)
+      .string(row.spec)
+      .u64(row.epoch)
+      .u64(row.snapshot_sequence)
+      .u64(row.running_checksum);
   return out.bytes(encode(ContentRow{row.snapshot_number, row.snapshot})).take();
 }
 
@@ -106,7 +111,7 @@ std::optional<SceneRow> decode_scene(absl::string_view bytes) {
   row.spec = in.string();
   row.epoch = in.u64();
   row.snapshot_sequence = in.u64();
-  row.chain = in.u64();
+  row.running_checksum = in.u64();
   const std::optional<ContentRow> snapshot = decode_content(in.rest());
   if (!in.ok() || !snapshot) return std::nullopt;
   row.snapshot_number = snapshot->number;
@@ -130,8 +135,9 @@ std::string record_head(const LogEntry& entry) {
   return out.u32(static_cast<uint32_t>(entry.bytes.size())).take();
 }
 
-uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes, uint64_t chain) {
-  return checksum(ByteWriter().bytes(key).bytes(head).u64(checksum(bytes)).view(), chain);
+uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes,
+                         uint64_t running_checksum) {
+  return checksum(ByteWriter().bytes(key).bytes(head).u64(checksum(bytes)).view(), running_checksum);
 }
 
 std::optional<LogEntry> decode_record(absl::string_view value) {

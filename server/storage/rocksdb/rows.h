@@ -59,7 +59,7 @@ struct SceneRow {
   std::string spec;
   uint64_t epoch = 0;
   uint64_t snapshot_sequence = 0;
-  uint64_t chain = 0;  // of the record snapshot_sequence, with which the next one's checksum begins
+  uint64_t running_checksum = 0;  // of the record snapshot_sequence, with which the next one's checksum begins
   uint64_t snapshot_number = 0;
   ChunkList snapshot;
 };
@@ -88,11 +88,11 @@ std::string mesh_prefix(const Sha256& sha256, uint64_t number);
 std::string chunk_key(absl::string_view prefix, uint32_t index);
 
 // Values of the column family meta, and of chunks: bytes and their checksum.
-std::string sealed(absl::string_view key, absl::string_view bytes);
+std::string with_checksum(absl::string_view key, absl::string_view bytes);
 // Nothing where the checksum says that these are not the bytes of `key`.
-std::optional<absl::string_view> unsealed(absl::string_view key, absl::string_view value);
+std::optional<absl::string_view> verified(absl::string_view key, absl::string_view value);
 // The last eight bytes of any value.
-uint64_t seal_of(absl::string_view value);
+uint64_t stored_checksum(absl::string_view value);
 
 std::string encode(const SceneRow& row);
 std::string encode(const CatalogueRow& row);
@@ -105,7 +105,8 @@ std::optional<ContentRow> decode_content(absl::string_view bytes);
 inline constexpr size_t kRecordHeadBytes = 1 + 8 + 8 + 8 + 4;
 inline constexpr size_t kRecordOverhead = kRecordHeadBytes + 8;
 std::string record_head(const LogEntry& entry);
-uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes, uint64_t chain);
+uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes,
+                         uint64_t running_checksum);
 // Its entry borrows from `value`. Nothing where it is no record; its checksum is for the caller to compare.
 std::optional<LogEntry> decode_record(absl::string_view value);
 

@@ -1,4 +1,4 @@
-#include "server/storage/integrity/high_water.h"
+#include "server/storage/integrity/durable_marker.h"
 
 #include <algorithm>
 #include <utility>
@@ -23,17 +23,17 @@ std::string framed(const std::string& bytes) {
   return out.u64(sum).take();
 }
 
-std::optional<HighWater> unframed(absl::string_view slot) {
+std::optional<DurableMarker> unframed(absl::string_view slot) {
   ByteReader in(slot);
   if (in.bytes(kMagic.size()) != kMagic) return std::nullopt;
   const absl::string_view bytes = in.bytes(in.u32());
   const size_t summed = slot.size() - in.rest().size();
   const uint64_t sum = in.u64();
   if (!in.ok() || sum != checksum(slot.substr(0, summed))) return std::nullopt;
-  return decode_high_water(bytes);
+  return decode_durable_marker(bytes);
 }
 
-std::string path_of(const std::string& folder) { return absl::StrCat(folder, "/", HighWaterFile::kName); }
+std::string path_of(const std::string& folder) { return absl::StrCat(folder, "/", DurableMarkerFile::kName); }
 
 absl::Status error(const std::string& folder, const rocksdb::Status& status) {
   return disk_error(absl::StrCat("writing ", path_of(folder)), status);
@@ -41,46 +41,53 @@ absl::Status error(const std::string& folder, const rocksdb::Status& status) {
 
 }  // namespace
 
-std::string encode(const HighWater& high_water) {
+std::string encode(const DurableMarker& durable_marker) {
   ByteWriter out;
-  out.u64(high_water.number).u8(high_water.closed ? 1 : 0).u64(high_water.catalogue).u64(high_water.next_scene);
-  out.u64(high_water.mesh_sum).u64(high_water.covered_sequence).string(high_water.manifest);
-  out.u64(high_water.manifest_bytes).string(high_water.catalogue_damage);
-  out.u32(static_cast<uint32_t>(high_water.marks.size()));
-  for (const Mark& mark : high_water.marks) {
-    out.u64(mark.scene).string(mark.name).u64(mark.sequence).u64(mark.chain).u64(mark.row_seal);
-    out.u8(mark.copied ? 1 : 0).string(mark.damage);
+  out.u64(durable_marker.number)
+      .u8(durable_marker.closed ? 1 : 0)
+      .u64(durable_marker.catalogue)
+      .u64(durable_marker.next_scene);
+  out.u64(durable_marker.mesh_sum).u64(durable_marker.flushed_sequence).string(durable_marker.manifest);
+  out.u64(durable_marker.manifest_bytes).string(durable_marker.catalogue_damage);
+  out.u32(static_cast<uint32_t>(durable_marker.scene_markers.size()));
+  for (const SceneMarker& scene_marker : durable_marker.scene_markers) {
+    out.u64(scene_marker.scene)
+        .string(scene_marker.name)
+        .u64(scene_marker.sequence)
+        .u64(scene_marker.running_checksum)
+        .u64(scene_marker.row_checksum);
+    out.u8(scene_marker.copied ? 1 : 0).string(scene_marker.damage);
   }
   return out.take();
 }
 
-std::optional<HighWater> decode_high_water(absl::string_view bytes) {
+std::optional<DurableMarker> decode_durable_marker(absl::string_view bytes) {
   ByteReader in(bytes);
-  HighWater found;
+  DurableMarker found;
   found.number = in.u64();
   found.closed = in.u8() != 0;
   found.catalogue = in.u64();
   found.next_scene = in.u64();
   found.mesh_sum = in.u64();
-  found.covered_sequence = in.u64();
+  found.flushed_sequence = in.u64();
   found.manifest = in.string();
   found.manifest_bytes = in.u64();
   found.catalogue_damage = in.string();
   const uint32_t count = in.u32();
   for (uint32_t i = 0; i < count && in.ok(); ++i) {
-    Mark& mark = found.marks.emplace_back();
-    mark.scene = in.u64();
-    mark.name = in.string();
-    mark.sequence = in.u64();
-    mark.chain = in.u64();
-    mark.row_seal = in.u64();
-    mark.copied = in.u8() != 0;
-    mark.damage = in.string();
+    SceneMarker& scene_marker = found.scene_markers.emplace_back();
+    scene_marker.scene = in.u64();
+    scene_marker.name = in.string();
+    scene_marker.sequence = in.u64();
+    scene_marker.running_checksum = in.u64();
+    scene_marker.row_checksum = in.u64();
+    scene_marker.copied = in.u8() != 0;
+    scene_marker.damage = in.string();
   }
   return in.ended() ? std::optional(std::move(found)) : std::nullopt;
 }
 
-absl::StatusOr<HighWater> HighWaterFile::read(rocksdb::Env& env, const std::string& folder) {
+absl::StatusOr<DurableMarker> DurableMarkerFile::read(rocksdb::Env& env, const std::string& folder) {
   const std::string path = path_of(folder);
   uint64_t size = 0;
   rocksdb::Status status = env.FileExists(path);
@@ -89,40 +96,40 @@ absl::StatusOr<HighWater> HighWaterFile::read(rocksdb::Env& env, const std::stri
   std::string bytes;
   if (status.ok() && size <= kMaxFileBytes) status = rocksdb::ReadFileToString(&env, path, &bytes);
   if (!status.ok()) return disk_error(absl::StrCat("reading ", path), status);
-  std::optional<HighWater> newest;
+  std::optional<DurableMarker> newest;
   // A file that was cut still has its first slot where it was; of the second nobody knows.
   for (const size_t start : {size_t{0}, bytes.size() / 2}) {
-    std::optional<HighWater> found = unframed(absl::string_view(bytes).substr(start));
+    std::optional<DurableMarker> found = unframed(absl::string_view(bytes).substr(start));
     if (found && (!newest || newest->number < found->number)) newest = std::move(found);
   }
   if (!newest) return absl::DataLossError(absl::StrCat(path, " cannot be read"));
   return *newest;
 }
 
-absl::Status HighWaterFile::write(HighWater& high_water) {
-  ++high_water.number;
-  const std::string slot = framed(encode(high_water));
+absl::Status DurableMarkerFile::write(DurableMarker& durable_marker) {
+  ++durable_marker.number;
+  const std::string slot = framed(encode(durable_marker));
   if (file_ == nullptr || slot.size() > slot_bytes_) {
-    --high_water.number;
-    return replace(high_water);
+    --durable_marker.number;
+    return replace(durable_marker);
   }
-  rocksdb::Status status = file_->Write(high_water.number % 2 * slot_bytes_, slot);
+  rocksdb::Status status = file_->Write(durable_marker.number % 2 * slot_bytes_, slot);
   if (status.ok()) status = file_->Sync();
   if (!status.ok()) file_ = nullptr;  // what is in it now is not known: make another
   return status.ok() ? absl::OkStatus() : error(folder_, status);
 }
 
-absl::Status HighWaterFile::replace(HighWater& high_water) {
+absl::Status DurableMarkerFile::replace(DurableMarker& durable_marker) {
   file_ = nullptr;
   std::string bytes;
-  high_water.number += 2 - high_water.number % 2;
-  HighWater second = high_water;
+  durable_marker.number += 2 - durable_marker.number % 2;
+  DurableMarker second = durable_marker;
   ++second.number;
-  const std::string slots[2] = {framed(encode(high_water)), framed(encode(second))};
+  const std::string slots[2] = {framed(encode(durable_marker)), framed(encode(second))};
   slot_bytes_ = kFirstSlotBytes;
   while (slot_bytes_ < slots[0].size() * 2) slot_bytes_ *= 2;
   for (const std::string& slot : slots) bytes.append(slot).append(slot_bytes_ - slot.size(), '\0');
-  high_water.number = second.number;
+  durable_marker.number = second.number;
 
   const std::string path = path_of(folder_);
   const std::string fresh = path + ".new";

@@ -6,8 +6,8 @@
 // checksum, so that a torn write leaves the one before. A file whose slots became too small is replaced as a whole.
 //
 // Threads: one at a time.
-#ifndef LOCUS_SERVER_STORAGE_INTEGRITY_HIGH_WATER_H_
-#define LOCUS_SERVER_STORAGE_INTEGRITY_HIGH_WATER_H_
+#ifndef LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
+#define LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
 
 #include <cstdint>
 #include <memory>
@@ -23,45 +23,45 @@
 namespace locus::server {
 
 // A scene as it must be found.
-struct Mark {
+struct SceneMarker {
   SceneKey scene = 0;
   std::string name;
-  uint64_t sequence = 0;  // at least up to here there are records
-  uint64_t chain = 0;     // the checksum of that record, or of the snapshot's last
-  uint64_t row_seal = 0;  // of its row in the catalogue, exactly
-  bool copied = false;    // by back_up(), and not restarted since
-  std::string damage;     // found earlier; stays until the scene is deleted or repaired
+  uint64_t sequence = 0;          // at least up to here there are records
+  uint64_t running_checksum = 0;  // the checksum of that record, or of the snapshot's last
+  uint64_t row_checksum = 0;      // of its row in the catalogue, exactly
+  bool copied = false;            // by back_up(), and not restarted since
+  std::string damage;             // found earlier; stays until the scene is deleted or repaired
 };
 
-struct HighWater {
+struct DurableMarker {
   uint64_t number = 0;            // of this write
   bool closed = false;            // nothing came after this
   uint64_t catalogue = 0;         // generation; 0 before the database was made
   SceneKey next_scene = 1;        // keys below were given to scenes
   uint64_t mesh_sum = 0;          // of the catalogue's rows of meshes
-  uint64_t covered_sequence = 0;  // of RocksDB: all writes up to here are in what this says
+  uint64_t flushed_sequence = 0;  // of RocksDB: all writes up to here are in what this says
   std::string manifest;           // RocksDB's list of its files ...
   uint64_t manifest_bytes = 0;    // ... and how long it was at least
   std::string catalogue_damage;   // found earlier, of the catalogue as a whole
-  std::vector<Mark> marks;
+  std::vector<SceneMarker> scene_markers;
 };
 
-std::string encode(const HighWater& high_water);
-std::optional<HighWater> decode_high_water(absl::string_view bytes);
+std::string encode(const DurableMarker& durable_marker);
+std::optional<DurableMarker> decode_durable_marker(absl::string_view bytes);
 
-class HighWaterFile {
+class DurableMarkerFile {
  public:
   static constexpr absl::string_view kName = "HIGH_WATER";
 
   // What the file in `folder` says: NOT_FOUND where there is none, DATA_LOSS where neither slot can be read.
-  static absl::StatusOr<HighWater> read(rocksdb::Env& env, const std::string& folder);
+  static absl::StatusOr<DurableMarker> read(rocksdb::Env& env, const std::string& folder);
 
-  HighWaterFile(rocksdb::Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
+  DurableMarkerFile(rocksdb::Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
 
   // On the disk when this returns. Numbers the write; the first makes the file or replaces it whole.
-  absl::Status write(HighWater& high_water);
+  absl::Status write(DurableMarker& durable_marker);
   // The same for both slots: what is written must not be undone by damage to one of them.
-  absl::Status replace(HighWater& high_water);
+  absl::Status replace(DurableMarker& durable_marker);
 
  private:
   rocksdb::Env& env_;
@@ -72,4 +72,4 @@ class HighWaterFile {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_STORAGE_INTEGRITY_HIGH_WATER_H_
+#endif  // LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
