@@ -178,7 +178,7 @@ int maintain(const Maintenance& maintenance) {
   if (maintenance.task == Maintenance::Task::kRepair) return print(repair(options));
   const absl::StatusOr<DirectoryReport> report = check(options);
   const int printed = print(report);
-  return printed == EXIT_SUCCESS && !report->sound() ? EXIT_FAILURE : printed;
+  return printed == EXIT_SUCCESS && !report->intact() ? EXIT_FAILURE : printed;
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ absl::Status too_large(uint64_t bytes) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<RocksdbLog>> RocksdbLog::open(const StorageOptions& options) {
-  const StorageOptions with_defaults = settled(options);
+  const StorageOptions with_defaults = with_defaults(options);
   absl::StatusOr<OpenedDirectory> opened = open_directory(with_defaults);
   if (!opened.ok()) return opened.status();
   std::unique_ptr<RocksdbLog> log(new RocksdbLog(with_defaults, *std::move(opened)));
@@ -39,7 +39,7 @@ RocksdbLog::RocksdbLog(const StorageOptions& options, OpenedDirectory opened)
     : options_(options),
       lock_(std::move(opened.lock)),
       database_(std::move(opened.database)),
-      findings_(std::move(opened.findings)),
+      damage_report_(std::move(opened.damage_report)),
       closed_in_order_(opened.durable_marker.closed),
       outlines_(*options.env, options.path),
       durable_marker_file_(std::move(opened.durable_marker_file)),
@@ -60,9 +60,9 @@ RocksdbLog::~RocksdbLog() {
 }
 
 void RocksdbLog::list_stored() {
-  for (const SceneFinding& found : findings_.scenes) {
+  for (const SceneHealth& found : damage_report_.scenes) {
     StoredScene& stored = stored_scenes_.emplace_back();
-    auto place = std::make_shared<SceneState>();
+    auto place = std::make_shared<SceneLogState>();
     place->key = stored.key = found.key;
     place->name = stored.name = found.name;
     stored.last_sequence = found.last;
@@ -74,7 +74,7 @@ void RocksdbLog::list_stored() {
     }
     if (!found.damage.empty()) {
       stored.damage = absl::DataLossError(
-          absl::StrCat("scene '", found.name, "' is damaged: ", found.damage, remedy(options_.path)));
+          absl::StrCat("scene '", found.name, "' is damaged: ", found.damage, repair_hint(options_.path)));
       place->damage = stored.damage;
       place->damage_found = found.damage;
     }
@@ -89,16 +89,16 @@ void RocksdbLog::list_stored() {
   }
   std::sort(stored_scenes_.begin(), stored_scenes_.end(),
             [](const StoredScene& a, const StoredScene& b) { return a.name < b.name; });
-  if (!findings_.catalogue_damage.empty())
+  if (!damage_report_.catalogue_damage.empty())
     catalogue_damage_ = absl::DataLossError(
-        absl::StrCat(options_.path, " is damaged: ", findings_.catalogue_damage, remedy(options_.path)));
-  for (const MeshFinding& found : findings_.meshes) {
+        absl::StrCat(options_.path, " is damaged: ", damage_report_.catalogue_damage, repair_hint(options_.path)));
+  for (const MeshHealth& found : damage_report_.meshes) {
     StoredMesh& stored = stored_meshes_.emplace_back();
     stored.name = found.name;
     stored.sha256 = found.sha256;
     if (!found.damage.empty())
       stored.damage = absl::DataLossError(
-          absl::StrCat("mesh '", found.name, "' is damaged: ", found.damage, remedy(options_.path)));
+          absl::StrCat("mesh '", found.name, "' is damaged: ", found.damage, repair_hint(options_.path)));
   }
 }
 
@@ -107,12 +107,12 @@ absl::Status RocksdbLog::begin() {
   {
     MutexLock lock(catalogue_mutex_);
     MutexLock high_water_lock(high_water_mutex_);
-    const CatalogueRow said = findings_.catalogue.value_or(CatalogueRow());
-    catalogue_ = Catalogue(std::move(findings_.rows), std::max(said.generation, durable_marker_.catalogue),
+    const CatalogueRow said = damage_report_.catalogue.value_or(CatalogueRow());
+    catalogue_ = Catalogue(std::move(damage_report_.rows), std::max(said.generation, durable_marker_.catalogue),
                            std::max(said.next_scene, durable_marker_.next_scene));
     next_scene_ = catalogue_.totals().next_scene;
     rocksdb::WriteBatch batch;
-    for (const std::string& key : findings_.pending) {
+    for (const std::string& key : damage_report_.pending) {
       if (!in_use(key)) {
         rocksdb::ColumnFamilyHandle* family = key[0] == kPendingMeshTag ? database_->mesh() : database_->snapshot();
         LOCUS_CHECK(batch.DeleteRange(family, key.substr(1), end_of(key.substr(1))).ok());
@@ -129,7 +129,7 @@ absl::Status RocksdbLog::begin() {
     scenes_.set_catalogue(catalogue_.totals());
     outlines_.drop_all_but(contents());
   }
-  findings_ = Findings();
+  damage_report_ = DamageReport();
   look_at_the_disk();
   write_high_water(false);
   if (high_water_failed_)
@@ -151,9 +151,9 @@ std::set<Sha256> RocksdbLog::contents() const {
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel level) {
-  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
   if (!place.ok()) return place.status();
-  SceneState& scene = **place;
+  SceneLogState& scene = **place;
   if (entries.empty()) return scenes_.last_of(scene);
   uint64_t bytes = 0;
   for (const LogEntry& entry : entries) bytes += entry.bytes.size();
@@ -189,7 +189,7 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
 }
 
 absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
-  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
   if (!place.ok()) return place.status();
   const uint64_t last = scenes_.last_of(**place);
   SceneRow row;
@@ -209,7 +209,7 @@ absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) cons
   absl::Status status = read_records(*database_, key, from, last, *running_checksum, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(
-      absl::StrCat("scene '", row.name, "' is damaged: ", status.message(), remedy(options_.path)));
+      absl::StrCat("scene '", row.name, "' is damaged: ", status.message(), repair_hint(options_.path)));
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequence) const {
@@ -219,13 +219,13 @@ absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequ
       database_->db().Get(reading_options(), database_->log(), log_key(row.key, sequence), &value);
   if (status.ok() && value.size() >= kRecordOverhead) return stored_checksum(view_of(value));
   if (status.ok() || status.IsNotFound())
-    return absl::DataLossError(
-        absl::StrCat("scene '", row.name, "' is damaged: record ", sequence, " is missing", remedy(options_.path)));
+    return absl::DataLossError(absl::StrCat("scene '", row.name, "' is damaged: record ", sequence, " is missing",
+                                            repair_hint(options_.path)));
   return read_error(absl::StrCat("reading record ", sequence, " of scene '", row.name, "'"), status);
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::latest(SceneKey key) const {
-  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
   if (!place.ok()) return place.status();
   return scenes_.last_of(**place);
 }

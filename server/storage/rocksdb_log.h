@@ -84,8 +84,8 @@ class RocksdbLog final : public UpdateLog {
   uint64_t seal_of_row(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<uint64_t> chain_of(const SceneRow& row, uint64_t sequence) const;
   // `before` is the number of the snapshot it replaces.
-  absl::Status put_snapshot(const ScenePlace& place, uint64_t before, uint64_t sequence, const ContentRow& snapshot)
-      LOCUS_EXCLUDES(catalogue_mutex_);
+  absl::Status put_snapshot(const SceneLogStatePtr& place, uint64_t before, uint64_t sequence,
+                            const ContentRow& snapshot) LOCUS_EXCLUDES(catalogue_mutex_);
   // Whether the chunks of a pending key are those of a snapshot or mesh by now.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
   std::set<Sha256> contents() const LOCUS_REQUIRES(catalogue_mutex_);
@@ -104,7 +104,7 @@ class RocksdbLog final : public UpdateLog {
   const StorageOptions options_;
   const std::unique_ptr<DirectoryLock> lock_;
   const std::unique_ptr<Database> database_;
-  Findings findings_;  // until begin() is done
+  DamageReport damage_report_;  // until begin() is done
   std::vector<StoredScene> stored_scenes_;
   std::vector<StoredMesh> stored_meshes_;
   absl::Status catalogue_damage_;

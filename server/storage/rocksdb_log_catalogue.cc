@@ -141,11 +141,11 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
       drop_chunks(database_->snapshot(), pending, prefix);
       return status;
     }
-    auto place = std::make_shared<SceneState>();
+    auto place = std::make_shared<SceneLogState>();
     place->key = row.key;
     place->name = row.name;
     place->written = place->synced = {0, row.running_checksum};
-    SceneState& scene = *place;
+    SceneLogState& scene = *place;
     scenes_.add(std::move(place));
     scenes_.set_row(scene, row, seal_of_row(row.key), catalogue_.totals());
     write_high_water(false);
@@ -154,7 +154,7 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
 }
 
 absl::Status RocksdbLog::delete_scene(SceneKey key) {
-  const ScenePlace place = scenes_.find_any(key);
+  const SceneLogStatePtr place = scenes_.find_any(key);
   if (place == nullptr) return not_there(absl::StrCat("the log has no scene ", key, "; it may have been deleted"));
   MutexLock writing(place->writing);
   MutexLock lock(catalogue_mutex_);
@@ -169,7 +169,7 @@ absl::Status RocksdbLog::delete_scene(SceneKey key) {
 }
 
 absl::Status RocksdbLog::restart_scene(SceneKey key, uint64_t epoch) {
-  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
   if (!place.ok()) return place.status();
   MutexLock writing((*place)->writing);
   MutexLock lock(catalogue_mutex_);
@@ -184,7 +184,7 @@ absl::Status RocksdbLog::restart_scene(SceneKey key, uint64_t epoch) {
 }
 
 absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSource state) {
-  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
   if (!place.ok()) return place.status();
   uint64_t before = 0;
   {
@@ -212,7 +212,7 @@ absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSo
   return absl::OkStatus();
 }
 
-absl::Status RocksdbLog::put_snapshot(const ScenePlace& place, uint64_t before, uint64_t sequence,
+absl::Status RocksdbLog::put_snapshot(const SceneLogStatePtr& place, uint64_t before, uint64_t sequence,
                                       const ContentRow& snapshot) {
   MutexLock lock(catalogue_mutex_);
   const SceneKey key = place->key;
@@ -238,7 +238,7 @@ absl::Status RocksdbLog::put_snapshot(const ScenePlace& place, uint64_t before, 
 }
 
 absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
-  const absl::StatusOr<ScenePlace> place = scenes_.find(key);
+  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
   if (!place.ok()) return place.status();
   absl::StatusOr<SceneRow> row;
   {
@@ -250,7 +250,7 @@ absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
       read_chunks(*database_, database_->snapshot(), snapshot_prefix(key, row->snapshot_number), row->snapshot, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(
-      absl::StrCat("scene '", row->name, "' is damaged: its snapshot: ", status.message(), remedy(options_.path)));
+      absl::StrCat("scene '", row->name, "' is damaged: its snapshot: ", status.message(), repair_hint(options_.path)));
 }
 
 bool RocksdbLog::in_use(absl::string_view pending) const {
@@ -342,7 +342,7 @@ absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
   if (!row) return not_there("the log has no mesh of this content");
   absl::Status status = read_chunks(*database_, database_->mesh(), mesh_prefix(sha256, row->number), row->chunks, sink);
   if (!absl::IsDataLoss(status)) return status;
-  return absl::DataLossError(absl::StrCat("a mesh is damaged: ", status.message(), remedy(options_.path)));
+  return absl::DataLossError(absl::StrCat("a mesh is damaged: ", status.message(), repair_hint(options_.path)));
 }
 
 void RocksdbLog::keep_outline(const Sha256& sha256, absl::string_view bytes) {

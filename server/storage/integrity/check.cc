@@ -22,17 +22,17 @@ absl::Status take_lock(const StorageOptions& options, std::unique_ptr<DirectoryL
 
 }  // namespace
 
-bool DirectoryReport::sound() const {
+bool DirectoryReport::intact() const {
   const auto is_sound = [](const auto& one) { return one.damage.empty(); };
   return damage.empty() && catalogue_damage.empty() && std::all_of(scenes.begin(), scenes.end(), is_sound) &&
          std::all_of(meshes.begin(), meshes.end(), is_sound);
 }
 
-DirectoryReport report_of(const Findings& findings) {
+DirectoryReport report_of(const DamageReport& damage_report) {
   DirectoryReport report;
-  if (!findings.has_format) report.damage = "the catalogue is lost";
-  report.catalogue_damage = findings.catalogue_damage;
-  for (const SceneFinding& found : findings.scenes) {
+  if (!damage_report.has_format) report.damage = "the catalogue is lost";
+  report.catalogue_damage = damage_report.catalogue_damage;
+  for (const SceneHealth& found : damage_report.scenes) {
     SceneReport& scene = report.scenes.emplace_back();
     scene.key = found.key;
     scene.name = found.name;
@@ -48,13 +48,13 @@ DirectoryReport report_of(const Findings& findings) {
   }
   std::sort(report.scenes.begin(), report.scenes.end(),
             [](const SceneReport& a, const SceneReport& b) { return a.name < b.name; });
-  for (const MeshFinding& found : findings.meshes)
+  for (const MeshHealth& found : damage_report.meshes)
     report.meshes.push_back({found.name, found.sha256, found.content.chunks.bytes, found.damage});
   return report;
 }
 
 absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
-  const StorageOptions options = settled(given);
+  const StorageOptions options = with_defaults(given);
   const DatabaseOptions wanted = database_options_of(options);
   if (!options.env->FileExists(wanted.folder).ok() &&
       !options.env->FileExists(absl::StrCat(options.path, "/", DurableMarkerFile::kName)).ok())
@@ -78,10 +78,10 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
     report.damage = strict.ToString();
     return report;
   }
-  const absl::StatusOr<Findings> findings =
-      judge(*database, durable_marker.ok() ? &*durable_marker : nullptr, Depth::kEverything);
-  if (!findings.ok()) return findings.status();
-  report = report_of(*findings);
+  const absl::StatusOr<DamageReport> damage_report =
+      verify(*database, durable_marker.ok() ? &*durable_marker : nullptr, Depth::kEverything);
+  if (!damage_report.ok()) return damage_report.status();
+  report = report_of(*damage_report);
   report.closed_in_order = durable_marker.ok() && durable_marker->closed;
   return report;
 }

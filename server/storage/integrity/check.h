@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/scene/log/update_log.h"
-#include "server/storage/integrity/judge.h"
+#include "server/storage/integrity/verify.h"
 #include "server/storage/rocksdb/storage_options.h"
 
 namespace locus::server {
@@ -41,14 +41,14 @@ struct DirectoryReport {
   std::vector<SceneReport> scenes;  // by name
   std::vector<MeshReport> meshes;   // by name
 
-  bool sound() const;
+  bool intact() const;
 };
 
 // NOT_FOUND where there is no data directory, FAILED_PRECONDITION where a process has it open or another version wrote
 // it, UNAVAILABLE for a disk that fails. Damage is no error.
 absl::StatusOr<DirectoryReport> check(const StorageOptions& options);
 
-DirectoryReport report_of(const Findings& findings);
+DirectoryReport report_of(const DamageReport& damage_report);
 
 }  // namespace locus::server
 

@@ -23,7 +23,7 @@ constexpr uint64_t kMinBuffer = uint64_t{256} << 10;
 
 absl::Status nothing_opens(const StorageOptions& options, absl::string_view why) {
   return absl::DataLossError(
-      absl::StrCat("the data directory ", options.path, " cannot be opened: ", why, remedy(options.path)));
+      absl::StrCat("the data directory ", options.path, " cannot be opened: ", why, repair_hint(options.path)));
 }
 
 absl::Status open_error(const StorageOptions& options, const rocksdb::Status& status) {
@@ -89,9 +89,9 @@ absl::Status make_new(const StorageOptions& options, OpenedDirectory& opened) {
 }
 
 // Takes over what was judged of a damaged directory, so that the next one to open it finds the same.
-void remember(const Findings& findings, DurableMarker& durable_marker) {
+void remember(const DamageReport& damage_report, DurableMarker& durable_marker) {
   std::vector<SceneMarker> scene_markers;
-  for (const SceneFinding& scene : findings.scenes) {
+  for (const SceneHealth& scene : damage_report.scenes) {
     SceneMarker& scene_marker = scene_markers.emplace_back();
     for (const SceneMarker& before : durable_marker.scene_markers) {
       if (before.scene == scene.key) scene_marker = before;
@@ -102,27 +102,27 @@ void remember(const Findings& findings, DurableMarker& durable_marker) {
     durable_marker.next_scene = std::max(durable_marker.next_scene, scene.key + 1);
   }
   durable_marker.scene_markers = std::move(scene_markers);
-  durable_marker.catalogue_damage = findings.catalogue_damage;
-  if (findings.catalogue) {
-    durable_marker.next_scene = std::max(durable_marker.next_scene, findings.catalogue->next_scene);
-    durable_marker.catalogue = std::max(durable_marker.catalogue, findings.catalogue->generation);
+  durable_marker.catalogue_damage = damage_report.catalogue_damage;
+  if (damage_report.catalogue) {
+    durable_marker.next_scene = std::max(durable_marker.next_scene, damage_report.catalogue->next_scene);
+    durable_marker.catalogue = std::max(durable_marker.catalogue, damage_report.catalogue->generation);
   }
   durable_marker.catalogue = std::max<uint64_t>(durable_marker.catalogue, 1);
 }
 
-bool is_sound(const Findings& findings) {
-  return findings.catalogue_damage.empty() &&
-         std::all_of(findings.scenes.begin(), findings.scenes.end(),
-                     [](const SceneFinding& scene) { return scene.damage.empty(); });
+bool is_sound(const DamageReport& damage_report) {
+  return damage_report.catalogue_damage.empty() &&
+         std::all_of(damage_report.scenes.begin(), damage_report.scenes.end(),
+                     [](const SceneHealth& scene) { return scene.damage.empty(); });
 }
 
 // Judges, and writes down what is damaged before anything else happens.
 absl::Status judge_and_remember(const Database& database, const DurableMarker* must, OpenedDirectory& opened) {
-  absl::StatusOr<Findings> findings = judge(database, must, Depth::kKeys);
-  if (!findings.ok()) return findings.status();
-  opened.findings = *std::move(findings);
-  if (is_sound(opened.findings)) return absl::OkStatus();
-  remember(opened.findings, opened.durable_marker);
+  absl::StatusOr<DamageReport> damage_report = verify(database, must, Depth::kKeys);
+  if (!damage_report.ok()) return damage_report.status();
+  opened.damage_report = *std::move(damage_report);
+  if (is_sound(opened.damage_report)) return absl::OkStatus();
+  remember(opened.damage_report, opened.durable_marker);
   return opened.durable_marker_file->replace(opened.durable_marker);
 }
 
@@ -166,7 +166,7 @@ absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::take(rocksdb::Env&
 
 DirectoryLock::~DirectoryLock() { env_.UnlockFile(lock_).PermitUncheckedError(); }
 
-StorageOptions settled(StorageOptions options) {
+StorageOptions with_defaults(StorageOptions options) {
   if (options.env == nullptr) options.env = rocksdb::Env::Default();
   // Of the disk that it will be on, where it is yet to be made.
   std::error_code failed;
@@ -221,7 +221,7 @@ absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
   }
   absl::Status judged = judge_and_remember(*opened.database, must, opened);
   if (!judged.ok()) return judged;
-  if (!opened.findings.has_format) return nothing_opens(options, "its catalogue is lost");
+  if (!opened.damage_report.has_format) return nothing_opens(options, "its catalogue is lost");
   return opened;
 }
 

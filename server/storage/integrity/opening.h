@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 #include "rocksdb/env.h"
 #include "server/storage/integrity/durable_marker.h"
-#include "server/storage/integrity/judge.h"
+#include "server/storage/integrity/verify.h"
 #include "server/storage/rocksdb/database.h"
 #include "server/storage/rocksdb/storage_options.h"
 
@@ -39,11 +39,11 @@ struct OpenedDirectory {
   std::unique_ptr<Database> database;
   std::unique_ptr<DurableMarkerFile> durable_marker_file;
   DurableMarker durable_marker;  // as it was found, with what damage was found since
-  Findings findings;
+  DamageReport damage_report;
 };
 
 // The options with nothing left open: env, and reserve and buffer as this disk allows.
-StorageOptions settled(StorageOptions options);
+StorageOptions with_defaults(StorageOptions options);
 DatabaseOptions database_options_of(const StorageOptions& options);
 
 // `options` are settled. Errors as of RocksdbLog::open().

@@ -90,7 +90,7 @@ void keep_row(const std::string& key, const std::string& value, Result& result, 
   copy.put(copy.target().meta(), key, value);
 }
 
-absl::Status copy_scene(const Database& source, const SceneFinding& found, const DurableMarker* must, Copy& copy,
+absl::Status copy_scene(const Database& source, const SceneHealth& found, const DurableMarker* must, Copy& copy,
                         Result& result, RepairReport& report) {
   SceneRepair repaired;
   repaired.key = found.key;
@@ -131,7 +131,7 @@ absl::Status copy_scene(const Database& source, const SceneFinding& found, const
   return absl::OkStatus();
 }
 
-absl::Status copy_mesh(const Database& source, const MeshFinding& found, Copy& copy, Result& result,
+absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copy& copy, Result& result,
                        RepairReport& report) {
   const std::string content = content_key(found.sha256);
   absl::Status status = absl::DataLossError("");
@@ -151,7 +151,7 @@ absl::Status copy_mesh(const Database& source, const MeshFinding& found, Copy& c
   return absl::OkStatus();
 }
 
-absl::Status make_copy(const Database& source, const Findings& findings, const DurableMarker* must,
+absl::Status make_copy(const Database& source, const DamageReport& damage_report, const DurableMarker* must,
                        const StorageOptions& options, const std::string& folder, RepairReport& report) {
   DatabaseOptions wanted = database_options_of(options);
   wanted.folder = absl::StrCat(folder, "/", kDatabaseFolder);
@@ -163,15 +163,15 @@ absl::Status make_copy(const Database& source, const Findings& findings, const D
   Result result;
   DurableMarker& durable_marker = result.durable_marker;
   if (must != nullptr) durable_marker.next_scene = must->next_scene;
-  for (const SceneFinding& scene : findings.scenes) {
+  for (const SceneHealth& scene : damage_report.scenes) {
     durable_marker.next_scene = std::max(durable_marker.next_scene, scene.key + 1);
     if (absl::Status status = copy_scene(source, scene, must, copy, result, report); !status.ok()) return status;
   }
-  for (const MeshFinding& mesh : findings.meshes) {
+  for (const MeshHealth& mesh : damage_report.meshes) {
     if (absl::Status status = copy_mesh(source, mesh, copy, result, report); !status.ok()) return status;
   }
-  const uint64_t generation =
-      std::max(must == nullptr ? 0 : must->catalogue, findings.catalogue ? findings.catalogue->generation : 0);
+  const uint64_t generation = std::max(must == nullptr ? 0 : must->catalogue,
+                                       damage_report.catalogue ? damage_report.catalogue->generation : 0);
   const Catalogue catalogue(result.rows, generation, durable_marker.next_scene);
   copy.put(target->meta(), std::string(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
   catalogue.add_to(copy.batch(), target->meta(), CatalogueChange());
@@ -247,7 +247,7 @@ absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& opti
 }  // namespace
 
 absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
-  const StorageOptions options = settled(given);
+  const StorageOptions options = with_defaults(given);
   const std::string folder = absl::StrCat(options.path, "/", kRepairedFolder);
   RepairReport report;
   if (!fs::exists(options.path)) return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
@@ -264,11 +264,11 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   {
     const auto source = open_source(options, must, folder);
     if (!source.ok()) return source.status();
-    const absl::StatusOr<Findings> findings = judge(**source, must, Depth::kEverything);
-    if (!findings.ok()) return findings.status();
-    report.found = report_of(*findings);
-    if (report.found.sound() && !fs::exists(folder)) return report;
-    if (absl::Status status = make_copy(**source, *findings, must, options, folder, report); !status.ok()) {
+    const absl::StatusOr<DamageReport> damage_report = verify(**source, must, Depth::kEverything);
+    if (!damage_report.ok()) return damage_report.status();
+    report.found = report_of(*damage_report);
+    if (report.found.intact() && !fs::exists(folder)) return report;
+    if (absl::Status status = make_copy(**source, *damage_report, must, options, folder, report); !status.ok()) {
       fs::remove_all(folder, failed);
       return status;
     }

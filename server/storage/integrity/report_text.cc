@@ -29,7 +29,7 @@ std::string to_text(const DirectoryReport& report) {
     absl::StrAppend(&text, "mesh ", mesh.name, ": ", verdict(mesh.damage), " (", mesh.bytes, " bytes)\n");
   absl::StrAppend(&text, report.scenes.size(), " scenes, ", report.meshes.size(), " meshes, ",
                   report.closed_in_order ? "closed in order" : "not closed in order", ": ",
-                  report.sound() ? "all is sound" : "NOT all is sound; `locusd repair`, or restore a backup", "\n");
+                  report.intact() ? "all is sound" : "NOT all is sound; `locusd repair`, or restore a backup", "\n");
   return text;
 }
 

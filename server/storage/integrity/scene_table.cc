@@ -17,19 +17,19 @@ absl::Status not_found(SceneKey scene) {
 
 }  // namespace
 
-void SceneTable::add(ScenePlace scene) {
+void SceneTable::add(SceneLogStatePtr scene) {
   MutexLock lock(mutex_);
   scenes_[scene->key] = std::move(scene);
 }
 
-absl::StatusOr<ScenePlace> SceneTable::find(SceneKey scene) const {
-  ScenePlace found = find_any(scene);
+absl::StatusOr<SceneLogStatePtr> SceneTable::find(SceneKey scene) const {
+  SceneLogStatePtr found = find_any(scene);
   if (found == nullptr) return not_found(scene);
   if (!found->damage.ok()) return found->damage;
   return found;
 }
 
-ScenePlace SceneTable::find_any(SceneKey scene) const {
+SceneLogStatePtr SceneTable::find_any(SceneKey scene) const {
   MutexLock lock(mutex_);
   const auto found = scenes_.find(scene);
   return found == scenes_.end() ? nullptr : found->second;
@@ -45,12 +45,12 @@ size_t SceneTable::size() const {
   return scenes_.size();
 }
 
-uint64_t SceneTable::last_of(const SceneState& scene) const {
+uint64_t SceneTable::last_of(const SceneLogState& scene) const {
   MutexLock lock(mutex_);
   return scene.written.sequence;
 }
 
-absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneState& scene, uint64_t epoch,
+absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneLogState& scene, uint64_t epoch,
                                                            uint64_t database_sequence) {
   MutexLock lock(mutex_);
   if (scene.deleted) return not_found(scene.key);
@@ -66,7 +66,7 @@ absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneState& scene, ui
   return Start{scene.written, scene.possibly_written_end};
 }
 
-void SceneTable::end_append(SceneState& scene, Position written, bool synced) {
+void SceneTable::end_append(SceneLogState& scene, Position written, bool synced) {
   MutexLock lock(mutex_);
   scene.begun_at.reset();
   scene.written = written;
@@ -74,21 +74,21 @@ void SceneTable::end_append(SceneState& scene, Position written, bool synced) {
   if (synced) scene.synced = written;
 }
 
-void SceneTable::fail_append(SceneState& scene, uint64_t last) {
+void SceneTable::fail_append(SceneLogState& scene, uint64_t last) {
   MutexLock lock(mutex_);
   scene.begun_at.reset();
   scene.possibly_written_end = std::max(scene.possibly_written_end, last);
 }
 
-std::vector<std::pair<ScenePlace, Position>> SceneTable::written() const {
+std::vector<std::pair<SceneLogStatePtr, Position>> SceneTable::written() const {
   MutexLock lock(mutex_);
-  std::vector<std::pair<ScenePlace, Position>> positions;
+  std::vector<std::pair<SceneLogStatePtr, Position>> positions;
   positions.reserve(scenes_.size());
   for (const auto& [key, scene] : scenes_) positions.emplace_back(scene, scene->written);
   return positions;
 }
 
-void SceneTable::on_disk(const std::vector<std::pair<ScenePlace, Position>>& positions) {
+void SceneTable::on_disk(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) {
   MutexLock lock(mutex_);
   for (const auto& [scene, position] : positions) {
     if (scene->synced.sequence < position.sequence) scene->synced = position;
@@ -100,7 +100,7 @@ void SceneTable::set_catalogue(const CatalogueRow& totals) {
   totals_ = totals;
 }
 
-void SceneTable::set_row(SceneState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals) {
+void SceneTable::set_row(SceneLogState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals) {
   MutexLock lock(mutex_);
   if (scene.epoch != row.epoch) scene.copied = false;
   scene.epoch = row.epoch;

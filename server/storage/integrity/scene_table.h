@@ -28,7 +28,7 @@ struct Position {
 };
 
 // A scene's place in the log. The table's lock guards all but `writing`.
-struct SceneState {
+struct SceneLogState {
   SceneKey key = 0;
   std::string name;
   absl::Status damage;
@@ -46,7 +46,7 @@ struct SceneState {
   Mutex writing;  // held while something is written that another write to the scene must not overtake
 };
 
-using ScenePlace = std::shared_ptr<SceneState>;
+using SceneLogStatePtr = std::shared_ptr<SceneLogState>;
 
 class SceneTable {
  public:
@@ -55,29 +55,29 @@ class SceneTable {
     uint64_t possibly_written_end = 0;
   };
 
-  void add(ScenePlace scene) LOCUS_EXCLUDES(mutex_);
+  void add(SceneLogStatePtr scene) LOCUS_EXCLUDES(mutex_);
   // NOT_FOUND, or the scene's damage.
-  absl::StatusOr<ScenePlace> find(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
+  absl::StatusOr<SceneLogStatePtr> find(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
   // Also a damaged one; null where it is not known.
-  ScenePlace find_any(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
+  SceneLogStatePtr find_any(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
   bool has_name(absl::string_view name) const LOCUS_EXCLUDES(mutex_);
   size_t size() const LOCUS_EXCLUDES(mutex_);
-  uint64_t last_of(const SceneState& scene) const LOCUS_EXCLUDES(mutex_);
+  uint64_t last_of(const SceneLogState& scene) const LOCUS_EXCLUDES(mutex_);
 
   // Between the two `writing` is held. FAILED_PRECONDITION for another epoch, NOT_FOUND for a scene deleted meanwhile.
-  absl::StatusOr<Start> begin_append(SceneState& scene, uint64_t epoch, uint64_t database_sequence)
+  absl::StatusOr<Start> begin_append(SceneLogState& scene, uint64_t epoch, uint64_t database_sequence)
       LOCUS_EXCLUDES(mutex_);
-  void end_append(SceneState& scene, Position written, bool synced) LOCUS_EXCLUDES(mutex_);
-  void fail_append(SceneState& scene, uint64_t last) LOCUS_EXCLUDES(mutex_);
+  void end_append(SceneLogState& scene, Position written, bool synced) LOCUS_EXCLUDES(mutex_);
+  void fail_append(SceneLogState& scene, uint64_t last) LOCUS_EXCLUDES(mutex_);
 
   // Where all scenes have been written to; after the disk has it, on_disk() takes the same list.
-  std::vector<std::pair<ScenePlace, Position>> written() const LOCUS_EXCLUDES(mutex_);
-  void on_disk(const std::vector<std::pair<ScenePlace, Position>>& positions) LOCUS_EXCLUDES(mutex_);
+  std::vector<std::pair<SceneLogStatePtr, Position>> written() const LOCUS_EXCLUDES(mutex_);
+  void on_disk(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) LOCUS_EXCLUDES(mutex_);
 
   // A change of the catalogue has come to the disk: its totals, and the row of `scene` if the change was of one;
   // without a row the scene is gone.
   void set_catalogue(const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
-  void set_row(SceneState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals)
+  void set_row(SceneLogState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals)
       LOCUS_EXCLUDES(mutex_);
   void remove(SceneKey scene, const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
 
@@ -87,7 +87,7 @@ class SceneTable {
 
  private:
   mutable Mutex mutex_;
-  std::map<SceneKey, ScenePlace> scenes_ LOCUS_GUARDED_BY(mutex_);
+  std::map<SceneKey, SceneLogStatePtr> scenes_ LOCUS_GUARDED_BY(mutex_);
   CatalogueRow totals_ LOCUS_GUARDED_BY(mutex_);
 };
 

@@ -1,4 +1,4 @@
-#include "server/storage/integrity/judge.h"
+#include "server/storage/integrity/verify.h"
 
 #include <algorithm>
 #include <map>
@@ -27,7 +27,7 @@ std::string count_of(uint64_t count, absl::string_view thing) {
   return absl::StrCat(count, " ", thing, count == 1 ? "" : "s");
 }
 
-absl::Status read_meta(const Database& database, Findings& found) {
+absl::Status read_meta(const Database& database, DamageReport& found) {
   const std::unique_ptr<rocksdb::Iterator> at(database.db().NewIterator(reading_options(), database.meta()));
   for (at->SeekToFirst(); at->Valid(); at->Next()) {
     const absl::string_view key = view_of(at->key());
@@ -53,7 +53,7 @@ absl::Status read_meta(const Database& database, Findings& found) {
   return read_error("reading the catalogue", at->status());
 }
 
-Standing compare(const Findings& found, const DurableMarker& must) {
+Standing compare(const DamageReport& found, const DurableMarker& must) {
   CatalogueRow sums;
   Catalogue::add_sums(found.rows, sums);
   const CatalogueRow said = found.catalogue.value_or(CatalogueRow());
@@ -66,7 +66,7 @@ Standing compare(const Findings& found, const DurableMarker& must) {
 }
 
 // What is wrong with the scene's row, apart from its log.
-std::string row_damage(const SceneFinding& scene, const SceneMarker* scene_marker, const Standing& standing) {
+std::string row_damage(const SceneHealth& scene, const SceneMarker* scene_marker, const Standing& standing) {
   if (standing.whole && standing.later) return "";
   if (scene_marker == nullptr)
     return standing.whole ? "it was deleted, and is back" : "it is not in HIGH_WATER, and the catalogue is not whole";
@@ -81,7 +81,7 @@ std::string damage_of(const absl::Status& status, absl::Status& disk) {
   return std::string(status.message());
 }
 
-std::string log_damage(SceneFinding& scene, const SceneMarker* scene_marker, const DurableMarker& must,
+std::string log_damage(SceneHealth& scene, const SceneMarker* scene_marker, const DurableMarker& must,
                        const Database& database, absl::Status& disk) {
   const SceneRow& row = *scene.row;
   uint64_t chain_at = 0;
@@ -108,7 +108,7 @@ std::string log_damage(SceneFinding& scene, const SceneMarker* scene_marker, con
 }
 
 // Every byte, for whoever asks for it.
-std::string deep_damage(const SceneFinding& scene, const Database& database, absl::Status& disk) {
+std::string deep_damage(const SceneHealth& scene, const Database& database, absl::Status& disk) {
   const SceneRow& row = *scene.row;
   const auto nowhere = [](absl::string_view) { return absl::OkStatus(); };
   absl::Status status =
@@ -119,7 +119,7 @@ std::string deep_damage(const SceneFinding& scene, const Database& database, abs
   return damage_of(status, disk);
 }
 
-absl::Status judge_scene(SceneFinding& scene, const SceneMarker* scene_marker, const DurableMarker* must,
+absl::Status judge_scene(SceneHealth& scene, const SceneMarker* scene_marker, const DurableMarker* must,
                          const Standing& standing, const Database& database, Depth depth) {
   absl::Status disk;
   if (scene_marker != nullptr) scene.expected_sequence = scene_marker->sequence;
@@ -137,14 +137,14 @@ absl::Status judge_scene(SceneFinding& scene, const SceneMarker* scene_marker, c
 }
 
 absl::Status find_scenes(const DurableMarker* must, const Standing& standing, const Database& database, Depth depth,
-                         Findings& found) {
-  std::map<SceneKey, SceneFinding> scenes;
+                         DamageReport& found) {
+  std::map<SceneKey, SceneHealth> scenes;
   std::map<SceneKey, const SceneMarker*> scene_markers;
   for (const auto& [key, value] : found.rows) {
     if (key[0] != kSceneTag) continue;
     std::optional<SceneRow> row = decode_scene(*verified(key, value));
     if (!row) continue;
-    SceneFinding& scene = scenes[row->key];
+    SceneHealth& scene = scenes[row->key];
     scene.key = row->key;
     scene.name = row->name;
     scene.row_checksum = stored_checksum(value);
@@ -156,7 +156,7 @@ absl::Status find_scenes(const DurableMarker* must, const Standing& standing, co
       if (scenes.contains(scene_marker.scene)) continue;
       // Deleted after HIGH_WATER was written, and rightly so.
       if (standing.whole && standing.later && scene_marker.damage.empty()) continue;
-      SceneFinding& scene = scenes[scene_marker.scene];
+      SceneHealth& scene = scenes[scene_marker.scene];
       scene.key = scene_marker.scene;
       scene.name = scene_marker.name;
     }
@@ -171,11 +171,11 @@ absl::Status find_scenes(const DurableMarker* must, const Standing& standing, co
   return absl::OkStatus();
 }
 
-absl::Status find_meshes(const Database& database, Depth depth, Findings& found) {
+absl::Status find_meshes(const Database& database, Depth depth, DamageReport& found) {
   absl::Status disk;
   const std::string start(1, kMeshTag);
   for (auto row = found.rows.lower_bound(start); row != found.rows.end() && row->first[0] == kMeshTag; ++row) {
-    MeshFinding& mesh = found.meshes.emplace_back();
+    MeshHealth& mesh = found.meshes.emplace_back();
     mesh.name = row->first.substr(1);
     mesh.damage = found.catalogue_damage;
     const absl::string_view sha256 = *verified(row->first, row->second);
@@ -195,8 +195,8 @@ absl::Status find_meshes(const Database& database, Depth depth, Findings& found)
 
 }  // namespace
 
-absl::StatusOr<Findings> judge(const Database& database, const DurableMarker* durable_marker, Depth depth) {
-  Findings found;
+absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth) {
+  DamageReport found;
   if (absl::Status status = read_meta(database, found); !status.ok()) return status;
   Standing standing;
   if (durable_marker != nullptr) standing = compare(found, *durable_marker);
@@ -217,7 +217,7 @@ absl::StatusOr<Findings> judge(const Database& database, const DurableMarker* du
   return found;
 }
 
-std::string remedy(const std::string& path) {
+std::string repair_hint(const std::string& path) {
   return absl::StrCat("; `locusd check ", path, "` says more, `locusd repair ", path,
                       "` keeps what is sound, or restore a backup");
 }

@@ -1,7 +1,7 @@
 // Judges what a data directory holds: every scene by its own numbers and checksums and by what HIGH_WATER says must be
 // there. What RocksDB believes of itself counts for nothing here, only what it hands out. Free functions; any thread.
-#ifndef LOCUS_SERVER_STORAGE_INTEGRITY_JUDGE_H_
-#define LOCUS_SERVER_STORAGE_INTEGRITY_JUDGE_H_
+#ifndef LOCUS_SERVER_STORAGE_INTEGRITY_VERIFY_H_
+#define LOCUS_SERVER_STORAGE_INTEGRITY_VERIFY_H_
 
 #include <optional>
 #include <string>
@@ -16,7 +16,7 @@
 
 namespace locus::server {
 
-struct SceneFinding {
+struct SceneHealth {
   SceneKey key = 0;
   std::string name;
   std::optional<SceneRow> row;  // nothing where it is lost
@@ -29,19 +29,19 @@ struct SceneFinding {
   std::string damage;              // what is wrong, empty where nothing is
 };
 
-struct MeshFinding {
+struct MeshHealth {
   std::string name;
   Sha256 sha256 = {};
   ContentRow content;
   std::string damage;
 };
 
-struct Findings {
+struct DamageReport {
   bool has_format = false;
   Catalogue::Rows rows;  // all that are sound by themselves
   std::optional<CatalogueRow> catalogue;
-  std::vector<SceneFinding> scenes;  // those that are there and those that must be, by key
-  std::vector<MeshFinding> meshes;   // by name
+  std::vector<SceneHealth> scenes;   // those that are there and those that must be, by key
+  std::vector<MeshHealth> meshes;    // by name
   std::string catalogue_damage;      // names may be missing, or be back; then no mesh is believed
   std::vector<std::string> pending;  // keys of chunks whose snapshot or mesh was not finished
 };
@@ -51,11 +51,11 @@ enum class Depth : uint8_t { kKeys, kEverything };
 
 // UNAVAILABLE where the disk fails, and FAILED_PRECONDITION for a format of another version. `high_water` is null where
 // it was lost; then everything is damaged.
-absl::StatusOr<Findings> judge(const Database& database, const DurableMarker* durable_marker, Depth depth);
+absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth);
 
 // What to do about damage, as the end of a message.
-std::string remedy(const std::string& path);
+std::string repair_hint(const std::string& path);
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_STORAGE_INTEGRITY_JUDGE_H_
+#endif  // LOCUS_SERVER_STORAGE_INTEGRITY_VERIFY_H_
