@@ -59,7 +59,7 @@ class PersistentArray {
   void set(size_t place, T value);
 
   // Bytes of leaves and of the list that `other` does not share. O(leaves).
-  size_t bytes_apart_from(const PersistentArray& other) const;
+  size_t unshared_bytes(const PersistentArray& other) const;
   // fn(value, other's value) for each place whose leaf `other` does not share; null where it has no such place.
   // O(leaves and places handed over).
   template <class Fn>
@@ -114,7 +114,7 @@ void PersistentArray<T, kLeafSize>::set(size_t place, T value) {
 }
 
 template <class T, size_t kLeafSize>
-size_t PersistentArray<T, kLeafSize>::bytes_apart_from(const PersistentArray& other) const {
+size_t PersistentArray<T, kLeafSize>::unshared_bytes(const PersistentArray& other) const {
   if (list_ == other.list_) return 0;
   size_t bytes = sizeof(List) + list_->leaves.size() * sizeof(list_->leaves[0]);
   for (size_t leaf = 0; leaf < list_->leaves.size(); ++leaf)

@@ -66,9 +66,9 @@ class PersistentIdTable {
 
   // Of leaves that snapshots may hold and this table does not any more, since this was last asked.
   size_t take_replaced_bytes() { return std::exchange(replaced_bytes_, 0); }
-  size_t bytes() const { return bytes_apart_from(PersistentIdTable()); }
+  size_t bytes() const { return unshared_bytes(PersistentIdTable()); }
   // Of what `other` does not share. O(leaves).
-  size_t bytes_apart_from(const PersistentIdTable& other) const;
+  size_t unshared_bytes(const PersistentIdTable& other) const;
 
  private:
   static constexpr size_t kPlaces = 5;        // of a bucket
@@ -238,8 +238,8 @@ void PersistentIdTable<Hash>::rebuild(size_t leaf_count) {
 }
 
 template <class Hash>
-size_t PersistentIdTable<Hash>::bytes_apart_from(const PersistentIdTable& other) const {
-  size_t bytes = leaves_.bytes_apart_from(other.leaves_);
+size_t PersistentIdTable<Hash>::unshared_bytes(const PersistentIdTable& other) const {
+  size_t bytes = leaves_.unshared_bytes(other.leaves_);
   leaves_.for_each_apart_from(other.leaves_, [&bytes](const auto& leaf, const auto* theirs) {
     if (theirs == nullptr || leaf != *theirs) bytes += sizeof(Leaf);
   });

@@ -99,9 +99,9 @@ struct Brick {
     if (recent != nullptr) __builtin_prefetch(recent.get());
   }
 
-  size_t bytes() const { return bytes_apart_from(nullptr); }
+  size_t bytes() const { return unshared_bytes(nullptr); }
   // Without what `other`, perhaps a later version of this brick, shares; null shares nothing.
-  size_t bytes_apart_from(const Brick* other) const {
+  size_t unshared_bytes(const Brick* other) const {
     if (other == this) return 0;
     const bool shares_sorted = other != nullptr && sorted == other->sorted;
     const bool shares_recent = recent == nullptr || (other != nullptr && recent == other->recent);

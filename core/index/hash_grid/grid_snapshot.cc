@@ -77,12 +77,12 @@ double GridSnapshot::values_per_cell(const internal::GridLevel& level, const Vec
   return nearby > 0 ? nearby : internal::values_per_cell(level.extent, level.size);
 }
 
-size_t GridSnapshot::bytes_apart_from(const GridSnapshot& other) const {
-  size_t bytes = bricks_.bytes_apart_from(other.bricks_) + bricks_by_handle_.bytes_apart_from(other.bricks_by_handle_);
+size_t GridSnapshot::unshared_bytes(const GridSnapshot& other) const {
+  size_t bytes = bricks_.unshared_bytes(other.bricks_) + bricks_by_handle_.unshared_bytes(other.bricks_by_handle_);
   bricks_.for_each_apart_from(other.bricks_,
                               [&bytes](const internal::BrickPtr& brick, const internal::BrickPtr* theirs) {
                                 if (brick != nullptr)
-                                  bytes += brick->bytes_apart_from(theirs == nullptr ? nullptr : theirs->get());
+                                  bytes += brick->unshared_bytes(theirs == nullptr ? nullptr : theirs->get());
                               });
   for (const internal::GridLevel& level : levels_) {
     const bool shared = std::any_of(other.levels_.begin(), other.levels_.end(),

@@ -110,7 +110,7 @@ class GridSnapshot {
   // O(bricks).
   GridStatistics statistics() const;
   // Bytes of what `other`, another snapshot of the grid, does not share. O(bricks that differ).
-  size_t bytes_apart_from(const GridSnapshot& other) const;
+  size_t unshared_bytes(const GridSnapshot& other) const;
 
  private:
   const internal::Brick* find_brick(const internal::GridLevel& level, const internal::GridKey& key) const;

@@ -180,7 +180,7 @@ void HashGrid::rebuild_bricks(const GridMoves& moves) {
 
 void HashGrid::replace_brick(uint32_t brick, internal::BrickPtr next) {
   if (const internal::Brick* old = bricks_[brick].get(); old != nullptr)
-    replaced_bytes_ += old->bytes_apart_from(next.get());
+    replaced_bytes_ += old->unshared_bytes(next.get());
   if (next == nullptr) {
     drop_brick(brick);
   } else {

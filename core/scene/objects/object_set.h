@@ -74,10 +74,10 @@ class ObjectSet {
 
   GridStatistics statistics() const { return grid_.statistics(); }
   // Of objects, bricks and what finds them. O(bricks).
-  size_t bytes() const { return bytes_apart_from(ObjectSet()); }
+  size_t bytes() const { return unshared_bytes(ObjectSet()); }
   // Of what `other`, a set of the same scene, does not share. O(what differs).
-  size_t bytes_apart_from(const ObjectSet& other) const {
-    return grid_.bytes_apart_from(other.grid_) + handles_.bytes_apart_from(other.handles_);
+  size_t unshared_bytes(const ObjectSet& other) const {
+    return grid_.unshared_bytes(other.grid_) + handles_.unshared_bytes(other.handles_);
   }
 
  private:

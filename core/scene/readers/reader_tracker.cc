@@ -106,7 +106,7 @@ uint64_t ReaderTracker::count(std::vector<Holding>& pinned, const SceneSnapshot&
   uint64_t held = 0;
   for (size_t i = 0; i < pinned.size(); ++i) {
     const SceneSnapshot& next = i + 1 < pinned.size() ? *pinned[i + 1].snapshot : latest;
-    pinned[i].bytes = bytes_apart_from(*pinned[i].snapshot, next);
+    pinned[i].bytes = unshared_bytes(*pinned[i].snapshot, next);
     held += pinned[i].bytes;
   }
   return held;

@@ -7,7 +7,7 @@ namespace {
 
 std::shared_ptr<const HistoryRecord> record_of(const HistoryRecord& record, const ObjectSet& next) {
   HistoryRecord counted = record;
-  counted.bytes = sizeof(HistoryRecord) + record.objects.bytes_apart_from(next);
+  counted.bytes = sizeof(HistoryRecord) + record.objects.unshared_bytes(next);
   if (record.to_next.fast != nullptr) counted.bytes += record.to_next.fast->size() * sizeof(FastMover);
   return std::make_shared<const HistoryRecord>(std::move(counted));
 }

@@ -24,18 +24,18 @@ uint64_t past_apart_from(const SceneSnapshot& held, const SceneSnapshot& later) 
     if (kept == record.get()) continue;
     // The last record is made anew when the next one comes, of the same objects.
     const bool same_tick = kept != nullptr && kept->tick == record->tick;
-    bytes += same_tick ? record->objects.bytes_apart_from(kept->objects) : record->bytes;
+    bytes += same_tick ? record->objects.unshared_bytes(kept->objects) : record->bytes;
   }
   return bytes;
 }
 
 }  // namespace
 
-uint64_t bytes_apart_from(const SceneSnapshot& held, const SceneSnapshot& later) {
+uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   const uint64_t statics = held.statics == later.statics ? 0 : held.statics->bytes();
   // The first that the later revision still has of all that came after: it shares most.
   const HistoryRecord* next = first_record(later, held.tick);
-  return statics + held.objects.bytes_apart_from(next == nullptr ? later.objects : next->objects) +
+  return statics + held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
          past_apart_from(held, later);
 }
 

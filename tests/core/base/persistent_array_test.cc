@@ -64,7 +64,7 @@ TEST(PersistentArrayTest, WhatIsApartIsWhatWasWrittenSince) {
   Array array;
   for (uint32_t place = 0; place < 1000; ++place) array.set(place, 1);
   const Array before = array.snapshot();
-  EXPECT_EQ(before.bytes_apart_from(before), 0u);
+  EXPECT_EQ(before.unshared_bytes(before), 0u);
   array.set(500, 2);
   const Array after = array.snapshot();
   size_t changed = 0, seen = 0;
@@ -74,8 +74,8 @@ TEST(PersistentArrayTest, WhatIsApartIsWhatWasWrittenSince) {
   });
   EXPECT_EQ(changed, 1u);
   EXPECT_LT(seen, 1000u);
-  EXPECT_GT(before.bytes_apart_from(after), 0u);
-  EXPECT_LT(before.bytes_apart_from(after), before.bytes_apart_from(Array()));
+  EXPECT_GT(before.unshared_bytes(after), 0u);
+  EXPECT_LT(before.unshared_bytes(after), before.unshared_bytes(Array()));
 }
 
 }  // namespace

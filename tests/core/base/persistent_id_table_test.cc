@@ -124,11 +124,11 @@ TEST(PersistentIdTableTest, WhatIsApartIsWhatWasWrittenSince) {
   PersistentIdTable<> table;
   for (Id id = 1; id <= 10'000; ++id) table.set(id, 1);
   const PersistentIdTable<> before = table.snapshot();
-  EXPECT_EQ(before.bytes_apart_from(table.snapshot()), 0u);
+  EXPECT_EQ(before.unshared_bytes(table.snapshot()), 0u);
   table.set(500, 2);
   const PersistentIdTable<> after = table.snapshot();
-  EXPECT_GT(before.bytes_apart_from(after), 0u);
-  EXPECT_LT(before.bytes_apart_from(after) * 10, before.bytes());
+  EXPECT_GT(before.unshared_bytes(after), 0u);
+  EXPECT_LT(before.unshared_bytes(after) * 10, before.bytes());
   EXPECT_EQ(before.find(500), 1u);
   EXPECT_EQ(after.find(500), 2u);
 }
@@ -142,7 +142,7 @@ TEST(PersistentIdTableTest, CountsWhatOnlySnapshotsHoldFromNowOn) {
   table.set(500, 3);
   const size_t replaced = table.take_replaced_bytes();
   EXPECT_GT(replaced, 0u);
-  EXPECT_LE(replaced, before.bytes_apart_from(table.snapshot()));
+  EXPECT_LE(replaced, before.unshared_bytes(table.snapshot()));
   EXPECT_EQ(table.take_replaced_bytes(), 0u);
   table.fit(40'000);
   EXPECT_GT(table.take_replaced_bytes() * 10, before.bytes() * 9);

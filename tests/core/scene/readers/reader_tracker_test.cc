@@ -71,8 +71,7 @@ TEST_F(ReaderTrackerTest, WhatReadersHoldIsCountedOnce) {
   EXPECT_TRUE(step_now().ok());
   const SnapshotPin second = pin();
   EXPECT_TRUE(step_now().ok());
-  EXPECT_EQ(scene_.status().pinned_bytes,
-            bytes_apart_from(*first, *second) + bytes_apart_from(*second, *scene_.latest()));
+  EXPECT_EQ(scene_.status().pinned_bytes, unshared_bytes(*first, *second) + unshared_bytes(*second, *scene_.latest()));
 }
 
 TEST_F(ReaderTrackerTest, AReaderWithinTheBudgetIsNeverToldToEndHoweverMuchIsReplaced) {
@@ -162,7 +161,7 @@ TEST_F(ReaderTrackerTest, WhoPinsAnOlderRevisionHoldsWhatItKeeps) {
   EXPECT_TRUE(step_now().ok());
   EXPECT_TRUE(step_now().ok());
   const SnapshotPin old = pin({View::Kind::kExactly, 1, 0});
-  EXPECT_EQ(scene_.status().pinned_bytes, bytes_apart_from(*old, *scene_.latest()));
+  EXPECT_EQ(scene_.status().pinned_bytes, unshared_bytes(*old, *scene_.latest()));
 }
 
 TEST_F(ReaderTrackerTest, OnlyWhoWasToldToEndIsCutOffAndOnlyOnce) {

@@ -44,28 +44,28 @@ class SnapshotBytesWithPastTest : public SnapshotBytesTest {
 
 TEST_F(SnapshotBytesTest, ARevisionHoldsNothingApartFromItself) {
   // Each level of the grid has a few words of its own.
-  EXPECT_LT(bytes_apart_from(*scene_.latest(), *scene_.latest()), 1'000u);
+  EXPECT_LT(unshared_bytes(*scene_.latest(), *scene_.latest()), 1'000u);
 }
 
 TEST_F(SnapshotBytesTest, WhatAllWasReplacedIsHeldOnce) {
   const SnapshotPtr held = scene_.latest();
-  const uint64_t after_one = bytes_apart_from(*held, *after(step(1)));
+  const uint64_t after_one = unshared_bytes(*held, *after(step(1)));
   for (int i = 2; i < 20; ++i) apply(step(float(i)));
   EXPECT_GT(after_one, kObjects * sizeof(Vec3d));
-  EXPECT_LE(bytes_apart_from(*held, *scene_.latest()), after_one + 1'000);
+  EXPECT_LE(unshared_bytes(*held, *scene_.latest()), after_one + 1'000);
 }
 
 TEST_F(SnapshotBytesTest, LittleIsHeldWhereLittleWasReplaced) {
   const SnapshotPtr held = scene_.latest();
-  const uint64_t of_one = bytes_apart_from(*held, *after(with(move_to({1}, {1, 0, 0}))));
-  EXPECT_LT(3 * of_one, bytes_apart_from(*held, *after(step(1))));
+  const uint64_t of_one = unshared_bytes(*held, *after(with(move_to({1}, {1, 0, 0}))));
+  EXPECT_LT(3 * of_one, unshared_bytes(*held, *after(step(1))));
 }
 
 TEST_F(SnapshotBytesTest, IsAtMostFourTimesWhatRevisionsReplaced) {
   const SnapshotPtr held = scene_.latest();
   for (int i = 1; i < 5; ++i) {
     apply(step(float(i)));
-    EXPECT_LE(bytes_apart_from(*held, *scene_.latest()), 4 * (scene_.latest()->replaced_bytes - held->replaced_bytes));
+    EXPECT_LE(unshared_bytes(*held, *scene_.latest()), 4 * (scene_.latest()->replaced_bytes - held->replaced_bytes));
   }
 }
 
@@ -73,14 +73,14 @@ TEST_F(SnapshotBytesTest, ReplacedInstancesAreHeld) {
   ASSERT_TRUE(scene_.change_instances(placing(placement({kObjects + 1}, {0, 0, 0}))).ok());
   const SnapshotPtr held = scene_.latest();
   ASSERT_TRUE(scene_.change_instances(placing(placement({kObjects + 2}, {0, 0, 0}))).ok());
-  EXPECT_GE(bytes_apart_from(*held, *scene_.latest()), held->statics->bytes());
+  EXPECT_GE(unshared_bytes(*held, *scene_.latest()), held->statics->bytes());
   EXPECT_GE(scene_.latest()->replaced_bytes - held->replaced_bytes, held->statics->bytes());
 }
 
 TEST_F(SnapshotBytesWithPastTest, WhatThePastKeepsIsNotHeldByReaders) {
   const SnapshotPtr held = scene_.latest();
   for (uint32_t i = 1; i <= kTicks; ++i) apply(step(float(i)));
-  EXPECT_LT(bytes_apart_from(*held, *scene_.latest()), 1'000u);
+  EXPECT_LT(unshared_bytes(*held, *scene_.latest()), 1'000u);
 }
 
 TEST_F(SnapshotBytesWithPastTest, APastThatIsNotKeptAnyMoreIsHeldByReaders) {
@@ -88,8 +88,8 @@ TEST_F(SnapshotBytesWithPastTest, APastThatIsNotKeptAnyMoreIsHeldByReaders) {
   const SnapshotPtr held = scene_.latest();
   const uint64_t past = held->history->bytes;
   for (uint32_t i = 1; i <= 3 * kTicks; ++i) apply(step(100 + float(i)));
-  EXPECT_GT(bytes_apart_from(*held, *scene_.latest()), past);
-  EXPECT_LE(bytes_apart_from(*held, *scene_.latest()), 4 * (scene_.latest()->replaced_bytes - held->replaced_bytes));
+  EXPECT_GT(unshared_bytes(*held, *scene_.latest()), past);
+  EXPECT_LE(unshared_bytes(*held, *scene_.latest()), 4 * (scene_.latest()->replaced_bytes - held->replaced_bytes));
 }
 
 TEST_F(SnapshotBytesWithPastTest, APastOfOtherTicksThatHadTheSameNumbersIsHeld) {
@@ -100,7 +100,7 @@ TEST_F(SnapshotBytesWithPastTest, APastOfOtherTicksThatHadTheSameNumbersIsHeld) 
   restart.tick = 1;
   apply(restart);
   while (scene_.latest()->tick < held->tick) apply(step(60 + float(scene_.latest()->tick)));
-  EXPECT_GT(bytes_apart_from(*held, *scene_.latest()), held->history->bytes);
+  EXPECT_GT(unshared_bytes(*held, *scene_.latest()), held->history->bytes);
 }
 
 }  // namespace
