@@ -179,9 +179,9 @@ MeshPtr restore_mesh(const UpdateLog& log, const StoredMesh& stored, const Trian
   const std::optional<std::string> kept = log.read_outline(stored.sha256);
   if (!kept) return nullptr;
   const AlignedBytes bytes(*kept);
-  const absl::StatusOr<TreeOutline> outline = decode_outline(bytes);
-  if (!outline.ok()) return nullptr;
-  absl::StatusOr<MeshPtr> mesh = StaticMesh::restore(stored.name, stored.sha256, columns, *outline, options);
+  const absl::StatusOr<TreeTopology> topology = decode_outline(bytes);
+  if (!topology.ok()) return nullptr;
+  absl::StatusOr<MeshPtr> mesh = StaticMesh::restore(stored.name, stored.sha256, columns, *topology, options);
   return mesh.ok() ? *std::move(mesh) : nullptr;
 }
 
@@ -206,7 +206,7 @@ absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& sto
     return RecoveredMesh{std::move(restored), false};
   absl::StatusOr<MeshPtr> mesh = StaticMesh::build(stored.name, stored.sha256, *std::move(columns), options);
   if (!mesh.ok()) return named(name, mesh.status());
-  log.keep_outline(stored.sha256, encode_outline((*mesh)->tree().outline()));
+  log.keep_outline(stored.sha256, encode_outline((*mesh)->tree().topology()));
   return RecoveredMesh{*std::move(mesh), true};
 }
 

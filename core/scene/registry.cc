@@ -209,7 +209,7 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
       return content->next();
     };
     if (absl::Status status = log_->add_mesh(name, mesh->sha256(), next); !status.ok()) return status;
-    if (content) log_->keep_outline(mesh->sha256(), encode_outline(mesh->tree().outline()));
+    if (content) log_->keep_outline(mesh->sha256(), encode_outline(mesh->tree().topology()));
   }
   const MutexLock lock(mutex_);
   meshes_.emplace(name, mesh);

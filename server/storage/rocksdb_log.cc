@@ -41,7 +41,7 @@ RocksdbLog::RocksdbLog(const StorageOptions& options, OpenedDirectory opened)
       database_(std::move(opened.database)),
       damage_report_(std::move(opened.damage_report)),
       closed_in_order_(opened.durable_marker.closed),
-      outlines_(*options.env, options.path),
+      topologies_(*options.env, options.path),
       durable_marker_file_(std::move(opened.durable_marker_file)),
       durable_marker_(std::move(opened.durable_marker)) {}
 
@@ -127,7 +127,7 @@ absl::Status RocksdbLog::begin() {
       if (absl::Status status = commit(CatalogueChange(), batch); !status.ok()) return status;
     }
     scenes_.set_catalogue(catalogue_.totals());
-    outlines_.drop_all_but(contents());
+    topologies_.drop_all_but(contents());
   }
   damage_report_ = DamageReport();
   look_at_the_disk();

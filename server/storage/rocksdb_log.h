@@ -22,8 +22,8 @@
 #include "server/storage/integrity/opening.h"
 #include "server/storage/integrity/scene_table.h"
 #include "server/storage/rocksdb/catalogue.h"
-#include "server/storage/rocksdb/outline_files.h"
 #include "server/storage/rocksdb/storage_options.h"
+#include "server/storage/rocksdb/topology_files.h"
 
 namespace locus::server {
 
@@ -110,7 +110,7 @@ class RocksdbLog final : public UpdateLog {
   absl::Status catalogue_damage_;
   const bool closed_in_order_;
 
-  OutlineFiles outlines_;
+  TopologyFiles topologies_;
   SceneTable scenes_;
   mutable Mutex catalogue_mutex_;  // held while a change of the catalogue is written; before the two below
   Catalogue catalogue_ LOCUS_GUARDED_BY(catalogue_mutex_);

@@ -326,7 +326,7 @@ absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
     LOCUS_CHECK(batch.DeleteRange(database_->mesh(), all, end_of(all)).ok());
   }
   if (absl::Status status = commit(change, batch); !status.ok()) return status;
-  if (change.rows.size() > 1) outlines_.drop(sha256);
+  if (change.rows.size() > 1) topologies_.drop(sha256);
   scenes_.set_catalogue(catalogue_.totals());
   write_high_water(false);
   return absl::OkStatus();
@@ -347,10 +347,10 @@ absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
 
 void RocksdbLog::keep_outline(const Sha256& sha256, absl::string_view bytes) {
   if (!room_for("an outline", bytes.size()).ok()) return;
-  outlines_.keep(sha256, bytes);
+  topologies_.keep(sha256, bytes);
   written_bytes_ += bytes.size();
 }
 
-std::optional<std::string> RocksdbLog::read_outline(const Sha256& sha256) const { return outlines_.read(sha256); }
+std::optional<std::string> RocksdbLog::read_outline(const Sha256& sha256) const { return topologies_.read(sha256); }
 
 }  // namespace locus::server

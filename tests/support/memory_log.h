@@ -41,7 +41,7 @@ class MemoryLog : public UpdateLog {
     std::map<SceneKey, KeptScene> scenes;
     std::map<std::string, std::array<uint8_t, 32>> meshes;
     std::map<std::array<uint8_t, 32>, std::vector<Bytes>> contents;
-    std::map<std::array<uint8_t, 32>, std::string> outlines;
+    std::map<std::array<uint8_t, 32>, std::string> topologies;
     SceneKey last_key = 0;
   };
 
@@ -217,7 +217,7 @@ class MemoryLog : public UpdateLog {
     const bool used = std::any_of(kept_.meshes.begin(), kept_.meshes.end(),
                                   [&sha256](const auto& mesh) { return mesh.second == sha256; });
     if (!used) kept_.contents.erase(sha256);
-    if (!used) kept_.outlines.erase(sha256);
+    if (!used) kept_.topologies.erase(sha256);
     return absl::OkStatus();
   }
 
@@ -234,12 +234,12 @@ class MemoryLog : public UpdateLog {
 
   void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override {
     const MutexLock lock(mutex_);
-    if (failure_.ok()) kept_.outlines[sha256] = std::string(bytes);
+    if (failure_.ok()) kept_.topologies[sha256] = std::string(bytes);
   }
   std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const override {
     const MutexLock lock(mutex_);
-    const auto found = kept_.outlines.find(sha256);
-    return found == kept_.outlines.end() ? std::nullopt : std::optional(found->second);
+    const auto found = kept_.topologies.find(sha256);
+    return found == kept_.topologies.end() ? std::nullopt : std::optional(found->second);
   }
 
   absl::Status back_up(const std::string&) override { return absl::UnimplementedError("nowhere to go"); }

@@ -189,8 +189,8 @@ class StoredModel {
       if (known == meshes_.end()) return absl::StrCat("mesh ", mesh.name, " is back");
       if (mesh.sha256 != hash_of(known->second.first)) return absl::StrCat("mesh ", mesh.name, " is another");
       const auto chunks = read_mesh(log, mesh.sha256);
-      const std::optional<std::string> outline = log.read_outline(mesh.sha256);
-      if (outline && *outline != outline_bytes(known->second.first))
+      const std::optional<std::string> topology = log.read_outline(mesh.sha256);
+      if (topology && *topology != outline_bytes(known->second.first))
         return absl::StrCat("mesh ", mesh.name, " has another outline");
       if (absl::IsDataLoss(chunks.status()) && refusals == Refusals::kAllowed) continue;
       if (!chunks.ok()) return std::string(chunks.status().message());

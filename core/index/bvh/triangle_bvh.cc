@@ -62,10 +62,10 @@ absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triang
   return built;
 }
 
-absl::StatusOr<TriangleBvh> TriangleBvh::restore(const TreeOutline& outline, uint32_t triangle_count,
+absl::StatusOr<TriangleBvh> TriangleBvh::restore(const TreeTopology& topology, uint32_t triangle_count,
                                                  absl::FunctionRef<Triangle(uint32_t)> triangle,
                                                  const BvhOptions& options) {
-  absl::StatusOr<TriangleArrays> arrays = restore_arrays(outline, triangle_count, triangle, options);
+  absl::StatusOr<TriangleArrays> arrays = restore_arrays(topology, triangle_count, triangle, options);
   if (!arrays.ok()) return arrays.status();
   TriangleBvh restored;
   restored.arrays_ = *std::move(arrays);

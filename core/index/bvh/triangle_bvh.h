@@ -15,7 +15,7 @@
 #include "core/geometry/triangle.h"
 #include "core/index/bvh/box_distances.h"
 #include "core/index/bvh/bvh_build.h"
-#include "core/index/bvh/tree_outline.h"
+#include "core/index/bvh/tree_topology.h"
 #include "core/index/bvh/triangle_tree.h"
 #include "core/index/bvh/triangle_writer.h"
 #include "core/index/spatial_index.h"
@@ -34,7 +34,7 @@ class TriangleBvh {
   // The same tree again from what outline() gave, of triangles whose numbers are 0 to triangle_count - 1 and whose
   // vertices are finite: O(n) and several times faster. From any other outline of so many triangles a tree that answers
   // as right, if slower. Errors: as restore_arrays().
-  static absl::StatusOr<TriangleBvh> restore(const TreeOutline& outline, uint32_t triangle_count,
+  static absl::StatusOr<TriangleBvh> restore(const TreeTopology& topology, uint32_t triangle_count,
                                              absl::FunctionRef<Triangle(uint32_t)> triangle,
                                              const BvhOptions& options = {});
 
@@ -54,7 +54,7 @@ class TriangleBvh {
   // As Bvh::sah_cost().
   double sah_cost() const;
   // Not for an empty tree. Valid while this object stands.
-  TreeOutline outline() const { return outline_of(arrays_); }
+  TreeTopology topology() const { return outline_of(arrays_); }
   // Valid while this object stands unmoved. Not for an empty tree.
   TriangleTree tree() const {
     return {arrays_.nodes.get(), arrays_.ranges.get(), arrays_.blocks.get(), arrays_.numbers.get(), magnitude_};

@@ -4,36 +4,36 @@
 
 namespace locus {
 
-std::string encode_outline(const TreeOutline& outline) {
+std::string encode_outline(const TreeTopology& topology) {
   std::string bytes;
   // With room for what stands before each column, and for filling up to multiples of 8.
-  bytes.reserve(outline.numbers.size() * sizeof(uint32_t) + outline.block_sizes.size() +
-                outline.nodes.size() * sizeof(NodeOutline) + 64);
+  bytes.reserve(topology.numbers.size() * sizeof(uint32_t) + topology.block_sizes.size() +
+                topology.nodes.size() * sizeof(NodeOutline) + 64);
   ByteWriter writer(bytes);
   write_kind(writer, BytesKind::kTreeOutline);
   writer.number(uint64_t{kBvhBuilderVersion});
-  writer.column(outline.numbers);
-  writer.column(absl::MakeConstSpan(outline.block_sizes));
-  writer.column(absl::MakeConstSpan(outline.nodes));
+  writer.column(topology.numbers);
+  writer.column(absl::MakeConstSpan(topology.block_sizes));
+  writer.column(absl::MakeConstSpan(topology.nodes));
   return bytes;
 }
 
-absl::StatusOr<TreeOutline> decode_outline(const AlignedBytes& bytes) {
+absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes) {
   ByteReader reader(bytes.bytes());
   if (read_kind(reader) != BytesKind::kTreeOutline) reader.fail("the outline of a tree", "is something else");
   const uint64_t version = reader.number("the version of the builder");
   if (reader.good() && version != kBvhBuilderVersion)
     return absl::FailedPreconditionError(
         absl::StrCat("the tree is of builder ", version, ", this is ", kBvhBuilderVersion));
-  TreeOutline outline;
-  outline.numbers = reader.column<uint32_t>("the numbers of the triangles");
+  TreeTopology topology;
+  topology.numbers = reader.column<uint32_t>("the numbers of the triangles");
   const auto sizes = reader.column<uint8_t>("the sizes of the blocks");
-  outline.block_sizes.assign(sizes.begin(), sizes.end());
+  topology.block_sizes.assign(sizes.begin(), sizes.end());
   const auto nodes = reader.column<NodeOutline>("the nodes");
-  outline.nodes.assign(nodes.begin(), nodes.end());
+  topology.nodes.assign(nodes.begin(), nodes.end());
   reader.end("the outline of a tree");
   if (!reader.good()) return reader.status();
-  return outline;
+  return topology;
 }
 
 }  // namespace locus

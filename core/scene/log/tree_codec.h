@@ -1,4 +1,4 @@
-// The outline of a mesh's tree (core/index/bvh/tree_outline.h) as bytes for the log, with the version of the builder
+// The outline of a mesh's tree (core/index/bvh/tree_topology.h) as bytes for the log, with the version of the builder
 // that made it. The same for all instruction sets, as trees are. Free functions; any thread.
 #ifndef LOCUS_CORE_SCENE_LOG_TREE_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_TREE_CODEC_H_
@@ -6,15 +6,15 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "core/index/bvh/tree_outline.h"
+#include "core/index/bvh/tree_topology.h"
 #include "core/scene/log/byte_codec.h"
 
 namespace locus {
 
-std::string encode_outline(const TreeOutline& outline);
+std::string encode_outline(const TreeTopology& topology);
 
 // Borrows from `bytes`. DATA_LOSS saying what is wrong with them, FAILED_PRECONDITION for another builder's.
-absl::StatusOr<TreeOutline> decode_outline(const AlignedBytes& bytes);
+absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes);
 
 }  // namespace locus
 

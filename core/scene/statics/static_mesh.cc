@@ -29,11 +29,11 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::build(std::string 
 
 absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::restore(std::string name, const Sha256& sha256,
                                                                       const TriangleMesh& mesh,
-                                                                      const TreeOutline& outline,
+                                                                      const TreeTopology& topology,
                                                                       const BvhOptions& options) {
   const std::shared_ptr<StaticMesh> restored(new StaticMesh(std::move(name), sha256));
   const auto triangle = [&mesh](uint32_t number) { return mesh.triangle(number); };
-  absl::StatusOr<TriangleBvh> tree = TriangleBvh::restore(outline, mesh.triangle_count(), triangle, options);
+  absl::StatusOr<TriangleBvh> tree = TriangleBvh::restore(topology, mesh.triangle_count(), triangle, options);
   if (!tree.ok()) return tree.status();
   restored->tree_ = *std::move(tree);
   restored->keep_columns(mesh);

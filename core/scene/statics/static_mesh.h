@@ -26,7 +26,8 @@ class StaticMesh {
 
   // The same from the outline of the tree of that very mesh. Errors: as TriangleBvh::restore().
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> restore(std::string name, const Sha256& sha256,
-                                                                   const TriangleMesh& mesh, const TreeOutline& outline,
+                                                                   const TriangleMesh& mesh,
+                                                                   const TreeTopology& topology,
                                                                    const BvhOptions& options = {});
 
   const std::string& name() const { return name_; }

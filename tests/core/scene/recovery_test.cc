@@ -110,8 +110,8 @@ TEST_F(RecoverTest, WhatTheLogFoundDamagedIsNotLookedAt) {
 // One that was kept by another builder, that is damaged, or gone: the tree is built and kept again.
 TEST_F(RecoverTest, AnOutlineThatDoesNotFitIsMadeAnew) {
   const MemoryLog::Kept kept = log_.crash();
-  ASSERT_EQ(kept.outlines.size(), 1u);
-  const std::string right = kept.outlines.at(mesh_->sha256());
+  ASSERT_EQ(kept.topologies.size(), 1u);
+  const std::string right = kept.topologies.at(mesh_->sha256());
   std::string of_another_builder = right, of_other_triangles = right;
   of_another_builder[8] = static_cast<char>(kBvhBuilderVersion + 1);
   of_other_triangles[24] = static_cast<char>(99);  // the first triangle's number
@@ -127,7 +127,7 @@ TEST_F(RecoverTest, AnOutlineThatDoesNotFitIsMadeAnew) {
     EXPECT_EQ(again.read_outline(mesh_->sha256()), right);
   }
   MemoryLog::Kept without = kept;
-  without.outlines.clear();
+  without.topologies.clear();
   MemoryLog again(without);
   EXPECT_TRUE(recover_mesh(again, again.stored_meshes().front())->built);
   EXPECT_EQ(again.read_outline(mesh_->sha256()), right);

@@ -257,13 +257,13 @@ TEST_P(RocksdbLogDamageTest, SampleIsSound) {
     EXPECT_EQ(verdict.difference, "");
     EXPECT_GT(verdict.served, 2u);
   }
-  int tables = 0, outlines = 0;
+  int tables = 0, topologies = 0;
   for (const auto& [name, bytes] : sample().files) {
     tables += absl::EndsWith(name, ".sst");
-    outlines += absl::StartsWith(name, "outlines/");
+    topologies += absl::StartsWith(name, "outlines/");
   }
   EXPECT_GT(tables, 3);
-  EXPECT_GT(outlines, 0);
+  EXPECT_GT(topologies, 0);
 }
 
 TEST_P(RocksdbLogDamageTest, FlippedByteLosesNothingSilently) { flip_bytes(Trials::kFew); }

@@ -240,13 +240,13 @@ TEST_F(RocksdbLogTest, OutlinesOfNoMeshAndUnfinishedOnesGoWhenItOpens) {
   ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
   log_->keep_outline(hash_of(1), "outline");
   log_->keep_outline(hash_of(2), "of no mesh");
-  const std::filesystem::path outlines = std::filesystem::path(options_.path) / "outlines";
-  ASSERT_EQ(std::distance(std::filesystem::directory_iterator(outlines), {}), 2);
-  test::write_file_bytes((outlines / (std::string(64, 'a') + ".new")).string(), "half of one");
-  test::write_file_bytes((outlines / "of-somebody.svg").string(), "not ours");
+  const std::filesystem::path topologies = std::filesystem::path(options_.path) / "outlines";
+  ASSERT_EQ(std::distance(std::filesystem::directory_iterator(topologies), {}), 2);
+  test::write_file_bytes((topologies / (std::string(64, 'a') + ".new")).string(), "half of one");
+  test::write_file_bytes((topologies / "of-somebody.svg").string(), "not ours");
   open();
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(outlines), {}), 2);
-  EXPECT_TRUE(std::filesystem::exists(outlines / "of-somebody.svg"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(topologies), {}), 2);
+  EXPECT_TRUE(std::filesystem::exists(topologies / "of-somebody.svg"));
   EXPECT_EQ(log_->read_outline(hash_of(1)), "outline");
 }
 

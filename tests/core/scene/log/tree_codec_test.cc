@@ -15,27 +15,27 @@ namespace {
 
 absl::StatusOr<TriangleBvh> restore(const std::string& bytes, const std::vector<Triangle>& triangles) {
   const AlignedBytes aligned(bytes);
-  const absl::StatusOr<TreeOutline> outline = decode_outline(aligned);
-  if (!outline.ok()) return outline.status();
+  const absl::StatusOr<TreeTopology> topology = decode_outline(aligned);
+  if (!topology.ok()) return topology.status();
   const auto triangle = [&](uint32_t number) { return triangles[number]; };
-  return TriangleBvh::restore(*outline, static_cast<uint32_t>(triangles.size()), triangle);
+  return TriangleBvh::restore(*topology, static_cast<uint32_t>(triangles.size()), triangle);
 }
 
 std::string encoded(const std::vector<Triangle>& triangles) {
-  return encode_outline(TriangleBvh::build(triangles)->outline());
+  return encode_outline(TriangleBvh::build(triangles)->topology());
 }
 
 TEST(TreeCodecTest, AnOutlineComesBackAndTakesFiveBytesATriangle) {
   for (const std::vector<Triangle>& triangles : {bumpy_sphere(40, 0.05, 6), box_city(1, 1)}) {
     const TriangleBvh built = *TriangleBvh::build(triangles);
-    const std::string bytes = encode_outline(built.outline());
+    const std::string bytes = encode_outline(built.topology());
     EXPECT_LT(bytes.size(), 5 * triangles.size() + 64);
     const AlignedBytes aligned(bytes);
-    const absl::StatusOr<TreeOutline> outline = decode_outline(aligned);
-    ASSERT_TRUE(outline.ok()) << outline.status();
-    EXPECT_EQ(outline->numbers, built.outline().numbers);
-    EXPECT_EQ(outline->block_sizes, built.outline().block_sizes);
-    EXPECT_EQ(outline->nodes, built.outline().nodes);
+    const absl::StatusOr<TreeTopology> topology = decode_outline(aligned);
+    ASSERT_TRUE(topology.ok()) << topology.status();
+    EXPECT_EQ(topology->numbers, built.topology().numbers);
+    EXPECT_EQ(topology->block_sizes, built.topology().block_sizes);
+    EXPECT_EQ(topology->nodes, built.topology().nodes);
   }
 }
 

@@ -113,7 +113,7 @@ TEST(StaticMeshTest, RestoredFromItsOutlineItIsTheSameToTheLastByteItGives) {
   const std::vector<MeshPart> parts = {{"a", 0}, {"b", 7}};
   const auto built = build(columns.vertices, columns.indices, parts);
   const absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create(columns.vertices, columns.indices, parts);
-  const auto restored = StaticMesh::restore("mesh", {}, *mesh, built->tree().outline());
+  const auto restored = StaticMesh::restore("mesh", {}, *mesh, built->tree().topology());
   ASSERT_TRUE(restored.ok()) << restored.status();
   EXPECT_EQ((*restored)->name(), "mesh");
   EXPECT_EQ((*restored)->vertices(), columns.vertices);
@@ -130,7 +130,7 @@ TEST(StaticMeshTest, TheOutlineOfAnotherMeshMakesNone) {
   const Columns columns = welded(box_city(3, 3));
   const auto other = build({0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2});
   const absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create(columns.vertices, columns.indices, {});
-  EXPECT_EQ(StaticMesh::restore("mesh", {}, *mesh, other->tree().outline()).status().code(),
+  EXPECT_EQ(StaticMesh::restore("mesh", {}, *mesh, other->tree().topology()).status().code(),
             absl::StatusCode::kInvalidArgument);
 }
 

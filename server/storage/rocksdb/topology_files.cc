@@ -1,4 +1,4 @@
-#include "server/storage/rocksdb/outline_files.h"
+#include "server/storage/rocksdb/topology_files.h"
 
 #include <vector>
 
@@ -26,12 +26,12 @@ bool is_name(absl::string_view name) {
 
 }  // namespace
 
-OutlineFiles::OutlineFiles(rocksdb::Env& env, absl::string_view path)
+TopologyFiles::TopologyFiles(rocksdb::Env& env, absl::string_view path)
     : env_(env), folder_(absl::StrCat(path, "/", kFolder)) {}
 
-std::string OutlineFiles::path_of(const std::string& name) const { return absl::StrCat(folder_, "/", name); }
+std::string TopologyFiles::path_of(const std::string& name) const { return absl::StrCat(folder_, "/", name); }
 
-void OutlineFiles::keep(const Sha256& sha256, absl::string_view bytes) {
+void TopologyFiles::keep(const Sha256& sha256, absl::string_view bytes) {
   const std::string name = name_of(sha256);
   const std::string unfinished = absl::StrCat(path_of(name), kUnfinished);
   rocksdb::Status status = env_.CreateDirIfMissing(folder_);
@@ -40,7 +40,7 @@ void OutlineFiles::keep(const Sha256& sha256, absl::string_view bytes) {
   if (!status.ok()) env_.DeleteFile(unfinished).PermitUncheckedError();
 }
 
-std::optional<std::string> OutlineFiles::read(const Sha256& sha256) const {
+std::optional<std::string> TopologyFiles::read(const Sha256& sha256) const {
   const std::string name = name_of(sha256);
   std::string bytes;
   uint64_t size = 0;
@@ -52,9 +52,9 @@ std::optional<std::string> OutlineFiles::read(const Sha256& sha256) const {
   return bytes;
 }
 
-void OutlineFiles::drop(const Sha256& sha256) { env_.DeleteFile(path_of(name_of(sha256))).PermitUncheckedError(); }
+void TopologyFiles::drop(const Sha256& sha256) { env_.DeleteFile(path_of(name_of(sha256))).PermitUncheckedError(); }
 
-void OutlineFiles::drop_all_but(const std::set<Sha256>& used) {
+void TopologyFiles::drop_all_but(const std::set<Sha256>& used) {
   std::set<std::string> names;
   for (const Sha256& sha256 : used) names.insert(name_of(sha256));
   std::vector<std::string> there;

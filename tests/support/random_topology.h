@@ -1,13 +1,13 @@
 // Outlines of trees that no builder makes, of given many triangles: any triangles share a block, any blocks a node.
 // What a data directory could hold that is wrong and fits all the same.
-#ifndef LOCUS_TESTS_SUPPORT_RANDOM_OUTLINE_H_
-#define LOCUS_TESTS_SUPPORT_RANDOM_OUTLINE_H_
+#ifndef LOCUS_TESTS_SUPPORT_RANDOM_TOPOLOGY_H_
+#define LOCUS_TESTS_SUPPORT_RANDOM_TOPOLOGY_H_
 
 #include <algorithm>
 #include <numeric>
 #include <vector>
 
-#include "core/index/bvh/tree_outline.h"
+#include "core/index/bvh/tree_topology.h"
 #include "tests/support/random.h"
 
 namespace locus::test {
@@ -26,7 +26,7 @@ class RandomOutline {
   RandomOutline(const RandomOutline&) = delete;
   RandomOutline& operator=(const RandomOutline&) = delete;
 
-  const TreeOutline& outline() const { return outline_; }
+  const TreeTopology& topology() const { return outline_; }
 
  private:
   // A node with so many blocks below it, and all that is below it. Half of them at most go to one child, so that the
@@ -58,9 +58,9 @@ class RandomOutline {
   }
 
   std::vector<uint32_t> numbers_;
-  TreeOutline outline_;
+  TreeTopology outline_;
 };
 
 }  // namespace locus::test
 
-#endif  // LOCUS_TESTS_SUPPORT_RANDOM_OUTLINE_H_
+#endif  // LOCUS_TESTS_SUPPORT_RANDOM_TOPOLOGY_H_

@@ -3,8 +3,8 @@
 // not read. So files are not synced either. Files of other names are left alone.
 //
 // Threads: any, of one content one at a time.
-#ifndef LOCUS_SERVER_STORAGE_ROCKSDB_OUTLINE_FILES_H_
-#define LOCUS_SERVER_STORAGE_ROCKSDB_OUTLINE_FILES_H_
+#ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
+#define LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
 
 #include <optional>
 #include <set>
@@ -16,12 +16,12 @@
 
 namespace locus::server {
 
-class OutlineFiles {
+class TopologyFiles {
  public:
   static constexpr absl::string_view kFolder = "outlines";
 
   // Below the data directory `path`.
-  OutlineFiles(rocksdb::Env& env, absl::string_view path);
+  TopologyFiles(rocksdb::Env& env, absl::string_view path);
 
   void keep(const Sha256& sha256, absl::string_view bytes);
   std::optional<std::string> read(const Sha256& sha256) const;
@@ -38,4 +38,4 @@ class OutlineFiles {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_STORAGE_ROCKSDB_OUTLINE_FILES_H_
+#endif  // LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_

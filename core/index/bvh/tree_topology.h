@@ -4,8 +4,8 @@
 // whatever an outline says, a tree that is restored from it answers right. A bad one only makes it slow.
 //
 // Plain data; free functions, any thread.
-#ifndef LOCUS_CORE_INDEX_BVH_TREE_OUTLINE_H_
-#define LOCUS_CORE_INDEX_BVH_TREE_OUTLINE_H_
+#ifndef LOCUS_CORE_INDEX_BVH_TREE_TOPOLOGY_H_
+#define LOCUS_CORE_INDEX_BVH_TREE_TOPOLOGY_H_
 
 #include <cstdint>
 #include <vector>
@@ -29,21 +29,21 @@ struct NodeOutline {
 };
 
 // All in the order of a TriangleTree: depth-first, the blocks of a node before the nodes below it.
-struct TreeOutline {
+struct TreeTopology {
   absl::Span<const uint32_t> numbers;  // of the triangles, by position; borrowed
   std::vector<uint8_t> block_sizes;    // 1 to kTreeWidth
   std::vector<NodeOutline> nodes;
 };
 
 // Of a tree that is not empty. Borrows from it.
-TreeOutline outline_of(const TriangleArrays& arrays);
+TreeTopology outline_of(const TriangleArrays& arrays);
 
 // Of `triangle_count` triangles, each number from 0 on asked for once, on any threads. INVALID_ARGUMENT for an outline
 // that is none of so many triangles, CANCELLED. O(n).
-absl::StatusOr<TriangleArrays> restore_arrays(const TreeOutline& outline, uint32_t triangle_count,
+absl::StatusOr<TriangleArrays> restore_arrays(const TreeTopology& topology, uint32_t triangle_count,
                                               absl::FunctionRef<Triangle(uint32_t)> triangle,
                                               const BvhOptions& options);
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_BVH_TREE_OUTLINE_H_
+#endif  // LOCUS_CORE_INDEX_BVH_TREE_TOPOLOGY_H_

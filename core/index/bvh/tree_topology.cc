@@ -1,4 +1,4 @@
-#include "core/index/bvh/tree_outline.h"
+#include "core/index/bvh/tree_topology.h"
 
 #include <algorithm>
 #include <array>
@@ -22,12 +22,12 @@ absl::Status no_outline(absl::string_view why) {
 
 class Restorer {
  public:
-  Restorer(const TreeOutline& outline, uint32_t triangle_count, absl::FunctionRef<Triangle(uint32_t)> triangle,
+  Restorer(const TreeTopology& topology, uint32_t triangle_count, absl::FunctionRef<Triangle(uint32_t)> triangle,
            const BvhOptions& options)
-      : outline_(outline), triangle_(triangle), options_(options) {
+      : outline_(topology), triangle_(triangle), options_(options) {
     arrays_.triangle_count = triangle_count;
-    arrays_.block_count = static_cast<uint32_t>(outline.block_sizes.size());
-    arrays_.node_count = static_cast<uint32_t>(outline.nodes.size());
+    arrays_.block_count = static_cast<uint32_t>(topology.block_sizes.size());
+    arrays_.node_count = static_cast<uint32_t>(topology.nodes.size());
   }
 
   absl::StatusOr<TriangleArrays> restore() {
@@ -166,7 +166,7 @@ class Restorer {
     fill_boxes(absl::MakeConstSpan(boxes).first(used), node);
   }
 
-  const TreeOutline& outline_;
+  const TreeTopology& outline_;
   const absl::FunctionRef<Triangle(uint32_t)> triangle_;
   const BvhOptions& options_;
   TriangleArrays arrays_;
@@ -175,30 +175,30 @@ class Restorer {
 
 }  // namespace
 
-TreeOutline outline_of(const TriangleArrays& arrays) {
+TreeTopology outline_of(const TriangleArrays& arrays) {
   LOCUS_CHECK_LT(0u, arrays.node_count);
-  TreeOutline outline;
-  outline.numbers = {arrays.numbers.get(), arrays.triangle_count};
-  outline.block_sizes.reserve(arrays.block_count);
+  TreeTopology topology;
+  topology.numbers = {arrays.numbers.get(), arrays.triangle_count};
+  topology.block_sizes.reserve(arrays.block_count);
   for (uint32_t block = 0; block < arrays.block_count; ++block)
-    outline.block_sizes.push_back(static_cast<uint8_t>(arrays.blocks[block].count));
-  outline.nodes.resize(arrays.node_count);
+    topology.block_sizes.push_back(static_cast<uint8_t>(arrays.blocks[block].count));
+  topology.nodes.resize(arrays.node_count);
   for (uint32_t number = 0; number < arrays.node_count; ++number) {
     for (int slot = 0; slot < kTreeWidth; ++slot) {
       const uint32_t child = arrays.nodes[number].child[slot];
       if (child == kNoChild) continue;
-      NodeOutline& node = outline.nodes[number];
+      NodeOutline& node = topology.nodes[number];
       uint8_t& kind = (child & kBlockBit) != 0 ? node.blocks : node.nodes;
       kind = static_cast<uint8_t>(kind | 1u << slot);
     }
   }
-  return outline;
+  return topology;
 }
 
-absl::StatusOr<TriangleArrays> restore_arrays(const TreeOutline& outline, uint32_t triangle_count,
+absl::StatusOr<TriangleArrays> restore_arrays(const TreeTopology& topology, uint32_t triangle_count,
                                               absl::FunctionRef<Triangle(uint32_t)> triangle,
                                               const BvhOptions& options) {
-  return Restorer(outline, triangle_count, triangle, options).restore();
+  return Restorer(topology, triangle_count, triangle, options).restore();
 }
 
 }  // namespace locus

@@ -1,6 +1,6 @@
 // What is restored from an outline: the very tree that was built where it is its own, and from any other one a tree
 // that answers as right.
-#include "core/index/bvh/tree_outline.h"
+#include "core/index/bvh/tree_topology.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 #include "tests/support/equal_trees.h"
 #include "tests/support/generated_meshes.h"
 #include "tests/support/kernel_trials.h"
-#include "tests/support/random_outline.h"
+#include "tests/support/random_topology.h"
 #include "tests/support/region_trials.h"
 #include "tests/support/scene_search.h"
 #include "tests/support/threads.h"
@@ -29,31 +29,31 @@ std::vector<Triangle> renumbered(std::vector<Triangle> triangles) {
 }
 
 // With `triangles` in the order of their numbers.
-absl::StatusOr<TriangleBvh> restore(const TreeOutline& outline, const std::vector<Triangle>& triangles,
+absl::StatusOr<TriangleBvh> restore(const TreeTopology& topology, const std::vector<Triangle>& triangles,
                                     const BvhOptions& options = {}) {
   const auto triangle = [&](uint32_t number) { return triangles[number]; };
-  return TriangleBvh::restore(outline, static_cast<uint32_t>(triangles.size()), triangle, options);
+  return TriangleBvh::restore(topology, static_cast<uint32_t>(triangles.size()), triangle, options);
 }
 
-TEST(TreeOutlineTest, ATreeComesBackByteForByteOnAnyThreads) {
+TEST(TreeTopologyTest, ATreeComesBackByteForByteOnAnyThreads) {
   for (const std::vector<Triangle>& triangles : {bumpy_sphere(130, 0.05, 6), box_city(9, 1), bumpy_sphere(2, 0.1, 1)}) {
     const TriangleBvh built = *TriangleBvh::build(triangles);
     for (const ParallelFor& parallel_for : {on_threads(1), on_threads(3), backwards()}) {
       BvhOptions options;
       options.parallel_for = parallel_for;
-      const absl::StatusOr<TriangleBvh> restored = restore(built.outline(), triangles, options);
+      const absl::StatusOr<TriangleBvh> restored = restore(built.topology(), triangles, options);
       ASSERT_TRUE(restored.ok()) << restored.status();
       expect_equal_bytes(*restored, built);
     }
   }
 }
 
-TEST(TreeOutlineTest, ATreeOfEverySmallSizeComesBack) {
+TEST(TreeTopologyTest, ATreeOfEverySmallSizeComesBack) {
   const std::vector<Triangle> all = bumpy_sphere(6, 0.1, 2);
   for (size_t count = 1; count <= all.size(); ++count) {
     const std::vector<Triangle> some(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
     const TriangleBvh built = *TriangleBvh::build(some);
-    const absl::StatusOr<TriangleBvh> restored = restore(built.outline(), some);
+    const absl::StatusOr<TriangleBvh> restored = restore(built.topology(), some);
     ASSERT_TRUE(restored.ok()) << restored.status();
     expect_equal_bytes(*restored, built);
   }
@@ -66,17 +66,17 @@ std::string difference_of_any_outline(const TestScene<Triangle>& scene) {
   numbered.values = renumbered(scene.values);
   Random random(scene.values.size());
   const RandomOutline made(static_cast<uint32_t>(scene.values.size()), random);
-  const absl::StatusOr<TriangleBvh> tree = restore(made.outline(), numbered.values);
+  const absl::StatusOr<TriangleBvh> tree = restore(made.topology(), numbered.values);
   if (!tree.ok()) return tree.status().ToString();
   const ListIndex<Triangle> oracle = make_list(numbered.values);
   return IndexJudge<TriangleBvh>(*tree, oracle).difference(numbered);
 }
 
-TEST(TreeOutlineTest, AnyOutlineThatFitsAnswersAsTheListDoes) {
+TEST(TreeTopologyTest, AnyOutlineThatFitsAnswersAsTheListDoes) {
   EXPECT_EQ(search_all_scenes<Triangle>(scaled_count(1'000), scaled_count(300), difference_of_any_outline), "");
 }
 
-TEST(TreeOutlineTest, KernelsAnswerRightInATreeOfAnyOutline) {
+TEST(TreeTopologyTest, KernelsAnswerRightInATreeOfAnyOutline) {
   const std::vector<Triangle> triangles = bumpy_sphere(14, 0.1, 1);
   for (const std::string& name : instruction_sets()) {
     ASSERT_TRUE(use_instruction_set(name).ok());
@@ -86,12 +86,12 @@ TEST(TreeOutlineTest, KernelsAnswerRightInATreeOfAnyOutline) {
     for (uint64_t seed = 0; seed < 4; ++seed) {
       Random random(seed);
       const RandomOutline made(static_cast<uint32_t>(triangles.size()), random);
-      absl::StatusOr<TriangleBvh> tree = restore(made.outline(), triangles);
+      absl::StatusOr<TriangleBvh> tree = restore(made.topology(), triangles);
       ASSERT_TRUE(tree.ok()) << tree.status();
       const KernelTrial trial(absl::StrCat("outline ", seed), triangles,
                               random_questions(triangles, scaled_count(500), seed), *std::move(tree));
       EXPECT_EQ(trial.difference(*kernels), "") << name;
-      tree = restore(made.outline(), triangles);
+      tree = restore(made.topology(), triangles);
       const RegionTrial regions = random_region_trial("regions", triangles, *std::move(tree), scaled_count(100), seed);
       EXPECT_EQ(regions.difference(*region_kernels), "") << name;
     }
@@ -101,7 +101,7 @@ TEST(TreeOutlineTest, KernelsAnswerRightInATreeOfAnyOutline) {
 
 class WrongOutlineTest : public ::testing::Test {
  protected:
-  WrongOutlineTest() : built_(*TriangleBvh::build(triangles_)), wrong_(built_.outline()) {
+  WrongOutlineTest() : built_(*TriangleBvh::build(triangles_)), wrong_(built_.topology()) {
     numbers_.assign(wrong_.numbers.begin(), wrong_.numbers.end());
     wrong_.numbers = numbers_;
   }
@@ -110,7 +110,7 @@ class WrongOutlineTest : public ::testing::Test {
   const std::vector<Triangle> triangles_ = box_city(3, 1);
   const TriangleBvh built_;
   std::vector<uint32_t> numbers_;
-  TreeOutline wrong_;
+  TreeTopology wrong_;
 };
 
 TEST_F(WrongOutlineTest, TheOneOfTheTreeFits) { EXPECT_EQ(refused(), ""); }
@@ -185,10 +185,10 @@ class Chain {
  private:
   std::vector<Triangle> triangles_;
   std::vector<uint32_t> numbers_;
-  TreeOutline outline_;
+  TreeTopology outline_;
 };
 
-TEST(TreeOutlineTest, TheDeepestTreeThatIsLetInIsWalkedToItsEnd) {
+TEST(TreeTopologyTest, TheDeepestTreeThatIsLetInIsWalkedToItsEnd) {
   const Chain chain(limits::kMaxBvhDepth);
   absl::StatusOr<TriangleBvh> tree = chain.tree();
   ASSERT_TRUE(tree.ok()) << tree.status();
@@ -214,18 +214,18 @@ TEST(TreeOutlineTest, TheDeepestTreeThatIsLetInIsWalkedToItsEnd) {
   ASSERT_TRUE(use_instruction_set("").ok());
 }
 
-TEST(TreeOutlineTest, OneThatIsDeeperIsRefused) {
+TEST(TreeTopologyTest, OneThatIsDeeperIsRefused) {
   EXPECT_EQ(Chain(limits::kMaxBvhDepth + 1).tree().status().message(),
             "the outline of the tree does not fit: too deep");
 }
 
-TEST(TreeOutlineTest, CancelledItMakesNone) {
+TEST(TreeTopologyTest, CancelledItMakesNone) {
   const std::vector<Triangle> triangles = box_city(3, 1);
   const TriangleBvh built = *TriangleBvh::build(triangles);
   const std::atomic<bool> cancel = true;
   BvhOptions options;
   options.cancel = &cancel;
-  EXPECT_EQ(restore(built.outline(), triangles, options).status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(restore(built.topology(), triangles, options).status().code(), absl::StatusCode::kCancelled);
 }
 
 }  // namespace
