@@ -23,7 +23,7 @@ constexpr uint32_t kMaxPackets = 2;      // of rays that go together, likewise
 constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; their numbers fit a byte
 
 // A ray on its way. Waiting nodes and blocks start no later than the limit; below them stands kNoChild.
-struct alignas(64) Flight {
+struct alignas(64) InFlightRay {
   PreparedRay ray;
   uint32_t index;
   uint32_t now;  // where it is: a node, a block, or kNoChild at its end
@@ -41,7 +41,7 @@ enum Step : uint32_t { kNode = 0, kBlock = 1, kEnd = 2, kCandidates = 3, kSteps 
 static inline uint32_t step_at(uint32_t reference) { return (reference >> 31) + (reference == kNoChild ? 1u : 0u); }
 
 // Who is to take which step.
-struct Agenda {
+struct WorkList {
   uint8_t flights[kSteps][kMaxFlights];
   uint32_t counts[kSteps] = {};
 
@@ -53,10 +53,10 @@ enum class Wanted : uint8_t { kFirst, kAny, kAll };
 
 // Up to kPreparedRays rays through one tree: those whose numbers are given.
 template <Wanted kWanted>
-class Voyage {
+class RayStream {
  public:
-  inline Voyage(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared, KernelHit* hits,
-                KeptRows kept, const uint8_t* numbers, uint32_t count, Flight* flights)
+  inline RayStream(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared, KernelHit* hits,
+                   KeptRows kept, const uint8_t* numbers, uint32_t count, InFlightRay* flights)
       : tree_(tree),
         rays_(rays),
         prepared_(prepared),
@@ -69,10 +69,10 @@ class Voyage {
   // What hangs on the outcome of a step comes in a second pass over its rays: the processor, which looks only so far
   // ahead, is to find the steps of several rays there instead, none of which waits for another.
   inline void run() {
-    Agenda now;
+    WorkList now;
     for (uint32_t flight = 0; flight < kMaxFlights && next_ != count_; ++flight) start(flight, now);
     while (!now.empty()) {
-      Agenda then;
+      WorkList then;
       for (uint32_t i = 0; i < now.counts[kNode]; ++i) open_node(now.flights[kNode][i]);
       for (uint32_t i = 0; i < now.counts[kNode]; ++i) go_on(now.flights[kNode][i], then);
       for (uint32_t i = 0; i < now.counts[kBlock]; ++i) open_block(now.flights[kBlock][i]);
@@ -92,8 +92,8 @@ class Voyage {
     uint32_t number;  // of the block
   };
 
-  inline void start(uint32_t number, Agenda& then) {
-    Flight& flight = flights_[number];
+  inline void start(uint32_t number, WorkList& then) {
+    InFlightRay& flight = flights_[number];
     const uint32_t index = numbers_[next_++];
     flight.ray = PreparedRay(prepared_[index / kTreeWidth], index % kTreeWidth);
     flight.index = index;
@@ -109,7 +109,7 @@ class Voyage {
 
   // Puts the children that the ray may hit on the stack, the nearest last.
   inline void open_node(uint32_t number) {
-    Flight& flight = flights_[number];
+    InFlightRay& flight = flights_[number];
     const PreparedRay ray = flight.ray;
     const uint32_t octant = ray.whole(kOctant);
     const TriangleNode& node = tree_.nodes[flight.now];
@@ -133,8 +133,8 @@ class Voyage {
   }
 
   // Goes to the next of those that wait.
-  inline void go_on(uint32_t number, Agenda& then) {
-    Flight& flight = flights_[number];
+  inline void go_on(uint32_t number, WorkList& then) {
+    InFlightRay& flight = flights_[number];
     const uint32_t reference = flight.waiting[--flight.top], step = step_at(reference);
     flight.now = reference;
     fetch(reference, step);
@@ -142,7 +142,7 @@ class Voyage {
   }
 
   inline void open_block(uint32_t number) {
-    Flight& flight = flights_[number];
+    InFlightRay& flight = flights_[number];
     const uint32_t block_number = flight.now & ~kBlockBit;
     const TriangleBlock& block = tree_.blocks[block_number];
     flight.tests += block.count;
@@ -152,8 +152,8 @@ class Voyage {
   }
 
   // To what waits behind it, or to have decided first what it left open.
-  inline void leave_block(uint32_t number, Agenda& then) {
-    Flight& flight = flights_[number];
+  inline void leave_block(uint32_t number, WorkList& then) {
+    InFlightRay& flight = flights_[number];
     // Branches would be guessed wrongly too often here.
     const uint32_t settle_first =
         static_cast<uint32_t>(met_[number].block.open != 0) | static_cast<uint32_t>(flight.tests > kMaxKernelTests);
@@ -165,9 +165,9 @@ class Voyage {
   }
 
   // Decides what float left open in a block, and goes on.
-  inline void settle(uint32_t number, Agenda& then) {
+  inline void settle(uint32_t number, WorkList& then) {
     const Met& met = met_[number];
-    Flight& flight = flights_[number];
+    InFlightRay& flight = flights_[number];
     if (kAny && met.block.sure != 0) flight.found = true;
     const float limit = flight.limit;
     if (!kAny || !flight.found) decide_open(flight, met);
@@ -177,7 +177,7 @@ class Voyage {
     go_on(number, then);
   }
 
-  inline void decide_open(Flight& flight, const Met& met) {
+  inline void decide_open(InFlightRay& flight, const Met& met) {
     const TriangleBlock& block = tree_.blocks[met.number];
     for (uint32_t open = met.block.open; open != 0; open &= open - 1u) {
       const int place = __builtin_ctz(open);
@@ -188,7 +188,7 @@ class Voyage {
     }
   }
 
-  inline void take(Flight& flight, KernelRow hit) const {
+  inline void take(InFlightRay& flight, KernelRow hit) const {
     if constexpr (kAll) {
       const KeptRows kept = {kept_.rows + uint64_t{flight.index} * kept_.most, kept_.most};
       kept.offer(hit, flight.number, flight.limit);
@@ -201,7 +201,7 @@ class Voyage {
   }
 
   // Those that start exactly at the limit stay: a lower number may wait there.
-  static inline void drop_beyond(Flight& flight) {
+  static inline void drop_beyond(InFlightRay& flight) {
     const Floats8 limit = Floats8::all(flight.limit);
     uint32_t kept = 1;
     for (uint32_t from = 1; from < flight.top; from += kTreeWidth) {
@@ -216,8 +216,8 @@ class Voyage {
     flight.top = kept;
   }
 
-  inline void end(uint32_t number, Agenda& then) {
-    const Flight& flight = flights_[number];
+  inline void end(uint32_t number, WorkList& then) {
+    const InFlightRay& flight = flights_[number];
     const KernelVerdict verdict = flight.undecided ? KernelVerdict::kUndecided
                                   : flight.found   ? KernelVerdict::kHit
                                                    : KernelVerdict::kMiss;
@@ -238,7 +238,7 @@ class Voyage {
   const KeptRows kept_;  // kAll: of the first ray
   const uint8_t* const numbers_;
   const uint32_t count_;
-  Flight* const flights_;
+  InFlightRay* const flights_;
   // Where the things of each step lie; what has come to its end asks for the root.
   const char* const bases_[3] = {reinterpret_cast<const char*>(tree_.nodes),
                                  reinterpret_cast<const char*>(tree_.blocks),
@@ -289,7 +289,7 @@ static inline void trace(const TriangleTree& tree, const KernelRay* rays, Kernel
                          KeptRows kept) {
   PreparedRays prepared[kPreparedRays / kTreeWidth];
   uint8_t rest[kPreparedRays];
-  Flight flights[kMaxFlights];
+  InFlightRay flights[kMaxFlights];
   while (count != 0) {
     const auto now = static_cast<uint32_t>(count < kPreparedRays ? count : kPreparedRays);
     for (uint32_t i = 0; i < now; i += kTreeWidth) prepare(rays + i, now - i, tree.magnitude, prepared[i / kTreeWidth]);
@@ -299,7 +299,7 @@ static inline void trace(const TriangleTree& tree, const KernelRay* rays, Kernel
     } else {
       left = trace_packets<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, rest);
     }
-    Voyage<kWanted>(tree, rays, prepared, hits, kept, rest, left, flights).run();
+    RayStream<kWanted>(tree, rays, prepared, hits, kept, rest, left, flights).run();
     rays += now;
     hits += now;
     count -= now;

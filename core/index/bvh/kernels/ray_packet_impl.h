@@ -119,7 +119,7 @@ class Packet {
 
   // All that the rays have between them, the same in all lanes: a slab is entered no earlier and left no later than by
   // any start and any direction of theirs. With twice the rays' own pad, for the roundings here.
-  struct Beam {
+  struct RayFrustum {
     Floats8 near_origin[3], far_origin[3], least[3], most[3], pad[3];
   };
 
@@ -130,11 +130,11 @@ class Packet {
       const uint32_t world = axis(kAxisX + k);
       const Floats8 origin = Floats8::load(prepared_->columns[kFromX + k]);
       const bool negative = (axis(kOctant) >> world & 1u) != 0;
-      beam_.near_origin[world] = negative ? lowest(origin) : largest(origin);
-      beam_.far_origin[world] = negative ? largest(origin) : lowest(origin);
-      beam_.least[world] = lowest(slabs_.reciprocal[world]);
-      beam_.most[world] = largest(slabs_.reciprocal[world]);
-      beam_.pad[world] = largest(slabs_.near_offset[world] - slabs_.far_offset[world]);
+      frustum_.near_origin[world] = negative ? lowest(origin) : largest(origin);
+      frustum_.far_origin[world] = negative ? largest(origin) : lowest(origin);
+      frustum_.least[world] = lowest(slabs_.reciprocal[world]);
+      frustum_.most[world] = largest(slabs_.reciprocal[world]);
+      frustum_.pad[world] = largest(slabs_.near_offset[world] - slabs_.far_offset[world]);
     }
   }
 
@@ -143,10 +143,10 @@ class Packet {
     const float* const bounds = node.bounds[0];
     Floats8 near[3], far[3];
     for (uint32_t k = 0; k < 3; ++k) {
-      const Floats8 in = Floats8::load(bounds + kRows.entered[octant][k]) - beam_.near_origin[k];
-      const Floats8 out = Floats8::load(bounds + kRows.left[octant][k]) - beam_.far_origin[k];
-      near[k] = smaller(in * beam_.least[k], in * beam_.most[k]) - beam_.pad[k];
-      far[k] = larger(out * beam_.least[k], out * beam_.most[k]) + beam_.pad[k];
+      const Floats8 in = Floats8::load(bounds + kRows.entered[octant][k]) - frustum_.near_origin[k];
+      const Floats8 out = Floats8::load(bounds + kRows.left[octant][k]) - frustum_.far_origin[k];
+      near[k] = smaller(in * frustum_.least[k], in * frustum_.most[k]) - frustum_.pad[k];
+      far[k] = larger(out * frustum_.least[k], out * frustum_.most[k]) + frustum_.pad[k];
     }
     const Floats8 entered = larger(larger(near[0], near[1]), larger(near[2], Floats8::all(0)));
     const Floats8 left = smaller(smaller(far[0], far[1]), smaller(far[2], largest(limit)));
@@ -319,7 +319,7 @@ class Packet {
   const PreparedRays* prepared_;
   KernelHit* hits_;
   Slabs slabs_;
-  Beam beam_;
+  RayFrustum frustum_;
   uint32_t front_, back_;  // the rays that accept a triangle seen so
   uint32_t nodes_;
   uint32_t top_;
