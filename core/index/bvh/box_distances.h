@@ -47,11 +47,11 @@ class BoxDistances {
  private:
   static constexpr double kRounding = 0x1p-21;
 
-  static float lesser(float a, float b) { return a < b ? a : b; }
-  static float greater(float a, float b) { return a > b ? a : b; }
-  static float least(float a, float b, float c) { return lesser(lesser(a, b), c); }
-  static float most(float a, float b, float c) { return greater(greater(a, b), c); }
-  static float gap(float at, float low, float high) { return greater(greater(low - at, at - high), 0.0f); }
+  static float minimum(float a, float b) { return a < b ? a : b; }
+  static float maximum(float a, float b) { return a > b ? a : b; }
+  static float least(float a, float b, float c) { return minimum(minimum(a, b), c); }
+  static float most(float a, float b, float c) { return maximum(maximum(a, b), c); }
+  static float gap(float at, float low, float high) { return maximum(maximum(low - at, at - high), 0.0f); }
   static float squared(float x, float y, float z) { return x * x + y * y + z * z; }
 
   float x_, y_, z_;

@@ -28,14 +28,14 @@ struct Quad<float> {
   friend Quad operator-(Quad a, Quad b) { return {a.lanes - b.lanes}; }
   friend Quad operator*(Quad a, Quad b) { return {a.lanes * b.lanes}; }
   // The second where either is not a number.
-  friend Quad lesser(Quad a, Quad b) { return {a.lanes < b.lanes ? a.lanes : b.lanes}; }
-  friend Quad greater(Quad a, Quad b) { return {a.lanes > b.lanes ? a.lanes : b.lanes}; }
+  friend Quad minimum(Quad a, Quad b) { return {a.lanes < b.lanes ? a.lanes : b.lanes}; }
+  friend Quad maximum(Quad a, Quad b) { return {a.lanes > b.lanes ? a.lanes : b.lanes}; }
 
   // 1 where a <= b, else 0.
   friend Quad not_above(Quad a, Quad b) { return {a.lanes <= b.lanes ? all(1).lanes : all(0).lanes}; }
 
   // Truncated. Lanes must fit.
-  std::array<int32_t, 4> whole() const {
+  std::array<int32_t, 4> to_int() const {
     using Integers = int32_t __attribute__((vector_size(16)));
     const auto integers = __builtin_convertvector(lanes, Integers);
     std::array<int32_t, 4> result;
@@ -67,17 +67,17 @@ struct Quad<double> {
   friend Quad operator*(const Quad& a, const Quad& b) {
     return each(a, b, [](double x, double y) { return x * y; });
   }
-  friend Quad lesser(const Quad& a, const Quad& b) {
+  friend Quad minimum(const Quad& a, const Quad& b) {
     return each(a, b, [](double x, double y) { return x < y ? x : y; });
   }
-  friend Quad greater(const Quad& a, const Quad& b) {
+  friend Quad maximum(const Quad& a, const Quad& b) {
     return each(a, b, [](double x, double y) { return x > y ? x : y; });
   }
   friend Quad not_above(const Quad& a, const Quad& b) {
     return each(a, b, [](double x, double y) { return x <= y ? 1.0 : 0.0; });
   }
 
-  std::array<int32_t, 4> whole() const {
+  std::array<int32_t, 4> to_int() const {
     return {static_cast<int32_t>(lanes[0]), static_cast<int32_t>(lanes[1]), static_cast<int32_t>(lanes[2]),
             static_cast<int32_t>(lanes[3])};
   }
@@ -93,8 +93,8 @@ struct QuadBox {
     return {Quad<S>::of(box.min.x, box.min.y, box.min.z, 0), Quad<S>::of(box.max.x, box.max.y, box.max.z, 0)};
   }
   void add(const QuadBox& other) {
-    min = lesser(other.min, min);
-    max = greater(other.max, max);
+    min = minimum(other.min, min);
+    max = maximum(other.max, max);
   }
   void add(const Quad<S>& point) { add(QuadBox{point, point}); }
   Aabb<S> box() const { return {{min[0], min[1], min[2]}, {max[0], max[1], max[2]}}; }

@@ -44,7 +44,7 @@ class Binning {
 
   std::array<int32_t, 4> bins_of(const BoxReference<S>& reference) const {
     const Quad<S> place = (reference.center() - low_) * scale_;
-    return lesser(greater(place, Quad<S>::all(0)), last_).whole();
+    return minimum(maximum(place, Quad<S>::all(0)), last_).whole();
   }
 
  private:
@@ -187,8 +187,8 @@ Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, cons
       const Quad<S> center = moving.center();
       for (size_t part = 0; part < 2; ++part) {
         QuadBox<S>& centers = halves.parts[part].centers;
-        centers.min = lesser(center + away[part + goes_left], centers.min);
-        centers.max = greater(center - away[part + goes_left], centers.max);
+        centers.min = minimum(center + away[part + goes_left], centers.min);
+        centers.max = maximum(center - away[part + goes_left], centers.max);
       }
       reference = references[left];
       references[left] = moving;

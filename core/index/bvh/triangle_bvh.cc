@@ -23,7 +23,7 @@ bool refer(const Triangle& triangle, uint32_t index, BoxReference<float>& refere
   const Quad<float> a = Quad<float>::of(triangle.a.x, triangle.a.y, triangle.a.z, 0);
   const Quad<float> b = Quad<float>::of(triangle.b.x, triangle.b.y, triangle.b.z, 0);
   const Quad<float> c = Quad<float>::of(triangle.c.x, triangle.c.y, triangle.c.z, 0);
-  reference = BoxReference<float>::of({lesser(lesser(a, b), c), greater(greater(a, b), c)}, index);
+  reference = BoxReference<float>::of({minimum(minimum(a, b), c), maximum(maximum(a, b), c)}, index);
   // No other numbers are not 0 when taken from themselves.
   const Quad<float> nothing = (a - a) + (b - b) + (c - c);
   return nothing[0] + nothing[1] + nothing[2] == 0;

@@ -28,16 +28,16 @@ struct Floats8 {
 static inline Floats8 multiply_add(Floats8 a, Floats8 b, Floats8 c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
 static inline Floats8 multiply_subtract(Floats8 a, Floats8 b, Floats8 c) { return {_mm256_fmsub_ps(a.v, b.v, c.v)}; }
 static inline Floats8 subtract_product(Floats8 c, Floats8 a, Floats8 b) { return {_mm256_fnmadd_ps(a.v, b.v, c.v)}; }
-static inline Floats8 smaller(Floats8 a, Floats8 b) { return {_mm256_min_ps(a.v, b.v)}; }
-static inline Floats8 larger(Floats8 a, Floats8 b) { return {_mm256_max_ps(a.v, b.v)}; }
+static inline Floats8 minimum(Floats8 a, Floats8 b) { return {_mm256_min_ps(a.v, b.v)}; }
+static inline Floats8 maximum(Floats8 a, Floats8 b) { return {_mm256_max_ps(a.v, b.v)}; }
 static inline Floats8 square_root(Floats8 a) { return {_mm256_sqrt_ps(a.v)}; }
-static inline Floats8 size_of(Floats8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v)}; }
+static inline Floats8 absolute(Floats8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v)}; }
 
 static inline Floats8 bits_of(uint32_t bits) {
   return {_mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int>(bits)))};
 }
-static inline Floats8 both(Floats8 a, Floats8 b) { return {_mm256_and_ps(a.v, b.v)}; }
-static inline Floats8 either(Floats8 a, Floats8 b) { return {_mm256_or_ps(a.v, b.v)}; }
+static inline Floats8 bit_and(Floats8 a, Floats8 b) { return {_mm256_and_ps(a.v, b.v)}; }
+static inline Floats8 bit_or(Floats8 a, Floats8 b) { return {_mm256_or_ps(a.v, b.v)}; }
 static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
 // Lanes whose sign bit is set where a >= b.
 static inline Floats8 where_at_least(Floats8 a, Floats8 b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_GE_OQ)}; }

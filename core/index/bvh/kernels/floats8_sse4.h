@@ -41,16 +41,16 @@ struct Floats8 {
 static inline Floats8 multiply_add(Floats8 a, Floats8 b, Floats8 c) { return a * b + c; }
 static inline Floats8 multiply_subtract(Floats8 a, Floats8 b, Floats8 c) { return a * b - c; }
 static inline Floats8 subtract_product(Floats8 c, Floats8 a, Floats8 b) { return c - a * b; }
-static inline Floats8 smaller(Floats8 a, Floats8 b) { return {_mm_min_ps(a.low, b.low), _mm_min_ps(a.high, b.high)}; }
-static inline Floats8 larger(Floats8 a, Floats8 b) { return {_mm_max_ps(a.low, b.low), _mm_max_ps(a.high, b.high)}; }
+static inline Floats8 minimum(Floats8 a, Floats8 b) { return {_mm_min_ps(a.low, b.low), _mm_min_ps(a.high, b.high)}; }
+static inline Floats8 maximum(Floats8 a, Floats8 b) { return {_mm_max_ps(a.low, b.low), _mm_max_ps(a.high, b.high)}; }
 static inline Floats8 square_root(Floats8 a) { return {_mm_sqrt_ps(a.low), _mm_sqrt_ps(a.high)}; }
 
 static inline Floats8 bits_of(uint32_t bits) {
   return Floats8::both_halves(_mm_castsi128_ps(_mm_set1_epi32(static_cast<int>(bits))));
 }
-static inline Floats8 both(Floats8 a, Floats8 b) { return {_mm_and_ps(a.low, b.low), _mm_and_ps(a.high, b.high)}; }
-static inline Floats8 either(Floats8 a, Floats8 b) { return {_mm_or_ps(a.low, b.low), _mm_or_ps(a.high, b.high)}; }
-static inline Floats8 size_of(Floats8 a) { return both(a, bits_of(0x7FFFFFFFu)); }
+static inline Floats8 bit_and(Floats8 a, Floats8 b) { return {_mm_and_ps(a.low, b.low), _mm_and_ps(a.high, b.high)}; }
+static inline Floats8 bit_or(Floats8 a, Floats8 b) { return {_mm_or_ps(a.low, b.low), _mm_or_ps(a.high, b.high)}; }
+static inline Floats8 absolute(Floats8 a) { return bit_and(a, bits_of(0x7FFFFFFFu)); }
 static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
 static inline Floats8 where_at_least(Floats8 a, Floats8 b) {
   return {_mm_cmpge_ps(a.low, b.low), _mm_cmpge_ps(a.high, b.high)};

@@ -27,8 +27,8 @@
 namespace locus {
 namespace {
 
-static inline double larger(double a, double b) { return a < b ? b : a; }
-static inline double smaller(double a, double b) { return b < a ? b : a; }
+static inline double maximum(double a, double b) { return a < b ? b : a; }
+static inline double minimum(double a, double b) { return b < a ? b : a; }
 
 // One ray with eight triangles, or eight rays with one: in either case eight pairs side by side.
 struct Pairs {
@@ -75,18 +75,18 @@ static inline PairsMet meet(const Pairs& pairs) {
   const Projected p = project(pairs);
   const Floats8 zero = Floats8::all(0);
   PairsMet met;
-  met.least = smaller(p.weight_a, smaller(p.weight_b, p.weight_c));
-  met.most = larger(p.weight_a, larger(p.weight_b, p.weight_c));
+  met.least = minimum(p.weight_a, minimum(p.weight_b, p.weight_c));
+  met.most = maximum(p.weight_a, maximum(p.weight_b, p.weight_c));
   met.inside = at_most(zero - pairs.edge, met.least) | at_most(met.most, pairs.edge);
   const Floats8 determinant = p.weight_a + p.weight_b + p.weight_c;
   const Floats8 inverse = Floats8::all(1) / determinant;
   const Floats8 behind = multiply_add(p.weight_a, p.a_z, multiply_add(p.weight_b, p.b_z, p.weight_c * p.c_z));
   const Floats8 t = zero - behind * pairs.reciprocal_z * inverse;
   const Floats8 off =
-      planted(PlantedBug::kKernelTBound) ? zero : multiply_add(pairs.noise, size_of(inverse), pairs.t_floor);
+      planted(PlantedBug::kKernelTBound) ? zero : multiply_add(pairs.noise, absolute(inverse), pairs.t_floor);
   met.earliest = t - off;
   met.latest = t + off;
-  met.edge_on = at_most(size_of(determinant), Floats8::all(8) * pairs.edge);
+  met.edge_on = at_most(absolute(determinant), Floats8::all(8) * pairs.edge);
   met.open = met.inside & (met.edge_on | (at_most(met.earliest, pairs.limit) & at_most(zero, met.latest)));
   if (planted(PlantedBug::kKernelEdgeOn)) met.open &= ~met.edge_on;
   return met;
@@ -159,9 +159,9 @@ static inline bool may_be_edge_on(const TriangleBlock& block, PreparedRay prepar
   const double reach = 0x1p17 * edge_scale, longest = __builtin_fabs(along);
   double width = 0x1p-39 * reach * longest;
   for (int vertex = 0; vertex < 3; ++vertex)
-    width = larger(width, larger(__builtin_fabs(x[vertex]), __builtin_fabs(y[vertex])));
+    width = maximum(width, maximum(__builtin_fabs(x[vertex]), __builtin_fabs(y[vertex])));
   const double span =
-      larger(depths[0], larger(depths[1], depths[2])) - smaller(depths[0], smaller(depths[1], depths[2]));
+      maximum(depths[0], maximum(depths[1], depths[2])) - minimum(depths[0], minimum(depths[1], depths[2]));
   return size <= 4 * longest * width * (0x1p-16 * span + 0x1p-35 * reach);
 }
 
@@ -196,7 +196,7 @@ static inline Verdict decide(const TriangleBlock& block, int place, const Kernel
   const double determinant = a + b + c, size = __builtin_fabs(determinant);
   if (may_be_edge_on(block, prepared, x, y, z, along, size))
     return {is_exactly_edge_on(block, place, ray) ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
-  if (smaller(a, smaller(b, c)) < 0 && larger(a, larger(b, c)) > 0) return {KernelVerdict::kMiss, 0};
+  if (minimum(a, minimum(b, c)) < 0 && maximum(a, maximum(b, c)) > 0) return {KernelVerdict::kMiss, 0};
   if (!(determinant > 0 || planted(PlantedBug::kKernelCull) ? ray.accept_front : ray.accept_back))
     return {KernelVerdict::kMiss, 0};
   const Doubles shares = weights * z;

@@ -122,8 +122,8 @@ class RayStream {
       far[axis] = multiply_subtract(Floats8::load(bounds + kRows.left[octant][axis]), reciprocal,
                                     ray.spread(kFarOffset + axis));
     }
-    const Floats8 entered = larger(larger(near[0], near[1]), larger(near[2], Floats8::all(0)));
-    const Floats8 left = smaller(smaller(far[0], far[1]), smaller(far[2], Floats8::all(flight.limit)));
+    const Floats8 entered = maximum(maximum(near[0], near[1]), maximum(near[2], Floats8::all(0)));
+    const Floats8 left = minimum(minimum(far[0], far[1]), minimum(far[2], Floats8::all(flight.limit)));
     uint32_t* const waiting = flight.waiting + flight.top;
     if constexpr (kAny)
       flight.top += pack_children(node, entered, left, waiting);

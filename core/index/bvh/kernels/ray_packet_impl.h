@@ -20,7 +20,7 @@ namespace {
 static inline bool go_together(const PreparedRays& rays, float magnitude) {
   constexpr float kMaxSpread = 0.03f;
   const auto apart = [&](uint32_t column, float most) {
-    const Floats8 off = size_of(Floats8::load(rays.columns[column]) - Floats8::all(rays.columns[column][0]));
+    const Floats8 off = absolute(Floats8::load(rays.columns[column]) - Floats8::all(rays.columns[column][0]));
     return at_most(off, Floats8::all(most)) != 255u;
   };
   for (uint32_t column = kFromX; column <= kFromZ; ++column)
@@ -145,11 +145,11 @@ class Packet {
     for (uint32_t k = 0; k < 3; ++k) {
       const Floats8 in = Floats8::load(bounds + kRows.entered[octant][k]) - frustum_.near_origin[k];
       const Floats8 out = Floats8::load(bounds + kRows.left[octant][k]) - frustum_.far_origin[k];
-      near[k] = smaller(in * frustum_.least[k], in * frustum_.most[k]) - frustum_.pad[k];
-      far[k] = larger(out * frustum_.least[k], out * frustum_.most[k]) + frustum_.pad[k];
+      near[k] = minimum(in * frustum_.least[k], in * frustum_.most[k]) - frustum_.pad[k];
+      far[k] = maximum(out * frustum_.least[k], out * frustum_.most[k]) + frustum_.pad[k];
     }
-    const Floats8 entered = larger(larger(near[0], near[1]), larger(near[2], Floats8::all(0)));
-    const Floats8 left = smaller(smaller(far[0], far[1]), smaller(far[2], largest(limit)));
+    const Floats8 entered = maximum(maximum(near[0], near[1]), maximum(near[2], Floats8::all(0)));
+    const Floats8 left = minimum(minimum(far[0], far[1]), minimum(far[2], largest(limit)));
     return pack_slots(node, entered, left, octant, slots);
   }
 
@@ -173,8 +173,8 @@ class Packet {
       const auto far = [&](uint32_t k) {
         return multiply_subtract(Floats8::all(bounds[rows_out[k]]), slabs.reciprocal[k], slabs.far_offset[k]);
       };
-      const Floats8 entered = larger(larger(near(0), near(1)), larger(near(2), Floats8::all(0)));
-      const uint32_t met = at_most(entered, smaller(smaller(far(0), far(1)), smaller(far(2), limit)));
+      const Floats8 entered = maximum(maximum(near(0), near(1)), maximum(near(2), Floats8::all(0)));
+      const uint32_t met = at_most(entered, minimum(minimum(far(0), far(1)), minimum(far(2), limit)));
       waiting_[top] = {entered, met, node.child[slot]};
       top += met != 0 ? 1 : 0;
     }

@@ -88,8 +88,8 @@ static inline RayColumns columns_of(const KernelRay* rays, size_t count) {
 class Projection {
  public:
   inline Projection(const Floats8* direction, const KernelRay* rays, size_t count) {
-    const Floats8 x = size_of(direction[0]), y = size_of(direction[1]), z = size_of(direction[2]);
-    const Floats8 longest = larger(larger(x, y), z);
+    const Floats8 x = absolute(direction[0]), y = absolute(direction[1]), z = absolute(direction[2]);
+    const Floats8 longest = maximum(maximum(x, y), z);
     is_x_ = where_at_least(x, longest);
     is_y_ = where_at_least(y, longest);
     const uint32_t most_x = at_most(longest, x), most_y = at_most(longest, y), most_z = at_most(longest, z);
@@ -128,18 +128,18 @@ class Projection {
 
 static inline void prepare_slabs(const RayColumns& rays, Floats8 reach, Floats8* inverse, PreparedRays& to) {
   const Floats8* const d = rays.direction;
-  const Floats8 longest = larger(larger(size_of(d[0]), size_of(d[1])), size_of(d[2]));
+  const Floats8 longest = maximum(maximum(absolute(d[0]), absolute(d[1])), absolute(d[2]));
   // As SlabRay does: a component of zero becomes 1e-18 of the largest.
   const Floats8 least = longest * Floats8::all(1e-18f),
                 pad = reach * Floats8::all(planted(PlantedBug::kKernelTreePad) ? 0 : kTreePad);
   Floats8 octant = bits_of(0);
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    inverse[axis] = Floats8::all(1) / either(larger(size_of(d[axis]), least), both(bits_of(0x80000000u), d[axis]));
-    const Floats8 center = rays.origin[axis] * inverse[axis], around = pad * size_of(inverse[axis]);
+    inverse[axis] = Floats8::all(1) / bit_or(maximum(absolute(d[axis]), least), bit_and(bits_of(0x80000000u), d[axis]));
+    const Floats8 center = rays.origin[axis] * inverse[axis], around = pad * absolute(inverse[axis]);
     inverse[axis].store(to.columns[kReciprocal + axis]);
     (center + around).store(to.columns[kNearOffset + axis]);
     (center - around).store(to.columns[kFarOffset + axis]);
-    octant = either(octant, choose(d[axis], bits_of(1u << axis), bits_of(0)));
+    octant = bit_or(octant, choose(d[axis], bits_of(1u << axis), bits_of(0)));
   }
   octant.store(to.columns[kOctant]);
 }
@@ -157,13 +157,13 @@ static inline void prepare(const KernelRay* rays, size_t count, float magnitude,
   const RayColumns columns = columns_of(rays, count);
   const Floats8* const o = columns.origin;
   const Floats8* const d = columns.direction;
-  const Floats8 reach = larger(larger(size_of(o[0]), size_of(o[1])), size_of(o[2])) + Floats8::all(magnitude);
+  const Floats8 reach = maximum(maximum(absolute(o[0]), absolute(o[1])), absolute(o[2])) + Floats8::all(magnitude);
   Floats8 inverse[3];
   prepare_slabs(columns, reach, inverse, to);
   columns.limit.store(to.columns[kLimit]);
   const Projection axes(d, rays, count);
   const Floats8 inverse_z = axes.along(inverse[0], inverse[1], inverse[2]);
-  prepare_bounds(reach, size_of(inverse_z), to);
+  prepare_bounds(reach, absolute(inverse_z), to);
   inverse_z.store(to.columns[kReciprocalZ]);
   (axes.first(d[0], d[1], d[2]) * inverse_z).store(to.columns[kShearX]);
   (axes.second(d[0], d[1], d[2]) * inverse_z).store(to.columns[kShearY]);

@@ -85,7 +85,7 @@ static inline Vector8 cross(Vector8 a, Vector8 b) {
 // point, along `edge`.
 static inline Floats8 squared_distance_to_edge(Vector8 offset, Vector8 edge, Floats8 along, Floats8 length) {
   // A quotient of zeros becomes the second operand, zero.
-  const Floats8 foot = smaller(larger(along / length, Floats8::all(0)), Floats8::all(1));
+  const Floats8 foot = minimum(maximum(along / length, Floats8::all(0)), Floats8::all(1));
   const Vector8 rest = {subtract_product(offset.x, foot, edge.x), subtract_product(offset.y, foot, edge.y),
                         subtract_product(offset.z, foot, edge.z)};
   return dot(rest, rest);
@@ -105,9 +105,9 @@ class BallQuery {
   __attribute__((always_inline)) inline MetChildren meet_node(const TriangleNode& node) const {
     const Vector8 below = Vector8::load(node.bounds) - center_, above = center_ - Vector8::load(node.bounds + 3);
     const Floats8 zero = Floats8::all(0);
-    const Vector8 gap = {larger(larger(below.x, above.x), zero), larger(larger(below.y, above.y), zero),
-                         larger(larger(below.z, above.z), zero)};
-    const Vector8 far = {smaller(below.x, above.x), smaller(below.y, above.y), smaller(below.z, above.z)};
+    const Vector8 gap = {maximum(maximum(below.x, above.x), zero), maximum(maximum(below.y, above.y), zero),
+                         maximum(maximum(below.z, above.z), zero)};
+    const Vector8 far = {minimum(below.x, above.x), minimum(below.y, above.y), minimum(below.z, above.z)};
     const uint32_t some = at_most(dot(gap, gap), outer_);
     return {some, at_most(dot(far, far), inner_) & some};
   }
@@ -116,7 +116,7 @@ class BallQuery {
     const Vector8 a = Vector8::load(block.vertices) - center_, b = Vector8::load(block.vertices + 3) - center_,
                   c = Vector8::load(block.vertices + 6) - center_;
     const Floats8 aa = dot(a, a), bb = dot(b, b), cc = dot(c, c), ab = dot(a, b), bc = dot(b, c), ca = dot(c, a);
-    const uint32_t all = (1u << block.count) - 1u, in = at_most(smaller(aa, smaller(bb, cc)), inner_) & all;
+    const uint32_t all = (1u << block.count) - 1u, in = at_most(minimum(aa, minimum(bb, cc)), inner_) & all;
     const float reach = radius_ + unless(PlantedBug::kRegionBeyond, 0x1p-19f) * (radius_ + block.extent);
     const Floats8 limit = Floats8::all(reach * reach);
     const uint32_t out = lie_beyond(aa, ab, ca, limit) | lie_beyond(bb, bc, ab, limit) | lie_beyond(cc, ca, bc, limit);
@@ -130,7 +130,7 @@ class BallQuery {
   // Whether three vertices lie beyond the plane across the first at the square root of `limit`: by its square, and the
   // products of the others with it.
   static inline uint32_t lie_beyond(Floats8 square, Floats8 second, Floats8 third, Floats8 limit) {
-    const Floats8 least = larger(smaller(square, smaller(second, third)), Floats8::all(0));
+    const Floats8 least = maximum(minimum(square, minimum(second, third)), Floats8::all(0));
     return below(multiply_add(square, limit, Floats8::all(square_floor())), least * least);
   }
 
@@ -144,7 +144,7 @@ class BallQuery {
     const Floats8 plane = Floats8::all(
         unless(PlantedBug::kRegionPlane,
                0x1p-17f * square * reach + unless(PlantedBug::kRegionFloor, 0x1p-58f) * reach + square_floor()));
-    const Floats8 height = size_of(dot(normal, offset));
+    const Floats8 height = absolute(dot(normal, offset));
     const Floats8 limit = Floats8::all(radius_) * square_root(dot(normal, normal));
     const uint32_t open = at_most(height, limit + plane) & asked;  // the ball may reach the plane
     if (open == 0) return {0, 0};
@@ -152,11 +152,11 @@ class BallQuery {
     const Floats8 bb = dot(ab, ab), bc = dot(ab, ac), cc = dot(ac, ac), pb = dot(offset, ab), pc = dot(offset, ac);
     const Vector8 from_b = center_ - b, edge = c - b;
     const Floats8 to_edges =
-        smaller(smaller(squared_distance_to_edge(offset, ab, pb, bb), squared_distance_to_edge(offset, ac, pc, cc)),
+        minimum(minimum(squared_distance_to_edge(offset, ab, pb, bb), squared_distance_to_edge(offset, ac, pc, cc)),
                 squared_distance_to_edge(from_b, edge, dot(from_b, edge), dot(edge, edge)));
     const Floats8 weight_b = multiply_subtract(cc, pb, bc * pc), weight_c = multiply_subtract(bb, pc, bc * pb);
     const Floats8 weight_a = multiply_subtract(bb, cc, bc * bc) - weight_b - weight_c;
-    const Floats8 least = smaller(weight_a, smaller(weight_b, weight_c));
+    const Floats8 least = minimum(weight_a, minimum(weight_b, weight_c));
 
     const float near = unless(PlantedBug::kRegionNear, 0x1p-19f * reach + unless(PlantedBug::kRegionFloor, 0x1p-59f));
     const float within = radius_ > near ? (radius_ - near) * (radius_ - near) * (1 - kSquarePad) : -1;
@@ -170,7 +170,7 @@ class BallQuery {
     if (met.unsure == 0) return met;
 
     // Most of these are small triangles in a block of large ones: the bounds of their own decide them.
-    const Floats8 longest = larger(bb, cc), reach8 = square_root(larger(longest, dot(offset, offset)));
+    const Floats8 longest = maximum(bb, cc), reach8 = square_root(maximum(longest, dot(offset, offset)));
     const Floats8 own_weight = multiply_add(Floats8::all(unless(PlantedBug::kRegionOwnBounds, 0x1p-17f)),
                                             longest * square_root(longest) * reach8, Floats8::all(square_floor()));
     const Floats8 own_plane =

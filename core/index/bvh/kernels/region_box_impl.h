@@ -32,12 +32,12 @@ namespace locus {
 namespace {
 
 static inline Vector8 smallest(Vector8 a, Vector8 b, Vector8 c) {
-  return {smaller(a.x, smaller(b.x, c.x)), smaller(a.y, smaller(b.y, c.y)), smaller(a.z, smaller(b.z, c.z))};
+  return {minimum(a.x, minimum(b.x, c.x)), minimum(a.y, minimum(b.y, c.y)), minimum(a.z, minimum(b.z, c.z))};
 }
 static inline Vector8 largest(Vector8 a, Vector8 b, Vector8 c) {
-  return {larger(a.x, larger(b.x, c.x)), larger(a.y, larger(b.y, c.y)), larger(a.z, larger(b.z, c.z))};
+  return {maximum(a.x, maximum(b.x, c.x)), maximum(a.y, maximum(b.y, c.y)), maximum(a.z, maximum(b.z, c.z))};
 }
-static inline Vector8 size_of(Vector8 a) { return {size_of(a.x), size_of(a.y), size_of(a.z)}; }
+static inline Vector8 absolute(Vector8 a) { return {absolute(a.x), absolute(a.y), absolute(a.z)}; }
 static inline Vector8 times(Vector8 a, Floats8 s) { return {a.x * s, a.y * s, a.z * s}; }
 
 // Whether low to high overlaps, or lies within, a box of floats.
@@ -95,7 +95,7 @@ class BoxQuery {
                   c = seen(Vector8::load(block.vertices + 6) - center_);
     const Vector8 low = smallest(a, b, c), high = largest(a, b, c);
     Shadows shadows = {all, all};
-    const Vector8 gap = {larger(low.x, minus(high.x)), larger(low.y, minus(high.y)), larger(low.z, minus(high.z))};
+    const Vector8 gap = {maximum(low.x, minus(high.x)), maximum(low.y, minus(high.y)), maximum(low.z, minus(high.z))};
     shadows.meet(gap.x, span.inner.x, span.outer.x);
     shadows.meet(gap.y, span.inner.y, span.outer.y);
     shadows.meet(gap.z, span.inner.z, span.outer.z);
@@ -133,7 +133,7 @@ class BoxQuery {
                                   (kTurned ? 0x1p-15f : 0x1p-19f) * extent * extent * sum + square_floor()));
     }
     inline uint32_t contains(Vector8 point) const {
-      const Vector8 size = size_of(point);
+      const Vector8 size = absolute(point);
       return at_most(size.x, inner.x) & at_most(size.y, inner.y) & at_most(size.z, inner.z);
     }
 
@@ -167,15 +167,15 @@ class BoxQuery {
     const Vector8 middle = seen({(low.x + high.x) * half, (low.y + high.y) * half, (low.z + high.z) * half});
     const Vector8 extent = times(high - low, half);
     const Floats8 pad = Floats8::all(unless(PlantedBug::kRegionTurnedNode, 0x1p-19f)) *
-                        (larger(size_of(low.x), size_of(high.x)) + larger(size_of(low.y), size_of(high.y)) +
-                         larger(size_of(low.z), size_of(high.z)));
+                        (maximum(absolute(low.x), absolute(high.x)) + maximum(absolute(low.y), absolute(high.y)) +
+                         maximum(absolute(low.z), absolute(high.z)));
     uint32_t some = 255, whole = 255;
-    const Floats8 middles[3] = {size_of(middle.x), size_of(middle.y), size_of(middle.z)};
+    const Floats8 middles[3] = {absolute(middle.x), absolute(middle.y), absolute(middle.z)};
     for (int k = 0; k < 3; ++k) {
       const float* r = box_->rotation + k;
       const Floats8 reach =
-          multiply_add(size_of(Floats8::all(r[0])), extent.x,
-                       multiply_add(size_of(Floats8::all(r[3])), extent.y, size_of(Floats8::all(r[6])) * extent.z));
+          multiply_add(absolute(Floats8::all(r[0])), extent.x,
+                       multiply_add(absolute(Floats8::all(r[3])), extent.y, absolute(Floats8::all(r[6])) * extent.z));
       const Floats8 own = Floats8::all(box_->half[k]);
       some &= at_most(middles[k] - reach, own + pad);
       whole &= at_most(middles[k] + reach, own - pad);
@@ -184,7 +184,7 @@ class BoxQuery {
   }
 
   static inline void meet_normal(Vector8 normal, Vector8 vertex, const Span& span, Shadows& shadows) {
-    const Floats8 height = size_of(dot(normal, vertex)), reach = dot(size_of(normal), span.half);
+    const Floats8 height = absolute(dot(normal, vertex)), reach = dot(absolute(normal), span.half);
     shadows.meet(height, reach - span.plane, reach + span.plane);
   }
 
@@ -204,8 +204,8 @@ class BoxQuery {
                                  Floats8 inner_x, Floats8 inner_y, Floats8 outer_x, Floats8 outer_y, Floats8 across,
                                  Shadows& shadows) {
     const Floats8 p = multiply_subtract(x, from_y, y * from_x), q = multiply_subtract(x, other_y, y * other_x);
-    const Floats8 gap = larger(smaller(p, q), minus(larger(p, q)));
-    const Floats8 size_x = size_of(x), size_y = size_of(y);
+    const Floats8 gap = maximum(minimum(p, q), minus(maximum(p, q)));
+    const Floats8 size_x = absolute(x), size_y = absolute(y);
     shadows.meet(gap, multiply_add(size_y, inner_x, multiply_subtract(size_x, inner_y, across)),
                  multiply_add(size_y, outer_x, multiply_add(size_x, outer_y, across)));
   }
