@@ -71,7 +71,7 @@ class PersistentIdTable {
   size_t unshared_bytes(const PersistentIdTable& other) const;
 
  private:
-  static constexpr size_t kPlaces = 5;        // of a bucket
+  static constexpr size_t kSlots = 5;         // of a bucket
   static constexpr size_t kIdsPerBucket = 3;  // on the average, when the table is full
   static constexpr size_t kBucketsPerLeaf = 64;
   static constexpr size_t kIdsPerLeaf = kBucketsPerLeaf * kIdsPerBucket;
@@ -81,8 +81,8 @@ class PersistentIdTable {
   // An empty place holds kNoId and kNone.
   struct alignas(64) Bucket {
     Bucket() { numbers.fill(kNone); }
-    std::array<Id, kPlaces> ids{};
-    std::array<uint32_t, kPlaces> numbers;
+    std::array<Id, kSlots> ids{};
+    std::array<uint32_t, kSlots> numbers;
     uint32_t passed = 0;
   };
   static_assert(sizeof(Bucket) == 64);
@@ -114,7 +114,7 @@ class PersistentIdTable {
   // Where of the bucket the id is, or a negative number. Without branches: the place cannot be foretold.
   static int place_of(const Bucket& bucket, Id id) {
     uint32_t places = 0;
-    for (size_t place = 0; place < kPlaces; ++place) places |= (bucket.ids[place] == id ? 1u : 0u) << place;
+    for (size_t place = 0; place < kSlots; ++place) places |= (bucket.ids[place] == id ? 1u : 0u) << place;
     return places == 0 ? -1 : std::countr_zero(places);
   }
   uint32_t find_from(const Bucket& first, Id id) const {
@@ -232,7 +232,7 @@ void PersistentIdTable<Hash>::rebuild(size_t leaf_count) {
   for (size_t leaf = 0; leaf < before.size(); ++leaf) {
     if (before[leaf]->owner != owner_) replaced_bytes_ += sizeof(Leaf);
     for (const Bucket& bucket : before[leaf]->buckets)
-      for (size_t place = 0; place < kPlaces; ++place)
+      for (size_t place = 0; place < kSlots; ++place)
         if (bucket.ids[place] != kNoId) put(bucket.ids[place], bucket.numbers[place]);
   }
 }

@@ -24,9 +24,9 @@ using BoxQueryOf = typename PrimitiveTraits<typename Index::Value>::BoxQuery;
 
 namespace internal {
 // Counts into the caller's counter or, without one, into its own.
-class WorkSink {
+class CostCounter {
  public:
-  explicit WorkSink(Work* work) : work_(work != nullptr ? *work : own_) {}
+  explicit CostCounter(Work* work) : work_(work != nullptr ? *work : own_) {}
   Work& get() { return work_; }
 
  private:
@@ -36,7 +36,7 @@ class WorkSink {
 
 template <class Value, class Index, class Region, class Test>
 void collect_region(const Index& index, const Region& region, Test test, std::vector<Value>& result, Work* work) {
-  WorkSink sink(work);
+  CostCounter sink(work);
   RegionCollector<Value, Region, Test> collector(region, test, result);
   index.visit_region(collector, sink.get());
 }
@@ -51,7 +51,7 @@ inline constexpr auto kBoundsDecide = [](const auto&) { return true; };
 template <class V, SpatialIndex... Indices>
 bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, ScalarOf<V>& distance, Work* work,
                   const Indices&... indices) {
-  internal::WorkSink sink(work);
+  internal::CostCounter sink(work);
   NearestVisitor<V> nearest(ray, distance);
   (indices.visit_ray(ray.slabs(), nearest, sink.get()), ...);
   if (!nearest.best()) return false;
@@ -71,7 +71,7 @@ bool first_ray(const Index& index, const RayQueryOf<Index>& ray, typename Index:
 template <SpatialIndex Index>
 bool any_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
              Work* work = nullptr) {
-  internal::WorkSink sink(work);
+  internal::CostCounter sink(work);
   AnyHitVisitor<typename Index::Value> any(ray, distance);
   index.visit_ray(ray.slabs(), any, sink.get());
   return any.found();
@@ -81,7 +81,7 @@ bool any_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename
 template <SpatialIndex Index>
 void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
               size_t max_hits, std::vector<RayHit<typename Index::Value>>& result, Work* work = nullptr) {
-  internal::WorkSink sink(work);
+  internal::CostCounter sink(work);
   NearestFewVisitor<typename Index::Value> few(ray, distance, max_hits, result);
   index.visit_ray(ray.slabs(), few, sink.get());
   few.finish();
@@ -91,7 +91,7 @@ void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typenam
 template <SpatialIndex Index>
 void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
                       std::vector<typename Index::Value>& result, Work* work = nullptr) {
-  internal::WorkSink sink(work);
+  internal::CostCounter sink(work);
   BoundsOnRayVisitor<typename Index::Value> on_ray(ray, distance, result);
   index.visit_ray(ray.slabs(), on_ray, sink.get());
 }

@@ -76,7 +76,7 @@ class NearestValuesVisitor {
 template <SpatialIndex Index>
 void nearest_values(const Index& index, const Vec3d& point, double max_distance, size_t max_values,
                     std::vector<ValueAt<typename Index::Value>>& result, Work* work = nullptr) {
-  internal::WorkSink sink(work);
+  internal::CostCounter sink(work);
   NearestValuesVisitor<typename Index::Value> visitor(point, max_distance, max_values, result);
   index.visit_nearest(point, visitor, sink.get());
   visitor.finish();

@@ -38,11 +38,11 @@ uint32_t GridBlock::find_last(uint32_t handle, uint32_t count) const {
 }
 
 uint32_t GridBlock::find_near(uint32_t handle, uint32_t slot) const {
-  constexpr uint32_t kPlaces = 2 * kLanes;
-  if (stride_ < kPlaces) return find(handle);
-  const uint32_t begin = std::min(slot < kLanes ? 0 : slot - kLanes, stride_ - kPlaces);
+  constexpr uint32_t kSlots = 2 * kLanes;
+  if (stride_ < kSlots) return find(handle);
+  const uint32_t begin = std::min(slot < kLanes ? 0 : slot - kLanes, stride_ - kSlots);
   uint32_t place = 0;  // counted from 1; the handle is there once at most
-  for (uint32_t i = 0; i < kPlaces; ++i) place |= handles_[begin + i] == handle ? i + 1 : 0;
+  for (uint32_t i = 0; i < kSlots; ++i) place |= handles_[begin + i] == handle ? i + 1 : 0;
   return place == 0 ? count_ : begin + place - 1;
 }
 

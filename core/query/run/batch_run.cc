@@ -11,12 +11,12 @@ namespace locus {
 namespace {
 
 // Queries of a piece. Those that turn out to be much work are parted further.
-constexpr size_t kPieceQueries = 256;
+constexpr size_t kChunkQueries = 256;
 
 size_t most_queries(const QueryBlock& block) {
   const auto* const lookup = std::get_if<LookupColumns>(&block.kind);
   // Groups are looked up in one pass over all objects.
-  return lookup != nullptr && !lookup->groups.empty() ? limits::kMaxQueries : kPieceQueries;
+  return lookup != nullptr && !lookup->groups.empty() ? limits::kMaxQueries : kChunkQueries;
 }
 
 void copy_rows(const BlockResult& from, size_t first, size_t rows, const RowSpans& to) {
@@ -85,88 +85,88 @@ QueryCost BatchRun::cost() const {
 
 Progress BatchRun::work(uint64_t nanoseconds) {
   const uint64_t start = now();
-  Pieces::iterator piece;
+  Chunks::iterator chunk;
   {
     const MutexLock lock(mutex_);
     if (!can_begin()) return progress();
-    piece = begin_piece();
+    chunk = begin_chunk();
   }
-  Stretch stretch = begin_stretch(piece->block);
-  const uint64_t worked_before = stretch.start;
+  TimingSpan timing = begin_timing(chunk->block);
+  const uint64_t worked_before = timing.start;
   while (true) {
-    end_piece(piece, run(*piece));
+    end_chunk(chunk, run(*chunk));
     // Who lost the core meanwhile has not worked yet.
     const bool enough = !options_.clock || (now() - start >= nanoseconds && worked() - worked_before >= nanoseconds);
     const MutexLock lock(mutex_);
     --at_work_;
     const Progress reached = progress();
     const bool over = reached != Progress::kMore || enough;
-    if (!over) piece = begin_piece();
-    if (over || piece->block != stretch.block) end_stretch(stretch);
+    if (!over) chunk = begin_chunk();
+    if (over || chunk->block != timing.block) end_timing(timing);
     if (over) return reached;
-    if (piece->block != stretch.block) stretch = begin_stretch(piece->block);
+    if (chunk->block != timing.block) timing = begin_timing(chunk->block);
   }
 }
 
 // What is in no piece yet may wait for those before it; the first of all pieces may not.
 bool BatchRun::can_begin() const {
   if (control_.stopped()) return false;
-  if (!left_.empty()) return pieces_.size() < 2 * kMaxPieces || left_.front() == pieces_.begin();
-  return next_block_ < blocks_.size() && pieces_.size() < kMaxPieces;
+  if (!left_.empty()) return chunks_.size() < 2 * kMaxChunks || left_.front() == chunks_.begin();
+  return next_block_ < blocks_.size() && chunks_.size() < kMaxChunks;
 }
 
-BatchRun::Pieces::iterator BatchRun::begin_piece() {
+BatchRun::Chunks::iterator BatchRun::begin_chunk() {
   ++at_work_;
   if (!left_.empty()) return pop_left();
   const Block& block = blocks_[next_block_];
   const size_t end = std::min(block.queries, next_query_ + block.step);
-  pieces_.push_back({next_block_, next_query_, end});
+  chunks_.push_back({next_block_, next_query_, end});
   next_query_ = end;
   if (end == block.queries) {
     ++next_block_;
     next_query_ = 0;
     pass_empty_blocks();
   }
-  return std::prev(pieces_.end());
+  return std::prev(chunks_.end());
 }
 
-BatchRun::Pieces::iterator BatchRun::pop_left() {
-  const Pieces::iterator piece = left_.front();
+BatchRun::Chunks::iterator BatchRun::pop_left() {
+  const Chunks::iterator chunk = left_.front();
   left_.erase(left_.begin());
-  return piece;
+  return chunk;
 }
 
 void BatchRun::pass_empty_blocks() {
   while (next_block_ < blocks_.size() && blocks_[next_block_].queries == 0) ++next_block_;
 }
 
-size_t BatchRun::run(Piece& piece) {
-  Block& block = blocks_[piece.block];
+size_t BatchRun::run(Chunk& chunk) {
+  Block& block = blocks_[chunk.block];
   QueryTask task(snapshot_, control_, options_.brute_force);
-  BlockRunner runner(task, batch_.blocks[piece.block], block.moments, block.place,
+  BlockRunner runner(task, batch_.blocks[chunk.block], block.moments, block.place,
                      room_.load(std::memory_order_relaxed));
-  const size_t reached = runner.run(piece.begin, piece.end);
-  piece.rows = runner.take_rows();
-  piece.work = task.work();
+  const size_t reached = runner.run(chunk.begin, chunk.end);
+  chunk.rows = runner.take_rows();
+  chunk.work = task.work();
   return reached;
 }
 
-void BatchRun::end_piece(Pieces::iterator piece, size_t reached) {
+void BatchRun::end_chunk(Chunks::iterator chunk, size_t reached) {
   {
     const MutexLock lock(mutex_);
-    if (reached < piece->end) leave(piece, reached);
-    piece->done = true;
-    if (writing_ || !pieces_.front().done) return;
+    if (reached < chunk->end) leave(chunk, reached);
+    chunk->done = true;
+    if (writing_ || !chunks_.front().done) return;
     writing_ = true;
   }
   write_out();
 }
 
 // What is left of a piece is one of its own, right behind it.
-void BatchRun::leave(Pieces::iterator piece, size_t reached) {
-  const Pieces::iterator left = pieces_.insert(std::next(piece), {piece->block, reached, piece->end});
-  piece->end = reached;
-  const auto before = [](Pieces::iterator a, Pieces::iterator b) {
+void BatchRun::leave(Chunks::iterator chunk, size_t reached) {
+  const Chunks::iterator left = chunks_.insert(std::next(chunk), {chunk->block, reached, chunk->end});
+  chunk->end = reached;
+  const auto before = [](Chunks::iterator a, Chunks::iterator b) {
     return std::tie(a->block, a->begin) < std::tie(b->block, b->begin);
   };
   left_.insert(std::upper_bound(left_.begin(), left_.end(), left, before), left);
@@ -174,50 +174,50 @@ void BatchRun::leave(Pieces::iterator piece, size_t reached) {
 
 void BatchRun::write_out() {
   while (true) {
-    Pieces ready;
+    Chunks ready;
     {
       const MutexLock lock(mutex_);
-      const auto open = std::find_if(pieces_.begin(), pieces_.end(), [](const Piece& piece) { return !piece.done; });
-      ready.splice(ready.end(), pieces_, pieces_.begin(), open);
+      const auto open = std::find_if(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return !chunk.done; });
+      ready.splice(ready.end(), chunks_, chunks_.begin(), open);
       if (ready.empty()) {
         writing_ = false;
         return;
       }
     }
     if (control_.stopped()) continue;
-    for (const Piece& piece : ready) write(piece);
+    for (const Chunk& chunk : ready) write(chunk);
   }
 }
 
-void BatchRun::write(const Piece& piece) {
-  Block& block = blocks_[piece.block];
-  block.cost.work += piece.work;
-  if (row_layout(batch_.blocks[piece.block]) == RowLayout::kCounted) return write_counted(piece);
-  const std::vector<uint32_t>& cut = piece.rows.truncated;
-  if (!cut.empty()) std::copy(cut.begin(), cut.end(), answer_.add_truncated(piece.block, cut.size()));
+void BatchRun::write(const Chunk& chunk) {
+  Block& block = blocks_[chunk.block];
+  block.cost.work += chunk.work;
+  if (row_layout(batch_.blocks[chunk.block]) == RowLayout::kCounted) return write_counted(chunk);
+  const std::vector<uint32_t>& cut = chunk.rows.truncated;
+  if (!cut.empty()) std::copy(cut.begin(), cut.end(), answer_.add_truncated(chunk.block, cut.size()));
 }
 
 // Cuts rows where the reply is full.
-void BatchRun::write_counted(const Piece& piece) {
-  const ColumnSet columns = returned_columns(batch_.blocks[piece.block]);
+void BatchRun::write_counted(const Chunk& chunk) {
+  const ColumnSet columns = returned_columns(batch_.blocks[chunk.block]);
   const uint32_t bytes = row_bytes(columns);
   uint64_t room = room_.load(std::memory_order_relaxed);
-  uint32_t* const counts = answer_.add_counts(piece.block, piece.rows.counts.size());
+  uint32_t* const counts = answer_.add_counts(chunk.block, chunk.rows.counts.size());
   size_t first = 0, row = 0;  // rows from first to row are to be copied
   const auto copy = [&] {
-    if (row != first) copy_rows(piece.rows, first, row - first, answer_.add_rows(piece.block, columns, row - first));
+    if (row != first) copy_rows(chunk.rows, first, row - first, answer_.add_rows(chunk.block, columns, row - first));
   };
-  auto cut = piece.rows.truncated.begin();
-  for (size_t i = 0; i < piece.rows.counts.size(); ++i) {
-    const auto query = static_cast<uint32_t>(piece.begin + i);
-    const uint32_t rows = piece.rows.counts[i];
+  auto cut = chunk.rows.truncated.begin();
+  for (size_t i = 0; i < chunk.rows.counts.size(); ++i) {
+    const auto query = static_cast<uint32_t>(chunk.begin + i);
+    const uint32_t rows = chunk.rows.counts[i];
     const auto kept = static_cast<uint32_t>(std::min<uint64_t>(rows, room / bytes));
     counts[i] = kept;
     room -= uint64_t{kept} * bytes;
     row += kept;
-    const bool was_cut = cut != piece.rows.truncated.end() && *cut == query;
+    const bool was_cut = cut != chunk.rows.truncated.end() && *cut == query;
     if (was_cut) ++cut;
-    if (was_cut || kept < rows) *answer_.add_truncated(piece.block, 1) = query;
+    if (was_cut || kept < rows) *answer_.add_truncated(chunk.block, 1) = query;
     if (kept == rows) continue;
     copy();
     row += rows - kept;

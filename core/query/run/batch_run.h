@@ -3,7 +3,7 @@
 // batch cut by max_work apart).
 //
 // Threads: work() may be called by any number of threads at once; everything else before the first or after the last
-// call. Memory: rows wait for their turn in at most kMaxPieces pieces, each of at most a reply.
+// call. Memory: rows wait for their turn in at most kMaxChunks pieces, each of at most a reply.
 #ifndef LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 #define LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 
@@ -52,7 +52,7 @@ struct QueryCost {
 class BatchRun {
  public:
   // Pieces that wait for those before them, or are in work.
-  static constexpr size_t kMaxPieces = 16;
+  static constexpr size_t kMaxChunks = 16;
 
   // `snapshot`, `batch` and `answer` are borrowed; `batch` has passed check_batch(). OUT_OF_RANGE for a time that is
   // not kept, unless its block clamps.
@@ -78,16 +78,16 @@ class BatchRun {
     QueryCost cost;  // its work as far as it is written out
   };
   // Some queries of a block, in a row.
-  struct Piece {
+  struct Chunk {
     size_t block;
     size_t begin, end;
     bool done = false;
     BlockResult rows = {};  // of blocks that count them
     Work work = {};
   };
-  using Pieces = std::list<Piece>;
+  using Chunks = std::list<Chunk>;
   // What one thread does for one block without a break.
-  struct Stretch {
+  struct TimingSpan {
     size_t block;
     uint64_t start;
   };
@@ -96,22 +96,22 @@ class BatchRun {
   void add_block(QueryMoments moments);
 
   bool can_begin() const LOCUS_REQUIRES(mutex_);
-  Pieces::iterator begin_piece() LOCUS_REQUIRES(mutex_);
-  Pieces::iterator pop_left() LOCUS_REQUIRES(mutex_);
-  void leave(Pieces::iterator piece, size_t reached) LOCUS_REQUIRES(mutex_);
+  Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
+  Chunks::iterator pop_left() LOCUS_REQUIRES(mutex_);
+  void leave(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
   void pass_empty_blocks() LOCUS_REQUIRES(mutex_);
   // Answers the piece, or as much of it as makes a piece; returns the first query that is left.
-  size_t run(Piece& piece);
-  void end_piece(Pieces::iterator piece, size_t reached) LOCUS_EXCLUDES(mutex_);
+  size_t run(Chunk& chunk);
+  void end_chunk(Chunks::iterator chunk, size_t reached) LOCUS_EXCLUDES(mutex_);
   // Hands on what is done up to the first piece that is not.
   void write_out() LOCUS_EXCLUDES(mutex_);
-  void write(const Piece& piece);
-  void write_counted(const Piece& piece);
+  void write(const Chunk& chunk);
+  void write_counted(const Chunk& chunk);
   Progress progress() LOCUS_REQUIRES(mutex_);
   uint64_t now() const { return options_.clock ? options_.clock() : 0; }
-  Stretch begin_stretch(size_t block) const { return {block, worked()}; }
-  void end_stretch(const Stretch& stretch) LOCUS_REQUIRES(mutex_) {
-    blocks_[stretch.block].cost.nanoseconds += worked() - stretch.start;
+  TimingSpan begin_timing(size_t block) const { return {block, worked()}; }
+  void end_timing(const TimingSpan& timing) LOCUS_REQUIRES(mutex_) {
+    blocks_[timing.block].cost.nanoseconds += worked() - timing.start;
   }
   uint64_t worked() const { return options_.work_clock ? options_.work_clock() : now(); }
 
@@ -124,8 +124,8 @@ class BatchRun {
   std::atomic<uint64_t> room_;  // bytes of counted rows that still fit; written by whoever writes out
 
   Mutex mutex_;
-  Pieces pieces_ LOCUS_GUARDED_BY(mutex_);                       // in order, from the first that is not handed on
-  std::vector<Pieces::iterator> left_ LOCUS_GUARDED_BY(mutex_);  // of them, in order, those that nobody has begun
+  Chunks chunks_ LOCUS_GUARDED_BY(mutex_);                       // in order, from the first that is not handed on
+  std::vector<Chunks::iterator> left_ LOCUS_GUARDED_BY(mutex_);  // of them, in order, those that nobody has begun
   size_t next_block_ LOCUS_GUARDED_BY(mutex_) = 0;               // the first query that is in no piece
   size_t next_query_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint32_t at_work_ LOCUS_GUARDED_BY(mutex_) = 0;  // threads

@@ -11,7 +11,7 @@ namespace locus {
 namespace {
 
 // Work of a piece: about a tenth of a millisecond.
-constexpr uint64_t kPieceWork = 16'384;
+constexpr uint64_t kChunkWork = 16'384;
 // Work of a call of the kernels, which nothing can stop.
 constexpr uint64_t kCallWork = 65'536;
 // Rays of a call. The most are for rays that turn out dear behind cheap ones: at 4,096 triangles each they take 3 ms,
@@ -41,7 +41,7 @@ uint64_t BlockRunner::work_done() const {
   return work.nodes + work.cells + work.tests + rows_;
 }
 
-bool BlockRunner::enough() const { return work_done() >= kPieceWork && groups_.empty(); }
+bool BlockRunner::enough() const { return work_done() >= kChunkWork && groups_.empty(); }
 
 template <class Columns, class RegionOf>
 void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {

@@ -19,7 +19,7 @@ absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const Query
   };
   // One who finds nothing to begin may go: those at work go on until all is done.
   if (options.parallel_for)
-    options.parallel_for(BatchRun::kMaxPieces, work);
+    options.parallel_for(BatchRun::kMaxChunks, work);
   else
     work(0);
   if (absl::Status status = (*run)->status(); !status.ok()) return status;

@@ -193,7 +193,7 @@ TEST(BatchRunTest, RowsThatWaitForAnEarlierPieceAreOfAtMostSixteenPieces) {
   while (!slow_waits) std::this_thread::yield();
   size_t turns = 1;
   while (asked.run->work(0) == Progress::kMore) ++turns;
-  EXPECT_EQ(turns, BatchRun::kMaxPieces - 1);
+  EXPECT_EQ(turns, BatchRun::kMaxChunks - 1);
   let_go = true;
   first.join();
   EXPECT_EQ(last, Progress::kDone) << "who held the others up goes on alone";
