@@ -67,7 +67,7 @@ uint32_t* ResultColumns::add_truncated(size_t number, size_t queries) {
   return grow(*block(number).mutable_truncated(), queries);
 }
 
-MomentSpans ResultColumns::add_moments(size_t number, size_t queries) {
+TimeSpans ResultColumns::add_times(size_t number, size_t queries) {
   v1::BlockResult& to = block(number);
   return {grow(*to.mutable_resolved_ticks(), queries), grow(*to.mutable_resolved_fractions(), queries)};
 }

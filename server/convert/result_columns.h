@@ -18,7 +18,7 @@ class ResultColumns final : public AnswerSink {
   char* add_hits(size_t block, size_t queries) override;
   uint32_t* add_counts(size_t block, size_t queries) override;
   uint32_t* add_truncated(size_t block, size_t queries) override;
-  MomentSpans add_moments(size_t block, size_t queries) override;
+  TimeSpans add_times(size_t block, size_t queries) override;
   uint32_t* add_clamped(size_t block, size_t queries) override;
 
  private:

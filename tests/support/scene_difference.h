@@ -8,7 +8,7 @@
 
 #include "core/index/index_queries.h"
 #include "core/scene/scene.h"
-#include "core/scene/snapshot/moment.h"
+#include "core/scene/snapshot/scene_at_time.h"
 #include "tests/support/random.h"
 
 namespace locus::test {
@@ -88,10 +88,10 @@ inline std::string past_difference(const SceneSnapshot& a, const SceneSnapshot& 
   const uint64_t oldest = std::max(a.oldest_tick(), b.oldest_tick());
   if (oldest > a.tick) return "the past";
   const AsOf time{oldest + random.below(a.tick - oldest + 1), random.chance(0.5) ? random.float_between(0, 0.99) : 0};
-  const std::optional<Moment> one = find_moment(a, time), other = find_moment(b, time);
+  const std::optional<SceneAtTime> one = find_scene_at(a, time), other = find_scene_at(b, time);
   if (one.has_value() != other.has_value()) return "whether a moment is kept";
   if (!one) return "";
-  const auto shapes = [](const Moment& moment) {
+  const auto shapes = [](const SceneAtTime& moment) {
     std::vector<Object> objects;
     moment.objects().grid().for_each([&](const GridRef& value) {
       objects.push_back(object_of(value));

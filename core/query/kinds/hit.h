@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "core/base/ids.h"
-#include "core/scene/snapshot/moment.h"
+#include "core/scene/snapshot/scene_at_time.h"
 #include "core/scene/statics/instance.h"
 
 namespace locus {
@@ -18,14 +18,14 @@ struct Hit {
   uint32_t triangle = kNoTriangle;                   // number in the mesh
   GridRef object;                                    // one of the two, or neither for a miss
   const Instance* instance = nullptr;
-  const Moment* moment = nullptr;  // of the object: when it was found
+  const SceneAtTime* moment = nullptr;  // of the object: when it was found
 
   Shape object_shape() const { return moment == nullptr ? shape_of(object) : moment->shape(object); }
 };
 
 // As it is in the snapshot; the next, as it was at a moment, which the hit borrows.
 inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object}; }
-inline Hit hit_on(const GridRef& object, float t, const Moment& moment) {
+inline Hit hit_on(const GridRef& object, float t, const SceneAtTime& moment) {
   return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};
 }
 inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, GridRef(), &instance}; }

@@ -4,13 +4,13 @@
 
 namespace locus {
 
-Hit look_up(const SceneSnapshot& snapshot, const Moment& moment, Id id) {
+Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id) {
   if (const GridRef object = moment.objects().find_ref(id)) return hit_on(object, 0, moment);
   if (const Instance* instance = snapshot.statics->find(id)) return hit_on(*instance, 0);
   return {};
 }
 
-absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const Moment& moment,
+absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const SceneAtTime& moment,
                                                          absl::Span<const uint64_t> groups,
                                                          const OverlapOptions& options) {
   absl::flat_hash_map<Group, LowestRows> rows;

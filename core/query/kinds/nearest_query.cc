@@ -71,7 +71,7 @@ class NearestRows {
 
 class ObjectsNear {
  public:
-  ObjectsNear(QueryTask& task, const Moment& moment, const NearestRequest& request, const Filter& filter,
+  ObjectsNear(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request, const Filter& filter,
               NearestRows& rows)
       : task_(task), moment_(moment), request_(request), filter_(filter), rows_(rows) {}
 
@@ -89,7 +89,7 @@ class ObjectsNear {
 
  private:
   QueryTask& task_;
-  const Moment& moment_;
+  const SceneAtTime& moment_;
   const NearestRequest& request_;
   const Filter& filter_;
   NearestRows& rows_;
@@ -248,7 +248,7 @@ NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& ne
           block.precision};
 }
 
-std::vector<Hit> run_nearest(QueryTask& task, const Moment& moment, const NearestRequest& request,
+std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
                              const Filter& filter) {
   NearestRows rows(request);
   if (request.source != Source::kStatic) {

@@ -29,7 +29,7 @@ NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& ne
 // Rows: t is the distance, triangle that of the instance which is nearest. Cost: the nodes and cells within the
 // distance of the last row, and O(log count) for each row kept.
 // `moment` says when; the rows borrow it.
-std::vector<Hit> run_nearest(QueryTask& task, const Moment& moment, const NearestRequest& request,
+std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
                              const Filter& filter);
 
 // From the request's point to the nearest one of the row's object or triangle, or of its bounds with kConservative:

@@ -79,7 +79,7 @@ struct BoxShape {
 };
 
 template <class Kind>
-GridRegion region_asked(const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options) {
+GridRegion region_asked(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
   const typename Kind::WorldRegion region(shape);
   // Objects themselves, not only their bounds, are to reach into a ball.
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
@@ -88,8 +88,8 @@ GridRegion region_asked(const Moment& moment, const typename Kind::World& shape,
 template <class Kind>
 class ObjectRows {
  public:
-  ObjectRows(QueryTask& task, const Moment& moment, const typename Kind::World& shape, const OverlapOptions& options,
-             const Filter& filter)
+  ObjectRows(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
+             const OverlapOptions& options, const Filter& filter)
       : task_(task), moment_(moment), shape_(shape), options_(options), filter_(filter), found_(task.found_objects()) {
     found_.restart(options.max_results);
   }
@@ -115,7 +115,7 @@ class ObjectRows {
   }
 
   QueryTask& task_;
-  const Moment& moment_;
+  const SceneAtTime& moment_;
   const typename Kind::World& shape_;
   const OverlapOptions& options_;
   const Filter& filter_;
@@ -259,7 +259,7 @@ class InstanceSearch {
 };
 
 // The rows of instances, and of objects: of either that come first, and of both.
-OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const Moment& moment,
+OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();
   if (instances.runs.empty()) {
@@ -282,7 +282,7 @@ OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const M
 }
 
 template <class Kind>
-OverlapAnswer run_overlap(QueryTask& task, const Moment& moment, const typename Kind::World& shape,
+OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
                           const OverlapOptions& options, const Filter& filter) {
   LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
   if (options.source != Source::kDynamic) {
@@ -306,21 +306,21 @@ OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
   return {block.source, block.precision, detail, max_results, block.after_id};
 }
 
-OverlapAnswer run_ball(QueryTask& task, const Moment& moment, const Balld& ball, const OverlapOptions& options,
+OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
                        const Filter& filter) {
   return run_overlap<BallShape>(task, moment, ball, options, filter);
 }
 
-OverlapAnswer run_box(QueryTask& task, const Moment& moment, const Obbd& box, const OverlapOptions& options,
+OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter) {
   return run_overlap<BoxShape>(task, moment, box, options, filter);
 }
 
-GridRegion ball_region(const Moment& moment, const Balld& ball, const OverlapOptions& options) {
+GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options) {
   return region_asked<BallShape>(moment, ball, options);
 }
 
-GridRegion box_region(const Moment& moment, const Obbd& box, const OverlapOptions& options) {
+GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options) {
   return region_asked<BoxShape>(moment, box, options);
 }
 

@@ -21,14 +21,14 @@ struct OverlapOptions {
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
 // `moment` says when; the answer borrows it.
-OverlapAnswer run_ball(QueryTask& task, const Moment& moment, const Balld& ball, const OverlapOptions& options,
+OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
                        const Filter& filter);
-OverlapAnswer run_box(QueryTask& task, const Moment& moment, const Obbd& box, const OverlapOptions& options,
+OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter);
 
 // What such a query asks of the grid of objects.
-GridRegion ball_region(const Moment& moment, const Balld& ball, const OverlapOptions& options);
-GridRegion box_region(const Moment& moment, const Obbd& box, const OverlapOptions& options);
+GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options);
+GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
 
 // The ball or box of query `i` of a block, in world axes.
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i);

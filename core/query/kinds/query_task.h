@@ -15,7 +15,7 @@
 #include "core/index/work.h"
 #include "core/query/kinds/found_objects.h"
 #include "core/query/query_batch.h"
-#include "core/scene/snapshot/moment.h"
+#include "core/scene/snapshot/scene_at_time.h"
 
 namespace locus {
 
@@ -118,7 +118,7 @@ class QueryTask {
 
   // The same of the scene's objects at a moment, which visitors take by reference.
   template <class Visitor>
-  void visit_objects_on_ray(const Moment& moment, const SlabRay<double>& slabs, Visitor& visitor) {
+  void visit_objects_on_ray(const SceneAtTime& moment, const SlabRay<double>& slabs, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_)
       moment.objects().grid().for_each(visit);
@@ -127,7 +127,7 @@ class QueryTask {
           slabs, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
   }
   template <class Visitor>
-  void visit_objects_near(const Moment& moment, const Vec3d& point, Visitor& visitor) {
+  void visit_objects_near(const SceneAtTime& moment, const Vec3d& point, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_)
       moment.objects().grid().for_each(visit);
@@ -136,7 +136,7 @@ class QueryTask {
           point, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
   }
   template <class Visitor>
-  void visit_objects_in_region(const Moment& moment, Visitor& visitor) {
+  void visit_objects_in_region(const SceneAtTime& moment, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_) {
       moment.objects().grid().for_each(visit);

@@ -13,7 +13,7 @@ namespace {
 
 class ObjectVisitor {
  public:
-  ObjectVisitor(QueryTask& task, const Moment& moment, const RayRequest& request, const Filter& filter,
+  ObjectVisitor(QueryTask& task, const SceneAtTime& moment, const RayRequest& request, const Filter& filter,
                 HitCollector& collector)
       : task_(task),
         moment_(moment),
@@ -40,7 +40,7 @@ class ObjectVisitor {
   }
 
   QueryTask& task_;
-  const Moment& moment_;
+  const SceneAtTime& moment_;
   ObjectRay ray_;
   Precision precision_;
   const Filter& filter_;
@@ -103,7 +103,7 @@ RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding 
   return request;
 }
 
-RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryMoments& moments,
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryTimes& moments,
                     Winding winding, size_t begin, size_t end) {
   std::vector<AskedRay> rays;
   rays.reserve(end - begin);
@@ -118,7 +118,7 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
       InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
       task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
     }
-    const Moment& moment = moments.of(i);
+    const SceneAtTime& moment = moments.of(i);
     const bool asks_objects = block.source != Source::kStatic && moment.objects().grid().size() != 0;
     if (asks_objects && !ray.collector.done() && !task.ended()) {
       ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);

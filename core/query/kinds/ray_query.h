@@ -6,8 +6,8 @@
 
 #include "absl/container/inlined_vector.h"
 #include "core/query/kinds/hit.h"
-#include "core/query/kinds/query_moments.h"
 #include "core/query/kinds/query_task.h"
+#include "core/query/kinds/query_times.h"
 
 namespace locus {
 
@@ -34,7 +34,7 @@ using RayAnswers = std::vector<RayAnswer>;
 
 // The answers to queries `begin` to `end` (exclusive) of a block; they borrow `moments`. Many at once are answered
 // faster than one by one.
-RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryMoments& moments,
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryTimes& moments,
                     Winding winding, size_t begin, size_t end);
 
 // Weights of the second and third vertex, and the unit normal to the triangle's front or out of the object, at a hit

@@ -14,7 +14,7 @@
 namespace locus {
 
 // When queries asked in fact, one entry a query.
-struct MomentSpans {
+struct TimeSpans {
   uint64_t* ticks;
   float* fractions;
 };
@@ -32,7 +32,7 @@ class AnswerSink {
   virtual uint32_t* add_counts(size_t block, size_t queries) = 0;
   // Numbers of queries that were cut, ascending.
   virtual uint32_t* add_truncated(size_t block, size_t queries) = 0;
-  virtual MomentSpans add_moments(size_t block, size_t queries) = 0;
+  virtual TimeSpans add_times(size_t block, size_t queries) = 0;
   // Numbers of queries whose moment was not kept, so that the nearest was taken, ascending.
   virtual uint32_t* add_clamped(size_t block, size_t queries) = 0;
 };

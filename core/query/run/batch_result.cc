@@ -29,7 +29,7 @@ uint32_t* BatchResultSink::add_counts(size_t block, size_t queries) {
 uint32_t* BatchResultSink::add_truncated(size_t block, size_t queries) {
   return grow(result_.blocks[block].truncated, queries);
 }
-MomentSpans BatchResultSink::add_moments(size_t block, size_t queries) {
+TimeSpans BatchResultSink::add_times(size_t block, size_t queries) {
   BlockResult& result = result_.blocks[block];
   return {grow(result.resolved_ticks, queries), grow(result.resolved_fractions, queries)};
 }

@@ -26,9 +26,9 @@ void copy_rows(const BlockResult& from, size_t first, size_t rows, const RowSpan
   });
 }
 
-void write_moments(const QueryMoments& moments, size_t block, size_t queries, AnswerSink& answer) {
+void write_times(const QueryTimes& moments, size_t block, size_t queries, AnswerSink& answer) {
   if (!moments.asks_past() || queries == 0) return;
-  const MomentSpans to = answer.add_moments(block, queries);
+  const TimeSpans to = answer.add_times(block, queries);
   for (size_t i = 0; i < queries; ++i) {
     to.ticks[i] = moments.time(i).tick;
     to.fractions[i] = moments.time(i).fraction;
@@ -40,16 +40,16 @@ void write_moments(const QueryMoments& moments, size_t block, size_t queries, An
 
 absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                                             RunOptions options, AnswerSink& answer) {
-  std::vector<QueryMoments> moments;
+  std::vector<QueryTimes> moments;
   moments.reserve(batch.blocks.size());
   for (size_t b = 0; b < batch.blocks.size(); ++b) {
-    absl::StatusOr<QueryMoments> resolved =
-        QueryMoments::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"));
+    absl::StatusOr<QueryTimes> resolved =
+        QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"));
     if (!resolved.ok()) return resolved.status();
     moments.push_back(*std::move(resolved));
   }
   std::unique_ptr<BatchRun> run(new BatchRun(snapshot, batch, std::move(options), answer));
-  for (QueryMoments& of_block : moments) run->add_block(std::move(of_block));
+  for (QueryTimes& of_block : moments) run->add_block(std::move(of_block));
   const MutexLock lock(run->mutex_);
   run->pass_empty_blocks();
   return run;
@@ -63,7 +63,7 @@ BatchRun::BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOp
       control_(batch.max_work, options_.stop),
       room_(reply_limit(batch) - fixed_reply_bytes(batch)) {}
 
-void BatchRun::add_block(QueryMoments moments) {
+void BatchRun::add_block(QueryTimes moments) {
   const size_t number = blocks_.size();
   const QueryBlock& block = batch_.blocks[number];
   const size_t queries = query_count(block);
@@ -71,7 +71,7 @@ void BatchRun::add_block(QueryMoments moments) {
   if (row_layout(block) == RowLayout::kDense)
     to.place.rows = answer_.add_rows(number, returned_columns(block), queries);
   if (row_layout(block) == RowLayout::kBytes) to.place.hits = answer_.add_hits(number, queries);
-  write_moments(to.moments, number, queries, answer_);
+  write_times(to.moments, number, queries, answer_);
 }
 
 QueryCost BatchRun::cost() const {

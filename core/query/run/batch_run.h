@@ -17,8 +17,8 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
-#include "core/query/kinds/query_moments.h"
 #include "core/query/kinds/query_task.h"
+#include "core/query/kinds/query_times.h"
 #include "core/query/query_batch.h"
 #include "core/query/run/answer_sink.h"
 #include "core/query/run/block_runner.h"
@@ -69,9 +69,9 @@ class BatchRun {
 
  private:
   struct Block {
-    Block(QueryMoments&& when, size_t count, size_t most) : moments(std::move(when)), queries(count), step(most) {}
+    Block(QueryTimes&& when, size_t count, size_t most) : moments(std::move(when)), queries(count), step(most) {}
 
-    const QueryMoments moments;
+    const QueryTimes moments;
     const size_t queries;
     const size_t step;  // queries of a piece, at most
     BlockPlace place;
@@ -93,7 +93,7 @@ class BatchRun {
   };
 
   BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOptions options, AnswerSink& answer);
-  void add_block(QueryMoments moments);
+  void add_block(QueryTimes moments);
 
   bool can_begin() const LOCUS_REQUIRES(mutex_);
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);

@@ -20,7 +20,7 @@ constexpr uint64_t kMinRaysAtOnce = 8, kMaxRaysAtOnce = 128, kMaxRaysOfManyHits 
 
 }  // namespace
 
-BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryMoments& moments, BlockPlace& place,
+BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& moments, BlockPlace& place,
                          uint64_t max_bytes)
     : task_(task),
       block_(block),

@@ -25,7 +25,7 @@ class BlockRunner {
  public:
   // Rows beyond `max_bytes` of columns are dropped and their queries listed as truncated: nothing behind them would fit
   // the reply either.
-  BlockRunner(QueryTask& task, const QueryBlock& block, const QueryMoments& moments, BlockPlace& place,
+  BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& moments, BlockPlace& place,
               uint64_t max_bytes);
 
   // Queries begin to end (exclusive), in order, or fewer where they turn out to be much work, but one at least. Returns
@@ -60,7 +60,7 @@ class BlockRunner {
 
   QueryTask& task_;
   const QueryBlock& block_;
-  const QueryMoments& moments_;
+  const QueryTimes& moments_;
   BlockPlace& place_;
   const ColumnSet columns_;
   const uint64_t max_rows_;

@@ -67,7 +67,7 @@ void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, c
   for (size_t i = 0; i < triangles.size(); ++i) write_labels(hit, to, row + i);
 }
 
-void write_object_rows(absl::Span<const FoundObject> objects, const Moment& moment, const RowSpans& to) {
+void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime& moment, const RowSpans& to) {
   if (to.ids != nullptr)
     for (size_t row = 0; row < objects.size(); ++row) to.ids[row] = objects[row].id;
   if (to.triangles != nullptr) std::fill_n(to.triangles, objects.size(), kNoTriangle);

@@ -16,7 +16,7 @@ void write_row(const Hit& hit, const RowSpans& to, size_t row);
 // Writes a row like `hit` for each of some triangles, from row `row` on.
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);
 // Writes a row for each of some objects, as they were at `moment`, from the first row on.
-void write_object_rows(absl::Span<const FoundObject> objects, const Moment& moment, const RowSpans& to);
+void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime& moment, const RowSpans& to);
 // Writes what only hits of rays have: uv, normal and point, the latter relative to the frame.
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row);

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "core/scene/scene.h"
-#include "core/scene/snapshot/moment.h"
+#include "core/scene/snapshot/scene_at_time.h"
 #include "tests/bench/dynamic/contender.h"
 
 namespace locus::bench::dynamic {

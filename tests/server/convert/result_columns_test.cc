@@ -41,7 +41,7 @@ void fill(AnswerSink& sink) {
     count_up(sink.add_counts(1, kRows), kRows, 12);
     count_up(sink.add_truncated(1, 2), 2, 13);
     count_up(sink.add_hits(1, kRows), kRows, 14);
-    const MomentSpans moments = sink.add_moments(1, kRows);
+    const TimeSpans moments = sink.add_times(1, kRows);
     count_up(moments.ticks, kRows, 15);
     count_up(moments.fractions, kRows, 16);
     count_up(sink.add_clamped(1, 3), 3, 17);

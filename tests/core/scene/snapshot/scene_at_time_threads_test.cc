@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "core/scene/scene.h"
-#include "core/scene/snapshot/moment.h"
+#include "core/scene/snapshot/scene_at_time.h"
 #include "tests/support/random.h"
 #include "tests/support/test_scale.h"
 
@@ -41,7 +41,7 @@ void expect_past(const SceneSnapshot& snapshot, Random& random) {
   const uint64_t oldest = std::max<uint64_t>(snapshot.oldest_tick(), 1);
   const uint64_t tick = oldest + random.below(snapshot.tick - oldest + 1);
   const float fraction = tick == snapshot.tick || random.chance(0.3) ? 0 : 0.5f;
-  const Moment moment = find_moment(snapshot, {tick, fraction}).value();
+  const SceneAtTime moment = find_scene_at(snapshot, {tick, fraction}).value();
   const uint64_t id = 1 + random.below(kObjects);
   const double x = static_cast<double>(tick) + (fraction != 0 && lives(id, tick + 1) ? 0.5 : 0);
   size_t found = 0;

@@ -4,8 +4,8 @@
 // An object is there if it lived when the tick before the moment ended; it moves, in a straight line, only if the same
 // life is there when the next one does. So the set at the tick before is searched, as much wider as objects moved, and
 // each object found is put where it was. At a recorded tick and now nothing moves, and nothing is wider.
-#ifndef LOCUS_CORE_SCENE_SNAPSHOT_MOMENT_H_
-#define LOCUS_CORE_SCENE_SNAPSHOT_MOMENT_H_
+#ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
+#define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 
 #include <algorithm>
 #include <cmath>
@@ -26,12 +26,12 @@ struct AsOf {
   friend constexpr bool operator==(const AsOf&, const AsOf&) = default;
 };
 
-class Moment {
+class SceneAtTime {
  public:
   // When `objects` were as they are.
-  explicit Moment(const ObjectSet& objects) : at_(&objects) {}
+  explicit SceneAtTime(const ObjectSet& objects) : at_(&objects) {}
   // Part `weight` of the way from `at` to `next`, between which objects moved by `displacement`.
-  Moment(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement);
+  SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement);
 
   // Whether it lies between two ticks, so that objects may be elsewhere than in objects().
   bool between() const { return next_ != nullptr; }
@@ -78,12 +78,12 @@ class Moment {
 };
 
 // What the snapshot keeps of that time; nothing before its oldest tick and after its own. O(log records).
-std::optional<Moment> find_moment(const SceneSnapshot& snapshot, const AsOf& time);
+std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const AsOf& time);
 // `time`, or the nearest one that find_moment() finds.
 AsOf nearest_kept(const SceneSnapshot& snapshot, const AsOf& time);
 
 template <class MightMeet, class Visit>
-bool Moment::visit_fast(const MightMeet& might_meet, Work& work, const Visit& visit) const {
+bool SceneAtTime::visit_fast(const MightMeet& might_meet, Work& work, const Visit& visit) const {
   for (const FastMover& mover : *fast_) {
     ++work.cells;
     const double growth = internal::kBoundsGrowth * (magnitude(mover.centers) + double{mover.reach});
@@ -95,14 +95,14 @@ bool Moment::visit_fast(const MightMeet& might_meet, Work& work, const Visit& vi
 }
 
 template <class Ask, class Visit>
-void Moment::visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const {
+void SceneAtTime::visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const {
   if (fast_ == nullptr) return ask(visit);
   if (!visit_fast([&bounds](const Aabbd& way) { return overlaps(way, bounds); }, work, visit)) return;
   ask([&](const GridRef& object) { return is_fast(object.handle()) || visit(object); });
 }
 
 template <class Limit, class Visit>
-void Moment::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const {
+void SceneAtTime::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const {
   if (next_ == nullptr) return at_->grid().visit_ray(ray, limit, work, visit);
   const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
   if (fast_ == nullptr) return at_->grid().visit_ray(ray, limit, work, visit, reach);
@@ -116,7 +116,7 @@ void Moment::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& wor
 }
 
 template <class Limit, class Visit>
-void Moment::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
+void SceneAtTime::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
   if (next_ == nullptr) return at_->grid().visit_nearest(point, limit, work, visit);
   const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
   const auto wider = [&limit, reach] { return squared_limit(std::sqrt(limit()) + reach) * (1 + 0x1p-40); };
@@ -129,4 +129,4 @@ void Moment::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, c
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_SCENE_SNAPSHOT_MOMENT_H_
+#endif  // LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_

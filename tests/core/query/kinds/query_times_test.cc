@@ -1,5 +1,5 @@
 // Times of queries: which are kept, what is said of those that are not, and what a batch answers.
-#include "core/query/kinds/query_moments.h"
+#include "core/query/kinds/query_times.h"
 
 #include "core/query/columns.h"
 #include "core/query/run/run_batch.h"
@@ -16,9 +16,9 @@ SceneSpec ten_ticks() {
 }
 
 // Point 1 is at (t, 0, 0) at tick t, up to 30; it is in group 4.
-class QueryMomentsTest : public SceneFixture {
+class QueryTimesTest : public SceneFixture {
  protected:
-  QueryMomentsTest() : SceneFixture(ten_ticks()) {}
+  QueryTimesTest() : SceneFixture(ten_ticks()) {}
   void SetUp() override {
     InsertColumns insert = points({1}, {0, 0, 0});
     insert.groups = columns_.ids({4});
@@ -50,7 +50,7 @@ class QueryMomentsTest : public SceneFixture {
   }
 };
 
-TEST_F(QueryMomentsTest, EachQueryHasItsOwnTime) {
+TEST_F(QueryTimesTest, EachQueryHasItsOwnTime) {
   const BlockResult result = run_block(*scene_.latest(), where({20, 25, 30}, {0.5f, 0.25f, 0}));
   EXPECT_EQ(xs(result), (std::vector<double>{20.5, 25.25, 30}));
   EXPECT_EQ(result.resolved_ticks, (std::vector<uint64_t>{20, 25, 30}));
@@ -58,7 +58,7 @@ TEST_F(QueryMomentsTest, EachQueryHasItsOwnTime) {
   EXPECT_TRUE(result.clamped.empty());
 }
 
-TEST_F(QueryMomentsTest, OneTimeServesAllQueriesAndIsReportedForEach) {
+TEST_F(QueryTimesTest, OneTimeServesAllQueriesAndIsReportedForEach) {
   OwnedBlock block = where({22});
   block.ids = {1, 1, 1};
   const BlockResult result = run_block(*scene_.latest(), block);
@@ -66,14 +66,14 @@ TEST_F(QueryMomentsTest, OneTimeServesAllQueriesAndIsReportedForEach) {
   EXPECT_EQ(result.resolved_ticks, (std::vector<uint64_t>{22, 22, 22}));
 }
 
-TEST_F(QueryMomentsTest, OneTickWithManyFractionsAreManyTimes) {
+TEST_F(QueryTimesTest, OneTickWithManyFractionsAreManyTimes) {
   OwnedBlock block = where({22});
   block.ids = {1, 1};
   block.as_of_fractions = {0, 0.5f};
   EXPECT_EQ(xs(run_block(*scene_.latest(), block)), (std::vector<double>{22, 22.5}));
 }
 
-TEST_F(QueryMomentsTest, WithoutTimesNoneAreReported) {
+TEST_F(QueryTimesTest, WithoutTimesNoneAreReported) {
   OwnedBlock block = where({22});
   block.as_of_ticks.clear();
   const BlockResult result = run_block(*scene_.latest(), block);
@@ -82,7 +82,7 @@ TEST_F(QueryMomentsTest, WithoutTimesNoneAreReported) {
   EXPECT_TRUE(result.resolved_fractions.empty());
 }
 
-TEST_F(QueryMomentsTest, ATimeThatIsNotKeptRefusesTheBatchAndNamesTheRange) {
+TEST_F(QueryTimesTest, ATimeThatIsNotKeptRefusesTheBatchAndNamesTheRange) {
   const absl::Status status = refusal(where({25, 19}, {0, 0.75f}));
   expect_refusal(status, absl::StatusCode::kOutOfRange, Reason::kOutOfRange, "blocks[0].as_of_ticks", 1);
   EXPECT_NE(status.message().find("ticks 20 to 30"), absl::string_view::npos) << status;
@@ -91,7 +91,7 @@ TEST_F(QueryMomentsTest, ATimeThatIsNotKeptRefusesTheBatchAndNamesTheRange) {
                  "blocks[0].as_of_ticks", 0);
 }
 
-TEST_F(QueryMomentsTest, ClampingTakesTheNearestAndListsTheQuery) {
+TEST_F(QueryTimesTest, ClampingTakesTheNearestAndListsTheQuery) {
   OwnedBlock block = where({2, 25, 31}, {0.5f, 0.5f, 0.5f});
   block.settings.outside = OutsideHistory::kClamp;
   const BlockResult result = run_block(*scene_.latest(), block);
@@ -100,7 +100,7 @@ TEST_F(QueryMomentsTest, ClampingTakesTheNearestAndListsTheQuery) {
   EXPECT_EQ(result.resolved_fractions, (std::vector<float>{0, 0.5f, 0}));
 }
 
-TEST_F(QueryMomentsTest, GroupsAreLookedUpAtEachTime) {
+TEST_F(QueryTimesTest, GroupsAreLookedUpAtEachTime) {
   OwnedBlock block = where({20, 20, 28, 20});
   block.ids.clear();
   block.groups = {4, 4, 4, 5};
@@ -109,7 +109,7 @@ TEST_F(QueryMomentsTest, GroupsAreLookedUpAtEachTime) {
   EXPECT_EQ(xs(result), (std::vector<double>{20, 20, 28}));
 }
 
-TEST_F(QueryMomentsTest, TheRoomForTimesIsPartOfTheReply) {
+TEST_F(QueryTimesTest, TheRoomForTimesIsPartOfTheReply) {
   OwnedBlock block = where({20});
   QueryBatch batch;
   batch.blocks = {block.view()};

@@ -1,4 +1,4 @@
-#include "core/scene/snapshot/moment.h"
+#include "core/scene/snapshot/scene_at_time.h"
 
 #include "core/base/limits.h"
 #include "core/geometry/rotation.h"
@@ -14,14 +14,14 @@ bool before(const AsOf& a, const AsOf& b) { return a.tick < b.tick || (a.tick ==
 
 }  // namespace
 
-Moment::Moment(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement)
+SceneAtTime::SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement)
     : at_(&at),
       next_(&next),
       weight_(weight),
       reach_(displacement.reach * weight * kRelativeSlack + kPlaceSlack),
       fast_(displacement.fast.get()) {}
 
-GridRegion Moment::region(const Aabbd& bounds, const std::optional<Balld>& ball) const {
+GridRegion SceneAtTime::region(const Aabbd& bounds, const std::optional<Balld>& ball) const {
   if (next_ == nullptr) return {&at_->grid(), bounds, ball};
   const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
   std::optional<Balld> near = ball;
@@ -29,7 +29,7 @@ GridRegion Moment::region(const Aabbd& bounds, const std::optional<Balld>& ball)
   return {&at_->grid(), grown(bounds, reach), near};
 }
 
-Shape Moment::shape_between(const GridRef& object) const {
+Shape SceneAtTime::shape_between(const GridRef& object) const {
   Shape shape = shape_of(object);
   const GridRef later = next_->grid().find_like(object);
   if (!later) return shape;
@@ -38,21 +38,21 @@ Shape Moment::shape_between(const GridRef& object) const {
   return shape;
 }
 
-std::optional<Moment> find_moment(const SceneSnapshot& snapshot, const AsOf& time) {
+std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const AsOf& time) {
   const AsOf now{snapshot.tick, 0};
-  if (time == now) return Moment(snapshot.objects);
+  if (time == now) return SceneAtTime(snapshot.objects);
   if (before(now, time) || time.tick < snapshot.oldest_tick()) return std::nullopt;
   const auto& records = snapshot.history->records;
   const auto next = std::upper_bound(records.begin(), records.end(), time.tick,
                                      [](uint64_t tick, const auto& record) { return tick < record->tick; });
   const HistoryRecord& at = **(next - 1);
-  if (time == AsOf{at.tick, 0}) return Moment(at.objects);
+  if (time == AsOf{at.tick, 0}) return SceneAtTime(at.objects);
   const bool last = next == records.end();
   const uint64_t next_tick = last ? snapshot.tick : (*next)->tick;
   const double weight =
       (static_cast<double>(time.tick - at.tick) + double{time.fraction}) / static_cast<double>(next_tick - at.tick);
-  return Moment(at.objects, last ? snapshot.objects : (*next)->objects, weight,
-                last ? snapshot.since_close : at.to_next);
+  return SceneAtTime(at.objects, last ? snapshot.objects : (*next)->objects, weight,
+                     last ? snapshot.since_close : at.to_next);
 }
 
 AsOf nearest_kept(const SceneSnapshot& snapshot, const AsOf& time) {

@@ -1,5 +1,5 @@
 // Where objects were: at recorded ticks, between them, and through births, ends, jumps and changes.
-#include "core/scene/snapshot/moment.h"
+#include "core/scene/snapshot/scene_at_time.h"
 
 #include <algorithm>
 
@@ -14,9 +14,9 @@ SceneSpec with_history() {
   return spec;
 }
 
-class MomentTest : public SceneFixture {
+class SceneAtTimeTest : public SceneFixture {
  protected:
-  MomentTest() : SceneFixture(with_history()) {}
+  SceneAtTimeTest() : SceneFixture(with_history()) {}
 
   static UpdateBatch at_tick(uint64_t tick, UpdateBatch batch = {}) {
     batch.tick = tick;
@@ -30,18 +30,18 @@ class MomentTest : public SceneFixture {
   // Where it was; nothing if it was not there.
   std::optional<Shape> shape(Id id, uint64_t tick, float fraction = 0) const {
     const SnapshotPtr snapshot = scene_.latest();
-    const std::optional<Moment> moment = find_moment(*snapshot, {tick, fraction});
+    const std::optional<SceneAtTime> moment = find_scene_at(*snapshot, {tick, fraction});
     EXPECT_TRUE(moment) << tick << " is not kept";
     const GridRef object = moment->objects().find_ref(id);
     return object ? std::optional<Shape>(moment->shape(object)) : std::nullopt;
   }
   double x(Id id, uint64_t tick, float fraction = 0) const { return shape(id, tick, fraction).value().position.x; }
   bool is_kept(uint64_t tick, float fraction = 0) const {
-    return find_moment(*scene_.latest(), {tick, fraction}).has_value();
+    return find_scene_at(*scene_.latest(), {tick, fraction}).has_value();
   }
   std::vector<Id> found_near(Vec3d place, uint64_t tick, float fraction) const {
     const SnapshotPtr snapshot = scene_.latest();
-    const Moment moment = find_moment(*snapshot, {tick, fraction}).value();
+    const SceneAtTime moment = find_scene_at(*snapshot, {tick, fraction}).value();
     std::vector<Id> found;
     Work work;
     const Aabbd bounds = {place, place};
@@ -54,19 +54,19 @@ class MomentTest : public SceneFixture {
   }
 };
 
-TEST_F(MomentTest, NowIsTheSnapshotItself) {
+TEST_F(SceneAtTimeTest, NowIsTheSnapshotItself) {
   apply(at_tick(5, with(points({1}, {3, 0, 0}))));
   EXPECT_EQ(x(1, 5), 3);
 }
 
-TEST_F(MomentTest, ATickIsAsItWasWhenItEnded) {
+TEST_F(SceneAtTimeTest, ATickIsAsItWasWhenItEnded) {
   apply(at_tick(1, with(points({1}, {1, 0, 0}))));
   apply(with(move_to({1}, {2, 0, 0})));
   apply(at_tick(2, with(move_to({1}, {3, 0, 0}))));
   EXPECT_EQ(x(1, 1), 2);
 }
 
-TEST_F(MomentTest, BetweenTicksAnObjectIsOnTheStraightLine) {
+TEST_F(SceneAtTimeTest, BetweenTicksAnObjectIsOnTheStraightLine) {
   apply(at_tick(1, with(points({1}, {0, 0, 0}))));
   apply(at_tick(2, with(move_to({1}, {8, 4, 0}))));
   apply(at_tick(3, with(move_to({1}, {8, 8, 0}))));
@@ -74,14 +74,14 @@ TEST_F(MomentTest, BetweenTicksAnObjectIsOnTheStraightLine) {
   EXPECT_EQ(shape(1, 2, 0.5f)->position, (Vec3d{8, 6, 0}));
 }
 
-TEST_F(MomentTest, TicksThatWereLeftOutLieBetweenTheirNeighbours) {
+TEST_F(SceneAtTimeTest, TicksThatWereLeftOutLieBetweenTheirNeighbours) {
   apply(at_tick(10, with(points({1}, {0, 0, 0}))));
   apply(at_tick(14, with(move_to({1}, {8, 0, 0}))));
   EXPECT_EQ(x(1, 11), 2);
   EXPECT_EQ(x(1, 12, 0.5f), 5);
 }
 
-TEST_F(MomentTest, TurnsGoTheShorterWayRound) {
+TEST_F(SceneAtTimeTest, TurnsGoTheShorterWayRound) {
   InsertColumns insert = points({1}, {0, 0, 0});
   insert.rotations = columns_.floats({0, 0, 0, 1});
   apply(at_tick(1, with(insert)));
@@ -93,21 +93,21 @@ TEST_F(MomentTest, TurnsGoTheShorterWayRound) {
   EXPECT_NEAR(half.w, 0.92387953f, 1e-6);
 }
 
-TEST_F(MomentTest, WhatIsBornInBetweenIsNotThereBefore) {
+TEST_F(SceneAtTimeTest, WhatIsBornInBetweenIsNotThereBefore) {
   apply(at_tick(1, with(points({1}, {0, 0, 0}))));
   apply(at_tick(2, with(points({2}, {5, 0, 0}))));
   EXPECT_EQ(shape(2, 1, 0.9f), std::nullopt);
   EXPECT_EQ(x(2, 2), 5);
 }
 
-TEST_F(MomentTest, WhatEndsInBetweenStaysWhereItWas) {
+TEST_F(SceneAtTimeTest, WhatEndsInBetweenStaysWhereItWas) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, removing({1})));
   EXPECT_EQ(x(1, 1, 0.9f), 4);
   EXPECT_EQ(shape(1, 2), std::nullopt);
 }
 
-TEST_F(MomentTest, WhatJumpsStaysWhereItWasUntilItIsElsewhere) {
+TEST_F(SceneAtTimeTest, WhatJumpsStaysWhereItWasUntilItIsElsewhere) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, jump(move_to({1}, {100, 0, 0}))));
   apply(at_tick(3, with(move_to({1}, {102, 0, 0}))));
@@ -116,7 +116,7 @@ TEST_F(MomentTest, WhatJumpsStaysWhereItWasUntilItIsElsewhere) {
   EXPECT_EQ(x(1, 2, 0.5f), 101);
 }
 
-TEST_F(MomentTest, AnIdThatIsRemovedAndInsertedInOneBatchIsANewLife) {
+TEST_F(SceneAtTimeTest, AnIdThatIsRemovedAndInsertedInOneBatchIsANewLife) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   UpdateBatch batch = with(points({1}, {8, 0, 0}));
   batch.remove_ids = columns_.ids({1});
@@ -125,7 +125,7 @@ TEST_F(MomentTest, AnIdThatIsRemovedAndInsertedInOneBatchIsANewLife) {
   EXPECT_EQ(x(1, 2), 8);
 }
 
-TEST_F(MomentTest, ANewLifeInTheSamePlaceIsARevision) {
+TEST_F(SceneAtTimeTest, ANewLifeInTheSamePlaceIsARevision) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   UpdateBatch batch = with(points({1}, {4, 0, 0}));
   batch.remove_ids = columns_.ids({1});
@@ -133,7 +133,7 @@ TEST_F(MomentTest, ANewLifeInTheSamePlaceIsARevision) {
   EXPECT_EQ(apply(batch).revision, before + 1);
 }
 
-TEST_F(MomentTest, AnUpsertGoesOnWithTheLifeButNotBackwardsWithItsShape) {
+TEST_F(SceneAtTimeTest, AnUpsertGoesOnWithTheLifeButNotBackwardsWithItsShape) {
   apply(at_tick(1, with(balls({1}, {1}))));
   InsertColumns other = balls({1}, {3});
   other.positions = columns_.floats({8, 0, 0});
@@ -144,7 +144,7 @@ TEST_F(MomentTest, AnUpsertGoesOnWithTheLifeButNotBackwardsWithItsShape) {
   EXPECT_EQ(shape(1, 1, 0.5f)->radius, 1);
 }
 
-TEST_F(MomentTest, AHandleOfAnEndedLifeIsNotTakenForIt) {
+TEST_F(SceneAtTimeTest, AHandleOfAnEndedLifeIsNotTakenForIt) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, removing({1})));
   apply(with(points({2}, {50, 0, 0})));
@@ -152,7 +152,7 @@ TEST_F(MomentTest, AHandleOfAnEndedLifeIsNotTakenForIt) {
   EXPECT_EQ(x(1, 1, 0.5f), 4);
 }
 
-TEST_F(MomentTest, LabelsAreThoseOfTheTick) {
+TEST_F(SceneAtTimeTest, LabelsAreThoseOfTheTick) {
   InsertColumns insert = points({1}, {0, 0, 0});
   insert.tags = columns_.ids({7});
   apply(at_tick(1, with(insert)));
@@ -161,30 +161,30 @@ TEST_F(MomentTest, LabelsAreThoseOfTheTick) {
   relabel.tags = columns_.ids({8});
   apply(at_tick(2, with(relabel)));
   const SnapshotPtr snapshot = scene_.latest();
-  EXPECT_EQ(find_moment(*snapshot, {1, 0.5f})->objects().find_ref(1).entry().tag, 7u);
-  EXPECT_EQ(find_moment(*snapshot, {2, 0})->objects().find_ref(1).entry().tag, 8u);
+  EXPECT_EQ(find_scene_at(*snapshot, {1, 0.5f})->objects().find_ref(1).entry().tag, 7u);
+  EXPECT_EQ(find_scene_at(*snapshot, {2, 0})->objects().find_ref(1).entry().tag, 8u);
 }
 
-TEST_F(MomentTest, ASearchFindsWhatMovesPast) {
+TEST_F(SceneAtTimeTest, ASearchFindsWhatMovesPast) {
   apply(at_tick(1, with(points({1, 2}, {0, 0, 0, 3, 0, 0}))));
   apply(at_tick(2, with(move_to({1, 2}, {1, 0, 0, 3, 4, 0}))));
   EXPECT_EQ(found_near({0.5, 0, 0}, 1, 0.5f), std::vector<Id>{1});
   EXPECT_EQ(found_near({3, 2, 0}, 1, 0.5f), std::vector<Id>{2});
 }
 
-TEST_F(MomentTest, ASearchFindsTheFewThatMoveVeryFar) {
+TEST_F(SceneAtTimeTest, ASearchFindsTheFewThatMoveVeryFar) {
   apply(at_tick(1, with(points({1, 2}, {0, 0, 0, 3, 0, 0}))));
   apply(at_tick(2, with(move_to({1, 2}, {100000, 0, 0, 3, 1, 0}))));
   EXPECT_EQ(found_near({50000, 0, 0}, 1, 0.5f), std::vector<Id>{1});
 }
 
-TEST_F(MomentTest, ASearchHandsOverEachObjectOnce) {
+TEST_F(SceneAtTimeTest, ASearchHandsOverEachObjectOnce) {
   apply(at_tick(1, with(points({1}, {0, 0, 0}))));
   apply(at_tick(2, with(move_to({1}, {20, 0, 0}))));
   EXPECT_EQ(found_near({10, 0, 0}, 1, 0.5f), std::vector<Id>{1});
 }
 
-TEST_F(MomentTest, WhatIsToComeAndWhatIsForgottenIsNotKept) {
+TEST_F(SceneAtTimeTest, WhatIsToComeAndWhatIsForgottenIsNotKept) {
   for (uint64_t tick = 1; tick <= 30; ++tick) apply(at_tick(tick));
   EXPECT_TRUE(is_kept(20));
   EXPECT_TRUE(is_kept(30));
@@ -193,7 +193,7 @@ TEST_F(MomentTest, WhatIsToComeAndWhatIsForgottenIsNotKept) {
   EXPECT_FALSE(is_kept(31));
 }
 
-TEST_F(MomentTest, TheNearestKeptIsAtOneEndOrTheOther) {
+TEST_F(SceneAtTimeTest, TheNearestKeptIsAtOneEndOrTheOther) {
   for (uint64_t tick = 1; tick <= 30; ++tick) apply(at_tick(tick));
   const SnapshotPtr snapshot = scene_.latest();
   EXPECT_EQ(nearest_kept(*snapshot, {3, 0.5f}), (AsOf{20, 0}));
@@ -201,12 +201,12 @@ TEST_F(MomentTest, TheNearestKeptIsAtOneEndOrTheOther) {
   EXPECT_EQ(nearest_kept(*snapshot, {25, 0.5f}), (AsOf{25, 0.5f}));
 }
 
-TEST_F(MomentTest, ASnapshotKeepsItsOwnPast) {
+TEST_F(SceneAtTimeTest, ASnapshotKeepsItsOwnPast) {
   apply(at_tick(1, with(points({1}, {1, 0, 0}))));
   apply(at_tick(2, with(move_to({1}, {2, 0, 0}))));
   const SnapshotPtr kept = scene_.latest();
   for (uint64_t tick = 3; tick <= 40; ++tick) apply(at_tick(tick, with(move_to({1}, {float(tick), 0, 0}))));
-  const Moment moment = find_moment(*kept, {1, 0.5f}).value();
+  const SceneAtTime moment = find_scene_at(*kept, {1, 0.5f}).value();
   EXPECT_EQ(moment.shape(moment.objects().find_ref(1)).position.x, 1.5);
 }
 

@@ -1,4 +1,4 @@
-#include "core/query/kinds/query_moments.h"
+#include "core/query/kinds/query_times.h"
 
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
@@ -23,9 +23,9 @@ absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std
 
 }  // namespace
 
-absl::StatusOr<QueryMoments> QueryMoments::resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
-                                                   const std::string& field) {
-  QueryMoments result;
+absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
+                                               const std::string& field) {
+  QueryTimes result;
   const size_t n = query_count(block);
   if (block.as_of_ticks.empty() || n == 0) {
     result.moments_.emplace_back(snapshot.objects);
@@ -39,7 +39,7 @@ absl::StatusOr<QueryMoments> QueryMoments::resolve(const SceneSnapshot& snapshot
     const AsOf time = nearest_kept(snapshot, asked);
     if (!(time == asked) && block.outside == OutsideHistory::kReject) return not_kept(snapshot, asked, field, i);
     const bool repeated = i > 0 && time == result.times_.back();
-    result.moments_.push_back(repeated ? result.moments_.back() : *find_moment(snapshot, time));
+    result.moments_.push_back(repeated ? result.moments_.back() : *find_scene_at(snapshot, time));
     result.times_.push_back(time);
     result.clamped_.push_back(time == asked ? 0 : 1);
   }
