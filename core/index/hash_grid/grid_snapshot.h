@@ -83,7 +83,7 @@ class GridSnapshot {
   // values that are elsewhere than filed, by up to `astray`, likewise.
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
-                 double astray = 0) const;
+                 double displacement_bound = 0) const;
 
   // visit(GridRef) for every value whose bounds have a squared_distance() from `point` of at most limit(), and for
   // others near it; on each level about from near to far. limit() may fall meanwhile; false ends the visit. Cost: the
@@ -215,15 +215,15 @@ void GridSnapshot::visit_cells(const Aabbd& region, Work& work, const CullOf& cu
 
 template <class Limit, class Visit>
 void GridSnapshot::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
-                             double astray) const {
+                             double displacement_bound) const {
   for (const internal::GridLevel& level : levels_) {
     internal::LevelExtent extent = level.extent;
-    if (astray > 0) {
-      extent.reach += astray;
-      extent.bounds = grown(extent.bounds, astray);
+    if (displacement_bound > 0) {
+      extent.reach += displacement_bound;
+      extent.bounds = grown(extent.bounds, displacement_bound);
     }
     const internal::SlabMarch slabs(ray, extent, limit());
-    const double margin = astray + 2 * ray.margin(magnitude(extent.bounds));
+    const double margin = displacement_bound + 2 * ray.margin(magnitude(extent.bounds));
     const bool go_on = slabs.bricks() > static_cast<double>(level.table->size())
                            ? visit_by_distance(level, extent.reach, margin, ray, limit, work, visit)
                            : march(level, slabs, margin, ray, limit, work, visit);

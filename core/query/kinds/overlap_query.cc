@@ -23,11 +23,12 @@ struct LooselyPlaced {
 };
 
 // Of an object that is `astray` from where it is filed.
-LooselyPlaced loosely_placed(const GridRef& object, double astray) {
+LooselyPlaced loosely_placed(const GridRef& object, double displacement_bound) {
   const Vec3d place = object.entry().position;
   const double reach = object.reach();
   const double solid = object.entry().kind == ShapeKind::kBall ? reach : 0;
-  return {place, solid, reach, astray + internal::kBoundsGrowth * (max_component(abs(place)) + reach + astray)};
+  return {place, solid, reach,
+          displacement_bound + internal::kBoundsGrowth * (max_component(abs(place)) + reach + displacement_bound)};
 }
 
 // A ball or box in world axes, and the same in an instance's mesh axes: what the collecting below needs to know of it.
@@ -107,7 +108,7 @@ class ObjectRows {
   bool overlaps(const GridRef& object) const {
     const bool exact = options_.precision == Precision::kExact;
     if (exact) {  // most objects need neither be looked up in the next tick nor be told by their shape
-      const Verdict verdict = Kind::verdict(shape_, loosely_placed(object, moment_.astray(object)));
+      const Verdict verdict = Kind::verdict(shape_, loosely_placed(object, moment_.displacement_bound(object)));
       if (verdict != Verdict::kOpen) return verdict == Verdict::kIn;
     }
     const Shape shape = moment_.shape(object);

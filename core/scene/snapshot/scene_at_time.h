@@ -41,7 +41,7 @@ class SceneAtTime {
   Shape shape(const GridRef& object) const { return next_ == nullptr ? shape_of(object) : shape_between(object); }
 
   // How far from its place in objects() an object may be, but for the rounding of places; 0 where nothing moves.
-  double astray(const GridRef& object) const {
+  double displacement_bound(const GridRef& object) const {
     if (fast_ != nullptr && is_fast(object.handle())) return std::numeric_limits<double>::infinity();
     return reach_;
   }
