@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "absl/strings/str_split.h"
+#include "core/base/status_macros.h"
 
 namespace locus::client {
 namespace {
@@ -28,7 +29,7 @@ absl::Status check(const std::string& path) {
 }  // namespace
 
 absl::Status BackupPaths::add(const std::string& path) {
-  if (absl::Status checked = check(path); !checked.ok()) return checked;
+  RETURN_IF_ERROR(check(path));
   if (files_.size() >= kMaxBackupFiles) return absl::InvalidArgumentError("is one more than a backup may have");
   if (folders_.contains(path)) return absl::InvalidArgumentError("is a folder of another file");
   for (size_t slash = path.find('/'); slash != std::string::npos; slash = path.find('/', slash + 1)) {

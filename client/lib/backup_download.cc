@@ -6,6 +6,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "client/lib/status.h"
+#include "core/base/status_macros.h"
 #include "grpcpp/client_context.h"
 
 namespace locus::client {
@@ -33,10 +34,10 @@ class Receiver {
     if (piece.has_announced() != first_) return damaged("what comes is not announced in the first piece alone");
     if (first_) return begin(piece);
     if (!piece.path().empty()) {
-      if (absl::Status begun = begin_file(piece.path()); !begun.ok()) return begun;
+      RETURN_IF_ERROR(begin_file(piece.path()));
     }
     if (!in_file_) return damaged("bytes came that belong to no file");
-    if (absl::Status added = add(piece.data()); !added.ok()) return added;
+    RETURN_IF_ERROR(add(piece.data()));
     return piece.has_end() ? end_file(piece.end()) : absl::OkStatus();
   }
 

@@ -15,6 +15,7 @@
 #include "client/lib/mesh_upload.h"
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
+#include "core/base/status_macros.h"
 #include "grpcpp/channel.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "locus/v1/scene_service.grpc.pb.h"
@@ -75,14 +76,13 @@ Client::Client(std::unique_ptr<Connection> connection) : connection_(std::move(c
 Client::~Client() = default;
 
 absl::StatusOr<std::unique_ptr<Client>> Client::connect(absl::string_view address, const ClientOptions& options) {
-  const absl::StatusOr<std::string> target = target_of(address);
-  if (!target.ok()) return target.status();
-  std::shared_ptr<grpc::Channel> channel = open_channel(*target, options);
-  const absl::Status connected = await_connection(*channel, *target, options);
+  ASSIGN_OR_RETURN(const std::string target, target_of(address));
+  std::shared_ptr<grpc::Channel> channel = open_channel(target, options);
+  const absl::Status connected = await_connection(*channel, target, options);
   if (!connected.ok()) return connected;
-  std::shared_ptr<grpc::Channel> bulk = open_channel(*target, options);
+  std::shared_ptr<grpc::Channel> bulk = open_channel(target, options);
   auto connection = std::make_unique<Connection>(Connection{
-      *target, options, channel, bulk, v1::ServerService::NewStub(channel), v1::SceneService::NewStub(channel),
+      target, options, channel, bulk, v1::ServerService::NewStub(channel), v1::SceneService::NewStub(channel),
       v1::UpdateService::NewStub(channel), v1::QueryService::NewStub(channel), v1::SceneService::NewStub(bulk)});
   return std::unique_ptr<Client>(new Client(std::move(connection)));
 }
@@ -110,19 +110,17 @@ absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
 }
 
 absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {
-  absl::StatusOr<v1::CreateSceneResponse> response = call(*connection_->scenes, connection_->once(request.name()),
-                                                          request, &v1::SceneService::StubInterface::CreateScene);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_scene());
+  ASSIGN_OR_RETURN(v1::CreateSceneResponse response, call(*connection_->scenes, connection_->once(request.name()),
+                                                          request, &v1::SceneService::StubInterface::CreateScene));
+  return std::move(*response.mutable_scene());
 }
 
 absl::StatusOr<v1::Scene> Client::get_scene(absl::string_view name) const {
   v1::GetSceneRequest request;
   request.set_name(std::string(name));
-  absl::StatusOr<v1::GetSceneResponse> response =
-      call(*connection_->scenes, connection_->repeatable(name), request, &v1::SceneService::StubInterface::GetScene);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_scene());
+  ASSIGN_OR_RETURN(v1::GetSceneResponse response, call(*connection_->scenes, connection_->repeatable(name), request,
+                                                       &v1::SceneService::StubInterface::GetScene));
+  return std::move(*response.mutable_scene());
 }
 
 absl::StatusOr<std::vector<v1::Scene>> Client::list_scenes(const std::map<std::string, std::string>& labels) const {
@@ -130,11 +128,10 @@ absl::StatusOr<std::vector<v1::Scene>> Client::list_scenes(const std::map<std::s
   request.mutable_labels()->insert(labels.begin(), labels.end());
   std::vector<v1::Scene> scenes;
   do {
-    absl::StatusOr<v1::ListScenesResponse> page =
-        call(*connection_->scenes, connection_->repeatable(), request, &v1::SceneService::StubInterface::ListScenes);
-    if (!page.ok()) return page.status();
-    for (v1::Scene& scene : *page->mutable_scenes()) scenes.push_back(std::move(scene));
-    request.set_page_token(page->next_page_token());
+    ASSIGN_OR_RETURN(v1::ListScenesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
+                                                       &v1::SceneService::StubInterface::ListScenes));
+    for (v1::Scene& scene : *page.mutable_scenes()) scenes.push_back(std::move(scene));
+    request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
   return scenes;
 }
@@ -165,11 +162,10 @@ absl::StatusOr<std::vector<v1::Mesh>> Client::list_meshes() const {
   v1::ListMeshesRequest request;
   std::vector<v1::Mesh> meshes;
   do {
-    absl::StatusOr<v1::ListMeshesResponse> page =
-        call(*connection_->scenes, connection_->repeatable(), request, &v1::SceneService::StubInterface::ListMeshes);
-    if (!page.ok()) return page.status();
-    for (v1::Mesh& mesh : *page->mutable_meshes()) meshes.push_back(std::move(mesh));
-    request.set_page_token(page->next_page_token());
+    ASSIGN_OR_RETURN(v1::ListMeshesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
+                                                       &v1::SceneService::StubInterface::ListMeshes));
+    for (v1::Mesh& mesh : *page.mutable_meshes()) meshes.push_back(std::move(mesh));
+    request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
   return meshes;
 }
@@ -206,21 +202,19 @@ absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateB
   v1::ApplyUpdatesRequest request;
   request.set_scene(std::string(scene));
   *request.mutable_batch() = std::move(batch);
-  absl::StatusOr<v1::ApplyUpdatesResponse> response =
-      call(*connection_->updates, once_only ? connection_->repeatable(scene) : connection_->once(scene), request,
-           &v1::UpdateService::StubInterface::ApplyUpdates);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_ack());
+  ASSIGN_OR_RETURN(v1::ApplyUpdatesResponse response,
+                   call(*connection_->updates, once_only ? connection_->repeatable(scene) : connection_->once(scene),
+                        request, &v1::UpdateService::StubInterface::ApplyUpdates));
+  return std::move(*response.mutable_ack());
 }
 
 absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::QueryBatch batch) const {
   v1::QueryRequest request;
   request.set_scene(std::string(scene));
   *request.mutable_batch() = std::move(batch);
-  absl::StatusOr<v1::QueryResponse> response =
-      call(*connection_->queries, connection_->repeatable(scene), request, &v1::QueryService::StubInterface::Query);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_result());
+  ASSIGN_OR_RETURN(v1::QueryResponse response, call(*connection_->queries, connection_->repeatable(scene), request,
+                                                    &v1::QueryService::StubInterface::Query));
+  return std::move(*response.mutable_result());
 }
 
 std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace locus::client {
 namespace {
@@ -77,12 +78,11 @@ bool ResultRows::clamped(size_t query) const {
 }
 
 absl::StatusOr<RayHits> RayHits::of(const v1::BlockResult& block) {
-  absl::StatusOr<ResultRows> rows = ResultRows::of(block);
-  if (!rows.ok()) return rows.status();
-  if (rows->t().size() != rows->rows() || rows->ids().size() != rows->rows()) {
+  ASSIGN_OR_RETURN(ResultRows rows, ResultRows::of(block));
+  if (rows.t().size() != rows.rows() || rows.ids().size() != rows.rows()) {
     return absl::InvalidArgumentError("ray hits need the columns T and ID: ask for them, or for the default columns");
   }
-  return RayHits(*std::move(rows));
+  return RayHits(std::move(rows));
 }
 
 bool RayHits::hit(size_t ray) const { return id(ray) != 0; }
@@ -110,12 +110,11 @@ absl::StatusOr<AnyHits> AnyHits::of(const v1::BlockResult& block) {
 }
 
 absl::StatusOr<Overlaps> Overlaps::of(const v1::BlockResult& block) {
-  absl::StatusOr<ResultRows> rows = ResultRows::of(block);
-  if (!rows.ok()) return rows.status();
-  if (rows->ids().size() != rows->rows()) {
+  ASSIGN_OR_RETURN(ResultRows rows, ResultRows::of(block));
+  if (rows.ids().size() != rows.rows()) {
     return absl::InvalidArgumentError("overlaps need the column ID: ask for it, or for the default columns");
   }
-  return Overlaps(*std::move(rows));
+  return Overlaps(std::move(rows));
 }
 
 absl::Span<const uint64_t> Overlaps::ids(size_t query) const {

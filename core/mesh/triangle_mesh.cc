@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 
 namespace locus {
 namespace {
@@ -67,9 +68,9 @@ absl::Status check_values(const std::vector<float>& vertices, const std::vector<
 
 absl::StatusOr<TriangleMesh> TriangleMesh::create(std::vector<float> vertices, std::vector<uint32_t> indices,
                                                   std::vector<MeshPart> parts) {
-  if (absl::Status status = check_counts(vertices, indices, parts); !status.ok()) return status;
-  if (absl::Status status = check_values(vertices, indices); !status.ok()) return status;
-  if (absl::Status status = check_parts(parts, indices.size() / 3); !status.ok()) return status;
+  RETURN_IF_ERROR(check_counts(vertices, indices, parts));
+  RETURN_IF_ERROR(check_values(vertices, indices));
+  RETURN_IF_ERROR(check_parts(parts, indices.size() / 3));
   TriangleMesh mesh;
   mesh.vertices_ = std::move(vertices);
   mesh.indices_ = std::move(indices);

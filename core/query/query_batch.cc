@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "core/geometry/rotation.h"
 #include "core/query/columns.h"
 
@@ -20,8 +21,8 @@ class BlockCheck {
 
   absl::Status run() {
     n_ = query_count(block_);
-    if (absl::Status s = check_common(); !s.ok()) return s;
-    if (absl::Status s = check_columns_of_kind(); !s.ok()) return s;
+    RETURN_IF_ERROR(check_common());
+    RETURN_IF_ERROR(check_columns_of_kind());
     return std::visit([this](const auto& kind) { return check_kind(kind); }, block_.kind);
   }
 
@@ -38,21 +39,15 @@ class BlockCheck {
                           static_cast<double>(block_.ignore_ids.size()));
     if (block_.max_results > limits::kMaxMaxResults)
       return refuse_limit(name("max_results"), "max_results", limits::kMaxMaxResults, block_.max_results);
-    if (absl::Status s = check_column(block_.masks.size(), 1, n_, ColumnNeed::kOptional, name("masks")); !s.ok())
-      return s;
-    if (absl::Status s = check_column(block_.ignore_groups.size(), 1, n_, ColumnNeed::kOptional, name("ignore_groups"));
-        !s.ok())
-      return s;
+    RETURN_IF_ERROR(check_column(block_.masks.size(), 1, n_, ColumnNeed::kOptional, name("masks")));
+    RETURN_IF_ERROR(check_column(block_.ignore_groups.size(), 1, n_, ColumnNeed::kOptional, name("ignore_groups")));
     return check_as_of();
   }
 
   absl::Status check_as_of() const {
     const absl::Span<const float> fractions = block_.as_of_fractions;
-    if (absl::Status s = check_column(block_.as_of_ticks.size(), 1, n_, ColumnNeed::kOptional, name("as_of_ticks"));
-        !s.ok())
-      return s;
-    if (absl::Status s = check_column(fractions.size(), 1, n_, ColumnNeed::kOptional, name("as_of_fractions")); !s.ok())
-      return s;
+    RETURN_IF_ERROR(check_column(block_.as_of_ticks.size(), 1, n_, ColumnNeed::kOptional, name("as_of_ticks")));
+    RETURN_IF_ERROR(check_column(fractions.size(), 1, n_, ColumnNeed::kOptional, name("as_of_fractions")));
     if (!fractions.empty() && block_.as_of_ticks.empty())
       return refuse_argument(Reason::kMalformed, name("as_of_fractions"), {},
                              "go with as_of_ticks: give those, or neither");
@@ -145,31 +140,27 @@ class BlockCheck {
   }
 
   absl::Status check_kind(const RayColumns& rays) const {
-    if (absl::Status s = check_length(rays.origins.size(), 3, ColumnNeed::kEach, "rays.origins"); !s.ok()) return s;
-    if (absl::Status s = check_length(rays.directions.size(), 3, ColumnNeed::kEachOrOne, "rays.directions"); !s.ok())
-      return s;
-    if (absl::Status s = check_length(rays.t_max.size(), 1, ColumnNeed::kOptional, "rays.t_max"); !s.ok()) return s;
-    if (absl::Status s = check_points(rays.origins, "rays.origins"); !s.ok()) return s;
-    if (absl::Status s = check_reaches(rays.t_max, "rays.t_max"); !s.ok()) return s;
+    RETURN_IF_ERROR(check_length(rays.origins.size(), 3, ColumnNeed::kEach, "rays.origins"));
+    RETURN_IF_ERROR(check_length(rays.directions.size(), 3, ColumnNeed::kEachOrOne, "rays.directions"));
+    RETURN_IF_ERROR(check_length(rays.t_max.size(), 1, ColumnNeed::kOptional, "rays.t_max"));
+    RETURN_IF_ERROR(check_points(rays.origins, "rays.origins"));
+    RETURN_IF_ERROR(check_reaches(rays.t_max, "rays.t_max"));
     return check_directions(rays.directions);
   }
 
   absl::Status check_kind(const BallColumns& balls) const {
-    if (absl::Status s = check_length(balls.centers.size(), 3, ColumnNeed::kEach, "balls.centers"); !s.ok()) return s;
-    if (absl::Status s = check_length(balls.radii.size(), 1, ColumnNeed::kEachOrOne, "balls.radii"); !s.ok()) return s;
-    if (absl::Status s = check_points(balls.centers, "balls.centers"); !s.ok()) return s;
+    RETURN_IF_ERROR(check_length(balls.centers.size(), 3, ColumnNeed::kEach, "balls.centers"));
+    RETURN_IF_ERROR(check_length(balls.radii.size(), 1, ColumnNeed::kEachOrOne, "balls.radii"));
+    RETURN_IF_ERROR(check_points(balls.centers, "balls.centers"));
     return check_sizes(balls.radii, 1, "balls.radii");
   }
 
   absl::Status check_kind(const BoxColumns& boxes) const {
-    if (absl::Status s = check_length(boxes.centers.size(), 3, ColumnNeed::kEach, "boxes.centers"); !s.ok()) return s;
-    if (absl::Status s = check_length(boxes.half_extents.size(), 3, ColumnNeed::kEachOrOne, "boxes.half_extents");
-        !s.ok())
-      return s;
-    if (absl::Status s = check_length(boxes.rotations.size(), 4, ColumnNeed::kOptional, "boxes.rotations"); !s.ok())
-      return s;
-    if (absl::Status s = check_points(boxes.centers, "boxes.centers"); !s.ok()) return s;
-    if (absl::Status s = check_sizes(boxes.half_extents, 3, "boxes.half_extents"); !s.ok()) return s;
+    RETURN_IF_ERROR(check_length(boxes.centers.size(), 3, ColumnNeed::kEach, "boxes.centers"));
+    RETURN_IF_ERROR(check_length(boxes.half_extents.size(), 3, ColumnNeed::kEachOrOne, "boxes.half_extents"));
+    RETURN_IF_ERROR(check_length(boxes.rotations.size(), 4, ColumnNeed::kOptional, "boxes.rotations"));
+    RETURN_IF_ERROR(check_points(boxes.centers, "boxes.centers"));
+    RETURN_IF_ERROR(check_sizes(boxes.half_extents, 3, "boxes.half_extents"));
     return check_rotations(boxes.rotations);
   }
 
@@ -184,13 +175,11 @@ class BlockCheck {
   }
 
   absl::Status check_kind(const NearestColumns& nearest) const {
-    if (absl::Status s = check_length(nearest.points.size(), 3, ColumnNeed::kEach, "nearest.points"); !s.ok()) return s;
-    if (absl::Status s = check_length(nearest.max_distances.size(), 1, ColumnNeed::kOptional, "nearest.max_distances");
-        !s.ok())
-      return s;
+    RETURN_IF_ERROR(check_length(nearest.points.size(), 3, ColumnNeed::kEach, "nearest.points"));
+    RETURN_IF_ERROR(check_length(nearest.max_distances.size(), 1, ColumnNeed::kOptional, "nearest.max_distances"));
     if (nearest.count > limits::kMaxNearest)
       return refuse_limit(name("nearest.k"), "nearest", limits::kMaxNearest, nearest.count);
-    if (absl::Status s = check_points(nearest.points, "nearest.points"); !s.ok()) return s;
+    RETURN_IF_ERROR(check_points(nearest.points, "nearest.points"));
     return check_reaches(nearest.max_distances, "nearest.max_distances");
   }
 
@@ -232,8 +221,7 @@ absl::Status check_batch(const QueryBatch& batch) {
     return refuse_limit("blocks", "queries", limits::kMaxQueries, static_cast<double>(queries));
   if (batch.max_reply_bytes > limits::kMaxReplyBytes)
     return refuse_limit("max_reply_bytes", "reply_bytes", limits::kMaxReplyBytes, batch.max_reply_bytes);
-  for (size_t i = 0; i < batch.blocks.size(); ++i)
-    if (absl::Status status = BlockCheck(batch.blocks[i], i).run(); !status.ok()) return status;
+  for (size_t i = 0; i < batch.blocks.size(); ++i) RETURN_IF_ERROR(BlockCheck(batch.blocks[i], i).run());
   return check_reply_size(batch);
 }
 

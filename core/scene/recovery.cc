@@ -12,6 +12,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "core/scene/log/mesh_codec.h"
 #include "core/scene/log/record_codec.h"
 #include "core/scene/log/tree_codec.h"
@@ -159,18 +160,17 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
   absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
   if (!spec.ok()) return named("specification", spec.status());
   Meshes meshes(find_mesh);
-  absl::StatusOr<SceneWriter> writer = read_snapshot(log, stored.key, *spec, meshes);
-  if (!writer.ok()) return writer.status();
-  writer->begin_replay();
-  Replay replay(stored, *writer, meshes, progress);
+  ASSIGN_OR_RETURN(SceneWriter writer, read_snapshot(log, stored.key, *spec, meshes));
+  writer.begin_replay();
+  Replay replay(stored, writer, meshes, progress);
   const auto apply = [&replay](const LogRecord& record) { return replay.apply(record); };
-  if (absl::Status status = log.read(stored.key, stored.snapshot_sequence + 1, apply); !status.ok()) return status;
-  if (absl::Status status = replay.finish(); !status.ok()) return status;
-  if (absl::Status status = meshes.check(*writer->statics()); !status.ok()) return status;
-  writer->end_replay();
+  RETURN_IF_ERROR(log.read(stored.key, stored.snapshot_sequence + 1, apply));
+  RETURN_IF_ERROR(replay.finish());
+  RETURN_IF_ERROR(meshes.check(*writer.statics()));
+  writer.end_replay();
   const AckLevel level = ack_level(spec->durability);
   const SceneLog on{&log, stored.key, level, {stored.last_sequence, stored.snapshot_sequence, stored.log_bytes}};
-  return std::make_shared<Scene>(stored.name, *std::move(spec), *std::move(writer), on);
+  return std::make_shared<Scene>(stored.name, *std::move(spec), std::move(writer), on);
 }
 
 // Null where the log has no outline that fits, whatever the reason: the tree is built then.

@@ -8,6 +8,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "core/scene/log/mesh_codec.h"
 #include "core/scene/log/state_writer.h"
 #include "core/scene/log/tree_codec.h"
@@ -78,10 +79,9 @@ absl::StatusOr<ScenePtr> Registry::log_scene(const std::string& name, const Scen
     FrozenScene beginning;
     beginning.snapshot = writer.published();
     StateWriter state(std::move(beginning));
-    absl::StatusOr<SceneKey> key =
-        log_->create_scene(name, encode_spec(spec), epoch, [&state] { return state.next(); });
-    if (!key.ok()) return key.status();
-    on = {log_, *key, ack_level(spec.durability), {}};
+    ASSIGN_OR_RETURN(SceneKey key,
+                     log_->create_scene(name, encode_spec(spec), epoch, [&state] { return state.next(); }));
+    on = {log_, key, ack_level(spec.durability), {}};
   }
   return std::make_shared<Scene>(name, spec, std::move(writer), on);
 }
@@ -90,15 +90,13 @@ absl::StatusOr<ScenePtr> Registry::log_scene(const std::string& name, const Scen
 absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string& name, const SceneSpec& spec,
                                                               uint64_t epoch, const std::string& static_from,
                                                               bool if_absent) {
-  if (absl::Status status = check_scene_name(name, "name"); !status.ok()) return status;
+  RETURN_IF_ERROR(check_scene_name(name, "name"));
   const MutexLock change(changes_mutex_);
-  absl::StatusOr<Beginning> beginning = begin_scene(name, static_from, if_absent);
-  if (!beginning.ok()) return beginning.status();
-  if (beginning->existing != nullptr) return CreatedScene{std::move(beginning->existing), true};
-  absl::StatusOr<ScenePtr> scene = log_scene(name, spec, epoch, std::move(beginning->statics));
-  if (!scene.ok()) return scene.status();
-  put_in(*scene);
-  return CreatedScene{*std::move(scene), false};
+  ASSIGN_OR_RETURN(Beginning beginning, begin_scene(name, static_from, if_absent));
+  if (beginning.existing != nullptr) return CreatedScene{std::move(beginning.existing), true};
+  ASSIGN_OR_RETURN(ScenePtr scene, log_scene(name, spec, epoch, std::move(beginning.statics)));
+  put_in(scene);
+  return CreatedScene{std::move(scene), false};
 }
 
 void Registry::put_in(const ScenePtr& scene) {
@@ -123,7 +121,7 @@ std::optional<SceneKey> Registry::damaged_scene(const std::string& name) const {
 }
 
 absl::Status Registry::delete_damaged_scene(const std::string& name, SceneKey key) {
-  if (absl::Status status = log_->delete_scene(key); !status.ok()) return status;
+  RETURN_IF_ERROR(log_->delete_scene(key));
   const MutexLock lock(mutex_);
   damaged_scenes_.erase(name);
   return absl::OkStatus();
@@ -137,7 +135,7 @@ absl::Status Registry::delete_scene(const std::string& name) {
     return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "name",
                        absl::StrCat("no scene is called '", name, "'"));
   // Meanwhile it is found, and closed once its deletion is logged.
-  if (absl::Status status = (*scene)->remove(); !status.ok()) return status;
+  RETURN_IF_ERROR((*scene)->remove());
   const MutexLock lock(mutex_);
   scenes_.erase(name);
   return absl::OkStatus();
@@ -198,7 +196,7 @@ absl::StatusOr<MeshPtr> Registry::begin_mesh(const std::string& name, MeshPtr& m
 }
 
 absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh) {
-  if (absl::Status status = check_mesh_name(name, "mesh"); !status.ok()) return status;
+  RETURN_IF_ERROR(check_mesh_name(name, "mesh"));
   const MutexLock change(mesh_changes_mutex_);
   absl::StatusOr<MeshPtr> known = begin_mesh(name, mesh);
   if (!known.ok() || *known != nullptr) return known;
@@ -208,7 +206,7 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
       if (!content) content.emplace(mesh);
       return content->next();
     };
-    if (absl::Status status = log_->add_mesh(name, mesh->sha256(), next); !status.ok()) return status;
+    RETURN_IF_ERROR(log_->add_mesh(name, mesh->sha256(), next));
     if (content) log_->keep_outline(mesh->sha256(), encode_outline(mesh->tree().topology()));
   }
   const MutexLock lock(mutex_);
@@ -252,12 +250,11 @@ absl::StatusOr<MeshPtr> Registry::take_mesh(const std::string& name) {
 absl::Status Registry::delete_mesh(const std::string& name) {
   const MutexLock mesh_change(mesh_changes_mutex_);
   const MutexLock change(changes_mutex_);
-  absl::StatusOr<MeshPtr> taken = take_mesh(name);
-  if (!taken.ok()) return taken.status();
+  ASSIGN_OR_RETURN(MeshPtr taken, take_mesh(name));
   const absl::Status status = log_ == nullptr ? absl::OkStatus() : log_->delete_mesh(name);
   const MutexLock lock(mutex_);
-  if (*taken == nullptr && status.ok()) damaged_meshes_.erase(name);
-  if (*taken != nullptr && !status.ok()) meshes_.emplace(name, *std::move(taken));
+  if (taken == nullptr && status.ok()) damaged_meshes_.erase(name);
+  if (taken != nullptr && !status.ok()) meshes_.emplace(name, std::move(taken));
   return status;
 }
 

@@ -9,6 +9,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "core/scene/snapshot/snapshot_bytes.h"
 
 namespace locus {
@@ -121,9 +122,8 @@ absl::Status Scene::wait_for_readers(Deadline until) const {
 
 absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until) {
   const UpdateBatch* const one = &batch;
-  absl::StatusOr<Acks> acks = apply_each({&one, 1}, until);
-  if (!acks.ok()) return acks.status();
-  return std::move(acks->front());
+  ASSIGN_OR_RETURN(Acks acks, apply_each({&one, 1}, until));
+  return std::move(acks.front());
 }
 
 // What the writer table can tell already is not logged. Once anything is, it may tell otherwise by then.
@@ -139,11 +139,11 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
   if (good.empty()) return acks;
   while (true) {
     // Not under the writer's lock, where others could not wait for so long as they like.
-    if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
+    RETURN_IF_ERROR(wait_for_readers(until));
     const MutexLock lock(writer_mutex_);
-    if (absl::Status status = check_open(); !status.ok()) return status;
+    RETURN_IF_ERROR(check_open());
     if (pins_->over_budget()) continue;  // through another batch meanwhile
-    if (absl::Status status = log_each(good); !status.ok()) return status;
+    RETURN_IF_ERROR(log_each(good));
     // What is logged is applied, whatever happens.
     auto next = good.begin();
     for (absl::StatusOr<UpdateAck>& ack : acks) {
@@ -171,11 +171,11 @@ absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* co
   Acks acks;
   const std::vector<const UpdateBatch*> good = good_ones(batches, acks);
   while (true) {
-    if (absl::Status status = wait_for_readers(until); !status.ok()) return status;
+    RETURN_IF_ERROR(wait_for_readers(until));
     const MutexLock lock(writer_mutex_);
-    if (absl::Status status = check_open(); !status.ok()) return status;
+    RETURN_IF_ERROR(check_open());
     if (pins_->over_budget()) continue;
-    if (absl::Status status = log_joined(good); !status.ok()) return status;
+    RETURN_IF_ERROR(log_joined(good));
     SceneWriter::Joined joined = writer_.apply_joined(good);
     if (joined.snapshot != nullptr) publish(joined.snapshot);
     auto next = joined.acks.begin();
@@ -224,7 +224,7 @@ absl::Status Scene::check_kept(const StaticChange& change) const {
 }
 
 absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& change) {
-  if (absl::Status status = admit_change(change); !status.ok()) return status;
+  RETURN_IF_ERROR(admit_change(change));
   absl::StatusOr<InstanceChange> result = InstanceChange();
   if (absl::Status kept = check_kept(change); !kept.ok()) {
     result = std::move(kept);
@@ -237,21 +237,19 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 }
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
-  if (absl::Status status = wait_for_readers(ReaderTracker::kNever); !status.ok()) return status;
+  RETURN_IF_ERROR(wait_for_readers(ReaderTracker::kNever));
   // Building takes a while: no revision is held meanwhile but for its instances.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
   const std::shared_ptr<const StaticSet> statics = latest()->statics;
-  absl::StatusOr<StaticSet::Changed> changed = statics->apply(change, is_object, latest()->revision << 24);
-  if (!changed.ok()) return changed.status();
+  ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, latest()->revision << 24));
   const MutexLock lock(writer_mutex_);
-  if (absl::Status status = check_open(); !status.ok()) return status;
+  RETURN_IF_ERROR(check_open());
   // Objects inserted while the tree was being built may have taken an id.
-  for (size_t i = 0; i < changed->placed.size(); ++i)
-    if (writer_.is_object(changed->placed[i])) return taken_meanwhile(change, i, changed->placed[i]);
-  if (absl::Status status = journal_.append_change(writer_.epoch(), change, changed->placed); !status.ok())
-    return status;
-  SnapshotPtr snapshot = writer_.replace_statics(std::move(changed->set));
-  InstanceChange result{std::move(changed->placed), snapshot->revision, snapshot->epoch};
+  for (size_t i = 0; i < changed.placed.size(); ++i)
+    if (writer_.is_object(changed.placed[i])) return taken_meanwhile(change, i, changed.placed[i]);
+  RETURN_IF_ERROR(journal_.append_change(writer_.epoch(), change, changed.placed));
+  SnapshotPtr snapshot = writer_.replace_statics(std::move(changed.set));
+  InstanceChange result{std::move(changed.placed), snapshot->revision, snapshot->epoch};
   publish(snapshot);
   return result;
 }
@@ -326,9 +324,8 @@ absl::StatusOr<SnapshotPtr> Scene::view(const View& view, Deadline deadline) con
 }
 
 absl::StatusOr<SnapshotPin> Scene::pin(const View& view, Deadline deadline) const {
-  absl::StatusOr<SnapshotPtr> snapshot = this->view(view, deadline);
-  if (!snapshot.ok()) return snapshot.status();
-  return SnapshotPin(pins_, *std::move(snapshot));
+  ASSIGN_OR_RETURN(SnapshotPtr snapshot, this->view(view, deadline));
+  return SnapshotPin(pins_, std::move(snapshot));
 }
 
 void Scene::forget_recent() {
@@ -348,8 +345,8 @@ void Scene::close() {
 
 absl::Status Scene::remove() {
   const MutexLock lock(writer_mutex_);  // so that nothing is logged or acknowledged after
-  if (absl::Status status = check_open(); !status.ok()) return status;
-  if (absl::Status status = journal_.remove(); !status.ok()) return status;
+  RETURN_IF_ERROR(check_open());
+  RETURN_IF_ERROR(journal_.remove());
   close();
   return absl::OkStatus();
 }

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "core/base/planted_bug.h"
+#include "core/base/status_macros.h"
 #include "core/scene/updates/batch_applier.h"
 
 namespace locus {
@@ -74,9 +75,8 @@ UpdateAck SceneWriter::ack_now() const {
 }
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch) {
-  absl::StatusOr<std::optional<UpdateAck>> known = writers_.admit(batch.writer, batch.batch);
-  if (!known.ok()) return known.status();
-  if (*known) return Applied{old_ack(batch), nullptr};
+  ASSIGN_OR_RETURN(std::optional<UpdateAck> known, writers_.admit(batch.writer, batch.batch));
+  if (known) return Applied{old_ack(batch), nullptr};
   const bool jumps = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
                                                    [](const MoveColumns& move) { return move.teleport; });
   absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !jumps ? apply_moves(batch) : apply_changes(batch);
@@ -99,7 +99,7 @@ absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Application& applic
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch& batch) {
   Applied result;
   moves_.run(objects_, batch);
-  if (absl::Status status = fill_ack(batch, moves_, result); !status.ok()) return status;
+  RETURN_IF_ERROR(fill_ack(batch, moves_, result));
   result.snapshot = publish_moves(batch);
   UpdateAck reached = ack_now();
   result.ack.epoch = reached.epoch;
@@ -116,7 +116,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
   if (application.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
                        static_cast<double>(application.object_count()), 0);
-  if (absl::Status status = fill_ack(batch, application, result); !status.ok()) return status;
+  RETURN_IF_ERROR(fill_ack(batch, application, result));
   const BatchApplier::Difference difference = application.difference();
   const bool forgets_now = forgets(batch);
   start_tick(batch);

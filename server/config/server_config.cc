@@ -11,6 +11,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "core/base/status_macros.h"
 #include "server/config/listen_address.h"
 #include "server/config/machine.h"
 #include "server/config/observability_limits.h"
@@ -206,11 +207,10 @@ absl::Status check_http(const ServerConfig& config) {
     if (config.http_port_file.empty()) return absl::OkStatus();
     return absl::InvalidArgumentError("--http-port-file needs an HTTP port; give --http-listen an address");
   }
-  const absl::StatusOr<ListenAddress> address = parse_listen_address(config.http_listen);
-  if (!address.ok()) return address.status();
-  if (address->kind != ListenAddress::Kind::kTcp)
+  ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(config.http_listen));
+  if (address.kind != ListenAddress::Kind::kTcp)
     return absl::InvalidArgumentError("--http-listen takes host:port or [v6]:port, for scrapers speak TCP");
-  if (!address->local && !config.insecure) return reachable_from_outside(config.http_listen);
+  if (!address.local && !config.insecure) return reachable_from_outside(config.http_listen);
   return absl::OkStatus();
 }
 
@@ -321,10 +321,9 @@ absl::Status check_config(const ServerConfig& config) {
     return absl::InvalidArgumentError(absl::StrCat("more than ", limits::kMaxListenAddresses, " listen addresses"));
   bool tcp = false;
   for (const std::string& text : config.listen) {
-    const absl::StatusOr<ListenAddress> address = parse_listen_address(text);
-    if (!address.ok()) return address.status();
-    if (!address->local && !config.insecure) return reachable_from_outside(text);
-    tcp = tcp || address->kind == ListenAddress::Kind::kTcp;
+    ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(text));
+    if (!address.local && !config.insecure) return reachable_from_outside(text);
+    tcp = tcp || address.kind == ListenAddress::Kind::kTcp;
   }
   if (!config.port_file.empty() && !tcp)
     return absl::InvalidArgumentError("--port-file needs a TCP address among --listen; a unix socket has no port");

@@ -2,6 +2,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
 
@@ -117,15 +118,10 @@ absl::Status read_columns(const v1::QueryBlock& block, const std::string& field,
 }
 
 absl::Status read_block(const v1::QueryBlock& block, const std::string& field, QueryBlock* out) {
-  if (absl::Status status = read_kind(block, field, out); !status.ok()) return status;
-  if (absl::Status status = read_enum(block.source(), kSources, field + ".source", &out->source); !status.ok())
-    return status;
-  if (absl::Status status = read_enum(block.precision(), kPrecisions, field + ".precision", &out->precision);
-      !status.ok())
-    return status;
-  if (absl::Status status = read_enum(block.outside_history(), kOutsides, field + ".outside_history", &out->outside);
-      !status.ok())
-    return status;
+  RETURN_IF_ERROR(read_kind(block, field, out));
+  RETURN_IF_ERROR(read_enum(block.source(), kSources, field + ".source", &out->source));
+  RETURN_IF_ERROR(read_enum(block.precision(), kPrecisions, field + ".precision", &out->precision));
+  RETURN_IF_ERROR(read_enum(block.outside_history(), kOutsides, field + ".outside_history", &out->outside));
   out->as_of_ticks = span_of(block.as_of_ticks());
   out->as_of_fractions = span_of(block.as_of_fractions());
   out->frame = to_vec(block.frame());
@@ -147,10 +143,7 @@ absl::StatusOr<QueryBatch> to_queries(const v1::QueryBatch& batch) {
   out.max_reply_bytes = batch.max_reply_bytes();
   out.blocks.resize(static_cast<size_t>(batch.blocks_size()));
   for (int i = 0; i < batch.blocks_size(); ++i)
-    if (absl::Status status =
-            read_block(batch.blocks(i), absl::StrCat("blocks[", i, "]"), &out.blocks[static_cast<size_t>(i)]);
-        !status.ok())
-      return status;
+    RETURN_IF_ERROR(read_block(batch.blocks(i), absl::StrCat("blocks[", i, "]"), &out.blocks[static_cast<size_t>(i)]));
   return out;
 }
 

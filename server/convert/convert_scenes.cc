@@ -1,5 +1,6 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
 
@@ -84,12 +85,11 @@ absl::Status check_labels(const google::protobuf::Map<std::string, std::string>&
 }
 
 absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
-  if (absl::Status status = check_served(spec); !status.ok()) return status;
-  if (absl::Status status = check_labels(spec.labels(), "spec.labels"); !status.ok()) return status;
-  const absl::StatusOr<HistoryOptions> history = to_history(spec);
-  if (!history.ok()) return history.status();
+  RETURN_IF_ERROR(check_served(spec));
+  RETURN_IF_ERROR(check_labels(spec.labels(), "spec.labels"));
+  ASSIGN_OR_RETURN(const HistoryOptions history, to_history(spec));
   SceneSpec out;
-  out.history = *history;
+  out.history = history;
   out.labels.insert(spec.labels().begin(), spec.labels().end());
   out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
   if (spec.overload() == v1::OVERLOAD_POLICY_LATEST_WINS) out.overload = OverloadPolicy::kLatestWins;

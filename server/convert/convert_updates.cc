@@ -1,5 +1,6 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 
 namespace locus::server {
@@ -45,9 +46,9 @@ absl::Status read_shape(const v1::Insert& insert, const std::string& field, Inse
 }
 
 absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::string& field) {
-  if (absl::Status status = check_positions(insert, field); !status.ok()) return status;
+  RETURN_IF_ERROR(check_positions(insert, field));
   InsertColumns columns;
-  if (absl::Status status = read_shape(insert, field, &columns); !status.ok()) return status;
+  RETURN_IF_ERROR(read_shape(insert, field, &columns));
   columns.ids = span_of(insert.ids());
   columns.positions = span_of(insert.positions());
   columns.positions_f64 = span_of(insert.positions_f64());
@@ -59,7 +60,7 @@ absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::str
 }
 
 absl::StatusOr<MoveColumns> to_move(const v1::Move& move, const std::string& field) {
-  if (absl::Status status = check_positions(move, field); !status.ok()) return status;
+  RETURN_IF_ERROR(check_positions(move, field));
   MoveColumns columns;
   columns.ids = span_of(move.ids());
   columns.positions = span_of(move.positions());
@@ -92,7 +93,7 @@ absl::Status check_batch_form(const v1::UpdateBatch& batch) {
 }  // namespace
 
 absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
-  if (absl::Status status = check_batch_form(batch); !status.ok()) return status;
+  RETURN_IF_ERROR(check_batch_form(batch));
   UpdateBatch out;
   out.frame = to_vec(batch.frame());
   if (batch.has_tick()) out.tick = batch.tick();
@@ -100,14 +101,12 @@ absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
   out.remove_ids = span_of(batch.remove_ids());
   out.remove_groups = span_of(batch.remove_groups());
   for (int i = 0; i < batch.inserts_size(); ++i) {
-    absl::StatusOr<InsertColumns> insert = to_insert(batch.inserts(i), absl::StrCat("inserts[", i, "]"));
-    if (!insert.ok()) return insert.status();
-    out.inserts.push_back(*insert);
+    ASSIGN_OR_RETURN(InsertColumns insert, to_insert(batch.inserts(i), absl::StrCat("inserts[", i, "]")));
+    out.inserts.push_back(insert);
   }
   for (int i = 0; i < batch.moves_size(); ++i) {
-    absl::StatusOr<MoveColumns> move = to_move(batch.moves(i), absl::StrCat("moves[", i, "]"));
-    if (!move.ok()) return move.status();
-    out.moves.push_back(*move);
+    ASSIGN_OR_RETURN(MoveColumns move, to_move(batch.moves(i), absl::StrCat("moves[", i, "]")));
+    out.moves.push_back(move);
   }
   for (const v1::Relabel& relabel : batch.relabels()) out.relabels.push_back(to_relabel(relabel));
   out.upsert = batch.upsert();

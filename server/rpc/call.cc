@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "server/convert/status.h"
 #include "server/observability/log.h"
 
@@ -74,8 +75,8 @@ absl::Status Caller::check_scene(const std::string& scene) const {
 }
 
 absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field) {
-  if (absl::Status status = check_scene_name(name, field); !status.ok()) return status;
-  if (absl::Status status = caller.check_scene(name); !status.ok()) return status;
+  RETURN_IF_ERROR(check_scene_name(name, field));
+  RETURN_IF_ERROR(caller.check_scene(name));
   return caller.host().registry.find_scene(name);
 }
 
@@ -84,7 +85,7 @@ absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, Stead
     const SteadyTime slice = std::min(until, steady_clock::now() + kWaitSlice);
     absl::StatusOr<SnapshotPin> snapshot = scene.pin(view, slice);
     if (snapshot.status().code() != absl::StatusCode::kDeadlineExceeded || slice == until) return snapshot;
-    if (absl::Status status = caller.stop(); !status.ok()) return status;
+    RETURN_IF_ERROR(caller.stop());
     if (caller.host().drain.draining()) return draining();
   }
 }

@@ -42,7 +42,7 @@ class Caller {
   absl::Status check_scene(const std::string& scene) const;
 
   // Ends the call at once, CANCELLED, whatever it waits for.
-  void cut_off() const { context_.TryCancel(); }
+  void cancel() const { context_.TryCancel(); }
 
   // How logs call this call: by the caller's metadata x-request-id and traceparent where they are of their form, or by
   // an id of its own. Unlike the rest on the call's own thread only.

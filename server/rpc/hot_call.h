@@ -32,6 +32,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/convert/status.h"
 #include "server/host/host.h"
 #include "server/rpc/call.h"
@@ -194,7 +195,7 @@ class HotCall final : private IoLoop::ActiveCall {
     pass_ = gate.enter();
     if (!pass_)
       return refuse_full("", Method::kStream ? "streams" : "calls", gate.max(), gate.max() + 1.0, kRetryAfterMs);
-    if (absl::Status status = check_serving(host); !status.ok()) return status;
+    RETURN_IF_ERROR(check_serving(host));
     if (Method::kStream) open_.emplace(host.metrics, Method::kRpc);
     return absl::OkStatus();
   }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "core/scene/registry.h"
 #include "server/rpc/call.h"
 
@@ -15,8 +16,8 @@ class SceneBinding {
   // For every message. What this refuses, of the first one only, ends the stream.
   absl::Status bind(const Caller& caller, const std::string& scene) {
     if (!scene_.empty()) return absl::OkStatus();
-    if (absl::Status status = check_scene_name(scene, "scene"); !status.ok()) return status;
-    if (absl::Status status = caller.check_scene(scene); !status.ok()) return status;
+    RETURN_IF_ERROR(check_scene_name(scene, "scene"));
+    RETURN_IF_ERROR(caller.check_scene(scene));
     scene_ = scene;
     return absl::OkStatus();
   }

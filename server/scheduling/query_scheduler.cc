@@ -6,6 +6,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "server/scheduling/clocks.h"
 #include "server/scheduling/thread_priority.h"
 
@@ -92,7 +93,7 @@ Progress QueryScheduler::run_inline(QueryJob& job) {
 
 absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) {
   const JobClass job_class = nanoseconds <= options_.small_nanoseconds ? JobClass::kSmall : JobClass::kLarge;
-  if (absl::Status status = admit(job_class, nanoseconds); !status.ok()) return status;
+  RETURN_IF_ERROR(admit(job_class, nanoseconds));
   auto ticket = std::make_shared<Ticket>(job, client, nanoseconds, job_class);
   ticket->self = ticket;
   // From here on the job may be done at any moment.

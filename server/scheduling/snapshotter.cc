@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "core/scene/log/state_writer.h"
 #include "server/scheduling/thread_priority.h"
 
@@ -92,7 +93,7 @@ absl::StatusOr<uint64_t> Snapshotter::write(Scene& scene) {
     if (ended()) return absl::CancelledError("the server ends");
     return writer.next();
   };
-  if (absl::Status status = log_->write_snapshot(scene.log_key(), frozen.sequence, next); !status.ok()) return status;
+  RETURN_IF_ERROR(log_->write_snapshot(scene.log_key(), frozen.sequence, next));
   scene.snapshot_written(frozen.sequence, frozen.log_bytes);
   return writer.bytes();
 }

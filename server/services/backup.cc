@@ -21,6 +21,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "server/observability/log.h"
 #include "server/scheduling/thread_priority.h"
 
@@ -162,15 +163,14 @@ absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const Tak
 }
 
 absl::StatusOr<bool> send_copy(const fs::path& copy, const TakePiece& take) {
-  const absl::StatusOr<std::vector<File>> files = list_files(copy);
-  if (!files.ok()) return files.status();
+  ASSIGN_OR_RETURN(const std::vector<File> files, list_files(copy));
   v1::BackupResponse first;
-  first.mutable_announced()->set_files(static_cast<uint32_t>(files->size()));
+  first.mutable_announced()->set_files(static_cast<uint32_t>(files.size()));
   uint64_t bytes = 0;
-  for (const File& file : *files) bytes += file.bytes;
+  for (const File& file : files) bytes += file.bytes;
   first.mutable_announced()->set_bytes(bytes);
   if (!take(first)) return false;
-  for (const File& file : *files) {
+  for (const File& file : files) {
     absl::StatusOr<bool> sent = send_file(copy, file, take);
     if (!sent.ok() || !*sent) return sent;
   }
@@ -198,8 +198,8 @@ absl::Status back_up(Host& host, const Caller& caller, grpc::ServerWriter<v1::Ba
   if (!pass) return refuse_full("", "backups", host.backups.max(), host.backups.max() + 1.0, kBusyRetryMs);
   const fs::path path = directory_of(host);
   const Directory directory(path);
-  if (absl::Status made = directory.make(); !made.ok()) return made;
-  if (absl::Status copied = host.log->back_up((path / kCopy).string()); !copied.ok()) return copied;
+  RETURN_IF_ERROR(directory.make());
+  RETURN_IF_ERROR(host.log->back_up((path / kCopy).string()));
   const TakePiece take = [&](const v1::BackupResponse& piece) { return caller.stop().ok() && writer.Write(piece); };
   absl::StatusOr<bool> sent = false;
   std::thread([&] {

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/observability/log.h"
 
@@ -28,7 +29,7 @@ class Outcome {
   absl::StatusOr<InstanceChange> wait(const Caller& caller) LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     while (!change_) {
-      if (absl::Status status = caller.stop(); !status.ok()) return status;
+      RETURN_IF_ERROR(caller.stop());
       known_.wait_until(mutex_, std::min(caller.deadline(), std::chrono::steady_clock::now() + kWaitSlice));
     }
     return *change_;
@@ -52,11 +53,10 @@ size_t placement_count(const v1::Placement& place) {
 
 absl::StatusOr<PlacementColumns> to_placement(const Registry& registry, const v1::Placement& place,
                                               const std::string& field) {
-  if (absl::Status status = check_mesh_name(place.mesh(), field + ".mesh"); !status.ok()) return status;
-  absl::StatusOr<MeshPtr> mesh = registry.find_mesh(place.mesh(), field + ".mesh");
-  if (!mesh.ok()) return mesh.status();
+  RETURN_IF_ERROR(check_mesh_name(place.mesh(), field + ".mesh"));
+  ASSIGN_OR_RETURN(MeshPtr mesh, registry.find_mesh(place.mesh(), field + ".mesh"));
   PlacementColumns columns;
-  columns.mesh = *std::move(mesh);
+  columns.mesh = std::move(mesh);
   columns.ids = span_of(place.ids());
   columns.translations = span_of(place.translations());
   columns.rotations = span_of(place.rotations());
@@ -85,10 +85,9 @@ absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registr
   owned->change.remove_ids = span_of(owned->request.remove_ids());
   owned->change.remove_groups = span_of(owned->request.remove_groups());
   for (int i = 0; i < owned->request.place_size(); ++i) {
-    absl::StatusOr<PlacementColumns> place =
-        to_placement(registry, owned->request.place(i), absl::StrCat("place[", i, "]"));
-    if (!place.ok()) return place.status();
-    owned->change.place.push_back(*std::move(place));
+    ASSIGN_OR_RETURN(PlacementColumns place,
+                     to_placement(registry, owned->request.place(i), absl::StrCat("place[", i, "]")));
+    owned->change.place.push_back(std::move(place));
   }
   return owned;
 }
@@ -109,9 +108,8 @@ using SharedClaim = std::shared_ptr<const MemoryBudget::Claim>;
 absl::StatusOr<SharedClaim> make_room(Host& host, const Scene& scene, const StaticChange& change) {
   const uint64_t cost = change_cost(*scene.latest()->statics, change);
   if (cost == 0) return nullptr;
-  absl::StatusOr<MemoryBudget::Claim> claim = host.memory.claim("place", cost);
-  if (!claim.ok()) return claim.status();
-  return std::make_shared<const MemoryBudget::Claim>(*std::move(claim));
+  ASSIGN_OR_RETURN(MemoryBudget::Claim claim, host.memory.claim("place", cost));
+  return std::make_shared<const MemoryBudget::Claim>(std::move(claim));
 }
 
 void log_change(const Scene& scene, uint64_t number, const absl::StatusOr<InstanceChange>& change) {
@@ -128,13 +126,13 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   if (!scene.ok()) return scene.status();
   absl::StatusOr<std::shared_ptr<OwnedChange>> owned = read_change(host.registry, request);
   if (!owned.ok()) return owned.status();
-  if (request.no_wait())
-    if (absl::Status status = check_placements((*owned)->change); !status.ok()) return status;
+  if (request.no_wait()) RETURN_IF_ERROR(check_placements((*owned)->change));
   const absl::StatusOr<SharedClaim> room = make_room(host, **scene, (*owned)->change);
   if (!room.ok()) return room.status();
   const auto outcome = std::make_shared<Outcome>();
   const uint64_t epoch = (*scene)->latest()->epoch;
-  const absl::StatusOr<uint64_t> number =
+  ASSIGN_OR_RETURN(
+      const uint64_t number,
       host.changes.submit(epoch, [&host, arrived = SteadyTime::clock::now(), scene = *scene, owned = *owned, outcome,
                                   room = *room, trace = LogScope::current()](uint64_t change_number) {
         const LogScope scope(trace);
@@ -144,18 +142,16 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
         if (change.ok()) host.metrics.record_instance_change(nanoseconds_since(arrived));
         log_change(*scene, change_number, change);
         outcome->set(std::move(change));
-      });
-  if (!number.ok()) return number.status();
-  response->set_change(*number);
+      }));
+  response->set_change(number);
   response->set_epoch(epoch);
   if (request.no_wait()) {
     for (const v1::Placement& place : (*owned)->request.place()) response->mutable_ids()->MergeFrom(place.ids());
     return absl::OkStatus();
   }
-  const absl::StatusOr<InstanceChange> change = outcome->wait(caller);
-  if (!change.ok()) return change.status();
-  response->mutable_ids()->Add(change->placed.begin(), change->placed.end());
-  response->set_revision(change->revision);
+  ASSIGN_OR_RETURN(const InstanceChange change, outcome->wait(caller));
+  response->mutable_ids()->Add(change.placed.begin(), change.placed.end());
+  response->set_revision(change.revision);
   return absl::OkStatus();
 }
 

@@ -8,6 +8,7 @@
 
 #include "absl/types/span.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 
 namespace locus::server {
@@ -93,16 +94,14 @@ bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) {
 
 absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
                            grpc::ServerWriter<v1::DownloadMeshResponse>& writer) {
-  if (absl::Status status = check_mesh_name(request.mesh(), "mesh"); !status.ok()) return status;
-  absl::StatusOr<MeshPtr> mesh = host.registry.find_mesh(request.mesh(), "mesh");
-  if (!mesh.ok()) return mesh.status();
+  RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
+  ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.find_mesh(request.mesh(), "mesh"));
   // The vertices are made anew.
-  const absl::StatusOr<MemoryBudget::Claim> room =
-      host.memory.claim("mesh", uint64_t{kTripleBytes} * (*mesh)->vertex_count());
-  if (!room.ok()) return room.status();
-  const uint32_t uses = host.registry.mesh_uses(mesh->get());
+  ASSIGN_OR_RETURN(const MemoryBudget::Claim room,
+                   host.memory.claim("mesh", uint64_t{kTripleBytes} * mesh->vertex_count()));
+  const uint32_t uses = host.registry.mesh_uses(mesh.get());
   const auto take = [&](const v1::DownloadMeshResponse& piece) { return caller.stop().ok() && writer.Write(piece); };
-  if (send_mesh({request.mesh(), *std::move(mesh), uses}, take)) return absl::OkStatus();
+  if (send_mesh({request.mesh(), std::move(mesh), uses}, take)) return absl::OkStatus();
   const absl::Status status = caller.stop();
   return status.ok() ? absl::CancelledError("the caller stopped reading") : status;
 }

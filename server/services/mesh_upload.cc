@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/observability/log.h"
 
@@ -45,17 +46,11 @@ absl::Status check_parts(const v1::UploadMeshRequest& first) {
 }
 
 absl::Status check_first(const v1::UploadMeshRequest& first) {
-  if (absl::Status status = check_mesh_name(first.mesh(), "mesh"); !status.ok()) return status;
+  RETURN_IF_ERROR(check_mesh_name(first.mesh(), "mesh"));
   if (!first.sha256().empty() && first.sha256().size() != std::tuple_size_v<Sha256>)
     return malformed("sha256", "a SHA-256 has 32 bytes; leave it empty to have it computed");
-  if (absl::Status status =
-          check_count(first.vertex_count(), limits::kMaxMeshVertices, "vertex_count", "mesh_vertices");
-      !status.ok())
-    return status;
-  if (absl::Status status =
-          check_count(first.triangle_count(), limits::kMaxMeshTriangles, "triangle_count", "mesh_triangles");
-      !status.ok())
-    return status;
+  RETURN_IF_ERROR(check_count(first.vertex_count(), limits::kMaxMeshVertices, "vertex_count", "mesh_vertices"));
+  RETURN_IF_ERROR(check_count(first.triangle_count(), limits::kMaxMeshTriangles, "triangle_count", "mesh_triangles"));
   return check_parts(first);
 }
 
@@ -83,10 +78,9 @@ v1::Mesh describe_mesh(const Registry& registry, const std::string& name, MeshPt
 
 // Puts a mesh of known content under another name.
 absl::Status reuse(Host& host, const std::string& name, MeshPtr known, v1::UploadMeshResponse* response) {
-  absl::StatusOr<MeshPtr> mesh = host.registry.add_mesh(name, std::move(known));
-  if (!mesh.ok()) return mesh.status();
+  ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.add_mesh(name, std::move(known)));
   response->set_already_known(true);
-  *response->mutable_mesh() = describe_mesh(host.registry, name, *std::move(mesh));
+  *response->mutable_mesh() = describe_mesh(host.registry, name, std::move(mesh));
   return absl::OkStatus();
 }
 
@@ -143,7 +137,7 @@ Sha256 mesh_hash(absl::Span<const float> vertices, absl::Span<const uint32_t> in
 }
 
 absl::StatusOr<MeshUpload> MeshUpload::begin(const v1::UploadMeshRequest& first) {
-  if (absl::Status status = check_first(first); !status.ok()) return status;
+  RETURN_IF_ERROR(check_first(first));
   MeshUpload upload;
   upload.name_ = first.mesh();
   if (!first.sha256().empty()) {
@@ -157,8 +151,7 @@ absl::StatusOr<MeshUpload> MeshUpload::begin(const v1::UploadMeshRequest& first)
 }
 
 absl::Status MeshUpload::append(const v1::UploadMeshRequest& message) {
-  if (absl::Status status = append_column(message.vertices(), vertex_numbers_, "vertices", &vertices_); !status.ok())
-    return status;
+  RETURN_IF_ERROR(append_column(message.vertices(), vertex_numbers_, "vertices", &vertices_));
   return append_column(message.indices(), index_numbers_, "indices", &indices_);
 }
 
@@ -178,43 +171,37 @@ bool MeshUpload::has_counts_of(const StaticMesh& mesh) const {
 }
 
 absl::StatusOr<MeshUpload::Complete> MeshUpload::finish() {
-  if (absl::Status status = check_length(vertices_.size(), vertex_numbers_, "vertices"); !status.ok()) return status;
-  if (absl::Status status = check_length(indices_.size(), index_numbers_, "indices"); !status.ok()) return status;
+  RETURN_IF_ERROR(check_length(vertices_.size(), vertex_numbers_, "vertices"));
+  RETURN_IF_ERROR(check_length(indices_.size(), index_numbers_, "indices"));
   const Sha256 hash = mesh_hash(vertices_, indices_);
   if (announced_ && *announced_ != hash)
     return refuse_argument(Reason::kHashMismatch, "sha256", {},
                            "the bytes that came have another SHA-256; upload them again");
-  absl::StatusOr<TriangleMesh> mesh =
-      TriangleMesh::create(std::move(vertices_), std::move(indices_), std::move(parts_));
-  if (!mesh.ok()) return mesh.status();
-  return Complete{hash, *std::move(mesh)};
+  ASSIGN_OR_RETURN(TriangleMesh mesh,
+                   TriangleMesh::create(std::move(vertices_), std::move(indices_), std::move(parts_)));
+  return Complete{hash, std::move(mesh)};
 }
 
 absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1::UploadMeshRequest>& reader,
                          v1::UploadMeshResponse* response) {
   v1::UploadMeshRequest message;
   if (!reader.Read(&message)) return malformed("", "an upload has at least one message, which says what comes");
-  absl::StatusOr<MeshUpload> upload = MeshUpload::begin(message);
-  if (!upload.ok()) return upload.status();
-  const absl::StatusOr<bool> answered = answer_early(host, *upload, response);
+  ASSIGN_OR_RETURN(MeshUpload upload, MeshUpload::begin(message));
+  const absl::StatusOr<bool> answered = answer_early(host, upload, response);
   if (!answered.ok() || *answered) return answered.status();
-  const absl::StatusOr<MemoryBudget::Claim> room =
-      host.memory.claim("triangle_count", upload_cost(message.vertex_count(), message.triangle_count()));
-  if (!room.ok()) return room.status();
-  absl::Status status = upload->append(message);
-  while (status.ok() && reader.Read(&message)) status = upload->append_later(message);
+  ASSIGN_OR_RETURN(const MemoryBudget::Claim room,
+                   host.memory.claim("triangle_count", upload_cost(message.vertex_count(), message.triangle_count())));
+  absl::Status status = upload.append(message);
+  while (status.ok() && reader.Read(&message)) status = upload.append_later(message);
   if (status.ok()) status = caller.stop();
   if (!status.ok()) return status;
-  absl::StatusOr<MeshUpload::Complete> complete = upload->finish();
-  if (!complete.ok()) return complete.status();
-  if (MeshPtr known = host.registry.find_content(complete->sha256); known != nullptr)
-    return reuse(host, upload->name(), std::move(known), response);
-  absl::StatusOr<MeshPtr> built = build(host, upload->name(), *std::move(complete));
-  if (!built.ok()) return built.status();
-  absl::StatusOr<MeshPtr> added = host.registry.add_mesh(upload->name(), *std::move(built));
-  if (!added.ok()) return added.status();
-  log(LogLevel::kInfo, "mesh uploaded", {{"mesh", upload->name()}});
-  *response->mutable_mesh() = describe_mesh(host.registry, upload->name(), *std::move(added));
+  ASSIGN_OR_RETURN(MeshUpload::Complete complete, upload.finish());
+  if (MeshPtr known = host.registry.find_content(complete.sha256); known != nullptr)
+    return reuse(host, upload.name(), std::move(known), response);
+  ASSIGN_OR_RETURN(MeshPtr built, build(host, upload.name(), std::move(complete)));
+  ASSIGN_OR_RETURN(MeshPtr added, host.registry.add_mesh(upload.name(), std::move(built)));
+  log(LogLevel::kInfo, "mesh uploaded", {{"mesh", upload.name()}});
+  *response->mutable_mesh() = describe_mesh(host.registry, upload.name(), std::move(added));
   return absl::OkStatus();
 }
 

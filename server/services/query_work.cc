@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_join.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
 #include "server/observability/log.h"
@@ -31,12 +32,10 @@ void QueryWork::begin(const std::string& scene, const v1::QueryBatch& batch, v1:
 }
 
 absl::Status QueryWork::read(const std::string& scene, const v1::QueryBatch& batch) {
-  absl::StatusOr<ScenePtr> found = find_scene(slot_.caller(), scene, "scene");
-  if (!found.ok()) return found.status();
-  scene_ = *std::move(found);
-  absl::StatusOr<QueryBatch> queries = to_queries(batch);
-  if (!queries.ok()) return queries.status();
-  batch_ = *std::move(queries);
+  ASSIGN_OR_RETURN(ScenePtr found, find_scene(slot_.caller(), scene, "scene"));
+  scene_ = std::move(found);
+  ASSIGN_OR_RETURN(QueryBatch queries, to_queries(batch));
+  batch_ = std::move(queries);
   view_ = to_view(batch.view());
   return check_batch(batch_);
 }
@@ -63,7 +62,7 @@ void QueryWork::look() {
 
 // Nobody may write any more. A stream's messages are answered even so, before the stream ends.
 absl::Status QueryWork::no_longer() const {
-  if (absl::Status status = slot_.caller().stop(); !status.ok()) return status;
+  RETURN_IF_ERROR(slot_.caller().stop());
   if (!slot_.stream()) return draining();
   return absl::DeadlineExceededError("the server is shutting down before the scene reached the revision");
 }

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/mutex.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "core/scene/recovery.h"
 #include "core/scene/spec_codec.h"
 #include "server/observability/log.h"
@@ -121,14 +122,13 @@ class Recovery {
   // have gone on where it came from: then it is another count of revisions.
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
-    absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
-    if (!spec.ok()) return spec.status();
+    ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));
     // What readers may hold is for this daemon's options to say, not for those of the one that made the scene.
-    spec->pinned_bytes = host_.config.pinned_limit;
-    stored.spec = encode_spec(*spec);
-    if (stored.copied || (spec->durability == Durability::kMemory && !log_.closed_in_order())) {
+    spec.pinned_bytes = host_.config.pinned_limit;
+    stored.spec = encode_spec(spec);
+    if (stored.copied || (spec.durability == Durability::kMemory && !log_.closed_in_order())) {
       stored.epoch = new_epoch();
-      if (absl::Status status = log_.restart_scene(stored.key, stored.epoch); !status.ok()) return status;
+      RETURN_IF_ERROR(log_.restart_scene(stored.key, stored.epoch));
     }
     const auto find_mesh = [this](const Sha256& sha256) { return host_.registry.find_content(sha256); };
     return recover_scene(log_, stored, find_mesh);

@@ -7,6 +7,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 
 namespace locus::server {
@@ -165,17 +166,15 @@ bool dump_snapshot(const SceneSnapshot& snapshot, const MeshName& mesh_name, con
 
 absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request,
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
-  const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.scene(), "scene");
-  if (!scene.ok()) return scene.status();
-  absl::StatusOr<SnapshotPin> snapshot = wait_for(**scene, to_view(request.view()), caller.wait_until(false), caller);
-  if (!snapshot.ok()) return snapshot.status();
+  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(caller, request.scene(), "scene"));
+  ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
   // Its caller may take what is written as slowly as it likes.
-  snapshot->on_revoke([&caller] { caller.revoke_overdue(); });
+  snapshot.on_revoke([&caller] { caller.cancel(); });
   const auto take = [&](const v1::DumpSceneResponse& piece) {
-    return snapshot->status().ok() && caller.stop().ok() && writer.Write(piece);
+    return snapshot.status().ok() && caller.stop().ok() && writer.Write(piece);
   };
-  if (dump_snapshot(**snapshot, names_of(host.registry), take)) return absl::OkStatus();
-  if (absl::Status told = snapshot->status(); !told.ok()) return told;
+  if (dump_snapshot(*snapshot, names_of(host.registry), take)) return absl::OkStatus();
+  RETURN_IF_ERROR(snapshot.status());
   const absl::Status status = caller.stop();
   return status.ok() ? absl::CancelledError("the caller stopped reading") : status;
 }

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
 #include "server/observability/log.h"
@@ -64,12 +65,10 @@ v1::Scene describe(const Host& host, const Listed& listed) {
 }
 
 absl::Status list_scenes(const Host& host, const v1::ListScenesRequest& request, v1::ListScenesResponse* response) {
-  const absl::StatusOr<size_t> page_size = read_page_size(request.page_size());
-  if (!page_size.ok()) return page_size.status();
-  if (absl::Status status = check_labels(request.labels(), "labels"); !status.ok()) return status;
+  ASSIGN_OR_RETURN(const size_t page_size, read_page_size(request.page_size()));
+  RETURN_IF_ERROR(check_labels(request.labels(), "labels"));
   std::string after = request.page_token();
-  if (!after.empty())
-    if (absl::Status status = check_page_token(check_scene_name(after, "page_token")); !status.ok()) return status;
+  if (!after.empty()) RETURN_IF_ERROR(check_page_token(check_scene_name(after, "page_token")));
   std::vector<Listed> all = damaged_after(host, after, request);
   while (true) {
     const std::vector<ScenePtr> scenes = host.registry.list_scenes(after, limits::kMaxPageSize);
@@ -80,20 +79,18 @@ absl::Status list_scenes(const Host& host, const v1::ListScenesRequest& request,
     if (scenes.size() < limits::kMaxPageSize) break;
   }
   std::sort(all.begin(), all.end(), [](const Listed& a, const Listed& b) { return a.name < b.name; });
-  for (size_t i = 0; i < std::min(all.size(), *page_size); ++i) *response->add_scenes() = describe(host, all[i]);
-  if (all.size() > *page_size) response->set_next_page_token(all[*page_size - 1].name);
+  for (size_t i = 0; i < std::min(all.size(), page_size); ++i) *response->add_scenes() = describe(host, all[i]);
+  if (all.size() > page_size) response->set_next_page_token(all[page_size - 1].name);
   return absl::OkStatus();
 }
 
 absl::Status list_meshes(const Host& host, const v1::ListMeshesRequest& request, v1::ListMeshesResponse* response) {
-  const absl::StatusOr<size_t> page_size = read_page_size(request.page_size());
-  if (!page_size.ok()) return page_size.status();
+  ASSIGN_OR_RETURN(const size_t page_size, read_page_size(request.page_size()));
   if (!request.page_token().empty())
-    if (absl::Status status = check_page_token(check_mesh_name(request.page_token(), "page_token")); !status.ok())
-      return status;
-  const std::vector<Registry::NamedMesh> meshes = host.registry.list_meshes(request.page_token(), *page_size + 1);
-  for (size_t i = 0; i < std::min(meshes.size(), *page_size); ++i) *response->add_meshes() = to_proto(meshes[i]);
-  if (meshes.size() > *page_size) response->set_next_page_token(meshes[*page_size - 1].name);
+    RETURN_IF_ERROR(check_page_token(check_mesh_name(request.page_token(), "page_token")));
+  const std::vector<Registry::NamedMesh> meshes = host.registry.list_meshes(request.page_token(), page_size + 1);
+  for (size_t i = 0; i < std::min(meshes.size(), page_size); ++i) *response->add_meshes() = to_proto(meshes[i]);
+  if (meshes.size() > page_size) response->set_next_page_token(meshes[page_size - 1].name);
   return absl::OkStatus();
 }
 
@@ -113,24 +110,21 @@ absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteScen
 
 absl::Status SceneService::create(const Caller& caller, const v1::CreateSceneRequest& request,
                                   v1::CreateSceneResponse* response) {
-  if (absl::Status status = check_scene_name(request.name(), "name"); !status.ok()) return status;
-  if (absl::Status status = caller.check_scene(request.name()); !status.ok()) return status;
-  absl::StatusOr<SceneSpec> spec = to_spec(request.spec());
-  if (!spec.ok()) return spec.status();
+  RETURN_IF_ERROR(check_scene_name(request.name(), "name"));
+  RETURN_IF_ERROR(caller.check_scene(request.name()));
+  ASSIGN_OR_RETURN(SceneSpec spec, to_spec(request.spec()));
   if (request.spec().durability() == v1::DURABILITY_LOCAL && host_.log == nullptr) return not_served("spec.durability");
-  spec->pinned_bytes = host_.config.pinned_limit;
+  spec.pinned_bytes = host_.config.pinned_limit;
   const std::string& static_from = request.spec().static_from();
-  if (!static_from.empty())
-    if (absl::Status status = check_scene_name(static_from, "spec.static_from"); !status.ok()) return status;
+  if (!static_from.empty()) RETURN_IF_ERROR(check_scene_name(static_from, "spec.static_from"));
   MutexLock lock(create_mutex_);
   const size_t scenes = host_.registry.scene_count();
   if (scenes >= host_.config.max_scenes && !host_.registry.find_scene(request.name()).ok())
     return refuse_full("name", "scenes", host_.config.max_scenes, static_cast<double>(scenes + 1), 0);
-  const absl::StatusOr<Registry::CreatedScene> created =
-      host_.registry.create_scene(request.name(), *spec, new_epoch(), static_from, request.if_absent());
-  if (!created.ok()) return created.status();
-  if (!created->existed) log(LogLevel::kInfo, "scene created", {{"scene", request.name()}});
-  *response->mutable_scene() = describe(host_, *created->scene);
+  ASSIGN_OR_RETURN(const Registry::CreatedScene created,
+                   host_.registry.create_scene(request.name(), spec, new_epoch(), static_from, request.if_absent()));
+  if (!created.existed) log(LogLevel::kInfo, "scene created", {{"scene", request.name()}});
+  *response->mutable_scene() = describe(host_, *created.scene);
   return absl::OkStatus();
 }
 
@@ -176,8 +170,8 @@ grpc::Status SceneService::ListMeshes(grpc::ServerContext* context, const v1::Li
 grpc::Status SceneService::DeleteMesh(grpc::ServerContext* context, const v1::DeleteMeshRequest* request,
                                       v1::DeleteMeshResponse*) {
   return serve(host_, *context, Rpc::kDeleteMesh, [&](const Caller&) -> absl::Status {
-    if (absl::Status status = check_mesh_name(request->mesh(), "mesh"); !status.ok()) return status;
-    if (absl::Status status = host_.registry.delete_mesh(request->mesh()); !status.ok()) return status;
+    RETURN_IF_ERROR(check_mesh_name(request->mesh(), "mesh"));
+    RETURN_IF_ERROR(host_.registry.delete_mesh(request->mesh()));
     log(LogLevel::kInfo, "mesh deleted", {{"mesh", request->mesh()}});
     return absl::OkStatus();
   });

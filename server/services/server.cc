@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/config/listen_address.h"
 #include "server/host/host.h"
 #include "server/observability/http_server.h"
@@ -47,11 +48,10 @@ constexpr milliseconds kLastWords{500};
 absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& config) {
   std::vector<ListenAddress> addresses;
   for (const std::string& text : config.listen) {
-    absl::StatusOr<ListenAddress> address = parse_listen_address(text);
-    if (!address.ok()) return address.status();
-    if (absl::Status status = check_free(*address); !status.ok())
+    ASSIGN_OR_RETURN(ListenAddress address, parse_listen_address(text));
+    if (absl::Status status = check_free(address); !status.ok())
       return absl::Status(status.code(), absl::StrCat("cannot listen on ", text, ": ", status.message()));
-    addresses.push_back(*std::move(address));
+    addresses.push_back(std::move(address));
   }
   return addresses;
 }
@@ -59,12 +59,11 @@ absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& co
 // Null where there is to be none, or the default address is taken.
 absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, Scrape& scrape) {
   if (config.http_listen.empty()) return nullptr;
-  const absl::StatusOr<ListenAddress> address = parse_listen_address(config.http_listen);
-  if (!address.ok()) return address.status();
-  absl::StatusOr<std::unique_ptr<HttpServer>> http = HttpServer::start(*address, scrape.pages());
+  ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(config.http_listen));
+  absl::StatusOr<std::unique_ptr<HttpServer>> http = HttpServer::start(address, scrape.pages());
   if (http.ok()) return http;
   const std::string text =
-      absl::StrCat("cannot listen on ", config.http_listen, " for metrics and health pages: ", why_not(*address));
+      absl::StrCat("cannot listen on ", config.http_listen, " for metrics and health pages: ", why_not(address));
   if (config.http_listen != kDefaultHttpListen) return absl::UnavailableError(text);
   log(LogLevel::kWarning, text, {{"hint", "choose another address with --http-listen, or none by leaving it empty"}});
   return nullptr;
@@ -135,19 +134,17 @@ Server::~Server() {
 
 absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config, UpdateLog* log,
                                                       const std::atomic<bool>& stop) {
-  const absl::StatusOr<std::vector<ListenAddress>> addresses = read_addresses(config);
-  if (!addresses.ok()) return addresses.status();
+  ASSIGN_OR_RETURN(const std::vector<ListenAddress> addresses, read_addresses(config));
   enable_extras();
   auto parts = std::make_unique<Parts>(config, log);
   if (can_back_up(parts->host)) remove_leftover_backup(parts->host);
   parts->host.recovering = log != nullptr;
-  absl::StatusOr<std::unique_ptr<HttpServer>> http = start_http(config, parts->scrape);
-  if (!http.ok()) return http.status();
-  parts->http = *std::move(http);
+  ASSIGN_OR_RETURN(std::unique_ptr<HttpServer> http, start_http(config, parts->scrape));
+  parts->http = std::move(http);
   grpc::ServerBuilder builder;
   set_limits(config, builder);
-  std::vector<int> ports(addresses->size(), 0);
-  for (size_t i = 0; i < addresses->size(); ++i)
+  std::vector<int> ports(addresses.size(), 0);
+  for (size_t i = 0; i < addresses.size(); ++i)
     builder.AddListeningPort(config.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
   for (grpc::Service* service : parts->services()) builder.RegisterService(service);
   parts->io = std::make_unique<IoThreads>(builder, IoThreads::count_for(config.threads));
@@ -157,21 +154,20 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
     const size_t failed = static_cast<size_t>(std::find(ports.begin(), ports.end(), 0) - ports.begin());
     if (failed == ports.size()) return absl::InternalError("gRPC could not start the server");
     return absl::UnavailableError(
-        absl::StrCat("cannot listen on ", config.listen[failed], ": ", why_not((*addresses)[failed])));
+        absl::StrCat("cannot listen on ", config.listen[failed], ": ", why_not(addresses[failed])));
   }
   parts->update_service.listen(*parts->io);
   parts->query_service.listen(*parts->io);
   parts->io->start();
   std::unique_ptr<Server> server(new Server(std::move(parts)));
-  for (size_t i = 0; i < addresses->size(); ++i) {
+  for (size_t i = 0; i < addresses.size(); ++i) {
     const auto port = static_cast<uint16_t>(ports[i]);
-    server->addresses_.push_back(to_string((*addresses)[i], port));
-    const bool tcp = (*addresses)[i].kind == ListenAddress::Kind::kTcp;
+    server->addresses_.push_back(to_string(addresses[i], port));
+    const bool tcp = addresses[i].kind == ListenAddress::Kind::kTcp;
     if (tcp && server->port_ == 0) server->port_ = port;
   }
   Host& host = server->parts_->host;
-  if (log != nullptr)
-    if (absl::Status status = recover_all(host, stop); !status.ok()) return status;
+  if (log != nullptr) RETURN_IF_ERROR(recover_all(host, stop));
   host.recovering = false;
   server->parts_->health_service.serving();
   server->parts_->scrape.serving(server->addresses_);

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/host/memory_use.h"
 
@@ -29,16 +30,13 @@ void UpdateWork::begin(const std::string& scene, const v1::UpdateBatch& batch, v
 }
 
 absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBatch& batch) {
-  const absl::StatusOr<ScenePtr> scene = find_scene(slot_.caller(), scene_name, "scene");
-  if (!scene.ok()) return scene.status();
-  absl::StatusOr<UpdateBatch> updates = to_updates(batch);
-  if (!updates.ok()) return updates.status();
-  batch_ = *std::move(updates);
-  absl::StatusOr<MemoryBudget::Claim> room = make_room(slot_.host(), batch_);
-  if (!room.ok()) return room.status();
-  room_.emplace(*std::move(room));
+  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(slot_.caller(), scene_name, "scene"));
+  ASSIGN_OR_RETURN(UpdateBatch updates, to_updates(batch));
+  batch_ = std::move(updates);
+  ASSIGN_OR_RETURN(MemoryBudget::Claim room, make_room(slot_.host(), batch_));
+  room_.emplace(std::move(room));
   const WhenFull when_full = slot_.stream() ? WhenFull::kHold : WhenFull::kRefuse;
-  const absl::StatusOr<Posted> posted = slot_.host().updates.post(*scene, *this, when_full);
+  const absl::StatusOr<Posted> posted = slot_.host().updates.post(scene, *this, when_full);
   if (posted.ok() && *posted == Posted::kFull) slot_.hold();
   return posted.status();
 }

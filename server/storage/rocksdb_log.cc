@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "rocksdb/utilities/checkpoint.h"
 #include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
@@ -27,11 +28,10 @@ absl::Status too_large(uint64_t bytes) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<RocksdbLog>> RocksdbLog::open(const StorageOptions& options) {
-  const StorageOptions with_defaults = with_defaults(options);
-  absl::StatusOr<OpenedDirectory> opened = open_directory(with_defaults);
-  if (!opened.ok()) return opened.status();
-  std::unique_ptr<RocksdbLog> log(new RocksdbLog(with_defaults, *std::move(opened)));
-  if (absl::Status begun = log->begin(); !begun.ok()) return begun;
+  const StorageOptions resolved = with_defaults(options);
+  ASSIGN_OR_RETURN(OpenedDirectory opened, open_directory(resolved));
+  std::unique_ptr<RocksdbLog> log(new RocksdbLog(resolved, std::move(opened)));
+  RETURN_IF_ERROR(log->begin());
   return log;
 }
 
@@ -124,7 +124,7 @@ absl::Status RocksdbLog::begin() {
     const bool whole = said.generation == catalogue_.totals().generation &&
                        said.scene_sum == catalogue_.totals().scene_sum && said.mesh_sum == catalogue_.totals().mesh_sum;
     if (!whole || batch.Count() > 0) {
-      if (absl::Status status = commit(CatalogueChange(), batch); !status.ok()) return status;
+      RETURN_IF_ERROR(commit(CatalogueChange(), batch));
     }
     scenes_.set_catalogue(catalogue_.totals());
     topologies_.drop_all_but(contents());
@@ -151,14 +151,13 @@ std::set<Sha256> RocksdbLog::contents() const {
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel level) {
-  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
-  if (!place.ok()) return place.status();
-  SceneLogState& scene = **place;
+  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
+  SceneLogState& scene = *place;
   if (entries.empty()) return scenes_.last_of(scene);
   uint64_t bytes = 0;
   for (const LogEntry& entry : entries) bytes += entry.bytes.size();
   if (bytes > kMaxRecordBytes) return too_large(bytes);
-  if (absl::Status room = room_for("appending", bytes); !room.ok()) return room;
+  RETURN_IF_ERROR(room_for("appending", bytes));
 
   MutexLock lock(scene.writing);
   const auto start = scenes_.begin_append(scene, entries.front().epoch, database_->db().GetLatestSequenceNumber());
@@ -189,24 +188,21 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
 }
 
 absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
-  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
-  if (!place.ok()) return place.status();
-  const uint64_t last = scenes_.last_of(**place);
+  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
+  const uint64_t last = scenes_.last_of(*place);
   SceneRow row;
   {
     MutexLock lock(catalogue_mutex_);
-    absl::StatusOr<SceneRow> found = row_of(key);
-    if (!found.ok()) return found.status();
-    row = *std::move(found);
+    ASSIGN_OR_RETURN(SceneRow found, row_of(key));
+    row = std::move(found);
   }
   if (from <= row.snapshot_sequence)
     return refuse_argument(
         Reason::kOutOfRange, "from", std::nullopt,
         absl::StrCat("the records up to ", row.snapshot_sequence, " are in the snapshot: read that"));
   if (from > last) return absl::OkStatus();
-  const absl::StatusOr<uint64_t> running_checksum = chain_of(row, from - 1);
-  if (!running_checksum.ok()) return running_checksum.status();
-  absl::Status status = read_records(*database_, key, from, last, *running_checksum, sink);
+  ASSIGN_OR_RETURN(const uint64_t running_checksum, chain_of(row, from - 1));
+  absl::Status status = read_records(*database_, key, from, last, running_checksum, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(
       absl::StrCat("scene '", row.name, "' is damaged: ", status.message(), repair_hint(options_.path)));
@@ -225,9 +221,8 @@ absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequ
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::latest(SceneKey key) const {
-  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
-  if (!place.ok()) return place.status();
-  return scenes_.last_of(**place);
+  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
+  return scenes_.last_of(*place);
 }
 
 absl::Status RocksdbLog::back_up(const std::string& path) {
@@ -241,7 +236,7 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   {
     // Taken before the copy, and so never more than what is in it; after a sync, so that it is nearly as much.
     const auto written = scenes_.written();
-    if (absl::Status status = database_->sync(); !status.ok()) return status;
+    RETURN_IF_ERROR(database_->sync());
     scenes_.on_disk(written);
     scenes_.describe(0, durable_marker);
     // Here the scenes go on: what follows in the copy is another history.
@@ -257,7 +252,7 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   const std::unique_ptr<rocksdb::Checkpoint> checkpoint(made);
   if (status.ok()) status = checkpoint->CreateCheckpoint(absl::StrCat(unfinished, "/", kDatabaseFolder));
   if (!status.ok()) return disk_error(absl::StrCat("backing up to ", path), status);
-  if (absl::Status written = DurableMarkerFile(env, unfinished).replace(durable_marker); !written.ok()) return written;
+  RETURN_IF_ERROR(DurableMarkerFile(env, unfinished).replace(durable_marker));
   status = env.RenameFile(unfinished, path);
   if (status.ok()) status = sync_folder(env, path);
   return status.ok() ? absl::OkStatus() : disk_error(absl::StrCat("backing up to ", path), status);

@@ -6,6 +6,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
@@ -106,7 +107,7 @@ void RocksdbLog::drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::str
 
 absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                                   ChunkSource state) {
-  if (absl::Status room = room_for("a new scene", spec.size()); !room.ok()) return room;
+  RETURN_IF_ERROR(room_for("a new scene", spec.size()));
   if (scenes_.size() >= limits::kMaxScenes)
     return refuse_full("", "scenes", limits::kMaxScenes, static_cast<double>(scenes_.size() + 1), 0);
   SceneRow row;
@@ -121,9 +122,8 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
   row.running_checksum = checksum(scene_key(row.key));
   const std::string pending = pending_snapshot_key(row.key, row.snapshot_number);
   const std::string prefix = snapshot_prefix(row.key, row.snapshot_number);
-  absl::StatusOr<ChunkList> chunks = put_chunks(database_->snapshot(), pending, prefix, state);
-  if (!chunks.ok()) return chunks.status();
-  row.snapshot = *chunks;
+  ASSIGN_OR_RETURN(ChunkList chunks, put_chunks(database_->snapshot(), pending, prefix, state));
+  row.snapshot = chunks;
   {
     MutexLock lock(catalogue_mutex_);
     absl::Status status;
@@ -162,48 +162,43 @@ absl::Status RocksdbLog::delete_scene(SceneKey key) {
   const std::string prefix = scene_prefix(key);
   LOCUS_CHECK(batch.DeleteRange(database_->log(), prefix, end_of(prefix)).ok());
   LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), prefix, end_of(prefix)).ok());
-  if (absl::Status status = commit({{{scene_key(key), std::nullopt}}, 0}, batch); !status.ok()) return status;
+  RETURN_IF_ERROR(commit({{{scene_key(key), std::nullopt}}, 0}, batch));
   scenes_.remove(key, catalogue_.totals());
   write_high_water(false);
   return absl::OkStatus();
 }
 
 absl::Status RocksdbLog::restart_scene(SceneKey key, uint64_t epoch) {
-  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
-  if (!place.ok()) return place.status();
-  MutexLock writing((*place)->writing);
+  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
+  MutexLock writing(place->writing);
   MutexLock lock(catalogue_mutex_);
-  absl::StatusOr<SceneRow> row = row_of(key);
-  if (!row.ok()) return row.status();
-  row->epoch = epoch;
+  ASSIGN_OR_RETURN(SceneRow row, row_of(key));
+  row.epoch = epoch;
   rocksdb::WriteBatch batch;
-  if (absl::Status status = commit(change_of(*row), batch); !status.ok()) return status;
-  scenes_.set_row(**place, *row, seal_of_row(key), catalogue_.totals());
+  RETURN_IF_ERROR(commit(change_of(row), batch));
+  scenes_.set_row(*place, row, seal_of_row(key), catalogue_.totals());
   write_high_water(false);
   return absl::OkStatus();
 }
 
 absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSource state) {
-  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
-  if (!place.ok()) return place.status();
+  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
   uint64_t before = 0;
   {
     MutexLock lock(catalogue_mutex_);
-    const absl::StatusOr<SceneRow> row = row_of(key);
-    if (!row.ok()) return row.status();
-    const uint64_t last = scenes_.last_of(**place);
-    if (sequence < row->snapshot_sequence || sequence > last)
+    ASSIGN_OR_RETURN(const SceneRow row, row_of(key));
+    const uint64_t last = scenes_.last_of(*place);
+    if (sequence < row.snapshot_sequence || sequence > last)
       return refuse_argument(Reason::kOutOfRange, "sequence", std::nullopt,
-                             absl::StrCat("a snapshot may hold the records up to one from ", row->snapshot_sequence,
+                             absl::StrCat("a snapshot may hold the records up to one from ", row.snapshot_sequence,
                                           " to ", last, ", not ", sequence));
-    before = row->snapshot_number;
+    before = row.snapshot_number;
   }
   const uint64_t number = new_number();
   const std::string pending = pending_snapshot_key(key, number);
   const std::string prefix = snapshot_prefix(key, number);
-  const absl::StatusOr<ChunkList> chunks = put_chunks(database_->snapshot(), pending, prefix, state);
-  if (!chunks.ok()) return chunks.status();
-  absl::Status status = put_snapshot(*place, before, sequence, {number, *chunks});
+  ASSIGN_OR_RETURN(const ChunkList chunks, put_chunks(database_->snapshot(), pending, prefix, state));
+  absl::Status status = put_snapshot(place, before, sequence, {number, chunks});
   if (!status.ok()) {
     drop_chunks(database_->snapshot(), pending, prefix);
     return status;
@@ -216,30 +211,27 @@ absl::Status RocksdbLog::put_snapshot(const SceneLogStatePtr& place, uint64_t be
                                       const ContentRow& snapshot) {
   MutexLock lock(catalogue_mutex_);
   const SceneKey key = place->key;
-  absl::StatusOr<SceneRow> row = row_of(key);
-  if (!row.ok()) return row.status();
-  if (row->snapshot_number != before)
-    return absl::AbortedError(absl::StrCat("another snapshot of scene '", row->name, "' was written meanwhile"));
-  const absl::StatusOr<uint64_t> running_checksum = chain_of(*row, sequence);
-  if (!running_checksum.ok()) return running_checksum.status();
+  ASSIGN_OR_RETURN(SceneRow row, row_of(key));
+  if (row.snapshot_number != before)
+    return absl::AbortedError(absl::StrCat("another snapshot of scene '", row.name, "' was written meanwhile"));
+  ASSIGN_OR_RETURN(const uint64_t running_checksum, chain_of(row, sequence));
   const std::string dropped = snapshot_prefix(key, before);
-  row->snapshot_number = snapshot.number;
-  row->snapshot_sequence = sequence;
-  row->running_checksum = *running_checksum;
-  row->snapshot = snapshot.chunks;
+  row.snapshot_number = snapshot.number;
+  row.snapshot_sequence = sequence;
+  row.running_checksum = running_checksum;
+  row.snapshot = snapshot.chunks;
   rocksdb::WriteBatch batch;
   LOCUS_CHECK(batch.Delete(database_->meta(), pending_snapshot_key(key, snapshot.number)).ok());
   LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), dropped, end_of(dropped)).ok());
   LOCUS_CHECK(batch.DeleteRange(database_->log(), scene_prefix(key), log_key(key, sequence + 1)).ok());
-  if (absl::Status status = commit(change_of(*row), batch); !status.ok()) return status;
-  scenes_.set_row(*place, *row, seal_of_row(key), catalogue_.totals());
+  RETURN_IF_ERROR(commit(change_of(row), batch));
+  scenes_.set_row(*place, row, seal_of_row(key), catalogue_.totals());
   write_high_water(false);
   return absl::OkStatus();
 }
 
 absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
-  const absl::StatusOr<SceneLogStatePtr> place = scenes_.find(key);
-  if (!place.ok()) return place.status();
+  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
   absl::StatusOr<SceneRow> row;
   {
     MutexLock lock(catalogue_mutex_);
@@ -277,7 +269,7 @@ bool RocksdbLog::content_in_use(const Sha256& sha256, absl::string_view but) con
 
 absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, ChunkSource content) {
   MutexLock adding(adding_mesh_);
-  if (absl::Status room = room_for("a new mesh", 0); !room.ok()) return room;
+  RETURN_IF_ERROR(room_for("a new mesh", 0));
   const absl::string_view hash(reinterpret_cast<const char*>(sha256.data()), sha256.size());
   bool known = false;
   {
@@ -296,9 +288,8 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
   const std::string pending = pending_mesh_key(sha256, number);
   const std::string prefix = mesh_prefix(sha256, number);
   if (!known) {
-    const absl::StatusOr<ChunkList> chunks = put_chunks(database_->mesh(), pending, prefix, content);
-    if (!chunks.ok()) return chunks.status();
-    change.rows.push_back({content_key(sha256), encode(ContentRow{number, *chunks})});
+    ASSIGN_OR_RETURN(const ChunkList chunks, put_chunks(database_->mesh(), pending, prefix, content));
+    change.rows.push_back({content_key(sha256), encode(ContentRow{number, chunks})});
     LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
   }
   MutexLock lock(catalogue_mutex_);
@@ -325,7 +316,7 @@ absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
     const std::string all = content_key(sha256).substr(1);
     LOCUS_CHECK(batch.DeleteRange(database_->mesh(), all, end_of(all)).ok());
   }
-  if (absl::Status status = commit(change, batch); !status.ok()) return status;
+  RETURN_IF_ERROR(commit(change, batch));
   if (change.rows.size() > 1) topologies_.drop(sha256);
   scenes_.set_catalogue(catalogue_.totals());
   write_high_water(false);

@@ -39,7 +39,7 @@ ALLOWED = {
                    "proto"],
     "server/services": ["server/rpc", "server/host", "server/convert", "server/scheduling", "server/storage",
                         "server/security", "server/observability", "server/config", "core/*", "proto"],
-    "client/lib": ["proto"],
+    "client/lib": ["proto", "core/base/status_macros.h"],  # that file alone, in sources: it is not installed
     "client/cli": ["client/lib", "core/base"],
     "client/cli/commands": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
     "client/cli/rows": ["client/cli", "client/cli/rows/bulk", "client/lib", "core/base"],
@@ -56,7 +56,7 @@ ALLOWED = {
     "client/cli/extras/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
     "client/cli/backup": ["client/cli", "client/lib", "core/base"],
     "client/cli/config": ["client/cli", "server/config"],
-    "client/cli/script": ["client/cli", "client/cli/rows"],
+    "client/cli/script": ["client/cli", "client/cli/rows", "core/base"],
     "deploy/manual": ["client/cli", "server/config"],
 }
 # The kernels are compiled for processors that the rest may not run on: only plain data of the tree goes in.
@@ -127,7 +127,7 @@ def includes_follow_the_directions(tree):
             continue
         for target in quoted_includes(tree.files[path]):
             room = room_of_include(target)
-            if room is not None and room != "tests" and not may_include(folder, room):
+            if room not in (None, "tests") and not may_include(folder, room) and target not in ALLOWED[folder]:
                 problems.append(f"{path}: {folder} may not include {target}")
     return problems
 

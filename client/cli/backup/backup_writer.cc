@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
@@ -33,9 +34,9 @@ absl::Status BackupWriter::end_file(const client::BackupFile& file) {
 }
 
 absl::Status BackupWriter::finish() {
-  if (absl::Status opened = directory_.open_file(kChecksumFile); !opened.ok()) return opened;
-  if (absl::Status written = directory_.write(checksum_text(checksums_)); !written.ok()) return written;
-  if (absl::Status closed = directory_.close_file(); !closed.ok()) return closed;
+  RETURN_IF_ERROR(directory_.open_file(kChecksumFile));
+  RETURN_IF_ERROR(directory_.write(checksum_text(checksums_)));
+  RETURN_IF_ERROR(directory_.close_file());
   return directory_.keep();
 }
 

@@ -6,6 +6,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "client/lib/backup.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -48,11 +49,10 @@ absl::StatusOr<std::vector<Checksum>> parse_checksums(absl::string_view text) {
   for (size_t line = 1; !text.empty(); ++line) {
     const size_t end = text.find('\n');
     if (end == absl::string_view::npos) return damaged(line, "it does not end");
-    absl::StatusOr<Checksum> one = parse_line(text.substr(0, end), line);
-    if (!one.ok()) return one.status();
-    if (absl::Status fit = paths.add(one->path); !fit.ok())
-      return damaged(line, absl::StrCat("the path \"", absl::CEscape(one->path), "\" ", fit.message()));
-    checksums.push_back(*std::move(one));
+    ASSIGN_OR_RETURN(Checksum one, parse_line(text.substr(0, end), line));
+    if (absl::Status fit = paths.add(one.path); !fit.ok())
+      return damaged(line, absl::StrCat("the path \"", absl::CEscape(one.path), "\" ", fit.message()));
+    checksums.push_back(std::move(one));
     text.remove_prefix(end + 1);
   }
   return checksums;

@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/backup/file_error.h"
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -73,8 +74,8 @@ absl::Status PartialDirectory::check() const {
 }
 
 absl::Status PartialDirectory::make(uint64_t bytes) {
-  if (absl::Status checked = check(); !checked.ok()) return checked;
-  if (absl::Status folder = make_folder(partial_); !folder.ok()) return folder;
+  RETURN_IF_ERROR(check());
+  RETURN_IF_ERROR(make_folder(partial_));
   made_ = true;
   std::error_code why;
   const fs::space_info space = fs::space(partial_, why);
@@ -88,7 +89,7 @@ absl::Status PartialDirectory::make_folders_of(const std::string& path) {
   for (size_t slash = path.find('/'); slash != std::string::npos; slash = path.find('/', slash + 1)) {
     const std::string folder = path.substr(0, slash);
     if (!folders_.insert(folder).second) continue;
-    if (absl::Status made = make_folder(absl::StrCat(partial_, "/", folder)); !made.ok()) return made;
+    RETURN_IF_ERROR(make_folder(absl::StrCat(partial_, "/", folder)));
   }
   return absl::OkStatus();
 }
@@ -96,7 +97,7 @@ absl::Status PartialDirectory::make_folders_of(const std::string& path) {
 absl::Status PartialDirectory::open_file(const std::string& path) {
   LOCUS_CHECK(made_);
   LOCUS_CHECK(file_ < 0);
-  if (absl::Status folders = make_folders_of(path); !folders.ok()) return folders;
+  RETURN_IF_ERROR(make_folders_of(path));
   file_path_ = absl::StrCat(partial_, "/", path);
   file_ = open(file_path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kFileMode);
   return file_ >= 0 ? absl::OkStatus() : file_error("make", file_path_, errno);
@@ -125,9 +126,9 @@ absl::Status PartialDirectory::keep() {
   LOCUS_CHECK(made_);
   LOCUS_CHECK(file_ < 0);
   for (const std::string& folder : folders_) {
-    if (absl::Status synced = sync_folder(absl::StrCat(partial_, "/", folder)); !synced.ok()) return synced;
+    RETURN_IF_ERROR(sync_folder(absl::StrCat(partial_, "/", folder)));
   }
-  if (absl::Status synced = sync_folder(partial_); !synced.ok()) return synced;
+  RETURN_IF_ERROR(sync_folder(partial_));
   // Takes the place of an empty directory, and of nothing else.
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) return file_error("make", target_, errno);
   made_ = false;

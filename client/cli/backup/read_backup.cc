@@ -16,6 +16,7 @@
 #include "client/cli/backup/checksums.h"
 #include "client/cli/backup/file_error.h"
 #include "client/lib/sha256.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -115,22 +116,20 @@ struct Contents {
 
 // The files that are listed and there. Every other file is a problem.
 absl::StatusOr<Contents> find_files(const std::string& backup, Problems& problems) {
-  const absl::StatusOr<std::vector<Checksum>> checksums = read_checksums(backup);
-  if (!checksums.ok()) return checksums.status();
-  absl::StatusOr<std::map<std::string, uint64_t>> sizes = list_files(backup, problems);
-  if (!sizes.ok()) return sizes.status();
+  ASSIGN_OR_RETURN(const std::vector<Checksum> checksums, read_checksums(backup));
+  ASSIGN_OR_RETURN(auto sizes, list_files(backup, problems));
   Contents contents;
-  for (const Checksum& one : *checksums) {
-    const auto found = sizes->find(one.path);
-    if (found == sizes->end()) {
+  for (const Checksum& one : checksums) {
+    const auto found = sizes.find(one.path);
+    if (found == sizes.end()) {
       problems.add(one.path, "is missing");
       continue;
     }
     contents.files.push_back(one);
     contents.bytes += found->second;
-    sizes->erase(found);
+    sizes.erase(found);
   }
-  for (const auto& [path, bytes] : *sizes) problems.add(path, absl::StrCat("is not listed in ", kChecksumFile));
+  for (const auto& [path, bytes] : sizes) problems.add(path, absl::StrCat("is not listed in ", kChecksumFile));
   return contents;
 }
 
@@ -139,33 +138,32 @@ absl::StatusOr<Contents> find_files(const std::string& backup, Problems& problem
 absl::StatusOr<client::BackupSize> read_backup(const std::string& backup, PartialDirectory* copy,
                                                const BackupProgress& progress) {
   Problems problems;
-  const absl::StatusOr<Contents> contents = find_files(backup, problems);
-  if (!contents.ok()) return contents.status();
+  ASSIGN_OR_RETURN(const Contents contents, find_files(backup, problems));
   if (copy != nullptr) {
-    if (absl::Status whole = problems.status(backup); !whole.ok()) return whole;
-    if (absl::Status made = copy->make(contents->bytes); !made.ok()) return made;
+    RETURN_IF_ERROR(problems.status(backup));
+    RETURN_IF_ERROR(copy->make(contents.bytes));
   }
   client::BackupSize done;
   client::Sha256Hasher hasher;
   const auto take = [&](absl::string_view bytes) {
     hasher.add(bytes);
     done.bytes += bytes.size();
-    if (progress) progress(done.bytes, contents->bytes);
+    if (progress) progress(done.bytes, contents.bytes);
     return copy != nullptr ? copy->write(bytes) : absl::OkStatus();
   };
-  for (const Checksum& one : contents->files) {
+  for (const Checksum& one : contents.files) {
     if (copy != nullptr) {
-      if (absl::Status opened = copy->open_file(one.path); !opened.ok()) return opened;
+      RETURN_IF_ERROR(copy->open_file(one.path));
     }
-    if (absl::Status read = read_file(absl::StrCat(backup, "/", one.path), take); !read.ok()) return read;
+    RETURN_IF_ERROR(read_file(absl::StrCat(backup, "/", one.path), take));
     ++done.files;
     if (hasher.finish() != one.sha256)
       problems.add(one.path, absl::StrCat("has other bytes than ", kChecksumFile, " says"));
     if (copy == nullptr) continue;
-    if (absl::Status whole = problems.status(backup); !whole.ok()) return whole;
-    if (absl::Status closed = copy->close_file(); !closed.ok()) return closed;
+    RETURN_IF_ERROR(problems.status(backup));
+    RETURN_IF_ERROR(copy->close_file());
   }
-  if (absl::Status whole = problems.status(backup); !whole.ok()) return whole;
+  RETURN_IF_ERROR(problems.status(backup));
   return done;
 }
 

@@ -6,6 +6,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
 #include "client/lib/client.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -16,7 +17,7 @@ struct BackupOptions {
 
 absl::Status back_up(const BackupOptions& options, Context& context) {
   PartialDirectory directory(options.directory, TargetRule::kNothing);
-  if (absl::Status checked = directory.check(); !checked.ok()) return checked;
+  RETURN_IF_ERROR(directory.check());
   const absl::StatusOr<client::Client*> client = context.connect();
   if (!client.ok()) return client.status();
   ProgressLine line("backing up", context);
@@ -24,7 +25,7 @@ absl::Status back_up(const BackupOptions& options, Context& context) {
   const absl::StatusOr<client::BackupSize> size = (*client)->backup(writer);
   line.clear();
   if (!size.ok()) return size.status();
-  if (absl::Status finished = writer.finish(); !finished.ok()) return finished;
+  RETURN_IF_ERROR(writer.finish());
   Report report;
   report.head = {{"directory", directory.target()}, {"files", size->files}, {"bytes", size->bytes}};
   context.write(report);

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/bulk_query.h"
 #include "client/lib/result_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -50,18 +51,15 @@ absl::Status BulkAnswers::write_block(const v1::BlockResult& block, size_t rows,
   }
   clamped_ += static_cast<size_t>(block.clamped_size());
   if (query_.any) {
-    const absl::StatusOr<client::AnyHits> hits = client::AnyHits::of(block);
-    if (!hits.ok()) return hits.status();
-    if (hits->size() != rows) return no_fit();
-    for (size_t i = 0; i < rows; ++i) report_.add({{layout.query, layout.first_query + i}, {"hit", hits->hit(i)}});
+    ASSIGN_OR_RETURN(const client::AnyHits hits, client::AnyHits::of(block));
+    if (hits.size() != rows) return no_fit();
+    for (size_t i = 0; i < rows; ++i) report_.add({{layout.query, layout.first_query + i}, {"hit", hits.hit(i)}});
     return absl::OkStatus();
   }
-  const absl::StatusOr<client::ResultRows> answered = client::ResultRows::of(block);
-  if (!answered.ok()) return answered.status();
-  if (answered->queries() != rows) return no_fit();
-  const absl::StatusOr<std::vector<Json>> lines = rows_json(block, layout);
-  if (!lines.ok()) return lines.status();
-  for (const Json& line : *lines) report_.add(line);
+  ASSIGN_OR_RETURN(const client::ResultRows answered, client::ResultRows::of(block));
+  if (answered.queries() != rows) return no_fit();
+  ASSIGN_OR_RETURN(const std::vector<Json> lines, rows_json(block, layout));
+  for (const Json& line : lines) report_.add(line);
   return absl::OkStatus();
 }
 

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/failure.h"
 #include "client/lib/status.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
@@ -40,10 +41,9 @@ absl::Status several_values(const std::string& option) {
 }
 
 absl::StatusOr<std::unique_ptr<RowReader>> open_rows(const BulkOptions& options, RowSchema schema) {
-  absl::StatusOr<ByteInput> input = ByteInput::open(options.csv ? *options.csv : *options.ndjson);
-  if (!input.ok()) return input.status();
+  ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(options.csv ? *options.csv : *options.ndjson));
   const RowFormat format = options.csv ? RowFormat::kCsv : RowFormat::kNdjson;
-  return std::make_unique<RowReader>(*std::move(input), format, std::move(schema));
+  return std::make_unique<RowReader>(std::move(input), format, std::move(schema));
 }
 
 std::vector<float> float_column(const RowColumn& column, RowSpan rows, const std::vector<float>& absent,

@@ -11,6 +11,7 @@
 #include "client/cli/failure.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -44,13 +45,10 @@ class BulkQueryRun {
   absl::Status run() {
     // An input is there when the line runs, perhaps not before, and a pipe can be read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
-    const absl::StatusOr<std::unique_ptr<RowReader>> reader = open_rows(bulk_, query_.schema);
-    if (!reader.ok()) return reader.status();
-    const absl::StatusOr<client::Client*> client = context_.connect();
-    if (!client.ok()) return client.status();
-    reader_ = reader->get();
-    stream_ =
-        (*client)->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
+    ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, query_.schema));
+    ASSIGN_OR_RETURN(const client::Client* client, context_.connect());
+    reader_ = reader.get();
+    stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     absl::Status status = ask_all();
     // What was sent before a wrong row is answered all the same; after a refusal nothing more is waited for.
     while (!refused_ && !in_flight_.empty()) status.Update(write_front());
@@ -73,15 +71,14 @@ class BulkQueryRun {
     bool asked = false;
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
-      const absl::StatusOr<BatchEnd> end = reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch);
-      if (!end.ok()) return end.status();
+      ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
       // An input without rows asks an empty batch: it finds out whether the scene is there, and its revision.
-      if (batch.rows() > 0 || (*end == BatchEnd::kEnd && !asked)) {
+      if (batch.rows() > 0 || (end == BatchEnd::kEnd && !asked)) {
         asked = true;
-        if (const absl::Status sent = send(batch); !sent.ok()) return sent;
+        RETURN_IF_ERROR(send(batch));
       }
-      if (const absl::Status written = write_answers(*end); !written.ok()) return written;
-      if (*end == BatchEnd::kEnd) return absl::OkStatus();
+      RETURN_IF_ERROR(write_answers(end));
+      if (end == BatchEnd::kEnd) return absl::OkStatus();
     }
   }
 
@@ -90,7 +87,7 @@ class BulkQueryRun {
     size_t begin = 0;
     do {
       while (in_flight_.size() >= kBulkWindow || (!in_flight_.empty() && !answers_.revision() && !bulk_.follow)) {
-        if (const absl::Status written = write_front(); !written.ok()) return written;
+        RETURN_IF_ERROR(write_front());
       }
       InFlight& next = in_flight_.emplace_back();
       LOCUS_CHECK_LE(in_flight_.size(), kBulkWindow);
@@ -139,7 +136,7 @@ class BulkQueryRun {
           in_flight_.front().answer.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
         return absl::OkStatus();
       }
-      if (const absl::Status written = write_front(); !written.ok()) return written;
+      RETURN_IF_ERROR(write_front());
     }
     return absl::OkStatus();
   }

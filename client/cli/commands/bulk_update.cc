@@ -12,6 +12,7 @@
 #include "client/cli/failure.h"
 #include "client/cli/report_stream.h"
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -37,11 +38,10 @@ class BulkUpdateRun {
   absl::Status run() {
     // An input is there when the line runs, perhaps not before, and a pipe can be read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
-    const absl::StatusOr<std::unique_ptr<RowReader>> reader = open_rows(bulk_, update_.schema);
-    if (!reader.ok()) return reader.status();
+    ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, update_.schema));
     const absl::StatusOr<client::Client*> client = context_.connect();
     if (!client.ok()) return client.status();
-    reader_ = reader->get();
+    reader_ = reader.get();
     client::UpdateStreamOptions options;
     options.max_in_flight = static_cast<int>(kBulkWindow);
     stream_ = (*client)->update_stream(scene_, options);
@@ -64,16 +64,15 @@ class BulkUpdateRun {
     RowBatch batch;
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
-      const absl::StatusOr<BatchEnd> end = reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch);
-      if (!end.ok()) return end.status();
+      ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
       // An input without rows sends an empty batch: it finds out whether the scene is there, and its revision.
-      if (batch.rows() > 0 || (*end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty())) {
-        if (const absl::Status sent = send(batch); !sent.ok()) return sent;
+      if (batch.rows() > 0 || (end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty())) {
+        RETURN_IF_ERROR(send(batch));
       }
-      while (!in_flight_.empty() && (*end != BatchEnd::kFull || is_there(in_flight_.front()))) {
-        if (const absl::Status taken = take_front(); !taken.ok()) return taken;
+      while (!in_flight_.empty() && (end != BatchEnd::kFull || is_there(in_flight_.front()))) {
+        RETURN_IF_ERROR(take_front());
       }
-      if (*end == BatchEnd::kEnd) return absl::OkStatus();
+      if (end == BatchEnd::kEnd) return absl::OkStatus();
     }
   }
 
@@ -85,7 +84,7 @@ class BulkUpdateRun {
       }
     }
     while (in_flight_.size() >= kBulkWindow) {
-      if (const absl::Status taken = take_front(); !taken.ok()) return taken;
+      RETURN_IF_ERROR(take_front());
     }
     v1::UpdateBatch message = update_.batch_of(batch);
     InFlight& next = in_flight_.emplace_back();

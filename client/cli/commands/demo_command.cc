@@ -14,6 +14,7 @@
 #include "client/cli/levels/import/import_file.h"
 #include "client/lib/query_builder.h"
 #include "client/lib/result_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -110,13 +111,11 @@ absl::StatusOr<uint64_t> count_leaks(const client::Client& client, const std::st
         .frame({transform.translation.x, transform.translation.y, transform.translation.z})
         .source(v1::SOURCE_STATIC)
         .rays(origins, directions);
-    const absl::StatusOr<v1::QueryResult> result = client.query(scene, builder.build());
-    if (!result.ok()) return result.status();
-    const absl::StatusOr<client::RayHits> hits = client::RayHits::of(result->blocks(0));
-    if (!hits.ok()) return hits.status();
-    if (hits->size() != count) return absl::DataLossError("an answer does not hold one row a ray");
+    ASSIGN_OR_RETURN(const v1::QueryResult result, client.query(scene, builder.build()));
+    ASSIGN_OR_RETURN(const client::RayHits hits, client::RayHits::of(result.blocks(0)));
+    if (hits.size() != count) return absl::DataLossError("an answer does not hold one row a ray");
     for (size_t i = 0; i < count; ++i)
-      if (!(hits->t(i) <= 1 + kEdgeAllowance)) ++leaks;
+      if (!(hits.t(i) <= 1 + kEdgeAllowance)) ++leaks;
   }
   return leaks;
 }
@@ -127,10 +126,9 @@ absl::Status check_leaks(const client::Client& client, const DemoOptions& option
   const size_t each = options.edge_rays / level.instances.size();
   for (const CheckedInstance& instance : level.instances) {
     const EdgeRays aimed = aim_at_edges(instance.triangles, each, options.seed);
-    const absl::StatusOr<uint64_t> found = count_leaks(client, options.scene, aimed, instance.transform);
-    if (!found.ok()) return found.status();
+    ASSIGN_OR_RETURN(const uint64_t found, count_leaks(client, options.scene, aimed, instance.transform));
     rays += aimed.size();
-    leaks += *found;
+    leaks += found;
   }
   table.add_check("rays at shared edges: leaks", rays, leaks);
   return absl::OkStatus();
@@ -147,14 +145,13 @@ v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
 // The same scene on a second server, at the same tick, must answer with the same bytes.
 absl::Status check_other(const client::Client& client, const DemoOptions& options, const ImportedLevel& level,
                          const DemoWorld& world, uint64_t tick, DemoTable& table) {
-  const absl::StatusOr<std::unique_ptr<client::Client>> other = client::Client::connect(options.compare);
-  if (!other.ok()) return other.status();
-  if (absl::Status status = create_level(**other, options.scene, level); !status.ok()) return status;
+  ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> other, client::Client::connect(options.compare));
+  RETURN_IF_ERROR(create_level(*other, options.scene, level));
   for (const v1::UpdateBatch& batch : {world.inserts(), world.moves(tick)})
-    if (absl::Status status = (*other)->apply(options.scene, batch).status(); !status.ok()) return status;
+    RETURN_IF_ERROR(other->apply(options.scene, batch).status());
   const v1::QueryBatch batch = mixed_batch(world, options.seed + 77);
   const absl::StatusOr<v1::QueryResult> here = client.query(options.scene, batch);
-  const absl::StatusOr<v1::QueryResult> there = (*other)->query(options.scene, batch);
+  const absl::StatusOr<v1::QueryResult> there = other->query(options.scene, batch);
   if (!here.ok()) return here.status();
   if (!there.ok()) return there.status();
   uint64_t different = 0;
@@ -178,32 +175,28 @@ void describe(const DemoOptions& options, const ImportedLevel& level, const Demo
 }
 
 absl::Status demo(const DemoOptions& options, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<ImportedLevel> level = load_level(options);
-  if (!level.ok()) return level.status();
-  if (level->meshes.empty()) return absl::InvalidArgumentError("the level holds no mesh");
-  const DemoLevel placed = place_level(*level);
-  context.err() << "level: " << level->meshes.front().name << ", " << placed.triangles << " triangles\n";
-  if (absl::Status status = create_level(**client, options.scene, *level); !status.ok()) return status;
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const ImportedLevel level, load_level(options));
+  if (level.meshes.empty()) return absl::InvalidArgumentError("the level holds no mesh");
+  const DemoLevel placed = place_level(level);
+  context.err() << "level: " << level.meshes.front().name << ", " << placed.triangles << " triangles\n";
+  RETURN_IF_ERROR(create_level(*client, options.scene, level));
 
   const DemoWorld world(placed.bounds, options.objects, options.seed);
-  if (absl::Status status = (*client)->apply(options.scene, world.inserts()).status(); !status.ok()) return status;
+  RETURN_IF_ERROR(client->apply(options.scene, world.inserts()).status());
   context.err() << "moving " << options.objects << " objects " << options.rate << " times a second for "
                 << options.seconds << " s while clients ask ...\n";
   const LoadOptions load_options{options.scene, static_cast<uint64_t>(options.seconds * options.rate), options.rate,
                                  options.seed};
-  absl::StatusOr<LoadResult> load = run_load(**client, world, load_options);
-  if (!load.ok()) return load.status();
+  ASSIGN_OR_RETURN(LoadResult load, run_load(*client, world, load_options));
 
   context.err() << "checking answers by brute force ...\n";
   DemoTable table;
-  table.add_load("moves", load->moves, load->seconds);
-  check_samples(options, placed, world, *load, table);
-  if (absl::Status status = check_leaks(**client, options, placed, table); !status.ok()) return status;
-  if (!options.compare.empty())
-    if (absl::Status s = check_other(**client, options, *level, world, load->last_tick, table); !s.ok()) return s;
-  describe(options, *level, placed, *load, table);
+  table.add_load("moves", load.moves, load.seconds);
+  check_samples(options, placed, world, load, table);
+  RETURN_IF_ERROR(check_leaks(*client, options, placed, table));
+  if (!options.compare.empty()) RETURN_IF_ERROR(check_other(*client, options, level, world, load.last_tick, table));
+  describe(options, level, placed, load, table);
   context.write(table.report());
   if (table.all_wrong() == 0) return absl::OkStatus();
   return absl::InternalError(absl::StrCat(table.all_wrong(), " answers were wrong; please report this with the table"));

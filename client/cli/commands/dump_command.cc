@@ -8,6 +8,7 @@
 #include "client/cli/report_stream.h"
 #include "client/cli/rows/scene_rows.h"
 #include "client/lib/client.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -22,9 +23,8 @@ struct DumpOptions {
 
 // Whatever a line in a script may want to look at is held; else rows go out as they come in.
 absl::Status dump(const DumpOptions& options, Context& context) {
-  if (absl::Status checked = check(options.view); !checked.ok()) return checked;
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
+  RETURN_IF_ERROR(check(options.view));
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
   const Things things = things_of(options.view);
   constexpr char kNoRows[] = "an empty scene";
   Report kept;
@@ -50,7 +50,7 @@ absl::Status dump(const DumpOptions& options, Context& context) {
       return absl::OkStatus();
     });
   };
-  const absl::Status dumped = (*client)->dump(dump_request(options.scene, options.view, context), take);
+  const absl::Status dumped = client->dump(dump_request(options.scene, options.view, context), take);
   if (context.keeps_reports() && dumped.ok()) context.write(kept);
   if (!context.keeps_reports() && begun) stream.end();
   return dumped;

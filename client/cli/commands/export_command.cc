@@ -14,6 +14,7 @@
 #include "client/cli/levels/export/scene_export.h"
 #include "client/cli/levels/mesh_fetch.h"
 #include "client/lib/client.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -33,11 +34,10 @@ absl::Status check(const ExportOptions& options) {
 
 // From the scene as it is now. The dump may be of another revision, so this is a choice of where to stand, no promise.
 absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
-  const absl::StatusOr<v1::Scene> scene = client.get_scene(options.scene);
-  if (!scene.ok()) return scene.status();
-  if (!scene->has_min() || !scene->has_max()) return std::array<double, 3>{};
-  return recentre_of({scene->min().x(), scene->min().y(), scene->min().z()},
-                     {scene->max().x(), scene->max().y(), scene->max().z()});
+  ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.scene));
+  if (!scene.has_min() || !scene.has_max()) return std::array<double, 3>{};
+  return recentre_of({scene.min().x(), scene.min().y(), scene.min().z()},
+                     {scene.max().x(), scene.max().y(), scene.max().z()});
 }
 
 // Nodes for everything that is wanted. What the answer says about the scene.
@@ -63,34 +63,29 @@ absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file,
 }
 
 absl::Status export_scene(const ExportOptions& options, Context& context) {
-  if (absl::Status checked = check(options); !checked.ok()) return checked;
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<std::array<double, 3>> recentre = find_recentre(options, **client);
-  if (!recentre.ok()) return recentre.status();
-  SceneExport file(options.scene, options.up, *recentre);
-  absl::StatusOr<Json> head = read_scene(options, file, **client, context);
-  if (!head.ok()) return head.status();
+  RETURN_IF_ERROR(check(options));
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const auto recentre, find_recentre(options, *client));
+  SceneExport file(options.scene, options.up, recentre);
+  ASSIGN_OR_RETURN(Json head, read_scene(options, file, *client, context));
   uint64_t triangles = 0;
   for (const std::string& name : file.meshes()) {
-    const absl::StatusOr<ImportedMesh> mesh = fetch_mesh(name, context);
-    if (!mesh.ok()) return mesh.status();
-    triangles += mesh->indices.size() / 3;
-    if (absl::Status set = file.set_mesh(name, *mesh); !set.ok()) return set;
+    ASSIGN_OR_RETURN(const ImportedMesh mesh, fetch_mesh(name, context));
+    triangles += mesh.indices.size() / 3;
+    RETURN_IF_ERROR(file.set_mesh(name, mesh));
   }
-  const absl::StatusOr<uint64_t> bytes = file.writer().write(options.out);
-  if (!bytes.ok()) return bytes.status();
-  if (*recentre != std::array<double, 3>{}) {
-    context.err() << "note: the file's coordinates are 32-bit floats: everything was moved by " << -(*recentre)[0]
-                  << "," << -(*recentre)[1] << "," << -(*recentre)[2] << " to the origin\n";
-    (*head)["recentre"] = doubles_json(*recentre);
+  ASSIGN_OR_RETURN(const uint64_t bytes, file.writer().write(options.out));
+  if (recentre != std::array<double, 3>{}) {
+    context.err() << "note: the file's coordinates are 32-bit floats: everything was moved by " << -recentre[0] << ","
+                  << -recentre[1] << "," << -recentre[2] << " to the origin\n";
+    head["recentre"] = doubles_json(recentre);
   }
   Report report;
-  report.head = *std::move(head);
+  report.head = std::move(head);
   report.head["things"] = file.things();
   report.head["meshes"] = file.meshes().size();
   report.head["triangles"] = triangles;
-  report.head["bytes"] = *bytes;
+  report.head["bytes"] = bytes;
   context.write(report);
   return absl::OkStatus();
 }

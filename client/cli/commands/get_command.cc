@@ -13,6 +13,7 @@
 #include "client/cli/rows/query_report.h"
 #include "client/lib/query_builder.h"
 #include "client/lib/result_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -60,24 +61,21 @@ std::vector<uint64_t> missing_ids(const GetOptions& options, const v1::QueryResu
 
 absl::Status get(const GetOptions& options, Context& context) {
   if (options.ids.empty() && options.groups.empty()) return usage_error("nothing to get: give --id or --group");
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
   const v1::QueryBatch batch = batch_of(options, context);
-  const absl::StatusOr<v1::QueryResult> result = (*client)->query(options.scene, batch);
-  if (!result.ok()) return result.status();
-  if (result->blocks_size() != batch.blocks_size()) return absl::DataLossError("the server left blocks unanswered");
+  ASSIGN_OR_RETURN(const v1::QueryResult result, client->query(options.scene, batch));
+  if (result.blocks_size() != batch.blocks_size()) return absl::DataLossError("the server left blocks unanswered");
   Report report;
-  report.head = result_head(*result);
+  report.head = result_head(result);
   report.rows_name = "things";
   report.keys = row_keys({.columns = columns()});
-  for (const v1::BlockResult& block : result->blocks()) {
-    absl::StatusOr<std::vector<Json>> rows = rows_json(block, {.columns = columns()});
-    if (!rows.ok()) return rows.status();
-    for (Json& row : *rows) {
+  for (const v1::BlockResult& block : result.blocks()) {
+    ASSIGN_OR_RETURN(std::vector<Json> rows, rows_json(block, {.columns = columns()}));
+    for (Json& row : rows) {
       if (!row["id"].is_null()) report.rows.push_back(std::move(row));
     }
   }
-  const std::vector<uint64_t> missing = missing_ids(options, *result);
+  const std::vector<uint64_t> missing = missing_ids(options, result);
   if (!missing.empty()) report.head["missing"] = Json::array();
   for (const uint64_t id : missing) report.head["missing"].push_back(id_json(id));
   context.write(report);

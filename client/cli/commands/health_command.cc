@@ -4,6 +4,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -29,14 +30,13 @@ std::string name_of(client::Health health) {
 absl::Status health(const HealthOptions& options, Context& context) {
   const absl::StatusOr<client::Client*> client = context.connect();
   if (!client.ok()) return client.status();
-  const absl::StatusOr<client::Health> health = (*client)->health(options.service);
-  if (!health.ok()) return health.status();
+  ASSIGN_OR_RETURN(const client::Health health, (*client)->health(options.service));
   Report report;
-  report.head = {{"address", context.options().address}, {"status", name_of(*health)}};
+  report.head = {{"address", context.options().address}, {"status", name_of(health)}};
   context.write(report);
-  if (*health == client::Health::kServing) return absl::OkStatus();
+  if (health == client::Health::kServing) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      absl::StrCat("the server at ", context.options().address, " answers, but is ", name_of(*health)));
+      absl::StrCat("the server at ", context.options().address, " answers, but is ", name_of(health)));
 }
 
 }  // namespace

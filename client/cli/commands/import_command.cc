@@ -4,6 +4,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/commands/mesh_placement.h"
 #include "client/cli/levels/import/import_file.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -15,10 +16,9 @@ struct ImportCommandOptions {
 };
 
 absl::Status import(const ImportCommandOptions& options, Context& context) {
-  const absl::StatusOr<ImportedLevel> level = import_file(options.file, options.import);
-  if (!level.ok()) return level.status();
-  for (const std::string& note : level->notes) context.err() << "note: " << note << '\n';
-  return upload_and_place(options.placement, *level, context);
+  ASSIGN_OR_RETURN(const ImportedLevel level, import_file(options.file, options.import));
+  for (const std::string& note : level.notes) context.err() << "note: " << note << '\n';
+  return upload_and_place(options.placement, level, context);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "client/cli/failure.h"
 #include "client/cli/rows/update_report.h"
 #include "client/lib/update_builder.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -191,7 +192,7 @@ absl::Status insert_rows(const InsertOptions& options, Context& context) {
 
 absl::Status insert(const InsertOptions& options, Context& context) {
   if (options.bulk.given()) return insert_rows(options, context);
-  if (const absl::Status bulk = check(options.bulk); !bulk.ok()) return bulk;
+  RETURN_IF_ERROR(check(options.bulk));
   if (options.shape == "mixed") return usage_error("mixed shapes come from --from-csv or --from-ndjson");
   if (options.ids.empty() || options.at.empty()) {
     return usage_error("give --id and --at, or rows with --from-csv or --from-ndjson");

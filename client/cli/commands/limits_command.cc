@@ -3,6 +3,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -17,13 +18,11 @@ Json number_json(double value) {
 }
 
 absl::Status limits(const NoOptions&, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<v1::GetServerResponse> server = (*client)->get_server();
-  if (!server.ok()) return server.status();
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const v1::GetServerResponse server, client->get_server());
   Report report;
   report.rows_name = "limits";
-  for (const v1::Limit& limit : server->limits()) {
+  for (const v1::Limit& limit : server.limits()) {
     report.rows.push_back(
         {{"name", limit.name()}, {"value", number_json(limit.value())}, {"used", number_json(limit.used())}});
   }

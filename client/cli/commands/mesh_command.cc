@@ -10,6 +10,7 @@
 #include "client/cli/levels/mesh_fetch.h"
 #include "client/cli/levels/obj_file.h"
 #include "client/cli/output.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -27,15 +28,13 @@ Json summary_of(const v1::Mesh& mesh) {
 }
 
 absl::Status list(const MeshOptions&, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<std::vector<v1::Mesh>> meshes = (*client)->list_meshes();
-  if (!meshes.ok()) return meshes.status();
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes());
   Report report;
   report.rows_name = "meshes";
   report.no_rows = "no meshes";
   report.keys = {"name", "triangles", "vertices", "uses", "parts", "zero_area_triangles", "bytes"};
-  for (const v1::Mesh& mesh : *meshes) {
+  for (const v1::Mesh& mesh : meshes) {
     Json row = summary_of(mesh);
     row.erase("sha256");
     report.rows.push_back(std::move(row));
@@ -45,11 +44,9 @@ absl::Status list(const MeshOptions&, Context& context) {
 }
 
 absl::Status show(const MeshOptions& options, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<std::vector<v1::Mesh>> meshes = (*client)->list_meshes();
-  if (!meshes.ok()) return meshes.status();
-  for (const v1::Mesh& mesh : *meshes) {
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes());
+  for (const v1::Mesh& mesh : meshes) {
     if (mesh.name() != options.name) continue;
     Report report;
     report.head = summary_of(mesh);
@@ -69,23 +66,21 @@ absl::Status show(const MeshOptions& options, Context& context) {
 }
 
 absl::Status download(const MeshOptions& options, Context& context) {
-  const absl::StatusOr<ImportedMesh> mesh = fetch_mesh(options.name, context);
-  if (!mesh.ok()) return mesh.status();
+  ASSIGN_OR_RETURN(const ImportedMesh mesh, fetch_mesh(options.name, context));
   std::ofstream file(options.out, std::ios::trunc);
-  write_obj(file, *mesh);
+  write_obj(file, mesh);
   file.close();
   if (!file)
     return absl::FailedPreconditionError(absl::StrCat("cannot write ", options.out, ": check its folder and space"));
   Report report;
-  report.head = {{"file", options.out}, {"triangles", mesh->indices.size() / 3}};
+  report.head = {{"file", options.out}, {"triangles", mesh.indices.size() / 3}};
   context.write(report);
   return absl::OkStatus();
 }
 
 absl::Status remove(const MeshOptions& options, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::Status deleted = (*client)->delete_mesh(options.name);
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  const absl::Status deleted = client->delete_mesh(options.name);
   if (!deleted.ok()) return deleted;
   Report report;
   report.head["deleted"] = options.name;

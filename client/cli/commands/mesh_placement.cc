@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/lib/client.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -72,10 +73,9 @@ void add_placement_options(CLI::App& command, PlacementOptions& options) {
 }
 
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
   if (options.create) {
-    const absl::Status created = create_scene(options.scene, **client);
+    const absl::Status created = create_scene(options.scene, *client);
     if (!created.ok()) return created;
   }
   Report report;
@@ -84,21 +84,19 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
   change.set_scene(options.scene);
   for (const ImportedMesh& mesh : level.meshes) {
     const std::string name = mesh_name(options, level, mesh);
-    const absl::StatusOr<v1::UploadMeshResponse> uploaded = upload(name, mesh, **client, context);
-    if (!uploaded.ok()) return uploaded.status();
+    ASSIGN_OR_RETURN(const v1::UploadMeshResponse uploaded, upload(name, mesh, *client, context));
     add_placement(options, level, name, change);
     report.rows.push_back({{"mesh", name},
-                           {"triangles", uploaded->mesh().triangles()},
-                           {"zero_area_triangles", uploaded->mesh().zero_area_triangles()},
-                           {"already_known", uploaded->already_known()}});
+                           {"triangles", uploaded.mesh().triangles()},
+                           {"zero_area_triangles", uploaded.mesh().zero_area_triangles()},
+                           {"already_known", uploaded.already_known()}});
   }
-  const absl::StatusOr<v1::ChangeInstancesResponse> placed = (*client)->change_instances(change);
-  if (!placed.ok()) return placed.status();
-  context.remember_own(options.scene, {placed->epoch(), placed->revision()});
-  for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed->ids_size(); ++i) {
-    report.rows[i]["id"] = id_json(placed->ids(static_cast<int>(i)));
+  ASSIGN_OR_RETURN(const v1::ChangeInstancesResponse placed, client->change_instances(change));
+  context.remember_own(options.scene, {placed.epoch(), placed.revision()});
+  for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed.ids_size(); ++i) {
+    report.rows[i]["id"] = id_json(placed.ids(static_cast<int>(i)));
   }
-  report.head = {{"scene", options.scene}, {"revision", placed->revision()}};
+  report.head = {{"scene", options.scene}, {"revision", placed.revision()}};
   if (!level.source_format.empty()) report.head["format"] = level.source_format;
   context.write(report);
   return absl::OkStatus();

@@ -10,6 +10,7 @@
 #include "client/cli/failure.h"
 #include "client/cli/rows/update_report.h"
 #include "client/lib/update_builder.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -71,7 +72,7 @@ absl::Status move_rows(const MoveOptions& options, Context& context) {
 
 absl::Status move(const MoveOptions& options, Context& context) {
   if (options.bulk.given()) return move_rows(options, context);
-  if (const absl::Status bulk = check(options.bulk); !bulk.ok()) return bulk;
+  RETURN_IF_ERROR(check(options.bulk));
   if (options.ids.empty() || options.to.empty()) {
     return usage_error("give --id and --to, or rows with --from-csv or --from-ndjson");
   }

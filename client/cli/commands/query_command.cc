@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
@@ -12,9 +13,8 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
   const absl::Status checked = check(options);
   if (!checked.ok()) return checked;
   apply_to_batch(options, context, builder);
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  absl::StatusOr<v1::QueryResult> result = (*client)->query(options.scene, builder.build());
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  absl::StatusOr<v1::QueryResult> result = client->query(options.scene, builder.build());
   if (result.ok() && result->blocks_size() != 1) {
     return absl::DataLossError(absl::StrCat("the server answered one block with ", result->blocks_size()));
   }
@@ -23,14 +23,12 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
 
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context) {
-  const absl::StatusOr<v1::QueryResult> result = ask_block(options, builder, context);
-  if (!result.ok()) return result.status();
-  absl::StatusOr<std::vector<Json>> rows = rows_json(result->blocks(0), layout);
-  if (!rows.ok()) return rows.status();
+  ASSIGN_OR_RETURN(const v1::QueryResult result, ask_block(options, builder, context));
+  ASSIGN_OR_RETURN(std::vector<Json> rows, rows_json(result.blocks(0), layout));
   Report report;
-  report.head = result_head(*result);
+  report.head = result_head(result);
   report.rows_name = rows_name;
-  report.rows = *std::move(rows);
+  report.rows = std::move(rows);
   report.keys = row_keys(layout);
   context.write(report);
   return absl::OkStatus();

@@ -7,6 +7,7 @@
 #include "client/cli/commands/bulk_query.h"
 #include "client/cli/commands/query_command.h"
 #include "client/cli/failure.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -62,7 +63,7 @@ absl::Status query_points_of_input(const NearestOptions& options, Context& conte
 
 absl::Status query_nearest(const NearestOptions& options, Context& context) {
   if (options.bulk.given()) return query_points_of_input(options, context);
-  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  RETURN_IF_ERROR(check(options.bulk));
   if (options.at.empty()) return usage_error("give --at, or rows with --from-csv or --from-ndjson");
   const FramedPositions at = framed(options.at);
   RowLayout layout = layout_of(options);

@@ -7,6 +7,7 @@
 #include "client/cli/commands/bulk_query.h"
 #include "client/cli/commands/query_command.h"
 #include "client/cli/failure.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -102,7 +103,7 @@ absl::Status query_boxes_of_input(const BoxOptions& options, Context& context) {
 
 absl::Status query_ball(const BallOptions& options, Context& context) {
   if (options.bulk.given()) return query_balls_of_input(options, context);
-  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  RETURN_IF_ERROR(check(options.bulk));
   if (options.at.empty() || options.radii.empty()) {
     return usage_error("give --at and --radius, or rows with --from-csv or --from-ndjson");
   }
@@ -118,7 +119,7 @@ absl::Status query_ball(const BallOptions& options, Context& context) {
 
 absl::Status query_box(const BoxOptions& options, Context& context) {
   if (options.bulk.given()) return query_boxes_of_input(options, context);
-  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  RETURN_IF_ERROR(check(options.bulk));
   if (options.at.empty() || options.half_extents.empty()) {
     return usage_error("give --at and --half, or rows with --from-csv or --from-ndjson");
   }

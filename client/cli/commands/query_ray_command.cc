@@ -11,6 +11,7 @@
 #include "client/cli/commands/query_command.h"
 #include "client/cli/failure.h"
 #include "client/lib/result_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -27,15 +28,13 @@ struct RayOptions {
 };
 
 absl::Status report_any(const RayOptions& options, client::QueryBuilder& builder, Context& context) {
-  const absl::StatusOr<v1::QueryResult> result = ask_block(options.query, builder, context);
-  if (!result.ok()) return result.status();
-  const absl::StatusOr<client::AnyHits> hits = client::AnyHits::of(result->blocks(0));
-  if (!hits.ok()) return hits.status();
+  ASSIGN_OR_RETURN(const v1::QueryResult result, ask_block(options.query, builder, context));
+  ASSIGN_OR_RETURN(const client::AnyHits hits, client::AnyHits::of(result.blocks(0)));
   Report report;
-  report.head = result_head(*result);
+  report.head = result_head(result);
   report.rows_name = "rays";
   report.keys = {"ray", "hit"};
-  for (size_t ray = 0; ray < hits->size(); ++ray) report.rows.push_back({{"ray", ray}, {"hit", hits->hit(ray)}});
+  for (size_t ray = 0; ray < hits.size(); ++ray) report.rows.push_back({{"ray", ray}, {"hit", hits.hit(ray)}});
   context.write(report);
   return absl::OkStatus();
 }
@@ -87,7 +86,7 @@ absl::Status query_rays_of_input(const RayOptions& options, Context& context) {
 
 absl::Status query_ray(const RayOptions& options, Context& context) {
   if (options.bulk.given()) return query_rays_of_input(options, context);
-  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  RETURN_IF_ERROR(check(options.bulk));
   if (options.from.empty() || options.directions.empty()) {
     return usage_error("give --from and --dir, or rows with --from-csv or --from-ndjson");
   }

@@ -9,6 +9,7 @@
 #include "client/cli/failure.h"
 #include "client/cli/rows/update_report.h"
 #include "client/lib/update_builder.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -22,7 +23,7 @@ struct RemoveOptions {
 };
 
 absl::Status remove_rows(const RemoveOptions& options, Context& context) {
-  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  RETURN_IF_ERROR(check(options.bulk));
   if (!options.ids.empty() || !options.groups.empty() || options.all) {
     return usage_error("give --id, --group or --all, or an input of ids, not both");
   }
@@ -38,7 +39,7 @@ absl::Status remove_rows(const RemoveOptions& options, Context& context) {
 
 absl::Status remove(const RemoveOptions& options, Context& context) {
   if (options.bulk.given()) return remove_rows(options, context);
-  if (const absl::Status checked = check(options.bulk); !checked.ok()) return checked;
+  RETURN_IF_ERROR(check(options.bulk));
   if (options.ids.empty() && options.groups.empty() && !options.all) {
     return usage_error("nothing to remove: give --id, --group or --all");
   }

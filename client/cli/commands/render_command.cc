@@ -16,6 +16,7 @@
 #include "client/cli/extras/render/png_file.h"
 #include "client/cli/extras/render/thing_bounds.h"
 #include "client/cli/failure.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -61,23 +62,22 @@ absl::StatusOr<ImageSize> ray_image_size(const RenderOptions& options) {
 }
 
 absl::Status check_line(const RenderOptions& options) {
-  if (absl::Status status = check(options.camera); !status.ok()) return status;
-  if (absl::Status status = ray_image_size(options).status(); !status.ok()) return status;
+  RETURN_IF_ERROR(check(options.camera));
+  RETURN_IF_ERROR(ray_image_size(options).status());
   return check_png_path(options.out);
 }
 
 // Bounds of what the picture is of. Sets the revision that all of it is taken at.
 absl::StatusOr<Aabbd> find_target(RenderOptions& options, const client::Client& client) {
-  const absl::StatusOr<v1::Scene> scene = client.get_scene(options.cast.scene);
-  if (!scene.ok()) return scene.status();
-  options.cast.revision = {scene->epoch(), scene->revision()};
-  if (!scene->has_min() || !scene->has_max()) {
+  ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.cast.scene));
+  options.cast.revision = {scene.epoch(), scene.revision()};
+  if (!scene.has_min() || !scene.has_max()) {
     return absl::FailedPreconditionError(
         absl::StrCat("scene ", options.cast.scene,
                      " is empty, there is nothing to see: `locus import` and `locus insert` put something in it"));
   }
-  const Aabbd bounds = {{scene->min().x(), scene->min().y(), scene->min().z()},
-                        {scene->max().x(), scene->max().y(), scene->max().z()}};
+  const Aabbd bounds = {{scene.min().x(), scene.min().y(), scene.min().z()},
+                        {scene.max().x(), scene.max().y(), scene.max().z()}};
   if (!options.camera.at) return bounds;
   return thing_bounds(client, options.cast.scene, options.cast.revision, options.camera.at->value, bounds);
 }
@@ -158,27 +158,24 @@ CastProgress progress_line(const RenderOptions& options, uint64_t rays, Context&
 
 absl::Status render(const RenderOptions& given, Context& context) {
   RenderOptions options = given;
-  if (absl::Status status = check_line(options); !status.ok()) return status;
+  RETURN_IF_ERROR(check_line(options));
   options.cast.mask = static_cast<uint32_t>(options.mask.value);
   if (options.live) options.cast.moment = Moment::kLive;
   if (options.heat != Heat::kNone) options.cast.work = WorkReport::kReported;
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<Aabbd> target = find_target(options, **client);
-  if (!target.ok()) return target.status();
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const Aabbd target, find_target(options, *client));
   const ImageSize size = *ray_image_size(options);
-  const absl::StatusOr<Camera> camera = camera_of(options.camera, *target, size);
-  if (!camera.ok()) return camera.status();
+  ASSIGN_OR_RETURN(const Camera camera, camera_of(options.camera, target, size));
   const absl::Time start = absl::Now();
   const absl::StatusOr<CastResult> cast =
-      cast_rays(**client, *camera, size, options.cast, progress_line(options, size.pixels(), context));
+      cast_rays(*client, camera, size, options.cast, progress_line(options, size.pixels(), context));
   const absl::Duration took = absl::Now() - start;
   if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
   if (!cast.ok()) return cast.status();
   Report report;
-  report.head = head_of(options, *camera, *cast, took);
-  const Picture picture = paint(options, cast->image, *camera, report.head);
-  if (absl::Status status = write_png(options.out, reduced(picture, rays_a_side(options))); !status.ok()) return status;
+  report.head = head_of(options, camera, *cast, took);
+  const Picture picture = paint(options, cast->image, camera, report.head);
+  RETURN_IF_ERROR(write_png(options.out, reduced(picture, rays_a_side(options))));
   context.write(report);
   return absl::OkStatus();
 }

@@ -5,6 +5,7 @@
 #include "client/cli/backup/read_backup.h"
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -32,12 +33,12 @@ absl::Status restore(const RestoreOptions& options, Context& context) {
   if (options.verify_only) return verify(options, context);
   if (options.data_dir.empty()) return usage_error("give the DATA_DIR to restore into, or --verify-only");
   PartialDirectory copy(options.data_dir, TargetRule::kNothingOrEmpty);
-  if (absl::Status checked = copy.check(); !checked.ok()) return checked;
+  RETURN_IF_ERROR(copy.check());
   ProgressLine line("restoring", context);
   const absl::StatusOr<client::BackupSize> size = read_backup(options.backup, &copy, line.progress());
   line.clear();
   if (!size.ok()) return size.status();
-  if (absl::Status kept = copy.keep(); !kept.ok()) return kept;
+  RETURN_IF_ERROR(copy.keep());
   Report report;
   report.head = {{"data_dir", copy.target()}, {"files", size->files}, {"bytes", size->bytes}};
   context.write(report);

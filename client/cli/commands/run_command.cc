@@ -13,6 +13,7 @@
 #include "client/cli/script/runner.h"
 #include "client/cli/script/script.h"
 #include "client/cli/script/script_limits.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -107,21 +108,19 @@ void write_end(const Script& script, const ScriptCounts& counts, Context& contex
 }
 
 absl::Status run(const RunOptions& options, Context& context) {
-  const absl::StatusOr<Variables> variables = variables_from(options.settings);
-  if (!variables.ok()) return variables.status();
-  const absl::StatusOr<Script> script = read_script(options.file);
-  if (!script.ok()) return script.status();
+  ASSIGN_OR_RETURN(const Variables variables, variables_from(options.settings));
+  ASSIGN_OR_RETURN(const Script script, read_script(options.file));
   ScriptCounts checked;
-  const absl::Status mistake = check_script(*script, *variables, context, checked);
+  const absl::Status mistake = check_script(script, variables, context, checked);
   if (!mistake.ok()) return mistake;
   if (options.dry_run) {
-    write_checked(*script, checked, context);
+    write_checked(script, checked, context);
     return absl::OkStatus();
   }
   ScriptCounts counts;
   const AfterFailure after = options.keep_going ? AfterFailure::kGoOn : AfterFailure::kStop;
-  const absl::Status outcome = run_script(*script, *variables, after, context, counts);
-  write_end(*script, counts, context);
+  const absl::Status outcome = run_script(script, variables, after, context, counts);
+  write_end(script, counts, context);
   return outcome;
 }
 

@@ -13,6 +13,7 @@
 #include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
 #include "client/cli/output.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -106,38 +107,32 @@ absl::Status create(const CreateOptions& options, Context& context) {
   request.mutable_spec()->set_history_bytes(options.history_bytes);
   request.mutable_spec()->set_overload(options.overload);
   request.mutable_spec()->mutable_labels()->insert(labels->begin(), labels->end());
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<v1::Scene> scene = (*client)->create_scene(request);
-  if (!scene.ok()) return scene.status();
-  context.remember_own(options.name, {scene->epoch(), scene->revision()});
-  context.write(description_of(*scene));
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const v1::Scene scene, client->create_scene(request));
+  context.remember_own(options.name, {scene.epoch(), scene.revision()});
+  context.write(description_of(scene));
   return absl::OkStatus();
 }
 
 absl::Status list(const ListOptions& options, Context& context) {
   const auto labels = parse_labels(options.labels);
   if (!labels.ok()) return labels.status();
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<std::vector<v1::Scene>> scenes = (*client)->list_scenes(*labels);
-  if (!scenes.ok()) return scenes.status();
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const std::vector<v1::Scene> scenes, client->list_scenes(*labels));
   Report report;
   report.rows_name = "scenes";
   report.no_rows = "no scenes";
   const Json columns = summary_of({});
   for (const auto& [key, value] : columns.items()) report.keys.push_back(key);
-  for (const v1::Scene& scene : *scenes) report.rows.push_back(summary_of(scene));
+  for (const v1::Scene& scene : scenes) report.rows.push_back(summary_of(scene));
   context.write(report);
   return absl::OkStatus();
 }
 
 absl::Status describe(const DescribeOptions& options, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<v1::Scene> scene = (*client)->get_scene(options.name);
-  if (!scene.ok()) return scene.status();
-  context.write(description_of(*scene));
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const v1::Scene scene, client->get_scene(options.name));
+  context.write(description_of(scene));
   return absl::OkStatus();
 }
 
@@ -145,9 +140,8 @@ absl::Status remove(const DeleteOptions& options, Context& context) {
   v1::DeleteSceneRequest request;
   request.set_name(options.name);
   request.set_if_present(options.if_present);
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::Status deleted = (*client)->delete_scene(request);
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  const absl::Status deleted = client->delete_scene(request);
   if (!deleted.ok()) return deleted;
   context.forget_own(options.name);
   Report report;

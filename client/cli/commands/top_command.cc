@@ -12,6 +12,7 @@
 #include "client/cli/extras/top/metrics_text.h"
 #include "client/cli/extras/top/top_figures.h"
 #include "client/cli/output.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -35,11 +36,9 @@ struct Scraped {
 };
 
 absl::StatusOr<Scraped> scrape(const TopOptions& options) {
-  const absl::StatusOr<std::string> text = http_get(options.address, "/metrics", kTimeout);
-  if (!text.ok()) return text.status();
-  absl::StatusOr<std::vector<MetricSample>> samples = parse_metrics(*text);
-  if (!samples.ok()) return samples.status();
-  return Scraped{steady_clock::now(), *std::move(samples)};
+  ASSIGN_OR_RETURN(const std::string text, http_get(options.address, "/metrics", kTimeout));
+  ASSIGN_OR_RETURN(std::vector<MetricSample> samples, parse_metrics(text));
+  return Scraped{steady_clock::now(), std::move(samples)};
 }
 
 // Ctrl-C and the like end the table, not the program in the middle of a line: while this lives they wait to be asked.

@@ -3,6 +3,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -15,14 +16,12 @@ absl::Status version(const VersionOptions& options, Context& context) {
   Report report;
   report.head = {{"version", LOCUS_VERSION}, {"protocol", "locus.v1"}};
   if (options.server) {
-    const absl::StatusOr<client::Client*> client = context.connect();
-    if (!client.ok()) return client.status();
-    const absl::StatusOr<v1::GetServerResponse> server = (*client)->get_server();
-    if (!server.ok()) return server.status();
-    report.head["server_version"] = server->version();
-    report.head["instruction_set"] = server->instruction_set();
+    ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+    ASSIGN_OR_RETURN(const v1::GetServerResponse server, client->get_server());
+    report.head["server_version"] = server.version();
+    report.head["instruction_set"] = server.instruction_set();
     report.head["features"] = Json::array();
-    for (const std::string& feature : server->features()) report.head["features"].push_back(feature);
+    for (const std::string& feature : server.features()) report.head["features"].push_back(feature);
   }
   context.write(report);
   return absl::OkStatus();

@@ -8,6 +8,7 @@
 #include "absl/time/time.h"
 #include "client/cli/commands.h"
 #include "client/cli/default_scene.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -44,18 +45,16 @@ Report report_of(const v1::Scene& scene) {
 
 // Asks again and again, less often as time goes on: instances take from milliseconds to minutes to build.
 absl::Status wait(const WaitOptions& options, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
   const absl::Time end = absl::Now() + absl::Seconds(options.seconds);
   for (absl::Duration pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
-    const absl::StatusOr<v1::Scene> scene = (*client)->get_scene(options.scene);
-    if (!scene.ok()) return scene.status();
-    if (is_reached(*scene, options)) {
-      context.write(report_of(*scene));
+    ASSIGN_OR_RETURN(const v1::Scene scene, client->get_scene(options.scene));
+    if (is_reached(scene, options)) {
+      context.write(report_of(scene));
       return absl::OkStatus();
     }
     const absl::Duration left = end - absl::Now();
-    if (left <= absl::ZeroDuration()) return too_late(*scene, options);
+    if (left <= absl::ZeroDuration()) return too_late(scene, options);
     absl::SleepFor(std::min(pause, left));
   }
 }

@@ -6,6 +6,7 @@
 
 #include "client/cli/rows/past_options.h"
 #include "client/lib/result_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -86,17 +87,16 @@ std::vector<std::string> row_keys(const RowLayout& layout) {
 }
 
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout) {
-  const absl::StatusOr<ResultRows> rows = ResultRows::of(block);
-  if (!rows.ok()) return rows.status();
+  ASSIGN_OR_RETURN(const ResultRows rows, ResultRows::of(block));
   std::vector<Json> result;
-  for (size_t query = 0; query < rows->queries(); ++query) {
-    const client::RowRange range = rows->rows_of(query);
+  for (size_t query = 0; query < rows.queries(); ++query) {
+    const client::RowRange range = rows.rows_of(query);
     for (size_t row = range.begin; row < range.end; ++row) {
       Json json = Json::object();
-      const bool hit = rows->ids().empty() || rows->ids()[row] != 0;
+      const bool hit = rows.ids().empty() || rows.ids()[row] != 0;
       if (!layout.query.empty()) json[layout.query] = layout.first_query + query;
       if (layout.dense) json["hit"] = hit;
-      for (const v1::Column column : layout.columns) add_column(*rows, row, hit, column, layout.frame, json);
+      for (const v1::Column column : layout.columns) add_column(rows, row, hit, column, layout.frame, json);
       result.push_back(std::move(json));
     }
   }

@@ -1,5 +1,7 @@
 #include "client/cli/rows/scene_rows.h"
 
+#include "core/base/status_macros.h"
+
 namespace locus::cli {
 namespace {
 
@@ -88,7 +90,7 @@ absl::Status for_each_thing(const v1::DumpSceneResponse& piece,
     for (int row = 0; row < run.ids_size(); ++row) {
       SceneThing thing = shared_part(run, run.positions_f64(), row);
       read_shape(run, row, &thing);
-      if (absl::Status status = take(thing); !status.ok()) return status;
+      RETURN_IF_ERROR(take(thing));
     }
   }
   for (const v1::Placement& run : piece.instances()) {
@@ -98,7 +100,7 @@ absl::Status for_each_thing(const v1::DumpSceneResponse& piece,
       thing.kind = ThingKind::kInstance;
       thing.mesh = run.mesh();
       thing.scale = run.scales(row);
-      if (absl::Status status = take(thing); !status.ok()) return status;
+      RETURN_IF_ERROR(take(thing));
     }
   }
   return absl::OkStatus();

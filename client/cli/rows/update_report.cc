@@ -4,31 +4,30 @@
 
 #include "absl/strings/strip.h"
 #include "client/cli/failure.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
 absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, Context& context) {
   if (context.pending_batch()) return context.pending_batch()->add(scene, batch);
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  const absl::StatusOr<v1::UpdateAck> ack = (*client)->apply(scene, std::move(batch));
-  if (!ack.ok()) return ack.status();
-  context.remember_own(scene, {ack->epoch(), ack->revision()});
+  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(const v1::UpdateAck ack, client->apply(scene, std::move(batch)));
+  context.remember_own(scene, {ack.epoch(), ack.revision()});
   Report report;
-  report.head = {{"applied", ack->applied()},
-                 {"refused", ack->refused()},
-                 {"revision", ack->revision()},
-                 {"tick", ack->tick()},
-                 {"epoch", id_json(ack->epoch())}};
-  if (ack->errors_size() > 0) report.rows_name = "errors";
-  for (const v1::ItemError& error : ack->errors()) {
+  report.head = {{"applied", ack.applied()},
+                 {"refused", ack.refused()},
+                 {"revision", ack.revision()},
+                 {"tick", ack.tick()},
+                 {"epoch", id_json(ack.epoch())}};
+  if (ack.errors_size() > 0) report.rows_name = "errors";
+  for (const v1::ItemError& error : ack.errors()) {
     report.rows.push_back({{"field", error.field()},
                            {"index", error.index()},
                            {"id", id_json(error.id())},
                            {"reason", std::string(absl::StripPrefix(v1::Reason_Name(error.reason()), "REASON_"))}});
   }
   context.write(report);
-  return refused_items(*ack);
+  return refused_items(ack);
 }
 
 }  // namespace locus::cli

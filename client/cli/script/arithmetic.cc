@@ -1,6 +1,7 @@
 #include "client/cli/script/arithmetic.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -30,9 +31,8 @@ Answer by_parts(char sign, const Operand& a, const Operand& b) {
   };
   Vector result{};
   for (size_t i = 0; i < result.size(); ++i) {
-    const absl::StatusOr<Number> value = of_numbers(sign, part(a, i), part(b, i));
-    if (!value.ok()) return value.status();
-    result[i] = real(*value);
+    ASSIGN_OR_RETURN(const Number value, of_numbers(sign, part(a, i), part(b, i)));
+    result[i] = real(value);
   }
   return Value::of(result);
 }
@@ -41,19 +41,17 @@ Answer by_parts(char sign, const Operand& a, const Operand& b) {
 
 absl::StatusOr<Value> calculate(char sign, const Value& left, const Value& right) {
   if (!left.known() || !right.known()) return Value::unknown();
-  const absl::StatusOr<Operand> a = operand_of(left);
-  if (!a.ok()) return a.status();
-  const absl::StatusOr<Operand> b = operand_of(right);
-  if (!b.ok()) return b.status();
-  const Number* const x = std::get_if<Number>(&*a);
-  const Number* const y = std::get_if<Number>(&*b);
+  ASSIGN_OR_RETURN(const Operand a, operand_of(left));
+  ASSIGN_OR_RETURN(const Operand b, operand_of(right));
+  const Number* const x = std::get_if<Number>(&a);
+  const Number* const y = std::get_if<Number>(&b);
   if (x != nullptr && y != nullptr) {
     const absl::StatusOr<Number> number = of_numbers(sign, *x, *y);
     return number.ok() ? Answer(Value::of(*number)) : Answer(number.status());
   }
   const bool scales = (sign == '*' && (x == nullptr) != (y == nullptr)) || (sign == '/' && y != nullptr);
   const bool moves = (sign == '+' || sign == '-') && x == nullptr && y == nullptr;
-  if (scales || moves) return by_parts(sign, *a, *b);
+  if (scales || moves) return by_parts(sign, a, b);
   return absl::InvalidArgumentError(absl::StrCat("`", std::string(1, sign), "` does not go with ", shown(left), " and ",
                                                  shown(right),
                                                  ": for vectors there are + - between two of them, "

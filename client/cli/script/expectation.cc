@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/script/cursor.h"
 #include "client/cli/script/expression.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -27,9 +28,8 @@ absl::StatusOr<std::string> read_comparison(Cursor& cursor) {
 absl::StatusOr<std::optional<Value>> read_tolerance(Cursor& cursor, const Variables& variables) {
   cursor.skip_blanks();
   if (!cursor.accept("within")) return std::nullopt;
-  absl::StatusOr<Value> tolerance = read_expression(cursor, variables);
-  if (!tolerance.ok()) return tolerance.status();
-  return std::optional<Value>(*std::move(tolerance));
+  ASSIGN_OR_RETURN(Value tolerance, read_expression(cursor, variables));
+  return std::optional<Value>(std::move(tolerance));
 }
 
 bool entries_equal(const Json& a, const Json& b) {
@@ -55,35 +55,28 @@ absl::StatusOr<bool> contains(const Json& whole, const Json& part) {
   if (whole.is_array()) {
     return std::any_of(whole.begin(), whole.end(), [&](const Json& entry) { return equal(entry, part); });
   }
-  const absl::StatusOr<std::string> text = text_of(Value::of(part));
-  if (!text.ok()) return text.status();
-  if (whole.is_string()) return absl::StrContains(whole.get_ref<const std::string&>(), *text);
+  ASSIGN_OR_RETURN(const std::string text, text_of(Value::of(part)));
+  if (whole.is_string()) return absl::StrContains(whole.get_ref<const std::string&>(), text);
   return equal(whole, part);  // a column of one row
 }
 
 // Vectors part by part.
 absl::StatusOr<bool> near(const Value& left, const Value& right, const Value& tolerance) {
-  const absl::StatusOr<Number> bound = number_of(tolerance);
-  if (!bound.ok()) return bound.status();
-  if (real(*bound) < 0) return absl::InvalidArgumentError("a tolerance is not negative");
+  ASSIGN_OR_RETURN(const Number bound, number_of(tolerance));
+  if (real(bound) < 0) return absl::InvalidArgumentError("a tolerance is not negative");
   if (const absl::StatusOr<Number> x = number_of(left), y = number_of(right); x.ok() && y.ok()) {
     const absl::StatusOr<Number> difference = subtract(*x, *y);
-    return difference.ok() ? std::abs(real(*difference)) <= real(*bound) : absl::StatusOr<bool>(false);
+    return difference.ok() ? std::abs(real(*difference)) <= real(bound) : absl::StatusOr<bool>(false);
   }
-  const absl::StatusOr<Vector> a = vector_of(left);
-  if (!a.ok()) return a.status();
-  const absl::StatusOr<Vector> b = vector_of(right);
-  if (!b.ok()) return b.status();
-  return std::equal(a->begin(), a->end(), b->begin(),
-                    [&](double x, double y) { return std::abs(x - y) <= real(*bound); });
+  ASSIGN_OR_RETURN(const Vector a, vector_of(left));
+  ASSIGN_OR_RETURN(const Vector b, vector_of(right));
+  return std::equal(a.begin(), a.end(), b.begin(), [&](double x, double y) { return std::abs(x - y) <= real(bound); });
 }
 
 absl::StatusOr<bool> ordered(const std::string& comparison, const Value& left, const Value& right) {
-  const absl::StatusOr<Number> a = number_of(left);
-  if (!a.ok()) return a.status();
-  const absl::StatusOr<Number> b = number_of(right);
-  if (!b.ok()) return b.status();
-  const int order = compare(*a, *b);
+  ASSIGN_OR_RETURN(const Number a, number_of(left));
+  ASSIGN_OR_RETURN(const Number b, number_of(right));
+  const int order = compare(a, b);
   if (comparison == "<") return order < 0;
   if (comparison == "<=") return order <= 0;
   return comparison == ">" ? order > 0 : order >= 0;
@@ -95,12 +88,10 @@ absl::StatusOr<bool> holds(const Expectation& expectation) {
   if (comparison.front() == '<' || comparison.front() == '>') {
     return ordered(comparison, expectation.left, expectation.right);
   }
-  const absl::StatusOr<Json> left = plain(expectation.left);
-  if (!left.ok()) return left.status();
-  const absl::StatusOr<Json> right = plain(expectation.right);
-  if (!right.ok()) return right.status();
-  if (comparison == "contains") return contains(*left, *right);
-  return equal(*left, *right) == (comparison == "==");
+  ASSIGN_OR_RETURN(const Json left, plain(expectation.left));
+  ASSIGN_OR_RETURN(const Json right, plain(expectation.right));
+  if (comparison == "contains") return contains(left, right);
+  return equal(left, right) == (comparison == "==");
 }
 
 }  // namespace
@@ -108,26 +99,22 @@ absl::StatusOr<bool> holds(const Expectation& expectation) {
 absl::StatusOr<Expectation> read_expectation(absl::string_view text, const Variables& variables) {
   Expectation expectation;
   Cursor cursor(text);
-  absl::StatusOr<Value> left = read_expression(cursor, variables);
-  if (!left.ok()) return left.status();
-  absl::StatusOr<std::string> comparison = read_comparison(cursor);
-  if (!comparison.ok()) return comparison.status();
+  ASSIGN_OR_RETURN(Value left, read_expression(cursor, variables));
+  ASSIGN_OR_RETURN(std::string comparison, read_comparison(cursor));
   const size_t right_begin = cursor.at();
-  absl::StatusOr<Value> right = read_expression(cursor, variables);
-  if (!right.ok()) return right.status();
+  ASSIGN_OR_RETURN(Value right, read_expression(cursor, variables));
   expectation.right_text = std::string(absl::StripAsciiWhitespace(cursor.since(right_begin)));
-  absl::StatusOr<std::optional<Value>> tolerance = read_tolerance(cursor, variables);
-  if (!tolerance.ok()) return tolerance.status();
+  ASSIGN_OR_RETURN(std::optional<Value> tolerance, read_tolerance(cursor, variables));
   expectation.text = std::string(absl::StripAsciiWhitespace(cursor.since(0)));
   cursor.skip_blanks();
   if (!cursor.ended()) {
     return absl::InvalidArgumentError(absl::StrCat("expected the end of the line, found ", cursor.found()));
   }
-  if (*tolerance && *comparison != "==") return absl::InvalidArgumentError("`within` goes with == only");
-  expectation.left = *std::move(left);
-  expectation.comparison = *std::move(comparison);
-  expectation.right = *std::move(right);
-  expectation.tolerance = *std::move(tolerance);
+  if (tolerance && comparison != "==") return absl::InvalidArgumentError("`within` goes with == only");
+  expectation.left = std::move(left);
+  expectation.comparison = std::move(comparison);
+  expectation.right = std::move(right);
+  expectation.tolerance = std::move(tolerance);
   return expectation;
 }
 

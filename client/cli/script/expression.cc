@@ -8,6 +8,7 @@
 #include "client/cli/script/arithmetic.h"
 #include "client/cli/script/functions.h"
 #include "client/cli/script/quoted_text.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -45,9 +46,8 @@ Answer read_numbers(Cursor& cursor) {
   Json numbers = Json::array();
   size_t behind_first = 0;
   while (true) {
-    const absl::StatusOr<Number> number = read_number(cursor);
-    if (!number.ok()) return number.status();
-    numbers.push_back(json_of(*number));
+    ASSIGN_OR_RETURN(const Number number, read_number(cursor));
+    numbers.push_back(json_of(number));
     if (numbers.size() == 1) behind_first = cursor.at();
     if (cursor.peek() != ',' || !begins_number(cursor, 1)) break;
     cursor.next();
@@ -98,9 +98,8 @@ Answer list_of(std::vector<Value> values) {
   Json list = Json::array();
   for (const Value& value : values) {
     if (!value.known()) return Value::unknown();
-    const absl::StatusOr<Number> number = number_of(value);
-    if (!number.ok()) return number.status();
-    list.push_back(json_of(*number));
+    ASSIGN_OR_RETURN(const Number number, number_of(value));
+    list.push_back(json_of(number));
   }
   return Value::of(std::move(list));
 }

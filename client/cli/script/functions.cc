@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -37,9 +38,8 @@ Answer of_vector(const Value& value, Function function) {
 
 template <class Function>
 Answer of_two_vectors(const Arguments& arguments, Function function) {
-  const absl::StatusOr<Vector> b = vector_of(arguments[1]);
-  if (!b.ok()) return b.status();
-  return of_vector(arguments[0], [&](const Vector& a) { return function(a, *b); });
+  ASSIGN_OR_RETURN(const Vector b, vector_of(arguments[1]));
+  return of_vector(arguments[0], [&](const Vector& a) { return function(a, b); });
 }
 
 Answer finite_vector(const Vector& vector) {
@@ -51,22 +51,20 @@ Answer finite_vector(const Vector& vector) {
 
 // The absolute value of a number, or of each part of a vector.
 Answer absolute(const Value& value) {
-  const absl::StatusOr<Operand> operand = operand_of(value);
-  if (!operand.ok()) return operand.status();
-  if (const Vector* const vector = std::get_if<Vector>(&*operand)) {
+  ASSIGN_OR_RETURN(const Operand operand, operand_of(value));
+  if (const Vector* const vector = std::get_if<Vector>(&operand)) {
     return Value::of(Vector{std::abs((*vector)[0]), std::abs((*vector)[1]), std::abs((*vector)[2])});
   }
-  const Number& number = std::get<Number>(*operand);
+  const Number& number = std::get<Number>(operand);
   return compare(number, absl::int128(0)) < 0 ? value_of(subtract(absl::int128(0), number)) : Answer(Value::of(number));
 }
 
 // To an integer, so that it serves as an index or an id; what has no fraction is left as it is.
 template <class Function>
 Answer to_integer(const Value& value, Function function) {
-  const absl::StatusOr<Number> number = number_of(value);
-  if (!number.ok()) return number.status();
-  if (std::holds_alternative<absl::int128>(*number)) return Value::of(*number);
-  const double whole = function(std::get<double>(*number));
+  ASSIGN_OR_RETURN(const Number number, number_of(value));
+  if (std::holds_alternative<absl::int128>(number)) return Value::of(number);
+  const double whole = function(std::get<double>(number));
   if (std::abs(whole) >= 0x1p63) return absl::OutOfRangeError("the result needs more than 64 bits");
   return Value::of(Number(absl::int128(whole)));
 }
@@ -75,12 +73,11 @@ Answer to_integer(const Value& value, Function function) {
 Answer extreme(const Arguments& arguments, int sign) {
   std::vector<Number> numbers;
   for (const Value& argument : arguments) {
-    const absl::StatusOr<Operand> operand = operand_of(argument);
-    if (!operand.ok()) return operand.status();
-    if (const Number* const number = std::get_if<Number>(&*operand)) {
+    ASSIGN_OR_RETURN(const Operand operand, operand_of(argument));
+    if (const Number* const number = std::get_if<Number>(&operand)) {
       numbers.push_back(*number);
     } else {
-      const Vector& vector = std::get<Vector>(*operand);
+      const Vector& vector = std::get<Vector>(operand);
       numbers.insert(numbers.end(), vector.begin(), vector.end());
     }
   }

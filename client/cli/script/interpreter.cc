@@ -14,6 +14,7 @@
 #include "client/cli/script/expectation.h"
 #include "client/cli/script/expression.h"
 #include "client/cli/unknown_values.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -45,12 +46,11 @@ absl::StatusOr<std::string> take_target(std::vector<Word>& words) {
 }
 
 absl::StatusOr<uint64_t> integer_up_to(const Value& value, uint64_t limit, absl::string_view what) {
-  const absl::StatusOr<Number> number = number_of(value);
-  if (!number.ok()) return number.status();
-  const absl::int128* const integer = std::get_if<absl::int128>(&*number);
+  ASSIGN_OR_RETURN(const Number number, number_of(value));
+  const absl::int128* const integer = std::get_if<absl::int128>(&number);
   if (integer == nullptr || *integer < 0 || *integer > absl::int128(limit)) {
     return absl::InvalidArgumentError(
-        absl::StrCat(what, " is an integer from 0 to ", limit, ", not ", text_of(*number)));
+        absl::StrCat(what, " is an integer from 0 to ", limit, ", not ", text_of(number)));
   }
   return static_cast<uint64_t>(*integer);
 }
@@ -113,22 +113,20 @@ absl::Status Interpreter::let(const std::string& text) {
 }
 
 absl::Status Interpreter::use(const std::string& text) {
-  const absl::StatusOr<std::vector<Word>> words = read_words(text, variables_);
-  if (!words.ok()) return words.status();
-  if (words->size() != 1) return absl::InvalidArgumentError("expected `use SCENE`");
-  context_.use_scene(words->front().text);
+  ASSIGN_OR_RETURN(const std::vector<Word> words, read_words(text, variables_));
+  if (words.size() != 1) return absl::InvalidArgumentError("expected `use SCENE`");
+  context_.use_scene(words.front().text);
   return absl::OkStatus();
 }
 
 absl::Status Interpreter::begin(const std::string& text) {
-  const absl::StatusOr<std::vector<Word>> words = read_words(text, variables_);
-  if (!words.ok()) return words.status();
-  const bool with_tick = words->size() == 2 && words->front().text == "--tick";
-  if (!words->empty() && !with_tick) return absl::InvalidArgumentError("expected `begin` or `begin --tick N`");
+  ASSIGN_OR_RETURN(const std::vector<Word> words, read_words(text, variables_));
+  const bool with_tick = words.size() == 2 && words.front().text == "--tick";
+  if (!words.empty() && !with_tick) return absl::InvalidArgumentError("expected `begin` or `begin --tick N`");
   uint64_t tick = 0;
-  const bool known = !has_unknown(texts_of(*words));
-  if (with_tick && known && !absl::SimpleAtoi((*words)[1].text, &tick)) {
-    return absl::InvalidArgumentError(absl::StrCat("a tick is an integer from 0, not ", (*words)[1].text));
+  const bool known = !has_unknown(texts_of(words));
+  if (with_tick && known && !absl::SimpleAtoi(words[1].text, &tick)) {
+    return absl::InvalidArgumentError(absl::StrCat("a tick is an integer from 0, not ", words[1].text));
   }
   in_batch_ = true;
   if (!checks_only()) context_.pending_batch().emplace(with_tick ? std::optional<uint64_t>(tick) : std::nullopt);
@@ -154,16 +152,14 @@ absl::Status Interpreter::commit(const Statement& statement) {
 }
 
 absl::Status Interpreter::expect(const std::string& text) const {
-  const absl::StatusOr<Expectation> expectation = read_expectation(text, variables_);
-  if (!expectation.ok()) return expectation.status();
-  return checks_only() ? absl::OkStatus() : judge(*expectation);
+  ASSIGN_OR_RETURN(const Expectation expectation, read_expectation(text, variables_));
+  return checks_only() ? absl::OkStatus() : judge(expectation);
 }
 
 absl::Status Interpreter::echo(const std::string& text) {
-  const absl::StatusOr<std::vector<Word>> words = read_words(text, variables_);
-  if (!words.ok()) return words.status();
+  ASSIGN_OR_RETURN(const std::vector<Word> words, read_words(text, variables_));
   if (checks_only()) return absl::OkStatus();
-  const std::string line = absl::StrJoin(texts_of(*words), " ");
+  const std::string line = absl::StrJoin(texts_of(words), " ");
   if (context_.options().format == Format::kTable) {
     context_.out() << line << '\n';
   } else {
@@ -177,13 +173,12 @@ absl::Status Interpreter::echo(const std::string& text) {
 absl::Status Interpreter::sleep(const std::string& text) const {
   const absl::StatusOr<Value> value = read_value(text);
   if (!value.ok() || !value->known()) return value.status();
-  const absl::StatusOr<Number> seconds = number_of(*value);
-  if (!seconds.ok()) return seconds.status();
-  if (real(*seconds) < 0 || real(*seconds) > kMaxSleepSeconds) {
+  ASSIGN_OR_RETURN(const Number seconds, number_of(*value));
+  if (real(seconds) < 0 || real(seconds) > kMaxSleepSeconds) {
     return absl::InvalidArgumentError(
-        absl::StrCat("sleep takes 0 to ", kMaxSleepSeconds, " seconds, not ", text_of(*seconds)));
+        absl::StrCat("sleep takes 0 to ", kMaxSleepSeconds, " seconds, not ", text_of(seconds)));
   }
-  if (!checks_only()) absl::SleepFor(absl::Seconds(real(*seconds)));
+  if (!checks_only()) absl::SleepFor(absl::Seconds(real(seconds)));
   return absl::OkStatus();
 }
 

@@ -5,6 +5,7 @@
 #include "client/cli/script/expression.h"
 #include "client/cli/script/script_limits.h"
 #include "client/cli/unknown_values.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -43,11 +44,10 @@ absl::StatusOr<Value> read_double_quoted(Cursor& cursor, const Variables& variab
   while (!cursor.accept("\"")) {
     if (cursor.ended()) return not_closed('"');
     if (cursor.peek() == '$' || cursor.peek() == '{') {
-      const absl::StatusOr<Value> value =
-          cursor.accept("$") ? read_variable(cursor, variables) : read_braces(cursor, variables);
-      if (!value.ok()) return value.status();
-      known &= value->known();
-      const absl::Status appended = append_value(text, *value);
+      ASSIGN_OR_RETURN(const Value value,
+                       cursor.accept("$") ? read_variable(cursor, variables) : read_braces(cursor, variables));
+      known &= value.known();
+      const absl::Status appended = append_value(text, value);
       if (!appended.ok()) return appended;
     } else if (cursor.accept("\\")) {
       const absl::Status read = read_escape(cursor, text);
@@ -66,12 +66,11 @@ absl::Status append_value(std::string& text, const Value& value) {
     text += kNotKnownYet;
     return absl::OkStatus();
   }
-  const absl::StatusOr<std::string> more = text_of(value);
-  if (!more.ok()) return more.status();
-  if (text.size() + more->size() > kMaxTextBytes) {
+  ASSIGN_OR_RETURN(const std::string more, text_of(value));
+  if (text.size() + more.size() > kMaxTextBytes) {
     return absl::ResourceExhaustedError(absl::StrCat("a text gets longer than ", kMaxTextBytes, " bytes"));
   }
-  text += *more;
+  text += more;
   return absl::OkStatus();
 }
 

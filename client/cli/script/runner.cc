@@ -8,6 +8,7 @@
 #include "client/cli/failure.h"
 #include "client/cli/script/interpreter.h"
 #include "client/cli/script/script_limits.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -61,11 +62,10 @@ class Runner {
 
   absl::StatusOr<size_t> enter(size_t place) {
     const Statement& statement = script_.statements[place];
-    absl::StatusOr<Repetition> repetition = interpreter_.read_repetition(statement);
-    if (!repetition.ok()) return repetition.status();
+    ASSIGN_OR_RETURN(Repetition repetition, interpreter_.read_repetition(statement));
     const bool checks_only = context_.lines() == Lines::kScriptCheck;
     // A check goes once through every loop.
-    Loop loop{.begin = place, .times = checks_only ? 1 : *repetition->times, .counter = repetition->counter};
+    Loop loop{.begin = place, .times = checks_only ? 1 : *repetition.times, .counter = repetition.counter};
     if (loop.times == 0) return statement.partner + 1;
     interpreter_.enter_loop();
     const absl::Status set = count_up(loop);

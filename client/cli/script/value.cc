@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -90,23 +91,21 @@ absl::StatusOr<Json> single(const Value& value) {
 absl::StatusOr<Value> field_of(const Value& value, const std::string& name) {
   if (!value.known()) return value;
   if (value.kind == Value::Kind::kResult) return field_of_result(value, name);
-  const absl::StatusOr<Json> json = single(value);
-  if (!json.ok()) return json.status();
-  if (!json->is_object()) return is_something_else(value, absl::StrCat("a record: it has no field ", name));
-  if (json->contains(name)) return Value::of((*json)[name]);
+  ASSIGN_OR_RETURN(const Json json, single(value));
+  if (!json.is_object()) return is_something_else(value, absl::StrCat("a record: it has no field ", name));
+  if (json.contains(name)) return Value::of(json[name]);
   std::vector<std::string> names;
-  for (const auto& [key, entry] : json->items()) names.push_back(key);
+  for (const auto& [key, entry] : json.items()) names.push_back(key);
   return absl::NotFoundError(absl::StrCat("there is no field ", name, "; there are ", absl::StrJoin(names, ", ")));
 }
 
 absl::StatusOr<Value> entry_of(const Value& value, const Number& index) {
   if (!value.known()) return value;
   if (value.kind == Value::Kind::kPlain && !value.data.is_array()) return is_something_else(value, "a list");
-  const absl::StatusOr<uint64_t> size = size_of(value);
-  if (!size.ok()) return size.status();
+  ASSIGN_OR_RETURN(const uint64_t size, size_of(value));
   const absl::int128* const place = std::get_if<absl::int128>(&index);
-  if (place == nullptr || *place < 0 || *place >= absl::int128(*size)) {
-    return absl::OutOfRangeError(absl::StrCat("there is no entry [", text_of(index), "] among ", *size));
+  if (place == nullptr || *place < 0 || *place >= absl::int128(size)) {
+    return absl::OutOfRangeError(absl::StrCat("there is no entry [", text_of(index), "] among ", size));
   }
   const auto i = static_cast<size_t>(*place);
   if (value.kind == Value::Kind::kColumn) return Value::of(cell(value.result->rows[i], value.column));
@@ -136,31 +135,27 @@ absl::StatusOr<Json> plain(const Value& value) {
 }
 
 absl::StatusOr<Operand> operand_of(const Value& value) {
-  const absl::StatusOr<Json> json = single(value);
-  if (!json.ok()) return json.status();
-  if (const std::optional<Number> number = scalar_number(*json)) return Operand(*number);
-  if (const std::optional<Vector> vector = as_vector(*json)) return Operand(*vector);
+  ASSIGN_OR_RETURN(const Json json, single(value));
+  if (const std::optional<Number> number = scalar_number(json)) return Operand(*number);
+  if (const std::optional<Vector> vector = as_vector(json)) return Operand(*vector);
   return is_something_else(value, "a number or a vector");
 }
 
 absl::StatusOr<Number> number_of(const Value& value) {
-  const absl::StatusOr<Operand> operand = operand_of(value);
-  if (!operand.ok()) return operand.status();
-  const Number* const number = std::get_if<Number>(&*operand);
+  ASSIGN_OR_RETURN(const Operand operand, operand_of(value));
+  const Number* const number = std::get_if<Number>(&operand);
   return number != nullptr ? absl::StatusOr<Number>(*number) : is_something_else(value, "a number");
 }
 
 absl::StatusOr<Vector> vector_of(const Value& value) {
-  const absl::StatusOr<Operand> operand = operand_of(value);
-  if (!operand.ok()) return operand.status();
-  const Vector* const vector = std::get_if<Vector>(&*operand);
+  ASSIGN_OR_RETURN(const Operand operand, operand_of(value));
+  const Vector* const vector = std::get_if<Vector>(&operand);
   return vector != nullptr ? absl::StatusOr<Vector>(*vector) : is_something_else(value, "a vector x,y,z");
 }
 
 absl::StatusOr<std::string> text_of(const Value& value) {
-  const absl::StatusOr<Json> json = plain(value);
-  if (!json.ok()) return json.status();
-  return text_of_json(*json);
+  ASSIGN_OR_RETURN(const Json json, plain(value));
+  return text_of_json(json);
 }
 
 std::string shown(const Value& value) {

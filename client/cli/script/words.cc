@@ -4,6 +4,7 @@
 
 #include "client/cli/script/expression.h"
 #include "client/cli/script/quoted_text.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -21,9 +22,8 @@ absl::StatusOr<Word> read_word(Cursor& cursor, const Variables& variables) {
   Word word;
   while (!ends_word(cursor)) {
     if (absl::StrContains("$'\"{", cursor.peek())) {
-      const absl::StatusOr<Value> value = read_part(cursor, variables);
-      if (!value.ok()) return value.status();
-      const absl::Status appended = append_value(word.text, *value);
+      ASSIGN_OR_RETURN(const Value value, read_part(cursor, variables));
+      const absl::Status appended = append_value(word.text, value);
       if (!appended.ok()) return appended;
       word.bare = false;
       continue;
@@ -43,9 +43,8 @@ absl::StatusOr<std::vector<Word>> read_words(absl::string_view line, const Varia
   std::vector<Word> words;
   Cursor cursor(line);
   for (cursor.skip_blanks(); !cursor.ended(); cursor.skip_blanks()) {
-    absl::StatusOr<Word> word = read_word(cursor, variables);
-    if (!word.ok()) return word.status();
-    words.push_back(*std::move(word));
+    ASSIGN_OR_RETURN(Word word, read_word(cursor, variables));
+    words.push_back(std::move(word));
   }
   return words;
 }

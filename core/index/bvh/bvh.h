@@ -18,6 +18,7 @@
 #include "absl/types/span.h"
 #include "core/base/limits.h"
 #include "core/base/planted_bug.h"
+#include "core/base/status_macros.h"
 #include "core/index/bvh/bvh_build.h"
 #include "core/index/spatial_index.h"
 
@@ -39,9 +40,8 @@ class Bvh {
     std::vector<Aabb<S>> boxes;
     boxes.reserve(values.size());
     for (const V& value : values) boxes.push_back(Traits::bounds(value));
-    absl::StatusOr<BvhLayout<S>> layout = build_bvh_layout<S>(boxes, options);
-    if (!layout.ok()) return layout.status();
-    return Bvh(*std::move(layout), std::move(values));
+    ASSIGN_OR_RETURN(BvhLayout<S> layout, build_bvh_layout<S>(boxes, options));
+    return Bvh(std::move(layout), std::move(values));
   }
 
   size_t size() const { return values_.size(); }

@@ -8,6 +8,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "core/index/bvh/binary_tree.h"
 #include "core/index/bvh/wide_children.h"
 
@@ -62,7 +63,7 @@ absl::Status refuse_bounds(size_t index) {
 
 template <class S>
 absl::StatusOr<BvhLayout<S>> build_bvh_layout(absl::Span<const Aabb<S>> boxes, const BvhOptions& options) {
-  if (absl::Status status = check_build(boxes.size(), options); !status.ok()) return status;
+  RETURN_IF_ERROR(check_build(boxes.size(), options));
   BvhLayout<S> layout;
   if (boxes.empty()) return layout;
   auto references = std::make_unique_for_overwrite<BoxReference<S>[]>(boxes.size());
@@ -71,12 +72,11 @@ absl::StatusOr<BvhLayout<S>> build_bvh_layout(absl::Span<const Aabb<S>> boxes, c
     references[i] = BoxReference<S>::of(QuadBox<S>::of(boxes[i]), static_cast<uint32_t>(i));
   }
   const auto count = static_cast<uint32_t>(boxes.size());
-  absl::StatusOr<BinaryTree<S>> tree = BinaryTree<S>::build(std::move(references), count, options);
-  if (!tree.ok()) return tree.status();
-  collapse(*tree, layout);
-  layout.bounds = tree->root().bounds;
+  ASSIGN_OR_RETURN(BinaryTree<S> tree, BinaryTree<S>::build(std::move(references), count, options));
+  collapse(tree, layout);
+  layout.bounds = tree.root().bounds;
   layout.order.reserve(count);
-  for (uint32_t position = 0; position < count; ++position) layout.order.push_back(tree->index(position));
+  for (uint32_t position = 0; position < count; ++position) layout.order.push_back(tree.index(position));
   LOCUS_CHECK_LE(layout.depth, limits::kMaxBvhDepth);
   LOCUS_CHECK_LT(layout.nodes.size(), 2 * boxes.size());
   return layout;

@@ -44,7 +44,7 @@ class Binning {
 
   std::array<int32_t, 4> bins_of(const BoxReference<S>& reference) const {
     const Quad<S> place = (reference.center() - low_) * scale_;
-    return minimum(maximum(place, Quad<S>::all(0)), last_).whole();
+    return minimum(maximum(place, Quad<S>::all(0)), last_).to_int();
   }
 
  private:
@@ -113,7 +113,7 @@ class Orders {
       places[i] = place;
     }
     for (size_t i = 0; i < references.size(); ++i) {
-      const std::array<int32_t, 4> place = places[i].whole();
+      const std::array<int32_t, 4> place = places[i].to_int();
       for (size_t axis = 0; axis < 3; ++axis) order_[axis][static_cast<size_t>(place[axis])] = static_cast<uint8_t>(i);
     }
   }

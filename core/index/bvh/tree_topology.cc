@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "core/index/bvh/triangle_parts.h"
 
 namespace locus {
@@ -31,10 +32,10 @@ class Restorer {
   }
 
   absl::StatusOr<TriangleArrays> restore() {
-    if (absl::Status status = check_numbers(); !status.ok()) return status;
+    RETURN_IF_ERROR(check_numbers());
     make_arrays();
-    if (absl::Status status = place_blocks(); !status.ok()) return status;
-    if (absl::Status status = place_nodes(); !status.ok()) return status;
+    RETURN_IF_ERROR(place_blocks());
+    RETURN_IF_ERROR(place_nodes());
     in_pieces(arrays_.block_count, [this](uint32_t block) { fill(block); });
     if (cancelled(options_)) return cancelled_build();
     enclose();

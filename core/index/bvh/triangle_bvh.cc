@@ -7,6 +7,7 @@
 
 #include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "core/index/bvh/binary_tree.h"
 
 namespace locus {
@@ -46,17 +47,16 @@ absl::Status refer_all(absl::Span<const Triangle> triangles, const BvhOptions& o
 }  // namespace
 
 absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triangles, const BvhOptions& options) {
-  if (absl::Status status = check_build(triangles.size(), options); !status.ok()) return status;
+  RETURN_IF_ERROR(check_build(triangles.size(), options));
   TriangleBvh built;
   if (triangles.empty()) return built;
   auto references = std::make_unique_for_overwrite<BoxReference<float>[]>(triangles.size());
-  if (absl::Status status = refer_all(triangles, options, references.get()); !status.ok()) return status;
+  RETURN_IF_ERROR(refer_all(triangles, options, references.get()));
   const auto count = static_cast<uint32_t>(triangles.size());
-  absl::StatusOr<BinaryTree<float>> tree = BinaryTree<float>::build(std::move(references), count, options);
-  if (!tree.ok()) return tree.status();
-  built.arrays_ = TriangleWriter(triangles, *tree, options).write();
+  ASSIGN_OR_RETURN(BinaryTree<float> tree, BinaryTree<float>::build(std::move(references), count, options));
+  built.arrays_ = TriangleWriter(triangles, tree, options).write();
   if (cancelled(options)) return cancelled_build();
-  built.set_bounds(tree->root().bounds);
+  built.set_bounds(tree.root().bounds);
   LOCUS_CHECK_EQ(built.size(), triangles.size());
   LOCUS_CHECK_LE(built.depth(), limits::kMaxBvhDepth);
   return built;
@@ -65,10 +65,9 @@ absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triang
 absl::StatusOr<TriangleBvh> TriangleBvh::restore(const TreeTopology& topology, uint32_t triangle_count,
                                                  absl::FunctionRef<Triangle(uint32_t)> triangle,
                                                  const BvhOptions& options) {
-  absl::StatusOr<TriangleArrays> arrays = restore_arrays(topology, triangle_count, triangle, options);
-  if (!arrays.ok()) return arrays.status();
+  ASSIGN_OR_RETURN(TriangleArrays arrays, restore_arrays(topology, triangle_count, triangle, options));
   TriangleBvh restored;
-  restored.arrays_ = *std::move(arrays);
+  restored.arrays_ = std::move(arrays);
   const TriangleNode& root = restored.arrays_.nodes[0];
   Aabbf bounds;
   for (int slot = 0; slot < kTreeWidth && root.child[slot] != kNoChild; ++slot) bounds = merge(bounds, box(root, slot));

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "core/query/run/rows.h"
 
 namespace locus {
@@ -43,10 +44,9 @@ absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot&
   std::vector<QueryTimes> moments;
   moments.reserve(batch.blocks.size());
   for (size_t b = 0; b < batch.blocks.size(); ++b) {
-    absl::StatusOr<QueryTimes> resolved =
-        QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"));
-    if (!resolved.ok()) return resolved.status();
-    moments.push_back(*std::move(resolved));
+    ASSIGN_OR_RETURN(QueryTimes resolved,
+                     QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]")));
+    moments.push_back(std::move(resolved));
   }
   std::unique_ptr<BatchRun> run(new BatchRun(snapshot, batch, std::move(options), answer));
   for (QueryTimes& of_block : moments) run->add_block(std::move(of_block));

@@ -4,6 +4,8 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/status_macros.h"
+
 namespace locus {
 
 absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
@@ -22,7 +24,7 @@ absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const Query
     options.parallel_for(BatchRun::kMaxChunks, work);
   else
     work(0);
-  if (absl::Status status = (*run)->status(); !status.ok()) return status;
+  RETURN_IF_ERROR((*run)->status());
   for (size_t b = 0; b < result.blocks.size(); ++b) {
     result.blocks[b].work = (*run)->cost(b).work;
     result.blocks[b].nanoseconds = (*run)->cost(b).nanoseconds;

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 #include "core/scene/log/state_limits.h"
 
 namespace locus {
@@ -217,7 +218,7 @@ absl::StatusOr<SceneState> StateReader::finish(const FindMesh& find_mesh) && {
   if (state_.writers.size() != writers_ || instances_read_ != instances_ || objects_read_ != objects_)
     return data_loss(absl::StrCat("of ", writers_, " writers, ", instances_, " instances and ", objects_, " objects ",
                                   state_.writers.size(), ", ", instances_read_, " and ", objects_read_, " are there"));
-  if (absl::Status status = place(find_mesh); !status.ok()) return status;
+  RETURN_IF_ERROR(place(find_mesh));
   return std::move(state_);
 }
 

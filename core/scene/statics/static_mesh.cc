@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/status_macros.h"
+
 namespace locus {
 namespace {
 
@@ -20,9 +22,8 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::build(std::string 
                                                                     TriangleMesh mesh, const BvhOptions& options) {
   const std::shared_ptr<StaticMesh> built(new StaticMesh(std::move(name), sha256));
   built->keep_columns(mesh);
-  absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles_of(std::move(mesh)), options);
-  if (!tree.ok()) return tree.status();
-  built->tree_ = *std::move(tree);
+  ASSIGN_OR_RETURN(TriangleBvh tree, TriangleBvh::build(triangles_of(std::move(mesh)), options));
+  built->tree_ = std::move(tree);
   built->number_blocks();
   return built;
 }
@@ -33,9 +34,8 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::restore(std::strin
                                                                       const BvhOptions& options) {
   const std::shared_ptr<StaticMesh> restored(new StaticMesh(std::move(name), sha256));
   const auto triangle = [&mesh](uint32_t number) { return mesh.triangle(number); };
-  absl::StatusOr<TriangleBvh> tree = TriangleBvh::restore(topology, mesh.triangle_count(), triangle, options);
-  if (!tree.ok()) return tree.status();
-  restored->tree_ = *std::move(tree);
+  ASSIGN_OR_RETURN(TriangleBvh tree, TriangleBvh::restore(topology, mesh.triangle_count(), triangle, options));
+  restored->tree_ = std::move(tree);
   restored->keep_columns(mesh);
   restored->number_blocks();
   return restored;

@@ -10,6 +10,7 @@
 #include "core/base/column.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 
 namespace locus {
 namespace {
@@ -22,11 +23,11 @@ absl::Status check_columns(const PlacementColumns& place, const std::string& fie
   const auto check = [&](size_t numbers, size_t width, ColumnNeed need, absl::string_view name) {
     return check_column(numbers, width, n, need, absl::StrCat(field, ".", name));
   };
-  if (absl::Status s = check(place.translations.size(), 3, ColumnNeed::kEachOrOne, "translations"); !s.ok()) return s;
-  if (absl::Status s = check(place.rotations.size(), 4, ColumnNeed::kOptional, "rotations"); !s.ok()) return s;
-  if (absl::Status s = check(place.scales.size(), 1, ColumnNeed::kOptional, "scales"); !s.ok()) return s;
-  if (absl::Status s = check(place.layers.size(), 1, ColumnNeed::kOptional, "layers"); !s.ok()) return s;
-  if (absl::Status s = check(place.groups.size(), 1, ColumnNeed::kOptional, "groups"); !s.ok()) return s;
+  RETURN_IF_ERROR(check(place.translations.size(), 3, ColumnNeed::kEachOrOne, "translations"));
+  RETURN_IF_ERROR(check(place.rotations.size(), 4, ColumnNeed::kOptional, "rotations"));
+  RETURN_IF_ERROR(check(place.scales.size(), 1, ColumnNeed::kOptional, "scales"));
+  RETURN_IF_ERROR(check(place.layers.size(), 1, ColumnNeed::kOptional, "layers"));
+  RETURN_IF_ERROR(check(place.groups.size(), 1, ColumnNeed::kOptional, "groups"));
   return check(place.tags.size(), 1, ColumnNeed::kOptional, "tags");
 }
 
@@ -56,18 +57,16 @@ absl::StatusOr<Transform> read_transform(const PlacementColumns& place, uint32_t
     return refuse_argument(Reason::kNotFinite, field + ".scales", i, "a scale must be a finite number");
   if (!(scale >= limits::kMinScale && scale <= limits::kMaxScale))
     return refuse_argument(Reason::kOutOfRange, field + ".scales", i, "a scale must lie within 1e-12 and 1e12");
-  absl::StatusOr<Quaternion> rotation = read_rotation(place, i, field);
-  if (!rotation.ok()) return rotation.status();
-  return make_transform(translation, *rotation, scale);
+  ASSIGN_OR_RETURN(Quaternion rotation, read_rotation(place, i, field));
+  return make_transform(translation, rotation, scale);
 }
 
 absl::StatusOr<Instance> read_instance(const PlacementColumns& place, uint32_t i, const std::string& field) {
-  absl::StatusOr<Transform> transform = read_transform(place, i, field);
-  if (!transform.ok()) return transform.status();
+  ASSIGN_OR_RETURN(Transform transform, read_transform(place, i, field));
   Instance instance;
   instance.mesh = place.mesh;
-  instance.transform = *transform;
-  instance.bounds = bounds_to_world(*transform, place.mesh->bounds());
+  instance.transform = transform;
+  instance.bounds = bounds_to_world(transform, place.mesh->bounds());
   instance.layers = ColumnReader<uint32_t>(place.layers, 1).value(i, kDefaultLayers);
   instance.group = ColumnReader<uint64_t>(place.groups, 1).value(i, 0);
   instance.tag = ColumnReader<uint64_t>(place.tags, 1).value(i, 0);
@@ -109,18 +108,17 @@ class Changing {
 
   absl::Status place(const PlacementColumns& columns, const std::string& field) {
     LOCUS_CHECK(columns.mesh != nullptr);
-    if (absl::Status status = check_columns(columns, field); !status.ok()) return status;
+    RETURN_IF_ERROR(check_columns(columns, field));
     const size_t n = columns.count();
     if (instances_.size() + n > limits::kMaxInstances)
       return refuse_full(field, "instances", limits::kMaxInstances, static_cast<double>(instances_.size() + n), 0);
     for (uint32_t i = 0; i < n; ++i) {
-      absl::StatusOr<Instance> instance = read_instance(columns, i, field);
-      if (!instance.ok()) return instance.status();
-      instance->id = columns.ids.empty() ? choose_id() : columns.ids[i];
-      if (absl::Status status = check_id(instance->id, i, field); !status.ok()) return status;
-      taken_.insert(instance->id);
-      placed_.push_back(instance->id);
-      instances_.push_back(*std::move(instance));
+      ASSIGN_OR_RETURN(Instance instance, read_instance(columns, i, field));
+      instance.id = columns.ids.empty() ? choose_id() : columns.ids[i];
+      RETURN_IF_ERROR(check_id(instance.id, i, field));
+      taken_.insert(instance.id);
+      placed_.push_back(instance.id);
+      instances_.push_back(std::move(instance));
     }
     return absl::OkStatus();
   }
@@ -160,14 +158,12 @@ std::shared_ptr<const StaticSet> StaticSet::empty() { return std::shared_ptr<con
 absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
                                                     const std::function<bool(Id)>& is_object, uint64_t seed) const {
   Changing changing(*this, is_object, seed);
-  if (absl::Status status = changing.remove(change); !status.ok()) return status;
+  RETURN_IF_ERROR(changing.remove(change));
   for (size_t i = 0; i < change.place.size(); ++i)
-    if (absl::Status status = changing.place(change.place[i], absl::StrCat("place[", i, "]")); !status.ok())
-      return status;
-  absl::StatusOr<Bvh<Instance>> tree = Bvh<Instance>::build(std::move(changing.instances()), BvhOptions{});
-  if (!tree.ok()) return tree.status();
+    RETURN_IF_ERROR(changing.place(change.place[i], absl::StrCat("place[", i, "]")));
+  ASSIGN_OR_RETURN(Bvh<Instance> tree, Bvh<Instance>::build(std::move(changing.instances()), BvhOptions{}));
   std::shared_ptr<StaticSet> set(new StaticSet());
-  set->tree_ = *std::move(tree);
+  set->tree_ = std::move(tree);
   for (uint32_t i = 0; i < set->tree_.values().size(); ++i) {
     const Instance& instance = set->tree_.values()[i];
     set->positions_.emplace(instance.id, i);

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
+#include "core/base/status_macros.h"
 
 namespace locus {
 namespace {
@@ -24,9 +25,7 @@ absl::Status check_shape(const InsertColumns& insert, size_t n, const std::strin
   const std::string shape = field + (insert.kind == ShapeKind::kBall  ? ".ball"
                                      : insert.kind == ShapeKind::kBox ? ".box"
                                                                       : ".capsule");
-  if (has_radius)
-    if (absl::Status s = check_column(insert.radii.size(), 1, n, ColumnNeed::kEachOrOne, shape + ".radii"); !s.ok())
-      return s;
+  if (has_radius) RETURN_IF_ERROR(check_column(insert.radii.size(), 1, n, ColumnNeed::kEachOrOne, shape + ".radii"));
   if (!has_extent) return absl::OkStatus();
   return check_column(insert.extents.size(), 3, n, ColumnNeed::kEachOrOne,
                       shape + (insert.kind == ShapeKind::kBox ? ".half_extents" : ".half_axes"));
@@ -34,26 +33,22 @@ absl::Status check_shape(const InsertColumns& insert, size_t n, const std::strin
 
 template <class Columns>
 absl::Status check_labels(const Columns& columns, size_t n, const std::string& field) {
-  if (absl::Status s = check_column(columns.layers.size(), 1, n, ColumnNeed::kOptional, field + ".layers"); !s.ok())
-    return s;
-  if (absl::Status s = check_column(columns.groups.size(), 1, n, ColumnNeed::kOptional, field + ".groups"); !s.ok())
-    return s;
+  RETURN_IF_ERROR(check_column(columns.layers.size(), 1, n, ColumnNeed::kOptional, field + ".layers"));
+  RETURN_IF_ERROR(check_column(columns.groups.size(), 1, n, ColumnNeed::kOptional, field + ".groups"));
   return check_column(columns.tags.size(), 1, n, ColumnNeed::kOptional, field + ".tags");
 }
 
 absl::Status check_insert(const InsertColumns& insert, const std::string& field) {
   const size_t n = insert.ids.size();
-  if (absl::Status s = check_positions(insert.positions, insert.positions_f64, n, field); !s.ok()) return s;
-  if (absl::Status s = check_column(insert.rotations.size(), 4, n, ColumnNeed::kOptional, field + ".rotations");
-      !s.ok())
-    return s;
-  if (absl::Status s = check_shape(insert, n, field); !s.ok()) return s;
+  RETURN_IF_ERROR(check_positions(insert.positions, insert.positions_f64, n, field));
+  RETURN_IF_ERROR(check_column(insert.rotations.size(), 4, n, ColumnNeed::kOptional, field + ".rotations"));
+  RETURN_IF_ERROR(check_shape(insert, n, field));
   return check_labels(insert, n, field);
 }
 
 absl::Status check_move(const MoveColumns& move, const std::string& field) {
   const size_t n = move.ids.size();
-  if (absl::Status s = check_positions(move.positions, move.positions_f64, n, field); !s.ok()) return s;
+  RETURN_IF_ERROR(check_positions(move.positions, move.positions_f64, n, field));
   return check_column(move.rotations.size(), 4, n, ColumnNeed::kOptional, field + ".rotations");
 }
 
@@ -92,16 +87,13 @@ bool may_join(const UpdateBatch& first, const UpdateBatch& second) {
 }
 
 absl::Status check_form(const UpdateBatch& batch) {
-  if (absl::Status status = check_numbers(batch); !status.ok()) return status;
+  RETURN_IF_ERROR(check_numbers(batch));
   for (size_t i = 0; i < batch.inserts.size(); ++i)
-    if (absl::Status s = check_insert(batch.inserts[i], absl::StrCat("inserts[", i, "]")); !s.ok()) return s;
+    RETURN_IF_ERROR(check_insert(batch.inserts[i], absl::StrCat("inserts[", i, "]")));
   for (size_t i = 0; i < batch.moves.size(); ++i)
-    if (absl::Status s = check_move(batch.moves[i], absl::StrCat("moves[", i, "]")); !s.ok()) return s;
+    RETURN_IF_ERROR(check_move(batch.moves[i], absl::StrCat("moves[", i, "]")));
   for (size_t i = 0; i < batch.relabels.size(); ++i)
-    if (absl::Status s =
-            check_labels(batch.relabels[i], batch.relabels[i].ids.size(), absl::StrCat("relabels[", i, "]"));
-        !s.ok())
-      return s;
+    RETURN_IF_ERROR(check_labels(batch.relabels[i], batch.relabels[i].ids.size(), absl::StrCat("relabels[", i, "]")));
   return absl::OkStatus();
 }
 

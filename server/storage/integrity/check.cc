@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/storage/integrity/opening.h"
 #include "server/storage/rocksdb/errors.h"
 
@@ -60,7 +61,7 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
       !options.env->FileExists(absl::StrCat(options.path, "/", DurableMarkerFile::kName)).ok())
     return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
   std::unique_ptr<DirectoryLock> lock;
-  if (absl::Status status = take_lock(options, lock); !status.ok()) return status;
+  RETURN_IF_ERROR(take_lock(options, lock));
 
   DirectoryReport report;
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
@@ -78,10 +79,9 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
     report.damage = strict.ToString();
     return report;
   }
-  const absl::StatusOr<DamageReport> damage_report =
-      verify(*database, durable_marker.ok() ? &*durable_marker : nullptr, Depth::kEverything);
-  if (!damage_report.ok()) return damage_report.status();
-  report = report_of(*damage_report);
+  ASSIGN_OR_RETURN(const DamageReport damage_report,
+                   verify(*database, durable_marker.ok() ? &*durable_marker : nullptr, Depth::kEverything));
+  report = report_of(damage_report);
   report.closed_in_order = durable_marker.ok() && durable_marker->closed;
   return report;
 }

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
@@ -71,7 +72,7 @@ absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<
 
 absl::Status make_new(const StorageOptions& options, OpenedDirectory& opened) {
   // First of all: from now on an empty database is known to be one that was never finished.
-  if (absl::Status status = opened.durable_marker_file->replace(opened.durable_marker); !status.ok()) return status;
+  RETURN_IF_ERROR(opened.durable_marker_file->replace(opened.durable_marker));
   const DatabaseOptions wanted = database_options_of(options);
   rocksdb::Status status = Database::open(wanted, OpenMode::kCreate, opened.database);
   if (!status.ok()) return open_error(options, status);
@@ -82,7 +83,7 @@ absl::Status make_new(const StorageOptions& options, OpenedDirectory& opened) {
       batch.Put(database.meta(), slice_of(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
   if (!status.ok()) return disk_error("the format", status);
   catalogue.add_to(batch, database.meta(), CatalogueChange());
-  if (absl::Status written = database.write(batch, true); !written.ok()) return written;
+  RETURN_IF_ERROR(database.write(batch, true));
   opened.durable_marker.catalogue = 1;
   describe_file_list(database, opened.durable_marker);
   return opened.durable_marker_file->replace(opened.durable_marker);
@@ -118,9 +119,8 @@ bool is_sound(const DamageReport& damage_report) {
 
 // Judges, and writes down what is damaged before anything else happens.
 absl::Status judge_and_remember(const Database& database, const DurableMarker* must, OpenedDirectory& opened) {
-  absl::StatusOr<DamageReport> damage_report = verify(database, must, Depth::kKeys);
-  if (!damage_report.ok()) return damage_report.status();
-  opened.damage_report = *std::move(damage_report);
+  ASSIGN_OR_RETURN(DamageReport damage_report, verify(database, must, Depth::kKeys));
+  opened.damage_report = std::move(damage_report);
   if (is_sound(opened.damage_report)) return absl::OkStatus();
   remember(opened.damage_report, opened.durable_marker);
   return opened.durable_marker_file->replace(opened.durable_marker);
@@ -185,7 +185,7 @@ DatabaseOptions database_options_of(const StorageOptions& options) {
 
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
   OpenedDirectory opened;
-  if (absl::Status status = make_folder(*options.env, options.path); !status.ok()) return status;
+  RETURN_IF_ERROR(make_folder(*options.env, options.path));
   auto lock = DirectoryLock::take(*options.env, options.path);
   if (!lock.ok()) return lock.status();
   opened.lock = *std::move(lock);
@@ -200,7 +200,7 @@ absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
   if (durable_marker.ok()) opened.durable_marker = *durable_marker;
   const DurableMarker* must = durable_marker.ok() ? &*durable_marker : nullptr;
   if (*fresh) {
-    if (absl::Status status = make_new(options, opened); !status.ok()) return status;
+    RETURN_IF_ERROR(make_new(options, opened));
     durable_marker = opened.durable_marker;
     must = &*durable_marker;
   } else {

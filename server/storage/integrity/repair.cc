@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/storage/integrity/opening.h"
 #include "server/storage/integrity/scene_table.h"
 #include "server/storage/rocksdb/bytes.h"
@@ -113,7 +114,7 @@ absl::Status copy_scene(const Database& source, const SceneHealth& found, const 
   }
   if (!repaired.dropped) {
     SceneRow row = *found.row;
-    if (absl::Status status = copy_records(source, row, last, copy); !status.ok()) return status;
+    RETURN_IF_ERROR(copy_records(source, row, last, copy));
     if (damaged) ++row.epoch;
     const std::string key = scene_key(row.key);
     const std::string value = with_checksum(key, encode(row));
@@ -165,17 +166,17 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
   if (must != nullptr) durable_marker.next_scene = must->next_scene;
   for (const SceneHealth& scene : damage_report.scenes) {
     durable_marker.next_scene = std::max(durable_marker.next_scene, scene.key + 1);
-    if (absl::Status status = copy_scene(source, scene, must, copy, result, report); !status.ok()) return status;
+    RETURN_IF_ERROR(copy_scene(source, scene, must, copy, result, report));
   }
   for (const MeshHealth& mesh : damage_report.meshes) {
-    if (absl::Status status = copy_mesh(source, mesh, copy, result, report); !status.ok()) return status;
+    RETURN_IF_ERROR(copy_mesh(source, mesh, copy, result, report));
   }
   const uint64_t generation = std::max(must == nullptr ? 0 : must->catalogue,
                                        damage_report.catalogue ? damage_report.catalogue->generation : 0);
   const Catalogue catalogue(result.rows, generation, durable_marker.next_scene);
   copy.put(target->meta(), std::string(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
   catalogue.add_to(copy.batch(), target->meta(), CatalogueChange());
-  if (absl::Status status = copy.write(true); !status.ok()) return status;
+  RETURN_IF_ERROR(copy.write(true));
   durable_marker.catalogue = generation + 1;
   durable_marker.mesh_sum = catalogue.totals().mesh_sum;
   durable_marker.closed = true;
@@ -240,7 +241,7 @@ absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& opti
   const bool whole = must == nullptr || check_file_list(*options.env, wanted.folder, *must).ok();
   if (whole && Database::open(wanted, OpenMode::kReadOnly, database).ok()) return database;
   if (whole && Database::open(wanted, OpenMode::kReadOnlyLenient, database).ok()) return database;
-  if (absl::Status status = open_salvage(options, folder, database); !status.ok()) return status;
+  RETURN_IF_ERROR(open_salvage(options, folder, database));
   return database;
 }
 
@@ -255,7 +256,7 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   if (!lock.ok()) return lock.status();
   if (fs::exists(absl::StrCat(folder, "/", kReadyName))) {
     std::string kept_at;
-    if (absl::Status status = put_in_place(options, kept_at); !status.ok()) return status;
+    RETURN_IF_ERROR(put_in_place(options, kept_at));
   }
   std::error_code failed;
   fs::remove_all(folder, failed);
@@ -264,11 +265,10 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   {
     const auto source = open_source(options, must, folder);
     if (!source.ok()) return source.status();
-    const absl::StatusOr<DamageReport> damage_report = verify(**source, must, Depth::kEverything);
-    if (!damage_report.ok()) return damage_report.status();
-    report.found = report_of(*damage_report);
+    ASSIGN_OR_RETURN(const DamageReport damage_report, verify(**source, must, Depth::kEverything));
+    report.found = report_of(damage_report);
     if (report.found.intact() && !fs::exists(folder)) return report;
-    if (absl::Status status = make_copy(**source, *damage_report, must, options, folder, report); !status.ok()) {
+    if (absl::Status status = make_copy(**source, damage_report, must, options, folder, report); !status.ok()) {
       fs::remove_all(folder, failed);
       return status;
     }
@@ -281,7 +281,7 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   if (status.ok()) status = sync_folder(*options.env, folder);
   if (!status.ok()) return disk_error("writing the repaired database", status);
   report.changed = true;
-  if (absl::Status placed = put_in_place(options, report.kept_at); !placed.ok()) return placed;
+  RETURN_IF_ERROR(put_in_place(options, report.kept_at));
   return report;
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
@@ -197,7 +198,7 @@ absl::Status find_meshes(const Database& database, Depth depth, DamageReport& fo
 
 absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth) {
   DamageReport found;
-  if (absl::Status status = read_meta(database, found); !status.ok()) return status;
+  RETURN_IF_ERROR(read_meta(database, found));
   Standing standing;
   if (durable_marker != nullptr) standing = compare(found, *durable_marker);
   if (durable_marker == nullptr) {

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 
@@ -90,7 +91,7 @@ absl::Status read_records(const Database& database, SceneKey scene, uint64_t fro
     if (running_checksum != stored_checksum(value))
       return damaged(absl::StrCat("record ", record.sequence, " is not the one that was written"));
     record.entry = *entry;
-    if (absl::Status status = sink(record); !status.ok()) return status;
+    RETURN_IF_ERROR(sink(record));
   }
   if (!walk.status().ok()) return read_error(absl::StrCat("reading record ", record.sequence), walk.status());
   if (record.sequence > last) return absl::OkStatus();
@@ -107,7 +108,7 @@ absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* 
     const std::optional<absl::string_view> bytes = verified(walk.key(), walk.value());
     if (!bytes) return damaged(absl::StrCat("chunk ", found.chunks, " is not the one that was written"));
     found.add(walk.value());
-    if (absl::Status status = sink(*bytes); !status.ok()) return status;
+    RETURN_IF_ERROR(sink(*bytes));
   }
   if (!walk.status().ok()) return read_error(absl::StrCat("reading chunk ", found.chunks), walk.status());
   if (found == list) return absl::OkStatus();

@@ -1,6 +1,7 @@
 #include "client/cli/extras/demo/demo_level.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -16,7 +17,7 @@ absl::Status remove_level(const client::Client& client, const std::string& scene
   v1::DeleteSceneRequest request;
   request.set_name(scene);
   request.set_if_present(true);
-  if (absl::Status status = client.delete_scene(request); !status.ok()) return status;
+  RETURN_IF_ERROR(client.delete_scene(request));
   for (size_t i = 0; i < meshes; ++i)
     if (absl::Status status = client.delete_mesh(mesh_name(scene, i)); !status.ok() && !absl::IsNotFound(status))
       return status;
@@ -46,16 +47,16 @@ DemoLevel place_level(const ImportedLevel& level) {
 }
 
 absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level) {
-  if (absl::Status status = remove_level(client, scene, level.meshes.size()); !status.ok()) return status;
+  RETURN_IF_ERROR(remove_level(client, scene, level.meshes.size()));
   v1::CreateSceneRequest create;
   create.set_name(scene);
-  if (absl::Status status = client.create_scene(create).status(); !status.ok()) return status;
+  RETURN_IF_ERROR(client.create_scene(create).status());
   v1::ChangeInstancesRequest change;
   change.set_scene(scene);
   for (size_t i = 0; i < level.meshes.size(); ++i) {
     const ImportedMesh& mesh = level.meshes[i];
     const client::MeshColumns columns{mesh_name(scene, i), mesh.vertices, mesh.indices};
-    if (absl::Status status = client.upload_mesh(columns).status(); !status.ok()) return status;
+    RETURN_IF_ERROR(client.upload_mesh(columns).status());
     v1::Placement& placement = *change.add_place();
     placement.set_mesh(columns.name);
     placement.add_ids(i + 1);

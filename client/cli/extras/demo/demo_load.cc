@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/mutex.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -72,13 +73,12 @@ absl::Status ask(const client::Client& client, const DemoWorld& world, const Loa
       const int count = rays ? kRaysABatch : kRegionsABatch;
       const v1::QueryBatch batch = demo_batch(kinds[k], world, random, count);
       const Clock::time_point start = Clock::now();
-      absl::StatusOr<v1::QueryResult> answer = stream->send(batch).get();
-      if (!answer.ok()) return answer.status();
+      ASSIGN_OR_RETURN(v1::QueryResult answer, stream->send(batch).get());
       LoadFigures& figures = result.queries[static_cast<size_t>(kinds[k])];
       figures.milliseconds.push_back(milliseconds_since(start));
       figures.items += static_cast<uint64_t>(count);
-      figures.found += count_found(answer->blocks(0));
-      samplers[k].offer(batch, *answer);
+      figures.found += count_found(answer.blocks(0));
+      samplers[k].offer(batch, answer);
     }
   }
   return stream->close();
@@ -137,7 +137,7 @@ absl::StatusOr<LoadResult> run_load(const client::Client& client, const DemoWorl
   done.store(true);
   rays.join();
   regions.join();
-  if (absl::Status status = error.status(); !status.ok()) return status;
+  RETURN_IF_ERROR(error.status());
   return result;
 }
 

@@ -9,6 +9,7 @@
 #include "absl/strings/str_split.h"
 #include "client/cli/extras/render/framing.h"
 #include "client/cli/failure.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -88,9 +89,8 @@ absl::StatusOr<Camera> camera_of(const CameraOptions& options, const Aabbd& targ
   Vec3d forward = options.direction ? vector_of(*options.direction) : three_quarter_view(up);
   const Vec3d middle = options.look_at ? vector_of(*options.look_at) : (target.min + target.max) * 0.5;
   if (options.eye && !options.direction) forward = middle - vector_of(*options.eye);
-  const absl::StatusOr<ViewAxes> axes = axes_of(options, forward);
-  if (!axes.ok()) return axes.status();
-  Camera camera = frame_box(target, *axes, lens_of(options, size));
+  ASSIGN_OR_RETURN(const ViewAxes axes, axes_of(options, forward));
+  Camera camera = frame_box(target, axes, lens_of(options, size));
   if (options.eye) camera.eye = vector_of(*options.eye);
   return camera;
 }

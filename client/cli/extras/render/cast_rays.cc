@@ -11,6 +11,7 @@
 #include "client/lib/query_builder.h"
 #include "client/lib/query_stream.h"
 #include "client/lib/result_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -95,7 +96,7 @@ class Caster {
     if (static_cast<uint64_t>(answer.blocks_size()) * rays_per_block != range.size()) return misfit();
     uint64_t pixel = range.begin;
     for (const v1::BlockResult& block : answer.blocks()) {
-      if (absl::Status status = take_block({pixel, pixel + rays_per_block}, block); !status.ok()) return status;
+      RETURN_IF_ERROR(take_block({pixel, pixel + rays_per_block}, block));
       if (reported) result_.image.work[pixel] = {block.work().nodes(), block.work().cells(), block.work().tests()};
       pixel += rays_per_block;
     }
@@ -108,17 +109,16 @@ class Caster {
   }
 
   absl::Status take_block(const PixelRange& range, const v1::BlockResult& block) {
-    const absl::StatusOr<client::RayHits> hits = client::RayHits::of(block);
-    if (!hits.ok()) return hits.status();
-    const client::ResultRows& rows = hits->rows();
-    if (rows.rows() != range.size() || hits->size() != range.size() || rows.triangles().size() != range.size() ||
+    ASSIGN_OR_RETURN(const client::RayHits hits, client::RayHits::of(block));
+    const client::ResultRows& rows = hits.rows();
+    if (rows.rows() != range.size() || hits.size() != range.size() || rows.triangles().size() != range.size() ||
         rows.normals().size() != 3 * range.size()) {
       return misfit();
     }
     RayImage& image = result_.image;
     for (uint64_t i = 0; i < range.size(); ++i) {
-      image.t[range.begin + i] = hits->t(i);
-      image.ids[range.begin + i] = hits->id(i);
+      image.t[range.begin + i] = hits.t(i);
+      image.ids[range.begin + i] = hits.id(i);
       image.triangles[range.begin + i] = rows.triangles()[i];
       image.normals[range.begin + i] = {rows.normals()[3 * i], rows.normals()[3 * i + 1], rows.normals()[3 * i + 2]};
     }

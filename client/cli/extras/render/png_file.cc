@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -51,10 +52,9 @@ absl::Status check_png_path(const std::string& path) {
 }
 
 absl::Status write_png(const std::string& path, const Picture& picture) {
-  const absl::StatusOr<std::vector<char>> bytes = encode(picture);
-  if (!bytes.ok()) return bytes.status();
+  ASSIGN_OR_RETURN(const std::vector<char> bytes, encode(picture));
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file.write(bytes->data(), static_cast<std::streamsize>(bytes->size()));
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file.close();
   return file ? absl::OkStatus() : cannot_write(path);
 }

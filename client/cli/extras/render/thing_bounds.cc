@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/lib/query_builder.h"
 #include "client/lib/result_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -26,10 +27,9 @@ absl::Status check_there(const client::Client& client, const std::string& scene,
                          uint64_t id) {
   client::QueryBuilder builder;
   builder.exactly(revision).lookup().id(id);
-  const absl::StatusOr<v1::QueryResult> result = client.query(scene, builder.build());
-  if (!result.ok()) return result.status();
-  if (result->blocks_size() != 1 || result->blocks(0).ids_size() != 1) return absl::DataLossError("no row for an id");
-  return result->blocks(0).ids(0) == id ? absl::OkStatus() : not_found(scene, id, "");
+  ASSIGN_OR_RETURN(const v1::QueryResult result, client.query(scene, builder.build()));
+  if (result.blocks_size() != 1 || result.blocks(0).ids_size() != 1) return absl::DataLossError("no row for an id");
+  return result.blocks(0).ids(0) == id ? absl::OkStatus() : not_found(scene, id, "");
 }
 
 // What lies beyond a cut, seen from the inside of the box: cut c of a side is c + 1 sixteenths into the box from there.
@@ -66,15 +66,13 @@ absl::StatusOr<std::vector<bool>> ask_slabs(const client::Client& client, const 
   client::BoxBlock block = builder.boxes();
   block.frame({frame.x, frame.y, frame.z}).precision(v1::PRECISION_CONSERVATIVE).after_id(id - 1).max_results(1);
   block.boxes(centres, half_extents);
-  const absl::StatusOr<v1::QueryResult> result = client.query(scene, builder.build());
-  if (!result.ok()) return result.status();
-  if (result->blocks_size() != 1) return absl::DataLossError("one block was asked and another number answered");
-  const absl::StatusOr<client::Overlaps> found = client::Overlaps::of(result->blocks(0));
-  if (!found.ok()) return found.status();
-  if (found->size() != size_t{kSides} * kCuts) return absl::DataLossError("not one answer a box");
+  ASSIGN_OR_RETURN(const v1::QueryResult result, client.query(scene, builder.build()));
+  if (result.blocks_size() != 1) return absl::DataLossError("one block was asked and another number answered");
+  ASSIGN_OR_RETURN(const client::Overlaps found, client::Overlaps::of(result.blocks(0)));
+  if (found.size() != size_t{kSides} * kCuts) return absl::DataLossError("not one answer a box");
   std::vector<bool> reached;
-  for (size_t i = 0; i < found->size(); ++i) {
-    reached.push_back(!found->ids(i).empty() && found->ids(i).front() == id);
+  for (size_t i = 0; i < found.size(); ++i) {
+    reached.push_back(!found.ids(i).empty() && found.ids(i).front() == id);
   }
   return reached;
 }
@@ -113,15 +111,14 @@ bool moved(const Aabbd& before, const Aabbd& after) {
 
 absl::StatusOr<Aabbd> thing_bounds(const client::Client& client, const std::string& scene,
                                    const client::Revision& revision, uint64_t id, const Aabbd& scene_bounds) {
-  if (absl::Status there = check_there(client, scene, revision, id); !there.ok()) return there;
+  RETURN_IF_ERROR(check_there(client, scene, revision, id));
   Aabbd box = widened(scene_bounds);
   for (int round = 0; round < kMaxRounds; ++round) {
-    const absl::StatusOr<std::vector<bool>> reached = ask_slabs(client, scene, revision, id, box);
-    if (!reached.ok()) return reached.status();
-    const bool seen = std::find(reached->begin(), reached->end(), true) != reached->end();
+    ASSIGN_OR_RETURN(const std::vector<bool> reached, ask_slabs(client, scene, revision, id, box));
+    const bool seen = std::find(reached.begin(), reached.end(), true) != reached.end();
     if (!seen && round == 0) return not_found(scene, id, " that queries see: it is hidden (layers 0)");
     if (!seen) break;
-    const Aabbd before = std::exchange(box, narrowed(box, *reached));
+    const Aabbd before = std::exchange(box, narrowed(box, reached));
     if (!moved(before, box)) break;
   }
   return box;

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "client/cli/levels/export/export_limits.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -153,7 +154,7 @@ void GlbWriter::append_node(const Json& node) {
 }
 
 absl::Status GlbWriter::add_node(const std::string& name, const GlbPlace& place, size_t mesh, const Json& extras) {
-  if (absl::Status status = ensure_room(1); !status.ok()) return status;
+  RETURN_IF_ERROR(ensure_room(1));
   Json node = place_json(name, place);
   node["mesh"] = mesh;
   if (!extras.empty()) node["extras"] = extras;
@@ -164,7 +165,7 @@ absl::Status GlbWriter::add_node(const std::string& name, const GlbPlace& place,
 
 absl::Status GlbWriter::add_group(const std::string& name, const GlbPlace& place, const std::vector<Child>& children,
                                   const Json& extras) {
-  if (absl::Status status = ensure_room(1 + children.size()); !status.ok()) return status;
+  RETURN_IF_ERROR(ensure_room(1 + children.size()));
   Json node = place_json(name, place);
   node["children"] = Json::array();
   for (size_t i = 0; i < children.size(); ++i) node["children"].push_back(node_count_ + 1 + i);

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/levels/export/unit_shapes.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -80,16 +81,15 @@ absl::StatusOr<size_t> SceneExport::shape_mesh(Part part) {
   }
   mesh.parts = {{"objects", 0}};
   number = writer_.reserve_mesh();
-  if (absl::Status status = writer_.set_mesh(*number, mesh); !status.ok()) return status;
+  RETURN_IF_ERROR(writer_.set_mesh(*number, mesh));
   return *number;
 }
 
 absl::Status SceneExport::add_shape(const SceneThing& thing, Part part, const std::array<float, 3>& scale) {
-  const absl::StatusOr<size_t> mesh = shape_mesh(part);
-  if (!mesh.ok()) return mesh.status();
+  ASSIGN_OR_RETURN(const size_t mesh, shape_mesh(part));
   GlbPlace place = place_of(thing);
   place.scale = scale;
-  return writer_.add_node(object_name(thing), place, *mesh, facts_of(thing));
+  return writer_.add_node(object_name(thing), place, mesh, facts_of(thing));
 }
 
 // A side and two ends, since no scale of one mesh fits capsules of all proportions.
@@ -98,17 +98,15 @@ absl::Status SceneExport::add_capsule(const SceneThing& thing) {
   const double length = std::sqrt(double{axis[0]} * axis[0] + double{axis[1]} * axis[1] + double{axis[2]} * axis[2]);
   const float radius = drawn(thing.radius);
   if (length == 0) return add_shape(thing, Part::kBall, {radius, radius, radius});
-  const absl::StatusOr<size_t> dome = shape_mesh(Part::kDome);
-  if (!dome.ok()) return dome.status();
-  const absl::StatusOr<size_t> tube = shape_mesh(Part::kTube);
-  if (!tube.ok()) return tube.status();
+  ASSIGN_OR_RETURN(const size_t dome, shape_mesh(Part::kDome));
+  ASSIGN_OR_RETURN(const size_t tube, shape_mesh(Part::kTube));
   const std::array<float, 3> back = {-axis[0], -axis[1], -axis[2]};
   const std::array<float, 4> forth_rotation = rotation_to(axis, length);
   const std::array<float, 3> round = {radius, radius, radius};
   return writer_.add_group(object_name(thing), place_of(thing),
-                           {{*tube, {{}, forth_rotation, {radius, radius, drawn(static_cast<float>(length))}}},
-                            {*dome, {axis, forth_rotation, round}},
-                            {*dome, {back, rotation_to(back, length), round}}},
+                           {{tube, {{}, forth_rotation, {radius, radius, drawn(static_cast<float>(length))}}},
+                            {dome, {axis, forth_rotation, round}},
+                            {dome, {back, rotation_to(back, length), round}}},
                            facts_of(thing));
 }
 

@@ -14,6 +14,7 @@
 #include "client/cli/levels/import/quake/bsp_import.h"
 #include "client/cli/levels/import/quake/pk3_archive.h"
 #include "client/cli/levels/import/scene_import.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -36,20 +37,18 @@ absl::Status check_options(const std::string& extension, const ImportOptions& op
 }
 
 absl::StatusOr<ImportedLevel> import_bsp_file(const std::string& path, const ImportOptions& options) {
-  const absl::StatusOr<std::string> bytes = read_input_file(path, kMaxBspBytes);
-  if (!bytes.ok()) return bytes.status();
-  return import_bsp(*bytes, file_stem(path), options);
+  ASSIGN_OR_RETURN(const std::string bytes, read_input_file(path, kMaxBspBytes));
+  return import_bsp(bytes, file_stem(path), options);
 }
 
 absl::StatusOr<ImportedLevel> import_pk3_file(const std::string& path, const ImportOptions& options) {
-  absl::StatusOr<Pk3Level> found = read_pk3_level(path, options.entry);
-  if (!found.ok()) return found.status();
-  absl::StatusOr<ImportedLevel> level = import_bsp(found->bytes, file_stem(found->entry), options);
+  ASSIGN_OR_RETURN(Pk3Level found, read_pk3_level(path, options.entry));
+  absl::StatusOr<ImportedLevel> level = import_bsp(found.bytes, file_stem(found.entry), options);
   if (!level.ok())
-    return absl::Status(level.status().code(), absl::StrCat(found->entry, ": ", level.status().message()));
-  level->notes.push_back(absl::StrCat("Level ", found->entry, "."));
-  if (options.entry.empty() && !found->others.empty()) {
-    std::vector<std::string>& others = found->others;
+    return absl::Status(level.status().code(), absl::StrCat(found.entry, ": ", level.status().message()));
+  level->notes.push_back(absl::StrCat("Level ", found.entry, "."));
+  if (options.entry.empty() && !found.others.empty()) {
+    std::vector<std::string>& others = found.others;
     const size_t unlisted = others.size() - std::min(others.size(), kMaxListedEntries);
     others.resize(others.size() - unlisted);
     level->notes.push_back(absl::StrCat("The archive holds other levels: ", absl::StrJoin(others, ", "),
@@ -68,8 +67,8 @@ absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportO
     return absl::InvalidArgumentError(absl::StrCat("unsupported file type ", extension.empty() ? path : extension,
                                                    ": give OBJ, PLY, STL, GLB/glTF, BSP or PK3"));
   }
-  if (absl::Status status = check_options(extension, options); !status.ok()) return status;
-  if (absl::Status status = check_input_file(path, kMaxImportFileBytes); !status.ok()) return status;
+  RETURN_IF_ERROR(check_options(extension, options));
+  RETURN_IF_ERROR(check_input_file(path, kMaxImportFileBytes));
   if (extension == ".bsp") return import_bsp_file(path, options);
   if (extension == ".pk3") return import_pk3_file(path, options);
   return import_scene(path, options);

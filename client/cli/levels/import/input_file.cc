@@ -6,6 +6,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
@@ -39,7 +40,7 @@ absl::Status check_input_file(const std::string& path, uint64_t max_bytes) {
 }
 
 absl::StatusOr<std::string> read_input_file(const std::string& path, uint64_t max_bytes) {
-  if (absl::Status status = check_input_file(path, max_bytes); !status.ok()) return status;
+  RETURN_IF_ERROR(check_input_file(path, max_bytes));
   std::error_code error;
   std::string bytes(std::filesystem::file_size(path, error), '\0');
   std::ifstream file(path, std::ios::binary);

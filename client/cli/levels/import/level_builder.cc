@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/levels/import/import_limits.h"
 #include "client/cli/levels/import/part_name.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -108,11 +109,10 @@ absl::StatusOr<ImportedLevel> LevelBuilder::finish(std::string name) && {
   if (indices_.empty()) {
     return absl::InvalidArgumentError("the file holds no triangle: export it with its faces, not as points or lines");
   }
-  const absl::StatusOr<Box> box = bounds();
-  if (!box.ok()) return box.status();
+  ASSIGN_OR_RETURN(const Box box, bounds());
 
   ImportedLevel level;
-  level.recentre = choose_recentre(box->min, box->max);
+  level.recentre = choose_recentre(box.min, box.max);
   VertexWelder welder;
   for (uint32_t& index : indices_) {
     std::array<float, 3> rounded;

@@ -10,6 +10,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -91,9 +92,8 @@ absl::Status read_header_line(const std::vector<absl::string_view>& words, PlyHe
     header.elements.push_back(std::move(element));
   } else if (words[0] == "property") {
     if (header.elements.empty()) return damaged("property before the first element");
-    const absl::StatusOr<PlyProperty> property = read_property(words);
-    if (!property.ok()) return property.status();
-    header.elements.back().properties.push_back(*property);
+    ASSIGN_OR_RETURN(const PlyProperty property, read_property(words));
+    header.elements.back().properties.push_back(property);
   }
   return absl::OkStatus();
 }
@@ -115,7 +115,7 @@ absl::StatusOr<PlyHeader> read_header(absl::string_view bytes) {
       header.body = start;
       return header;
     }
-    if (absl::Status status = read_header_line(words, header); !status.ok()) return status;
+    RETURN_IF_ERROR(read_header_line(words, header));
   }
 }
 
@@ -176,10 +176,9 @@ absl::Status check_ascii_body(const PlyHeader& header, absl::string_view body) {
 }  // namespace
 
 absl::StatusOr<uint64_t> check_ply(absl::string_view bytes) {
-  const absl::StatusOr<PlyHeader> header = read_header(bytes);
-  if (!header.ok()) return header.status();
+  ASSIGN_OR_RETURN(const PlyHeader header, read_header(bytes));
   uint64_t faces = 0;
-  for (const PlyElement& element : header->elements) {
+  for (const PlyElement& element : header.elements) {
     if (element.name == "tristrips" && element.count > 0) {
       return absl::InvalidArgumentError(
           "the PLY file stores triangle strips (element tristrips), which are not supported: open it in MeshLab, "
@@ -187,9 +186,9 @@ absl::StatusOr<uint64_t> check_ply(absl::string_view bytes) {
     }
     if (element.name == "face") faces += std::min(element.count, UINT64_MAX - faces);
   }
-  const absl::string_view body = bytes.substr(header->body);
+  const absl::string_view body = bytes.substr(header.body);
   const absl::Status status =
-      header->encoding == PlyEncoding::kAscii ? check_ascii_body(*header, body) : check_binary_body(*header, body);
+      header.encoding == PlyEncoding::kAscii ? check_ascii_body(header, body) : check_binary_body(header, body);
   if (!status.ok()) return status;
   return faces;
 }

@@ -20,6 +20,7 @@
 #include "client/cli/levels/import/input_file.h"
 #include "client/cli/levels/import/level_builder.h"
 #include "client/cli/levels/import/ply_check.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -119,11 +120,9 @@ FaceCounts count_faces(const aiScene& scene) {
 // What a PLY file declares; nothing for other formats, which say no number that could be compared.
 absl::StatusOr<std::optional<uint64_t>> declared_faces(const std::string& path) {
   if (lower_extension(path) != ".ply") return std::nullopt;
-  const absl::StatusOr<std::string> bytes = read_input_file(path, kMaxImportFileBytes);
-  if (!bytes.ok()) return bytes.status();
-  const absl::StatusOr<uint64_t> declared = check_ply(*bytes);
-  if (!declared.ok()) return declared.status();
-  return *declared;
+  ASSIGN_OR_RETURN(const std::string bytes, read_input_file(path, kMaxImportFileBytes));
+  ASSIGN_OR_RETURN(const uint64_t declared, check_ply(bytes));
+  return declared;
 }
 
 absl::Status check_scene(const aiScene& scene, const FaceCounts& found, std::optional<uint64_t> declared) {
@@ -131,13 +130,13 @@ absl::Status check_scene(const aiScene& scene, const FaceCounts& found, std::opt
     return refusal(absl::StrCat("the PLY header declares ", *declared, " faces, but ", found.faces, " were read"));
   }
   for (size_t m = 0; m < scene.mNumMeshes; ++m) {
-    if (absl::Status status = check_mesh(*scene.mMeshes[m], m); !status.ok()) return status;
+    RETURN_IF_ERROR(check_mesh(*scene.mMeshes[m], m));
   }
   return absl::OkStatus();
 }
 
 absl::Status add_mesh(const aiMesh& mesh, const Affine& to_world, LevelBuilder& builder) {
-  if (absl::Status status = builder.ensure_room(mesh.mNumVertices, mesh.mNumFaces); !status.ok()) return status;
+  RETURN_IF_ERROR(builder.ensure_room(mesh.mNumVertices, mesh.mNumFaces));
   const auto first = static_cast<uint32_t>(builder.vertex_count());
   for (size_t v = 0; v < mesh.mNumVertices; ++v) builder.add_vertex(to_world.apply(mesh.mVertices[v]));
   const bool turn = to_world.mirrors();
@@ -169,7 +168,7 @@ absl::Status add_nodes(const aiScene& scene, LevelBuilder& builder) {
     for (size_t i = 0; i < node->mNumMeshes; ++i) {
       const aiMesh& mesh = *scene.mMeshes[node->mMeshes[i]];
       builder.begin_part(part_name(*node, mesh));
-      if (absl::Status status = add_mesh(mesh, to_world, builder); !status.ok()) return status;
+      RETURN_IF_ERROR(add_mesh(mesh, to_world, builder));
     }
     for (size_t i = node->mNumChildren; i-- > 0;) {
       const aiNode* child = node->mChildren[i];
@@ -210,18 +209,16 @@ void add_notes(const FaceCounts& found, uint64_t triangles_left, ImportedLevel& 
 
 absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const ImportOptions& options) {
   // Before parsing: what this refuses makes the parser read beyond its data.
-  const absl::StatusOr<std::optional<uint64_t>> declared = declared_faces(path);
-  if (!declared.ok()) return declared.status();
+  ASSIGN_OR_RETURN(const std::optional<uint64_t> declared, declared_faces(path));
   Assimp::Importer importer;
-  const absl::StatusOr<const aiScene*> parsed = parse(importer, path);
-  if (!parsed.ok()) return parsed.status();
-  const FaceCounts found = count_faces(**parsed);
-  if (absl::Status status = check_scene(**parsed, found, *declared); !status.ok()) return status;
+  ASSIGN_OR_RETURN(const const aiScene* parsed, parse(importer, path));
+  const FaceCounts found = count_faces(*parsed);
+  RETURN_IF_ERROR(check_scene(*parsed, found, declared));
   const aiScene* scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
   if (scene == nullptr) return refusal(absl::StrCat("cannot triangulate ", path, ": ", importer.GetErrorString()));
 
   LevelBuilder builder(options.scale);
-  if (absl::Status status = add_nodes(*scene, builder); !status.ok()) return status;
+  RETURN_IF_ERROR(add_nodes(*scene, builder));
   absl::StatusOr<ImportedLevel> level = std::move(builder).finish(file_stem(path));
   if (!level.ok()) return level;
   level->source_format = format_name(path);

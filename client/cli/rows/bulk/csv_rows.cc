@@ -6,6 +6,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "client/cli/rows/bulk/csv_record.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -15,7 +16,7 @@ bool same(const Slot& a, const Slot& b) { return a.field == b.field && a.part ==
 }  // namespace
 
 absl::Status CsvRows::read_header(absl::string_view record) {
-  if (const absl::Status split = split_csv_record(record, fields_); !split.ok()) return split;
+  RETURN_IF_ERROR(split_csv_record(record, fields_));
   std::vector<Slot> slots;
   for (const std::string& name : fields_) {
     const std::optional<Slot> slot = find_slot(schema_, name);
@@ -53,7 +54,7 @@ absl::Status CsvRows::check_complete() const {
 }
 
 absl::Status CsvRows::read_row(absl::string_view record, uint64_t line, RowBuilder& builder, RowBatch& batch) {
-  if (const absl::Status split = split_csv_record(record, fields_); !split.ok()) return split;
+  RETURN_IF_ERROR(split_csv_record(record, fields_));
   if (fields_.size() != slots_.size()) {
     return absl::InvalidArgumentError(
         absl::StrCat("has ", fields_.size(), " fields, the header names ", slots_.size()));
@@ -61,7 +62,7 @@ absl::Status CsvRows::read_row(absl::string_view record, uint64_t line, RowBuild
   builder.start();
   for (size_t i = 0; i < fields_.size(); ++i) {
     if (fields_[i].empty()) continue;
-    if (const absl::Status put = builder.put_text(slots_[i], fields_[i]); !put.ok()) return put;
+    RETURN_IF_ERROR(builder.put_text(slots_[i], fields_[i]));
   }
   return builder.finish(line, batch);
 }

@@ -5,6 +5,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "client/cli/rows/bulk/ndjson_rows.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
@@ -29,16 +30,15 @@ absl::StatusOr<BatchEnd> RowReader::fill(size_t max_rows, Patience patience, Row
   if (patience == Patience::kPause) pause_at = Clock::now() + kRowPause;
   while (batch.rows() < max_rows) {
     Record record;
-    const absl::StatusOr<Arrival> arrival = input_.next(record, pause_at);
-    if (!arrival.ok()) return arrival.status();
-    if (*arrival == Arrival::kPause) return BatchEnd::kPause;
-    if (*arrival == Arrival::kEnd) {
+    ASSIGN_OR_RETURN(const Arrival arrival, input_.next(record, pause_at));
+    if (arrival == Arrival::kPause) return BatchEnd::kPause;
+    if (arrival == Arrival::kEnd) {
       if (format_ == RowFormat::kNdjson || csv_.has_header()) return BatchEnd::kEnd;
       return absl::InvalidArgumentError(
           absl::StrCat("is empty; the first line names the columns, out of: ", known_columns(schema_)));
     }
     if (absl::StripAsciiWhitespace(record.text).empty()) continue;
-    if (const absl::Status taken = take(record, batch); !taken.ok()) return taken;
+    RETURN_IF_ERROR(take(record, batch));
     if (batch.rows() == 1) pause_at = Clock::now() + kRowPause;
   }
   return BatchEnd::kFull;

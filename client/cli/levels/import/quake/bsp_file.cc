@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -72,9 +73,8 @@ absl::StatusOr<size_t> count_elements(const Lumps& lumps, size_t lump, size_t el
 }
 
 absl::Status read_textures(const Lumps& lumps, BspFile& file) {
-  const absl::StatusOr<size_t> count = count_elements(lumps, kTexturesLump, kTextureBytes);
-  if (!count.ok()) return count.status();
-  for (size_t i = 0; i < *count; ++i) {
+  ASSIGN_OR_RETURN(const size_t count, count_elements(lumps, kTexturesLump, kTextureBytes));
+  for (size_t i = 0; i < count; ++i) {
     const absl::string_view field = lumps[kTexturesLump].substr(i * kTextureBytes, kTextureNameBytes);
     file.textures.emplace_back(field.substr(0, field.find('\0')));
   }
@@ -82,10 +82,9 @@ absl::Status read_textures(const Lumps& lumps, BspFile& file) {
 }
 
 absl::Status read_vertices(const Lumps& lumps, BspFile& file) {
-  const absl::StatusOr<size_t> count = count_elements(lumps, kVerticesLump, kVertexBytes);
-  if (!count.ok()) return count.status();
-  file.vertices.resize(*count);
-  for (size_t i = 0; i < *count; ++i) {
+  ASSIGN_OR_RETURN(const size_t count, count_elements(lumps, kVerticesLump, kVertexBytes));
+  file.vertices.resize(count);
+  for (size_t i = 0; i < count; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const float value = std::bit_cast<float>(read_u32(lumps[kVerticesLump], i * kVertexBytes + 4 * axis));
       if (!std::isfinite(value)) return damaged(kVerticesLump, i, "the position is not finite");
@@ -96,10 +95,9 @@ absl::Status read_vertices(const Lumps& lumps, BspFile& file) {
 }
 
 absl::Status read_meshverts(const Lumps& lumps, BspFile& file) {
-  const absl::StatusOr<size_t> count = count_elements(lumps, kMeshvertsLump, sizeof(uint32_t));
-  if (!count.ok()) return count.status();
-  file.meshverts.resize(*count);
-  for (size_t i = 0; i < *count; ++i) file.meshverts[i] = read_u32(lumps[kMeshvertsLump], i * sizeof(uint32_t));
+  ASSIGN_OR_RETURN(const size_t count, count_elements(lumps, kMeshvertsLump, sizeof(uint32_t)));
+  file.meshverts.resize(count);
+  for (size_t i = 0; i < count; ++i) file.meshverts[i] = read_u32(lumps[kMeshvertsLump], i * sizeof(uint32_t));
   return absl::OkStatus();
 }
 
@@ -151,10 +149,9 @@ absl::Status check_face(size_t number, const BspFace& face, const BspFile& file)
 }
 
 absl::Status read_faces(const Lumps& lumps, BspFile& file) {
-  const absl::StatusOr<size_t> count = count_elements(lumps, kFacesLump, kFaceBytes);
-  if (!count.ok()) return count.status();
-  file.faces.reserve(*count);
-  for (size_t i = 0; i < *count; ++i) {
+  ASSIGN_OR_RETURN(const size_t count, count_elements(lumps, kFacesLump, kFaceBytes));
+  file.faces.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
     const absl::string_view bytes = lumps[kFacesLump].substr(i * kFaceBytes, kFaceBytes);
     const uint32_t type = read_u32(bytes, 8);
     if (type < 1 || type > 4) {
@@ -169,7 +166,7 @@ absl::Status read_faces(const Lumps& lumps, BspFile& file) {
     face.meshvert_count = read_u32(bytes, 24);
     face.patch_width = read_u32(bytes, 96);
     face.patch_height = read_u32(bytes, 100);
-    if (absl::Status status = check_face(i, face, file); !status.ok()) return status;
+    RETURN_IF_ERROR(check_face(i, face, file));
     file.faces.push_back(face);
   }
   return absl::OkStatus();
@@ -178,11 +175,10 @@ absl::Status read_faces(const Lumps& lumps, BspFile& file) {
 }  // namespace
 
 absl::StatusOr<BspFile> parse_bsp(absl::string_view bytes) {
-  const absl::StatusOr<Lumps> lumps = split_lumps(bytes);
-  if (!lumps.ok()) return lumps.status();
+  ASSIGN_OR_RETURN(const Lumps lumps, split_lumps(bytes));
   BspFile file;
   for (const auto read : {read_textures, read_vertices, read_meshverts, read_faces}) {
-    if (absl::Status status = read(*lumps, file); !status.ok()) return status;
+    RETURN_IF_ERROR(read(lumps, file));
   }
   return file;
 }

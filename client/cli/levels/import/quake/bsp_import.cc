@@ -8,6 +8,7 @@
 #include "client/cli/levels/import/level_builder.h"
 #include "client/cli/levels/import/quake/bezier_patch.h"
 #include "client/cli/levels/import/quake/bsp_file.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -76,25 +77,24 @@ absl::StatusOr<ImportedLevel> import_bsp(absl::string_view bytes, const std::str
     return absl::ResourceExhaustedError(
         absl::StrCat("the level has ", bytes.size(), " bytes, the limit is ", kMaxBspBytes, ": give another level"));
   }
-  const absl::StatusOr<BspFile> file = parse_bsp(bytes);
-  if (!file.ok()) return file.status();
-  if (absl::Status status = check_triangles(*file, options.patch_subdivisions); !status.ok()) return status;
+  ASSIGN_OR_RETURN(const BspFile file, parse_bsp(bytes));
+  RETURN_IF_ERROR(check_triangles(file, options.patch_subdivisions));
 
   LevelBuilder builder(options.scale);
-  for (const std::array<float, 3>& vertex : file->vertices) builder.add_vertex(to_double(vertex));
+  for (const std::array<float, 3>& vertex : file.vertices) builder.add_vertex(to_double(vertex));
   size_t patches = 0;
   size_t billboards = 0;
-  for (const BspFace& face : file->faces) {
+  for (const BspFace& face : file.faces) {
     if (face.type == BspFaceType::kBillboard) {
       ++billboards;
       continue;
     }
-    builder.begin_part(file->textures[face.texture]);
+    builder.begin_part(file.textures[face.texture]);
     if (face.type == BspFaceType::kPatch) {
       ++patches;
-      add_patch(*file, face, options.patch_subdivisions, builder);
+      add_patch(file, face, options.patch_subdivisions, builder);
     } else {
-      add_listed_triangles(*file, face, builder);
+      add_listed_triangles(file, face, builder);
     }
   }
   absl::StatusOr<ImportedLevel> level = std::move(builder).finish(name);

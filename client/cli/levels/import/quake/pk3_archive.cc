@@ -14,6 +14,7 @@
 #include "absl/strings/str_join.h"
 #include "client/cli/levels/import/import_limits.h"
 #include "client/cli/levels/import/input_file.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -116,17 +117,13 @@ absl::StatusOr<std::string> unpack(zip_t* archive, const LevelEntry& level, cons
 }  // namespace
 
 absl::StatusOr<Pk3Level> read_pk3_level(const std::string& path, const std::string& entry) {
-  const absl::StatusOr<Archive> archive = open_archive(path);
-  if (!archive.ok()) return archive.status();
-  const absl::StatusOr<std::vector<LevelEntry>> levels = list_levels(archive->get(), path);
-  if (!levels.ok()) return levels.status();
-  const absl::StatusOr<size_t> chosen = choose_level(*levels, path, entry);
-  if (!chosen.ok()) return chosen.status();
-  absl::StatusOr<std::string> bytes = unpack(archive->get(), (*levels)[*chosen], path);
-  if (!bytes.ok()) return bytes.status();
+  ASSIGN_OR_RETURN(const Archive archive, open_archive(path));
+  ASSIGN_OR_RETURN(const std::vector<LevelEntry> levels, list_levels(archive.get(), path));
+  ASSIGN_OR_RETURN(const size_t chosen, choose_level(levels, path, entry));
+  ASSIGN_OR_RETURN(std::string bytes, unpack(archive.get(), levels[chosen], path));
 
-  Pk3Level level{(*levels)[*chosen].name, *std::move(bytes), names_of(*levels)};
-  level.others.erase(level.others.begin() + static_cast<std::ptrdiff_t>(*chosen));
+  Pk3Level level{levels[chosen].name, std::move(bytes), names_of(levels)};
+  level.others.erase(level.others.begin() + static_cast<std::ptrdiff_t>(chosen));
   return level;
 }
 

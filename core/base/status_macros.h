@@ -1,0 +1,30 @@
+// Passing errors on: RETURN_IF_ERROR and ASSIGN_OR_RETURN, for sources only. A header that others install or include
+// does not include this one.
+#ifndef LOCUS_CORE_BASE_STATUS_MACROS_H_
+#define LOCUS_CORE_BASE_STATUS_MACROS_H_
+
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+// Evaluates an expression of type absl::Status and returns it from the calling function unless it is OK.
+#define RETURN_IF_ERROR(...)                                                                \
+  do {                                                                                      \
+    if (absl::Status locus_status = (__VA_ARGS__); !locus_status.ok()) return locus_status; \
+  } while (false)
+
+// Evaluates an expression of type absl::StatusOr<T>; returns its status from the calling function unless it is OK, and
+// otherwise moves the value into `declaration`, as in ASSIGN_OR_RETURN(const Level level, read_level(path)). It expands
+// to several statements, so it stands in a block of its own and never behind an `if` without braces.
+#define ASSIGN_OR_RETURN(declaration, ...) \
+  LOCUS_ASSIGN_OR_RETURN_(LOCUS_JOIN_(locus_status_or_, __LINE__), declaration, __VA_ARGS__)
+
+#define LOCUS_JOIN_(a, b) LOCUS_JOIN_AGAIN_(a, b)
+#define LOCUS_JOIN_AGAIN_(a, b) a##b
+#define LOCUS_ASSIGN_OR_RETURN_(result, declaration, ...) \
+  auto result = (__VA_ARGS__);                            \
+  if (!result.ok()) return std::move(result).status();    \
+  declaration = *std::move(result)
+
+#endif  // LOCUS_CORE_BASE_STATUS_MACROS_H_
