@@ -131,7 +131,7 @@ class Scene {
   // on.
   absl::Status wait_for_readers(Deadline until) const LOCUS_EXCLUDES(mutex_);
   // For whoever has waited too long: ReaderTracker::cut_off().
-  void cut_off_readers() { pins_->revoke_overdue(); }
+  void revoke_overdue_readers() { pins_->revoke_overdue(); }
 
   // Tells once that the scene reached a revision or was closed: for whoever may not block in view(). `tell` is called
   // from any thread, at the latest when that revision is published, and under the scene's lock: it must be quick, take

@@ -99,7 +99,7 @@ absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>&
     absl::Status stopped = stop();
     if (stopped.code() == absl::StatusCode::kDeadlineExceeded) return late;
     if (!stopped.ok()) return stopped;
-    if (now - start > kReadersMayTake) scene.cut_off_readers();
+    if (now - start > kReadersMayTake) scene.revoke_overdue_readers();
   }
 }
 

@@ -259,7 +259,7 @@ void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
     stalled_.push_back(&scene_queue);
     work_.notify_one();
   }
-  if (too_slow != nullptr) too_slow->cut_off_readers();
+  if (too_slow != nullptr) too_slow->revoke_overdue_readers();
 }
 
 void UpdateQueue::put_back(SceneQueue& scene_queue, const Group& group) {

@@ -169,8 +169,8 @@ TEST_F(ReaderTrackerTest, OnlyWhoWasToldToEndIsCutOffAndOnlyOnce) {
   int first = 0, last = 0;
   pins.front().on_revoke([&first] { ++first; });
   pins.back().on_revoke([&last] { ++last; });
-  scene_.cut_off_readers();
-  scene_.cut_off_readers();
+  scene_.revoke_overdue_readers();
+  scene_.revoke_overdue_readers();
   EXPECT_EQ(first, 1);
   EXPECT_EQ(last, 0);
 }
@@ -182,7 +182,7 @@ TEST_F(ReaderTrackerTest, WhoIsGoneIsNotCutOff) {
     reader.on_revoke([&cut] { ++cut; });
   }
   const std::vector<SnapshotPin> pins = pin_too_much();
-  scene_.cut_off_readers();
+  scene_.revoke_overdue_readers();
   EXPECT_EQ(cut, 0);
 }
 
