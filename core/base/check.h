@@ -34,12 +34,31 @@ template <class A, class B>
 #define LOCUS_CHECK_LE(a, b) LOCUS_CHECK_OP_(a, <=, b)
 #define LOCUS_CHECK_LT(a, b) LOCUS_CHECK_OP_(a, <, b)
 
+// Whether LOCUS_DCHECK* and check_invariants() do anything: in debug builds and under the sanitizers. A class whose
+// comment names an invariant has a member check_invariants(), called at the end of every member that changes it; its
+// body stands inside `if constexpr (kDebugChecks)`, and it costs no more than the change it follows.
+namespace locus {
 #ifdef NDEBUG
-#define LOCUS_DCHECK(condition) \
-  do {                          \
-  } while (false && (condition))
+inline constexpr bool kDebugChecks = false;
 #else
-#define LOCUS_DCHECK(condition) LOCUS_CHECK(condition)
+inline constexpr bool kDebugChecks = true;
 #endif
+}  // namespace locus
+
+// Type-checked in every build, evaluated only where kDebugChecks is true.
+#define LOCUS_DCHECK(condition)                                  \
+  do {                                                           \
+    if constexpr (::locus::kDebugChecks) LOCUS_CHECK(condition); \
+  } while (false)
+#define LOCUS_DCHECK_OP_(a, op, b)                                  \
+  do {                                                              \
+    if constexpr (::locus::kDebugChecks) LOCUS_CHECK_OP_(a, op, b); \
+  } while (false)
+#define LOCUS_DCHECK_EQ(a, b) LOCUS_DCHECK_OP_(a, ==, b)
+#define LOCUS_DCHECK_NE(a, b) LOCUS_DCHECK_OP_(a, !=, b)
+#define LOCUS_DCHECK_LE(a, b) LOCUS_DCHECK_OP_(a, <=, b)
+#define LOCUS_DCHECK_LT(a, b) LOCUS_DCHECK_OP_(a, <, b)
+#define LOCUS_DCHECK_GE(a, b) LOCUS_DCHECK_OP_(a, >=, b)
+#define LOCUS_DCHECK_GT(a, b) LOCUS_DCHECK_OP_(a, >, b)
 
 #endif  // LOCUS_CORE_BASE_CHECK_H_

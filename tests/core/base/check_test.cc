@@ -36,5 +36,24 @@ TEST(CheckDeathTest, NanFailsEveryOrder) {
   EXPECT_DEATH(LOCUS_CHECK_LE(1.0, nan), "1 and nan");
 }
 
+// Release builds compile the operands, so that they stay right, and evaluate nothing.
+TEST(CheckDeathTest, DebugChecksFailWhereTheyAreOnAndEvaluateNothingElsewhere) {
+  int calls = 0;
+  const auto next = [&calls] { return ++calls; };
+  if constexpr (kDebugChecks) {
+    EXPECT_DEATH(LOCUS_DCHECK_EQ(next(), 2), "next\\(\\) == 2 with 1 and 2");
+    EXPECT_DEATH(LOCUS_DCHECK_GE(next(), 2), "next\\(\\) >= 2 with 1 and 2");
+    EXPECT_DEATH(LOCUS_DCHECK_GT(next(), 1), "next\\(\\) > 1 with 1 and 1");
+    EXPECT_DEATH(LOCUS_DCHECK_NE(next(), 1), "next\\(\\) != 1 with 1 and 1");
+    EXPECT_DEATH(LOCUS_DCHECK_LE(next(), 0), "next\\(\\) <= 0 with 1 and 0");
+    EXPECT_DEATH(LOCUS_DCHECK_LT(next(), 1), "next\\(\\) < 1 with 1 and 1");
+    EXPECT_DEATH(LOCUS_DCHECK(next() == 2), "check failed: next\\(\\) == 2");
+  } else {
+    LOCUS_DCHECK_EQ(next(), 2);
+    LOCUS_DCHECK(next() == 2);
+    EXPECT_EQ(calls, 0);
+  }
+}
+
 }  // namespace
 }  // namespace locus
