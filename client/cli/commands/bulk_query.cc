@@ -46,7 +46,7 @@ class BulkQueryRun {
     // An input is there when the line runs, perhaps not before, and a pipe can be read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, query_.schema));
-    ASSIGN_OR_RETURN(const client::Client* client, context_.connect());
+    ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
     reader_ = reader.get();
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     absl::Status status = ask_all();

@@ -175,7 +175,7 @@ void describe(const DemoOptions& options, const ImportedLevel& level, const Demo
 }
 
 absl::Status demo(const DemoOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const ImportedLevel level, load_level(options));
   if (level.meshes.empty()) return absl::InvalidArgumentError("the level holds no mesh");
   const DemoLevel placed = place_level(level);

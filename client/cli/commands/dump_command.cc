@@ -24,7 +24,7 @@ struct DumpOptions {
 // Whatever a line in a script may want to look at is held; else rows go out as they come in.
 absl::Status dump(const DumpOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.view));
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const Things things = things_of(options.view);
   constexpr char kNoRows[] = "an empty scene";
   Report kept;

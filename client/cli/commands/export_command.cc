@@ -64,7 +64,7 @@ absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file,
 
 absl::Status export_scene(const ExportOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options));
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const auto recentre, find_recentre(options, *client));
   SceneExport file(options.scene, options.up, recentre);
   ASSIGN_OR_RETURN(Json head, read_scene(options, file, *client, context));

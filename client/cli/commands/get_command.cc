@@ -61,7 +61,7 @@ std::vector<uint64_t> missing_ids(const GetOptions& options, const v1::QueryResu
 
 absl::Status get(const GetOptions& options, Context& context) {
   if (options.ids.empty() && options.groups.empty()) return usage_error("nothing to get: give --id or --group");
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const v1::QueryBatch batch = batch_of(options, context);
   ASSIGN_OR_RETURN(const v1::QueryResult result, client->query(options.scene, batch));
   if (result.blocks_size() != batch.blocks_size()) return absl::DataLossError("the server left blocks unanswered");

@@ -18,7 +18,7 @@ Json number_json(double value) {
 }
 
 absl::Status limits(const NoOptions&, Context& context) {
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::GetServerResponse server, client->get_server());
   Report report;
   report.rows_name = "limits";

@@ -28,7 +28,7 @@ Json summary_of(const v1::Mesh& mesh) {
 }
 
 absl::Status list(const MeshOptions&, Context& context) {
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes());
   Report report;
   report.rows_name = "meshes";
@@ -44,7 +44,7 @@ absl::Status list(const MeshOptions&, Context& context) {
 }
 
 absl::Status show(const MeshOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes());
   for (const v1::Mesh& mesh : meshes) {
     if (mesh.name() != options.name) continue;
@@ -79,7 +79,7 @@ absl::Status download(const MeshOptions& options, Context& context) {
 }
 
 absl::Status remove(const MeshOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const absl::Status deleted = client->delete_mesh(options.name);
   if (!deleted.ok()) return deleted;
   Report report;

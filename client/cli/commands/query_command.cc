@@ -13,7 +13,7 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
   const absl::Status checked = check(options);
   if (!checked.ok()) return checked;
   apply_to_batch(options, context, builder);
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   absl::StatusOr<v1::QueryResult> result = client->query(options.scene, builder.build());
   if (result.ok() && result->blocks_size() != 1) {
     return absl::DataLossError(absl::StrCat("the server answered one block with ", result->blocks_size()));

@@ -162,7 +162,7 @@ absl::Status render(const RenderOptions& given, Context& context) {
   options.cast.mask = static_cast<uint32_t>(options.mask.value);
   if (options.live) options.cast.moment = Moment::kLive;
   if (options.heat != Heat::kNone) options.cast.work = WorkReport::kReported;
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const Aabbd target, find_target(options, *client));
   const ImageSize size = *ray_image_size(options);
   ASSIGN_OR_RETURN(const Camera camera, camera_of(options.camera, target, size));

@@ -107,7 +107,7 @@ absl::Status create(const CreateOptions& options, Context& context) {
   request.mutable_spec()->set_history_bytes(options.history_bytes);
   request.mutable_spec()->set_overload(options.overload);
   request.mutable_spec()->mutable_labels()->insert(labels->begin(), labels->end());
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::Scene scene, client->create_scene(request));
   context.remember_own(options.name, {scene.epoch(), scene.revision()});
   context.write(description_of(scene));
@@ -117,7 +117,7 @@ absl::Status create(const CreateOptions& options, Context& context) {
 absl::Status list(const ListOptions& options, Context& context) {
   const auto labels = parse_labels(options.labels);
   if (!labels.ok()) return labels.status();
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const std::vector<v1::Scene> scenes, client->list_scenes(*labels));
   Report report;
   report.rows_name = "scenes";
@@ -130,7 +130,7 @@ absl::Status list(const ListOptions& options, Context& context) {
 }
 
 absl::Status describe(const DescribeOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::Scene scene, client->get_scene(options.name));
   context.write(description_of(scene));
   return absl::OkStatus();
@@ -140,7 +140,7 @@ absl::Status remove(const DeleteOptions& options, Context& context) {
   v1::DeleteSceneRequest request;
   request.set_name(options.name);
   request.set_if_present(options.if_present);
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const absl::Status deleted = client->delete_scene(request);
   if (!deleted.ok()) return deleted;
   context.forget_own(options.name);

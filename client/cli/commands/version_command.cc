@@ -16,7 +16,7 @@ absl::Status version(const VersionOptions& options, Context& context) {
   Report report;
   report.head = {{"version", LOCUS_VERSION}, {"protocol", "locus.v1"}};
   if (options.server) {
-    ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+    ASSIGN_OR_RETURN(client::Client* const client, context.connect());
     ASSIGN_OR_RETURN(const v1::GetServerResponse server, client->get_server());
     report.head["server_version"] = server.version();
     report.head["instruction_set"] = server.instruction_set();

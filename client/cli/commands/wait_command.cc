@@ -45,7 +45,7 @@ Report report_of(const v1::Scene& scene) {
 
 // Asks again and again, less often as time goes on: instances take from milliseconds to minutes to build.
 absl::Status wait(const WaitOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const client::Client* client, context.connect());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const absl::Time end = absl::Now() + absl::Seconds(options.seconds);
   for (absl::Duration pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
     ASSIGN_OR_RETURN(const v1::Scene scene, client->get_scene(options.scene));
