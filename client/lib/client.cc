@@ -10,12 +10,12 @@
 #include "client/lib/backup_download.h"
 #include "client/lib/call_metadata.h"
 #include "client/lib/connection.h"
-#include "client/lib/health_check.h"
 #include "client/lib/mesh_download.h"
 #include "client/lib/mesh_upload.h"
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
 #include "core/base/status_macros.h"
+#include "grpc/health/v1/health.grpc.pb.h"
 #include "grpcpp/channel.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "locus/v1/scene_service.grpc.pb.h"
@@ -95,13 +95,14 @@ absl::StatusOr<v1::GetServerResponse> Client::get_server() const {
 }
 
 absl::StatusOr<Health> Client::health(absl::string_view service) const {
-  const absl::Time deadline = absl::Now() + connection_->options.deadline;
-  absl::StatusOr<Health> health = Health::kUnknown;
-  with_retries(connection_->options.retry, deadline, [&] {
-    health = check_health(connection_->channel, service, deadline);
-    return health.status();
-  }).IgnoreError();
-  return health;
+  namespace health = grpc::health::v1;
+  const std::unique_ptr<health::Health::StubInterface> stub = health::Health::NewStub(connection_->channel);
+  health::HealthCheckRequest request;
+  request.set_service(std::string(service));
+  ASSIGN_OR_RETURN(const health::HealthCheckResponse response,
+                   call(*stub, connection_->repeatable(), request, &health::Health::StubInterface::Check));
+  const int status = response.status();
+  return health::HealthCheckResponse::ServingStatus_IsValid(status) ? static_cast<Health>(status) : Health::kUnknown;
 }
 
 absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {

@@ -1,7 +1,6 @@
 #include "server/services/backup.h"
 
 #include <fcntl.h>
-#include <grpcpp/impl/codegen/proto_utils.h>
 #include <openssl/evp.h>
 #include <unistd.h>
 

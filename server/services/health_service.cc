@@ -1,10 +1,5 @@
 #include "server/services/health_service.h"
 
-#include <google/protobuf/unknown_field_set.h>
-#include <grpcpp/impl/codegen/method_handler.h>
-#include <grpcpp/impl/codegen/proto_utils.h>
-#include <grpcpp/impl/codegen/rpc_service_method.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -18,75 +13,41 @@
 namespace locus::server {
 namespace {
 
-constexpr int kServiceField = 1;  // HealthCheckRequest.service, string
-constexpr int kStatusField = 1;   // HealthCheckResponse.status, enum
 constexpr std::array kServices = {"", "locus.v1.ServerService", "locus.v1.SceneService", "locus.v1.UpdateService",
                                   "locus.v1.QueryService"};
-// How late a watcher's thread notices that nobody listens any more.
-constexpr std::chrono::milliseconds kLookAgain{100};
+// Interval at which a watcher's thread checks whether its call was cancelled.
+constexpr std::chrono::milliseconds kCancellationPoll{100};
 constexpr uint32_t kRetryAfterMs = 1000;
-
-std::string service_of(const google::protobuf::Empty& request) {
-  const auto& fields = google::protobuf::Empty::GetReflection()->GetUnknownFields(request);
-  std::string service;
-  for (int i = 0; i < fields.field_count(); ++i) {
-    const google::protobuf::UnknownField& field = fields.field(i);
-    if (field.number() == kServiceField && field.type() == google::protobuf::UnknownField::TYPE_LENGTH_DELIMITED)
-      service = field.length_delimited();
-  }
-  return service;
-}
 
 bool is_known(const std::string& service) {
   return std::find(kServices.begin(), kServices.end(), service) != kServices.end();
 }
 
-void set_status(uint64_t status, google::protobuf::Empty& response) {
-  google::protobuf::Empty::GetReflection()->MutableUnknownFields(&response)->AddVarint(kStatusField, status);
-}
-
 }  // namespace
 
-HealthService::HealthService(Host& host) : host_(host) {
-  using grpc::internal::RpcMethod;
-  using grpc::internal::RpcServiceMethod;
-  AddMethod(new RpcServiceMethod("/grpc.health.v1.Health/Check", RpcMethod::NORMAL_RPC,
-                                 new grpc::internal::RpcMethodHandler<HealthService, Empty, Empty>(
-                                     [](HealthService* service, grpc::ServerContext*, const Empty* request,
-                                        Empty* response) { return service->check(*request, *response); },
-                                     this)));
-  AddMethod(new RpcServiceMethod(
-      "/grpc.health.v1.Health/Watch", RpcMethod::SERVER_STREAMING,
-      new grpc::internal::ServerStreamingHandler<HealthService, Empty, Empty>(
-          [](HealthService* service, grpc::ServerContext* context, const Empty* request,
-             grpc::ServerWriter<Empty>* writer) { return service->watch(*context, *request, *writer); },
-          this)));
+HealthService::Response::ServingStatus HealthService::status_of(State state) {
+  return state == State::kServing ? Response::SERVING : Response::NOT_SERVING;
 }
 
-grpc::Status HealthService::check(const Empty& request, Empty& response) const {
-  if (!is_known(service_of(request)))
+grpc::Status HealthService::Check(grpc::ServerContext*, const Request* request, Response* response) {
+  if (!is_known(request->service()))
     return grpc::Status(grpc::StatusCode::NOT_FOUND, "there is no service of this name");
-  set_status(static_cast<uint64_t>(std::min(state(), State::kNotServing)), response);
+  response->set_status(status_of(state()));
   return grpc::Status::OK;
 }
 
-bool HealthService::write(State state, grpc::ServerWriter<Empty>& writer) {
-  Empty response;
-  set_status(static_cast<uint64_t>(state), response);
-  return writer.Write(response);
-}
-
-grpc::Status HealthService::watch(grpc::ServerContext& context, const Empty& request,
-                                  grpc::ServerWriter<Empty>& writer) {
-  const AdmissionLimiter::Permit pass = host_.health_watchers.enter();
-  if (!pass)
+grpc::Status HealthService::Watch(grpc::ServerContext* context, const Request* request,
+                                  grpc::ServerWriter<Response>* writer) {
+  const AdmissionLimiter::Permit permit = host_.health_watchers.enter();
+  if (!permit)
     return to_grpc(refuse_full("", "health_watchers", kMaxHealthWatchers, kMaxHealthWatchers + 1.0, kRetryAfterMs));
-  const bool known = is_known(service_of(request));
-  std::optional<State> told;
-  for (State now = state(); !context.IsCancelled(); now = wait(context, now)) {
-    const State tell = known ? std::min(now, State::kNotServing) : State::kServiceUnknown;
-    if (tell != told && !write(tell, writer)) break;
-    told = tell;
+  const bool known = is_known(request->service());
+  std::optional<Response::ServingStatus> sent;
+  for (State now = state(); !context->IsCancelled(); now = wait(*context, now)) {
+    Response response;
+    response.set_status(known ? status_of(now) : Response::SERVICE_UNKNOWN);
+    if (response.status() != sent && !writer->Write(response)) break;
+    sent = response.status();
     if (now == State::kEnded) break;
   }
   return to_grpc(draining());
@@ -95,7 +56,7 @@ grpc::Status HealthService::watch(grpc::ServerContext& context, const Empty& req
 HealthService::State HealthService::wait(const grpc::ServerContext& context, State known) {
   const MutexLock lock(mutex_);
   while (state_ == known && !context.IsCancelled())
-    changed_.wait_until(mutex_, std::chrono::steady_clock::now() + kLookAgain);
+    changed_.wait_until(mutex_, std::chrono::steady_clock::now() + kCancellationPoll);
   return state_;
 }
 

@@ -8,41 +8,36 @@
 #ifndef LOCUS_SERVER_SERVICES_HEALTH_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_HEALTH_SERVICE_H_
 
-#include <grpcpp/server_context.h>
-#include <grpcpp/support/sync_stream.h>
-
 #include <cstdint>
 
 #include "core/base/mutex.h"
-#include "google/protobuf/empty.pb.h"
+#include "grpc/health/v1/health.grpc.pb.h"
 #include "server/host/host.h"
 
 namespace locus::server {
 
-class HealthService final : public grpc::Service {
+class HealthService final : public grpc::health::v1::Health::Service {
  public:
-  explicit HealthService(Host& host);
+  explicit HealthService(Host& host) : host_(host) {}
 
   void serving() { set(State::kServing); }
   void not_serving() { set(State::kNotServing); }
-  // No watcher is left soon after.
+  // Ends every watcher's call soon.
   void end() { set(State::kEnded); }
 
  private:
-  // Of the protocol, as far as they are its numbers.
-  enum class State : uint8_t { kServing = 1, kNotServing = 2, kServiceUnknown = 3, kEnded };
+  using Request = grpc::health::v1::HealthCheckRequest;
+  using Response = grpc::health::v1::HealthCheckResponse;
+  enum class State : uint8_t { kServing, kNotServing, kEnded };
 
-  // Requests and responses have one field each; Debian ships no schema of them, and any message is an Empty with
-  // unknown fields.
-  using Empty = google::protobuf::Empty;
-
-  grpc::Status check(const Empty& request, Empty& response) const LOCUS_EXCLUDES(mutex_);
-  grpc::Status watch(grpc::ServerContext& context, const Empty& request, grpc::ServerWriter<Empty>& writer)
+  grpc::Status Check(grpc::ServerContext* context, const Request* request, Response* response) override
       LOCUS_EXCLUDES(mutex_);
-  static bool write(State state, grpc::ServerWriter<Empty>& writer);
+  grpc::Status Watch(grpc::ServerContext* context, const Request* request,
+                     grpc::ServerWriter<Response>* writer) override LOCUS_EXCLUDES(mutex_);
+  static Response::ServingStatus status_of(State state);
   void set(State state) LOCUS_EXCLUDES(mutex_);
   State state() const LOCUS_EXCLUDES(mutex_);
-  // Returns when it is no longer `known`, or `context` was given up.
+  // Waits until the state differs from `known` or the call is cancelled; returns the state.
   State wait(const grpc::ServerContext& context, State known) LOCUS_EXCLUDES(mutex_);
 
   Host& host_;

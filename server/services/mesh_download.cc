@@ -1,7 +1,5 @@
 #include "server/services/mesh_download.h"
 
-#include <grpcpp/impl/codegen/proto_utils.h>
-
 #include <algorithm>
 #include <string>
 #include <vector>

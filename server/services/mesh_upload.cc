@@ -1,6 +1,5 @@
 #include "server/services/mesh_upload.h"
 
-#include <grpcpp/impl/codegen/proto_utils.h>
 #include <openssl/evp.h>
 
 #include <bit>

@@ -10,7 +10,7 @@
 
 #include "absl/status/status.h"
 #include "core/scene/statics/static_mesh.h"
-#include "locus/v1/scene_service.pb.h"
+#include "locus/v1/scene_service.grpc.pb.h"
 #include "server/rpc/call.h"
 
 namespace locus::server {

@@ -1,7 +1,5 @@
 #include "server/services/scene_dump.h"
 
-#include <grpcpp/impl/codegen/proto_utils.h>
-
 #include <algorithm>
 #include <vector>
 

@@ -3,43 +3,41 @@
 
 #include <future>
 
-#include "google/protobuf/empty.pb.h"
-#include "google/protobuf/unknown_field_set.h"
+#include "grpc/health/v1/health.grpc.pb.h"
 #include "server/config/observability_limits.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {
 namespace {
 
-using google::protobuf::Empty;
+using grpc::health::v1::HealthCheckRequest;
+using grpc::health::v1::HealthCheckResponse;
 
 // HealthCheckResponse.status.
 enum Health : uint64_t { kNothing = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
 class Watcher {
  public:
-  Watcher(const std::shared_ptr<grpc::Channel>& channel, const std::string& service) {
-    Empty request;
-    *Empty::GetReflection()->MutableUnknownFields(&request)->AddLengthDelimited(1) = service;
-    const grpc::internal::RpcMethod method("/grpc.health.v1.Health/Watch", grpc::internal::RpcMethod::SERVER_STREAMING,
-                                           channel);
+  Watcher(const std::shared_ptr<grpc::Channel>& channel, const std::string& service)
+      : stub_(grpc::health::v1::Health::NewStub(channel)) {
+    HealthCheckRequest request;
+    request.set_service(service);
     set_timeout(context_);
-    reader_.reset(grpc::internal::ClientReaderFactory<Empty>::Create(channel.get(), method, &context_, request));
+    reader_ = stub_->Watch(&context_, request);
   }
 
-  // What comes next; kNothing at the end.
+  // Returns the status of the next message; kNothing at the end of the stream.
   uint64_t next() {
-    Empty response;
-    if (!reader_->Read(&response)) return kNothing;
-    const auto& fields = Empty::GetReflection()->GetUnknownFields(response);
-    return fields.field_count() == 1 ? fields.field(0).varint() : kNothing;
+    HealthCheckResponse response;
+    return reader_->Read(&response) ? static_cast<uint64_t>(response.status()) : kNothing;
   }
   grpc::Status end() { return reader_->Finish(); }
   void cancel() { context_.TryCancel(); }
 
  private:
   grpc::ClientContext context_;
-  std::unique_ptr<grpc::ClientReader<Empty>> reader_;
+  const std::unique_ptr<grpc::health::v1::Health::Stub> stub_;
+  std::unique_ptr<grpc::ClientReader<HealthCheckResponse>> reader_;
 };
 
 TEST(HealthTest, AWatcherIsToldAtOnceAndWhenTheServerDrains) {
