@@ -13,6 +13,7 @@ enum class PlantedBug {
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
   kUnsignedCellIndex,  // cell indices truncate towards zero instead of flooring
   kRewindReach,        // between two ticks objects are looked for only where they were at the first
+  kRewindFastBox,      // the way of an object that moved far leaves out its later, shorter moves of the tick
   kUnpaddedNear,       // the near side of the slab test of tree nodes goes without its pad
   kEdgeOnInDouble,     // triangles nearly edge-on are decided in double, like all others
   kGridBallMargin,     // float culls what balls reach without its error bound

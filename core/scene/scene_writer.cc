@@ -29,7 +29,7 @@ absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding windi
   writer.revision_ = state.revision;
   writer.tick_ = state.tick;
   writer.writers_ = std::move(state.writers);
-  writer.recorder_.set_has_past(state.has_past);
+  writer.recorder_.restore(state.has_past);
   writer.published_ = writer.freeze();
   return writer;
 }
@@ -51,7 +51,7 @@ SnapshotPtr SceneWriter::freeze() {
   recorder_.measure(objects);
   return std::make_shared<const SceneSnapshot>(
       SceneSnapshot{epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(),
-                    objects_.displacement(), replaced_bytes_ + recorder_.dropped_bytes()});
+                    objects_.displacement(), replaced_bytes_ + recorder_.dropped_bytes(), recorder_.limit()});
 }
 
 SnapshotPtr SceneWriter::next_revision() {

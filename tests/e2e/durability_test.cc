@@ -89,6 +89,29 @@ class DurabilityTest : public ::testing::Test {
     return response.result().DebugString();
   }
 
+  // Moves points 1 to 100 at every tick until a snapshot of the scene is on the disk.
+  void live_until_a_snapshot(const std::string& scene) {
+    const auto written = [this] { return daemon_.log().find("snapshot written") != std::string::npos; };
+    for (uint64_t tick = 1; tick <= 2000 && !written(); ++tick) {
+      v1::UpdateBatch batch;
+      for (uint64_t id = 1; id <= 100; ++id) *batch.add_inserts() = point(id, static_cast<double>(tick)).inserts(0);
+      batch.set_upsert(true);
+      batch.set_tick(tick);
+      ASSERT_TRUE(apply(scene, batch).ok());
+    }
+    ASSERT_TRUE(written());
+  }
+
+  grpc::Status look_up_at(const std::string& scene, uint64_t tick) {
+    v1::QueryRequest request;
+    request.set_scene(scene);
+    v1::QueryBlock* block = request.mutable_batch()->add_blocks();
+    block->mutable_lookup()->add_ids(1);
+    block->add_as_of_ticks(tick);
+    v1::QueryResponse response;
+    return call(*stubs().queries, &v1::QueryService::Stub::Query, request, &response);
+  }
+
   // Turns a byte in the middle of the file that holds most: of records that were written into a table at the end.
   void damage_the_log() {
     std::filesystem::path largest;
@@ -248,6 +271,25 @@ TEST_F(DurabilityTest, ADamagedSceneIsRefusedByNameTheOthersServeAndRepairSaysWh
   EXPECT_LT(left.size(), 200u);
   for (uint64_t i = 1; i <= left.size(); ++i) EXPECT_EQ(left.count(i), 1u);
   EXPECT_EQ(points_of(stubs(), "other").size(), 1u);
+}
+
+TEST_F(DurabilityTest, AfterARestartThePastBeginsAtTheSnapshotAndARefusalSaysWhy) {
+  daemon_.set_options({"--snapshot-after", "64KiB"});
+  daemon_.start();
+  v1::SceneSpec spec;
+  spec.set_history_ticks(10000);
+  create_scene(stubs(), "arena", spec);
+  live_until_a_snapshot("arena");
+  EXPECT_TRUE(look_up_at("arena", 1).ok());
+  EXPECT_EQ(daemon_.stop(), 0);
+  daemon_.start();
+  const v1::Scene scene = get_scene(stubs(), "arena");
+  ASSERT_GT(scene.oldest_tick(), 1u);
+  EXPECT_TRUE(look_up_at("arena", scene.oldest_tick()).ok());
+  const grpc::Status refused = look_up_at("arena", 1);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::OUT_OF_RANGE);
+  EXPECT_THAT(refused.error_message(), HasSubstr("the server has restarted since"));
+  EXPECT_THAT(refused.error_message(), ::testing::Not(HasSubstr("history_ticks")));
 }
 
 }  // namespace

@@ -42,6 +42,10 @@ std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_co
 
 std::string compare_rewinds_with_model() { return search_rewind_lockstep(scaled_count(10), 40); }
 
+std::string compare_rewinds_of_busy_ticks_with_model() {
+  return search_rewind_lockstep(scaled_count(10), 40, kTicksOfManyBatches);
+}
+
 #ifdef LOCUS_X86_KERNELS
 // One object serves for all instruction sets: they are compiled from one source.
 std::string compare_kernels_with_list() {
@@ -78,6 +82,7 @@ constexpr Trial kTrials[] = {
     {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},
     {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
     {"RewindThatLooksOnlyWhereObjectsWere", PlantedBug::kRewindReach, compare_rewinds_with_model},
+    {"RewindThatForgetsTheWayBack", PlantedBug::kRewindFastBox, compare_rewinds_of_busy_ticks_with_model},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

@@ -9,6 +9,10 @@ namespace {
 
 TEST(RewindEqualsModelTest, ThroughManyShortLives) { EXPECT_EQ(search_rewind_lockstep(scaled_count(70), 60), ""); }
 
+TEST(RewindEqualsModelTest, ThroughTicksOfManyBatches) {
+  EXPECT_EQ(search_rewind_lockstep(scaled_count(70), 60, kTicksOfManyBatches), "");
+}
+
 TEST(RewindEqualsModelTest, ThroughLongLives) {
   EXPECT_EQ(search_rewind_lockstep(4, static_cast<int>(scaled_count(600))), "");
 }

@@ -1,10 +1,13 @@
 // Lets objects of a scene with history be born, move, jump, change and die at random, and compares questions about any
 // time with those to a model that keeps every tick in full: every column, bit for bit, by every instruction set, on one
-// and two threads, and by brute force. For the random tests, which expect no difference, and for a planted bug.
+// and two threads, and by brute force. A tick has one batch or several, in which the same object goes far and comes
+// back, is replaced, jumps, dies and is born again. For the random tests, which expect no difference, and for planted
+// bugs.
 #ifndef LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -49,11 +52,13 @@ inline void append_answer(const BlockResult& from, uint32_t query, BlockResult& 
 
 class RewindLockstep {
  public:
-  // Objects move about `step` a tick and live within `world` of the origin; now and then one goes much farther.
-  RewindLockstep(uint64_t seed, double world, double step)
+  // Objects move about `step` a batch and live within `world` of the origin; now and then one goes much farther. A
+  // batch begins a tick with the probability `new_tick`.
+  RewindLockstep(uint64_t seed, double world, double step, double new_tick)
       : random_(seed),
         world_(world),
         step_(step),
+        new_tick_(new_tick),
         history_ticks_(1 + random_.below(12)),
         model_(history_ticks_),
         scene_("rewind", spec(), 1, StaticSet::empty()) {}
@@ -84,10 +89,15 @@ class RewindLockstep {
     return ids;
   }
 
-  Vec3d step_from(Vec3d place) {
+  // Where an object goes next, which may be back to about where the tick began.
+  Vec3d step_from(Id id, Vec3d place) {
+    if (random_.chance(0.25))
+      return model_.position_at_last_tick(id).value_or(place) + random_.vector(step_ * (random_.chance(0.5) ? 8 : 1));
     if (random_.chance(0.01)) return random_.vector(world_);
     if (random_.chance(0.05)) return place;
-    return place + random_.vector(step_ * (random_.chance(0.05) ? 40 : 1));
+    if (!random_.chance(0.05)) return place + random_.vector(step_);
+    far_ids_[next_far_++ % far_ids_.size()] = id;
+    return place + random_.vector(step_ * 40);
   }
 
   MoveColumns moves(double share, bool teleport) {
@@ -98,7 +108,7 @@ class RewindLockstep {
     for (const uint64_t id : ids) {
       const auto known = model_.objects().find(id);
       const Vec3d place =
-          known == model_.objects().end() ? random_.vector(world_) : step_from(known->second.shape.position);
+          known == model_.objects().end() ? random_.vector(world_) : step_from(id, known->second.shape.position);
       positions.insert(positions.end(), {place.x, place.y, place.z});
       const Quaternion q = random_.rotation();
       rotations.insert(rotations.end(), {q.x, q.y, q.z, q.w});
@@ -115,8 +125,8 @@ class RewindLockstep {
     const std::vector<uint64_t> ids = some_ids(share);
     std::vector<double> positions;
     std::vector<uint64_t> groups;
-    for (size_t i = 0; i < ids.size(); ++i) {
-      const Vec3d place = random_.vector(world_);
+    for (const uint64_t id : ids) {
+      const Vec3d place = step_from(id, random_.vector(world_));
       positions.insert(positions.end(), {place.x, place.y, place.z});
       groups.push_back(random_.below(4));
     }
@@ -132,7 +142,7 @@ class RewindLockstep {
   // Most ticks only move; most of those move everything.
   UpdateBatch draw() {
     UpdateBatch batch;
-    if (random_.chance(0.7)) batch.tick = model_.tick() + (random_.chance(0.2) ? random_.below(6) : 1);
+    if (random_.chance(new_tick_)) batch.tick = model_.tick() + (random_.chance(0.2) ? random_.below(6) : 1);
     const double share = random_.chance(0.6) ? 1 : random_.unit() * 0.2;
     batch.moves.push_back(moves(share, false));
     if (random_.chance(0.5)) return batch;
@@ -167,9 +177,23 @@ class RewindLockstep {
     return "";
   }
 
-  // Somewhere near an object of the present.
-  Vec3d place() {
+  // Any object, or one of those that went far lately, which are the ones that searches treat apart.
+  const Object& some_object(const std::vector<Object>& objects) {
+    const Id far = random_.pick(far_ids_);
+    const auto at =
+        std::find_if(objects.begin(), objects.end(), [far](const Object& object) { return object.id == far; });
+    return at == objects.end() || random_.chance(0.3) ? random_.pick(objects) : *at;
+  }
+
+  // Somewhere near an object of the present, or near one of the time that query `i` of the block asks about.
+  Vec3d place(const OwnedBlock& block, size_t i) {
     if (model_.objects().empty()) return {};
+    if (random_.chance(0.5)) {
+      const uint64_t tick = block.as_of_ticks[i % block.as_of_ticks.size()];
+      const auto& fractions = block.as_of_fractions;
+      const auto then = model_.objects_at(tick, fractions.empty() ? 0 : fractions[i % fractions.size()]);
+      if (then && !then->empty()) return some_object(*then).shape.position + random_.vector(step_ / 2);
+    }
     auto at = model_.objects().begin();
     std::advance(at, static_cast<std::ptrdiff_t>(random_.below(model_.objects().size())));
     return at->second.shape.position + random_.vector(step_ * 2);
@@ -184,20 +208,22 @@ class RewindLockstep {
     if (kind == 2) block.settings.kind = RayColumns{{}, {}, {}, static_cast<RayMode>(random_.below(3))};
     if (kind == 3 || kind == 4) block.settings.kind = LookupColumns{};
     if (kind == 5) block.settings.kind = NearestColumns{{}, {}, static_cast<uint32_t>(1 + random_.below(4))};
+    draw_times(n, block);
+    const double size = random_.chance(0.5) ? 4 * step_ : step_ / 2;
     for (size_t i = 0; i < n; ++i) {
       if (kind == 3) block.ids.push_back(1 + random_.below(kIds));
       if (kind == 4) block.groups.push_back(1 + random_.below(3));
-      if (kind < 3 || kind == 5) append(block.points, to_float(place()));
-      if (kind == 0) block.sizes.push_back(random_.float_between(0, 4 * step_));
-      if (kind == 1) append(block.sizes, to_float(random_.positive_vector(4 * step_)));
+      if (kind < 3 || kind == 5) append(block.points, to_float(place(block, i)));
+      if (kind == 0) block.sizes.push_back(random_.float_between(0, size));
+      if (kind == 1) append(block.sizes, to_float(random_.positive_vector(size)));
       if (kind == 2) append(block.sizes, random_.float_vector(1));
     }
-    add_settings(kind, n, block);
+    add_settings(kind, block);
     return block;
   }
   static void append(std::vector<float>& to, Vec3f v) { to.insert(to.end(), {v.x, v.y, v.z}); }
 
-  void add_settings(uint64_t kind, size_t n, OwnedBlock& block) {
+  void add_settings(uint64_t kind, OwnedBlock& block) {
     const bool any = kind == 2 && std::get<RayColumns>(block.settings.kind).mode == RayMode::kAny;
     if (kind != 3 && kind != 4 && random_.chance(0.2)) block.settings.precision = Precision::kConservative;
     if (random_.chance(0.3)) block.settings.max_results = 3;
@@ -206,6 +232,10 @@ class RewindLockstep {
     if (kind == 2 && !any) block.settings.columns.add(Column::kNormal);
     if ((kind == 2 && !any) || kind == 5) block.settings.columns.add(Column::kT);
     if (kind == 5) block.settings.columns.add(Column::kPoint);
+  }
+
+  // One time for all `n` queries, or one for each.
+  void draw_times(size_t n, OwnedBlock& block) {
     block.settings.outside = OutsideHistory::kClamp;
     const uint64_t oldest = model_.oldest_tick(), ticks = model_.tick() - oldest;
     const bool one = random_.chance(0.3);
@@ -259,19 +289,24 @@ class RewindLockstep {
   }
 
   Random random_;
-  double world_, step_;
+  double world_, step_, new_tick_;
   uint64_t history_ticks_;
+  std::array<Id, 32> far_ids_{};  // of objects that went far last
+  size_t next_far_ = 0;
   SceneModel model_;
   Scene scene_;
   Columns columns_;
 };
 
+// The chance that a batch begins a tick: most ticks have one batch, or most have several.
+constexpr double kTicksOfOneBatch = 0.7, kTicksOfManyBatches = 0.25;
+
 // The first difference over `count` scenes of `batches` batches each, empty when there is none.
-inline std::string search_rewind_lockstep(uint64_t count, int batches) {
+inline std::string search_rewind_lockstep(uint64_t count, int batches, double new_tick = kTicksOfOneBatch) {
   for (uint64_t seed = 0; seed < count; ++seed) {
     const double step = std::exp2(static_cast<double>(seed % 7) - 3);
     const double world = seed % 2 == 0 ? 100 : 20;
-    const std::string what = RewindLockstep(seed, world, step).run(batches);
+    const std::string what = RewindLockstep(seed, world, step, new_tick).run(batches);
     if (!what.empty()) return "seed " + std::to_string(seed) + ", " + what;
   }
   return "";

@@ -61,6 +61,13 @@ class SceneModel {
     }
     return objects;
   }
+  // Returns where an object was when the last recorded tick ended; nothing if it was not there.
+  std::optional<Vec3d> position_at_last_tick(Id id) const {
+    if (past_.empty()) return std::nullopt;
+    const Objects& objects = past_.rbegin()->second.objects;
+    const auto known = objects.find(id);
+    return known == objects.end() ? std::nullopt : std::optional<Vec3d>(known->second.shape.position);
+  }
   const std::set<Id>& instances() const { return instances_; }
 
   // Takes an instance away, if `removed` is not 0, and places one as `placed`. False when that is refused.

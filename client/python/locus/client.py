@@ -94,6 +94,7 @@ class Client:
         """Creates an empty scene, or one that starts with the instances of `static_from`.
 
         `history_ticks`: for how many ticks the past can be asked about; `history_bytes`: memory it may take, 0 = 256 MiB.
+        A restart of the server keeps of the past only what came after the scene's last snapshot on disk.
         `overload`: what becomes of moves that come faster than they can be applied.
         `if_absent` returns a scene of that name as it is; otherwise that is ALREADY_EXISTS.
         """

@@ -7,6 +7,26 @@
 namespace locus {
 namespace {
 
+// Returns why the past begins at its oldest tick, and what to do about it.
+std::string explanation(const SceneSnapshot& snapshot) {
+  switch (snapshot.past_limit) {
+    case PastLimit::kOff:
+      return "the scene keeps no past. Ask about now, clamp, or create the scene with history_ticks";
+    case PastLimit::kBegan:
+      return "the scene's ticks began there. Ask about one of those, or clamp";
+    case PastLimit::kTicks:
+      return "older ones are beyond history_ticks. Ask about one of those, clamp, or create the scene with a larger "
+             "history_ticks";
+    case PastLimit::kBytes:
+      return "older ones did not fit into history_bytes. Ask about one of those, clamp, or create the scene with a "
+             "larger history_bytes";
+    case PastLimit::kRestored:
+      return "the server has restarted since, and on disk a scene has no past before its last snapshot. Ask about one "
+             "of those, or clamp";
+  }
+  return "";
+}
+
 absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std::string& field, size_t entry) {
   Refusal refusal;
   refusal.reason = Reason::kOutOfRange;
@@ -14,11 +34,13 @@ absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std
   refusal.index = static_cast<uint32_t>(entry);
   refusal.asked = static_cast<double>(time.tick) + double{time.fraction};
   const std::string fraction = time.fraction == 0 ? "" : absl::StrCat(" and a fraction of ", time.fraction);
-  return refuse(
-      absl::StatusCode::kOutOfRange,
-      absl::StrCat("tick ", time.tick, fraction, " is not kept; ticks ", snapshot.oldest_tick(), " to ", snapshot.tick,
-                   " are. Ask about one of those, clamp, or create the scene with a longer ", "history_ticks"),
-      refusal);
+  const std::string asked = absl::StrCat("tick ", time.tick, fraction);
+  const std::string kept = absl::StrCat("ticks ", snapshot.oldest_tick(), " to ", snapshot.tick, " are");
+  const std::string message =
+      time.tick < snapshot.oldest_tick()
+          ? absl::StrCat(asked, " is not kept; ", kept, ": ", explanation(snapshot))
+          : absl::StrCat(asked, " has not come yet; ", kept, " kept. Ask about one of those, or clamp");
+  return refuse(absl::StatusCode::kOutOfRange, message, refusal);
 }
 
 }  // namespace

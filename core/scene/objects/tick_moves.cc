@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/planted_bug.h"
+
 namespace locus {
 
 void TickMoves::start_tick(double fast_length) {
@@ -18,20 +20,19 @@ TickMoves::Start& TickMoves::start_of(uint32_t handle) {
   return starts_[handle];
 }
 
-void TickMoves::born(uint32_t handle) { start_of(handle) = {{}, tick_, 0, true}; }
+void TickMoves::born(uint32_t handle) { start_of(handle) = {{}, tick_, 0, Kind::kNewborn}; }
 
 void TickMoves::moved(const GridRef& before, Vec3d to) {
   Start& start = start_of(before.handle());
-  if (start.tick != tick_) start = {before.entry().position, tick_, before.reach(), false};
-  if (start.newborn) return;
+  if (start.tick != tick_) start = {before.entry().position, tick_, before.reach(), Kind::kOrdinary};
+  if (start.kind == Kind::kNewborn) return;
   const double length = std::sqrt(squared_length(to - start.position));
-  if (length <= displacement_.reach) return;
-  if (length > fast_length_) return add_fast(before, start, to, length);
-  displacement_.reach = length;
+  const bool listed = start.kind == Kind::kListed && !planted(PlantedBug::kRewindFastBox);
+  if (listed || length > fast_length_) return add_fast(before.handle(), start, to, length);
+  displacement_.reach = std::max(displacement_.reach, length);
 }
 
-void TickMoves::add_fast(const GridRef& before, const Start& start, Vec3d to, double length) {
-  const uint32_t handle = before.handle();
+void TickMoves::add_fast(uint32_t handle, Start& start, Vec3d to, double length) {
   const auto at = std::lower_bound(fast_.begin(), fast_.end(), handle,
                                    [](const FastMover& mover, uint32_t value) { return mover.handle < value; });
   const Aabbd centers{min(start.position, to), max(start.position, to)};
@@ -41,6 +42,7 @@ void TickMoves::add_fast(const GridRef& before, const Start& start, Vec3d to, do
     at->centers = merge(at->centers, centers);
     return;
   }
+  start.kind = Kind::kListed;
   fast_.insert(at, {handle, start.reach, length, centers});
   if (fast_.size() > kMaxFast) list_fewer();
 }
@@ -51,6 +53,7 @@ void TickMoves::list_fewer() {
     std::erase_if(fast_, [this](const FastMover& mover) {
       if (mover.length > fast_length_) return false;
       displacement_.reach = std::max(displacement_.reach, mover.length);
+      starts_[mover.handle].kind = Kind::kOrdinary;
       return true;
     });
   }

@@ -41,14 +41,17 @@ class TickMoves {
   const Displacement& displacement();
 
  private:
+  // A listed object is in fast_: every further move has to widen its box, however short the move is.
+  enum class Kind : uint8_t { kOrdinary, kListed, kNewborn };
   struct Start {
     Vec3d position;
     uint64_t tick = 0;  // counted by start_tick(); of another one this says nothing
     float reach = 0;
-    bool newborn = false;
+    Kind kind = Kind::kOrdinary;
   };
   Start& start_of(uint32_t handle);
-  void add_fast(const GridRef& before, const Start& start, Vec3d to, double length);
+  // Lists an object, or extends the box of a listed one.
+  void add_fast(uint32_t handle, Start& start, Vec3d to, double length);
   void list_fewer();
 
   std::vector<Start> starts_;  // by handle

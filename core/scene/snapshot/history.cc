@@ -30,18 +30,25 @@ void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displ
   while (first + 1 < next.records.size() && next_tick >= options_.ticks &&
          next.records[first + 1]->tick <= next_tick - options_.ticks)
     ++first;
-  drop_first(next, first);
+  drop_first(next, first, PastLimit::kTicks);
   publish(std::move(next));
   measured_ = false;
 }
 
+void HistoryRecorder::restore(bool has_past) {
+  has_past_ = has_past;
+  if (has_past) limit_ = PastLimit::kRestored;
+}
+
 void HistoryRecorder::drop() {
   has_past_ = false;
+  limit_ = PastLimit::kBegan;
   if (history_ != nullptr) dropped_bytes_ += history_->bytes;
   history_ = nullptr;
 }
 
-void HistoryRecorder::drop_first(History& history, size_t count) {
+void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reason) {
+  if (count > 0) limit_ = reason;
   for (size_t i = 0; i < count; ++i) dropped_bytes_ += history.records[i]->bytes;
   history.records.erase(history.records.begin(), history.records.begin() + static_cast<std::ptrdiff_t>(count));
 }
@@ -58,7 +65,7 @@ void HistoryRecorder::publish(History history) {
   size_t first = history.records.size();
   while (first > 0 && history.bytes + history.records[first - 1]->bytes <= options_.bytes)
     history.bytes += history.records[--first]->bytes;
-  drop_first(history, first);
+  drop_first(history, first, PastLimit::kBytes);
   history_ = history.records.empty() ? nullptr : std::make_shared<const History>(std::move(history));
 }
 

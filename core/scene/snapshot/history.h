@@ -26,6 +26,15 @@ struct History {
 };
 using HistoryPtr = std::shared_ptr<const History>;
 
+// Why the past of a scene begins at its oldest tick: the reason that no tick before that is kept.
+enum class PastLimit : uint8_t {
+  kOff,       // the scene keeps no past
+  kBegan,     // there is no tick before: the scene began there, or restarted its ticks
+  kTicks,     // older ticks are further back than HistoryOptions::ticks
+  kBytes,     // older ticks did not fit into HistoryOptions::bytes
+  kRestored,  // the scene was read from a snapshot on disk, which holds nothing of the past
+};
+
 struct HistoryOptions {
   // How many ticks back the past can be asked about. 0 keeps none, and costs nothing.
   uint32_t ticks = 0;
@@ -52,20 +61,23 @@ class HistoryRecorder {
   // Whether a tick ended since drop(), kept or not: unlike what is kept, which goes by memory, this says the same for
   // the same batches at any time.
   bool has_past() const { return has_past_; }
-  void set_has_past(bool has_past) { has_past_ = has_past; }
+  // Begins with a scene read from disk, whose past, if it had one, is lost.
+  void restore(bool has_past);
+  PastLimit limit() const { return on() ? limit_ : PastLimit::kOff; }
   // Of all records so far that are not kept any more.
   uint64_t dropped_bytes() const { return dropped_bytes_; }
   // Nothing that is only in records below this tick is kept.
   uint64_t oldest_tick(uint64_t present) const { return history_ == nullptr ? present : history_->records[0]->tick; }
 
  private:
-  void drop_first(History& history, size_t count);
+  void drop_first(History& history, size_t count, PastLimit reason);
   void publish(History history);
 
   HistoryOptions options_;
   HistoryPtr history_;
   bool measured_ = true;
   bool has_past_ = false;
+  PastLimit limit_ = PastLimit::kBegan;
   uint64_t dropped_bytes_ = 0;
 };
 

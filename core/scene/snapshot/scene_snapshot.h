@@ -25,6 +25,7 @@ struct SceneSnapshot {
   // Of what revisions up to this one replaced, but for the maps that find it. What was born and replaced between two
   // revisions, or is kept in the past, is in it, so that neither holds all of it alone.
   uint64_t replaced_bytes = 0;
+  PastLimit past_limit = PastLimit::kOff;  // why nothing before oldest_tick() is kept
 
   // The oldest moment that can be asked about.
   uint64_t oldest_tick() const { return history == nullptr ? tick : history->records.front()->tick; }

@@ -197,6 +197,7 @@ TEST_F(RecoverTest, ThePastReachesBackToTheSnapshot) {
   const auto scene = recover_scene(again, again.stored_scenes()[1], find_);
   ASSERT_TRUE(scene.ok()) << scene.status();
   EXPECT_EQ((*scene)->latest()->oldest_tick(), 5u);
+  EXPECT_EQ((*scene)->latest()->past_limit, PastLimit::kRestored);
   EXPECT_EQ(find_scene_at(*(*scene)->latest(), {7, 0})->objects().find(1)->shape.position.x, 7);
 }
 

@@ -1,6 +1,8 @@
 // Times of queries: which are kept, what is said of those that are not, and what a batch answers.
 #include "core/query/kinds/query_times.h"
 
+#include <gmock/gmock.h>
+
 #include "core/query/columns.h"
 #include "core/query/run/run_batch.h"
 #include "tests/support/owned_block.h"
@@ -91,6 +93,14 @@ TEST_F(QueryTimesTest, ATimeThatIsNotKeptRefusesTheBatchAndNamesTheRange) {
                  "blocks[0].as_of_ticks", 0);
 }
 
+TEST_F(QueryTimesTest, ATimeThatHasNotComeIsRefusedWithoutAdviceAboutHistory) {
+  for (const OwnedBlock& block : {where({31}), where({30}, {0.5f})}) {
+    const std::string message(refusal(block).message());
+    EXPECT_NE(message.find("has not come yet; ticks 20 to 30 are kept"), std::string::npos) << message;
+    EXPECT_EQ(message.find("history"), std::string::npos) << message;
+  }
+}
+
 TEST_F(QueryTimesTest, ClampingTakesTheNearestAndListsTheQuery) {
   OwnedBlock block = where({2, 25, 31}, {0.5f, 0.5f, 0.5f});
   block.settings.outside = OutsideHistory::kClamp;
@@ -118,6 +128,153 @@ TEST_F(QueryTimesTest, TheRoomForTimesIsPartOfTheReply) {
   const uint64_t with_times = fixed_reply_bytes(batch);
   batch.blocks[0].as_of_ticks = {};
   EXPECT_LT(fixed_reply_bytes(batch), with_times);
+}
+
+// What the refusal of a time says about why it is not kept.
+class NotKeptTest : public SceneFixture {
+ protected:
+  // Objects 1 to 100 all move at each tick up to 30.
+  static void live(Scene& scene) {
+    Columns columns;
+    std::vector<uint64_t> ids(100);
+    for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
+    UpdateBatch batch;
+    batch.upsert = true;
+    for (uint64_t tick = 1; tick <= 30; ++tick) {
+      InsertColumns insert;
+      insert.ids = ids;
+      insert.positions = columns.floats({static_cast<float>(tick), 0, 0});
+      batch.inserts = {insert};
+      batch.tick = tick;
+      ASSERT_TRUE(scene.apply(batch).ok());
+    }
+  }
+  static std::string refusal(const SceneSnapshot& snapshot, uint64_t tick) {
+    OwnedBlock block;
+    block.settings.kind = LookupColumns{};
+    block.ids = {1};
+    block.as_of_ticks = {tick};
+    QueryBatch batch;
+    batch.blocks = {block.view()};
+    const absl::Status status = run_batch(snapshot, batch, {}).status();
+    expect_refusal(status, absl::StatusCode::kOutOfRange, Reason::kOutOfRange, "blocks[0].as_of_ticks", 0);
+    const std::string message(status.message());
+    return message.substr(message.find(": ") + 2);  // without the field
+  }
+};
+
+TEST_F(NotKeptTest, ASceneWithoutHistoryAdvisesHistoryTicks) {
+  live(scene_);
+  EXPECT_EQ(refusal(*scene_.latest(), 29),
+            "tick 29 is not kept; ticks 30 to 30 are: the scene keeps no past. Ask about now, clamp, or create the "
+            "scene with history_ticks");
+}
+
+TEST_F(NotKeptTest, ATickBeyondHistoryTicksAdvisesMoreOfThem) {
+  Scene scene("scene", ten_ticks(), kEpoch, StaticSet::empty());
+  live(scene);
+  EXPECT_EQ(refusal(*scene.latest(), 19),
+            "tick 19 is not kept; ticks 20 to 30 are: older ones are beyond history_ticks. Ask about one of those, "
+            "clamp, or create the scene with a larger history_ticks");
+}
+
+TEST_F(NotKeptTest, ATickThatDidNotFitAdvisesMoreBytes) {
+  SceneSpec spec;
+  spec.history = {1000, 100'000};
+  Scene scene("scene", spec, kEpoch, StaticSet::empty());
+  live(scene);
+  EXPECT_GT(scene.latest()->oldest_tick(), 1u);
+  EXPECT_THAT(refusal(*scene.latest(), 1),
+              ::testing::HasSubstr(": older ones did not fit into history_bytes. Ask about one of those, clamp, or "
+                                   "create the scene with a larger history_bytes"));
+}
+
+TEST_F(NotKeptTest, ATickBeforeTicksRestartedNeverComesBack) {
+  Scene scene("scene", ten_ticks(), kEpoch, StaticSet::empty());
+  live(scene);
+  UpdateBatch restart;
+  restart.restart_ticks = true;
+  restart.tick = 25;
+  ASSERT_TRUE(scene.apply(restart).ok());
+  EXPECT_EQ(refusal(*scene.latest(), 24),
+            "tick 24 is not kept; ticks 25 to 25 are: the scene's ticks began there. Ask about one of those, or clamp");
+}
+
+// Ball 7 is at the origin at tick 1 and at (0, 5, 0) at tick 3; in the tick between it first went far.
+class FastMoverQueryTest : public SceneFixture {
+ protected:
+  FastMoverQueryTest() : SceneFixture(ten_ticks()) {}
+  void SetUp() override {
+    batch(1, with(balls({7}, {0.5f})));
+    batch(2, with(move_to({7}, {100, 0, 0})));
+  }
+  void batch(uint64_t tick, UpdateBatch batch) {
+    batch.tick = tick;
+    apply(batch);
+  }
+  void end_by_move() {
+    batch(2, with(move_to({7}, {0, 5, 0})));
+    batch(3, {});
+  }
+  void end_by_upsert() {
+    InsertColumns insert = balls({7}, {0.5f});
+    insert.positions = columns_.floats({0, 5, 0});
+    UpdateBatch upsert = with(insert);
+    upsert.upsert = true;
+    batch(2, upsert);
+    batch(3, {});
+  }
+
+  // Half way between ticks 1 and 2, where the ball is at (0, 2.5, 0).
+  static OwnedBlock half_way(decltype(QueryBlock::kind) kind, std::vector<float> points,
+                             std::vector<float> sizes = {}) {
+    OwnedBlock block;
+    block.settings.kind = std::move(kind);
+    block.points = std::move(points);
+    block.sizes = std::move(sizes);
+    block.as_of_ticks = {1};
+    block.as_of_fractions = {0.5f};
+    return block;
+  }
+  std::vector<uint64_t> found(const OwnedBlock& block) const {
+    const BlockResult result = run_block(*scene_.latest(), block);
+    return {result.ids.begin(), result.ids.end()};
+  }
+  // Fails unless every kind of query finds the ball where it was.
+  void expect_found() const {
+    const std::vector<uint64_t> ball = {7};
+    OwnedBlock lookup = half_way(LookupColumns{}, {});
+    lookup.ids = {7};
+    EXPECT_EQ(run_block(*scene_.latest(), lookup).positions, (std::vector<double>{0, 2.5, 0}));
+    EXPECT_EQ(found(half_way(BallColumns{}, {0, 2.5f, 0}, {0.1f})), ball);
+    EXPECT_EQ(found(half_way(BoxColumns{}, {0, 2.5f, 0}, {0.1f, 0.1f, 0.1f})), ball);
+    EXPECT_EQ(found(half_way(RayColumns{}, {-10, 2.5f, 0}, {1, 0, 0})), ball);
+    OwnedBlock nearest = half_way(NearestColumns{{}, {}, 1}, {0, 2.5f, 0.75f});
+    nearest.extras = {1};
+    EXPECT_EQ(found(nearest), ball);
+  }
+};
+
+TEST_F(FastMoverQueryTest, ABallThatCameBackByAMoveIsFoundOnItsWay) {
+  end_by_move();
+  expect_found();
+}
+
+TEST_F(FastMoverQueryTest, ABallThatCameBackByAnUpsertIsFoundOnItsWay) {
+  end_by_upsert();
+  expect_found();
+}
+
+TEST_F(FastMoverQueryTest, ABallThatCameBackIsFoundOnItsWayBeforeTheTickEnds) {
+  batch(2, with(move_to({7}, {0, 5, 0})));
+  expect_found();
+}
+
+TEST_F(FastMoverQueryTest, ANewLifeUnderItsIdIsNotOnItsWay) {
+  batch(2, removing({7}));
+  end_by_upsert();
+  EXPECT_TRUE(found(half_way(BallColumns{}, {0, 2.5f, 0}, {0.1f})).empty());
+  EXPECT_EQ(found(half_way(BallColumns{}, {0, 0, 0}, {0.1f})), std::vector<uint64_t>{7});
 }
 
 }  // namespace

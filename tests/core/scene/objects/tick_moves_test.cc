@@ -68,6 +68,73 @@ TEST_F(TickMovesTest, AFastMoverIsListedAndDoesNotCount) {
   EXPECT_EQ(mover.centers, (Aabbd{{-50, 0, 0}, {100, 3, 0}}));
 }
 
+TEST_F(TickMovesTest, AMoveNoLongerThanTheReachWidensTheBoxOfAFastMover) {
+  move(0, {5, 0, 0});
+  move(7, {100, 0, 0});
+  move(7, {0, 3, 0});
+  EXPECT_EQ(moves_.displacement().reach, 5);
+  ASSERT_EQ(fast_count(), 1u);
+  EXPECT_EQ(moves_.displacement().fast->front().centers, (Aabbd{{0, 0, 0}, {100, 3, 0}}));
+}
+
+TEST_F(TickMovesTest, AMoveLongerThanTheReachWidensTheBoxOfAFastMoverAndDoesNotCount) {
+  move(0, {1, 0, 0});
+  move(7, {100, 0, 0});
+  move(7, {0, 6, 0});
+  EXPECT_EQ(moves_.displacement().reach, 1);
+  ASSERT_EQ(fast_count(), 1u);
+  EXPECT_EQ(moves_.displacement().fast->front().centers, (Aabbd{{0, 0, 0}, {100, 6, 0}}));
+}
+
+TEST_F(TickMovesTest, AShortMoveBeforeTheLongOneCountsAndOneAfterItWidensTheBox) {
+  move(7, {0, 3, 0});
+  move(7, {100, 0, 0});
+  move(7, {0, -2, 0});
+  EXPECT_EQ(moves_.displacement().reach, 3);
+  ASSERT_EQ(fast_count(), 1u);
+  EXPECT_EQ(moves_.displacement().fast->front().centers, (Aabbd{{0, -2, 0}, {100, 0, 0}}));
+}
+
+TEST_F(TickMovesTest, APublishedListKeepsItsBoxes) {
+  move(7, {100, 0, 0});
+  const Displacement published = moves_.displacement();
+  move(7, {0, 3, 0});
+  EXPECT_EQ(published.fast->front().centers, (Aabbd{{0, 0, 0}, {100, 0, 0}}));
+  EXPECT_EQ(moves_.displacement().fast->front().centers, (Aabbd{{0, 0, 0}, {100, 3, 0}}));
+}
+
+TEST_F(TickMovesTest, AFastMoverIsNotListedInTheNextTick) {
+  move(7, {100, 0, 0});
+  moves_.start_tick(8);
+  move(7, {100, 3, 0});
+  EXPECT_EQ(moves_.displacement().reach, 3);
+  EXPECT_EQ(fast_count(), 0u);
+}
+
+TEST_F(TickMovesTest, ANewLifeWithTheHandleOfAFastMoverMovesInNoSearch) {
+  move(7, {100, 0, 0});
+  moves_.start_tick(8);
+  moves_.born(7);
+  move(7, {0, 3, 0});
+  move(7, {0, 300, 0});
+  EXPECT_EQ(moves_.displacement().reach, 0);
+  EXPECT_EQ(fast_count(), 0u);
+}
+
+TEST_F(TickMovesTest, AnObjectThatLeftTheListCountsAgainAndMayBeListedAgain) {
+  for (uint32_t handle = 0; handle <= TickMoves::kMaxFast; ++handle) move(handle, {10, 0, 0});
+  ASSERT_EQ(fast_count(), 0u) << "far means farther than 16 now";
+  EXPECT_EQ(moves_.displacement().reach, 10);
+  move(3, {0, 12, 0});
+  EXPECT_EQ(moves_.displacement().reach, 12);
+  EXPECT_EQ(fast_count(), 0u);
+  move(3, {20, 0, 0});
+  move(3, {0, 0, 2});
+  EXPECT_EQ(moves_.displacement().reach, 12);
+  ASSERT_EQ(fast_count(), 1u);
+  EXPECT_EQ(moves_.displacement().fast->front().centers, (Aabbd{{0, 0, 0}, {20, 0, 2}}));
+}
+
 TEST_F(TickMovesTest, ANewLifeMovesInNoSearch) {
   moves_.born(3);
   move(3, {1000, 0, 0});

@@ -114,6 +114,39 @@ TEST_F(HistoryTest, RestartingAtTheSameTickForgetsTooAndIsARevision) {
   EXPECT_EQ(scene.apply(restart)->revision, before + 1);
 }
 
+TEST_F(HistoryTest, ThePastSaysWhyItBeginsWhereItDoes) {
+  constexpr uint64_t kPlenty = uint64_t{1} << 30;
+  Scene off("scene", {}, 1, StaticSet::empty());
+  Scene young("scene", spec(10, kPlenty), 1, StaticSet::empty());
+  Scene old("scene", spec(3, kPlenty), 1, StaticSet::empty());
+  Scene large("scene", spec(10, 1000), 1, StaticSet::empty());
+  for (Scene* scene : {&off, &young, &old, &large}) live(*scene, 5);
+  EXPECT_EQ(off.latest()->past_limit, PastLimit::kOff);
+  EXPECT_EQ(young.latest()->past_limit, PastLimit::kBegan);
+  EXPECT_EQ(old.latest()->past_limit, PastLimit::kTicks);
+  EXPECT_EQ(large.latest()->past_limit, PastLimit::kBytes);
+  UpdateBatch restart;
+  restart.restart_ticks = true;
+  ASSERT_TRUE(old.apply(restart).ok());
+  EXPECT_EQ(old.latest()->past_limit, PastLimit::kBegan);
+}
+
+TEST_F(HistoryTest, ARestoredPastIsLimitedByTicksOnceItIsLongEnough) {
+  HistoryRecorder recorder({2, uint64_t{1} << 30});
+  recorder.restore(true);
+  recorder.close(5, {}, {}, 6);
+  recorder.close(6, {}, {}, 7);
+  EXPECT_EQ(recorder.limit(), PastLimit::kRestored);
+  recorder.close(7, {}, {}, 8);
+  EXPECT_EQ(recorder.limit(), PastLimit::kTicks);
+}
+
+TEST_F(HistoryTest, ARestoredSceneThatHadNoPastLostNone) {
+  HistoryRecorder recorder({2, uint64_t{1} << 30});
+  recorder.restore(false);
+  EXPECT_EQ(recorder.limit(), PastLimit::kBegan);
+}
+
 // Whatever room there was: what a batch does goes by batches alone, so that a log of them does the same again.
 TEST_F(HistoryTest, RestartingIsARevisionEvenWhereNothingCouldBeKept) {
   Scene scene("scene", spec(100, 1), 1, StaticSet::empty());

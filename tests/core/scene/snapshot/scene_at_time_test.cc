@@ -144,6 +144,69 @@ TEST_F(SceneAtTimeTest, AnUpsertGoesOnWithTheLifeButNotBackwardsWithItsShape) {
   EXPECT_EQ(shape(1, 1, 0.5f)->radius, 1);
 }
 
+TEST_F(SceneAtTimeTest, AnUpsertWithoutRotationTurnsTheObjectBackOnItsWay) {
+  InsertColumns turned = points({1}, {0, 0, 0});
+  turned.rotations = columns_.floats({0, 0, 0.70710678f, 0.70710678f});
+  apply(at_tick(1, with(turned)));
+  UpdateBatch batch = with(points({1}, {0, 0, 0}));
+  batch.upsert = true;
+  apply(at_tick(2, batch));
+  EXPECT_NEAR((shape(1, 1, 0.5f)->rotation.z), 0.38268343f, 1e-6);
+  EXPECT_EQ(shape(1, 2)->rotation, Quaternion());
+}
+
+TEST_F(SceneAtTimeTest, AnUpsertShowsItsLabelsFromItsTickOn) {
+  apply(at_tick(1, with(points({1}, {0, 0, 0}))));
+  InsertColumns other = points({1}, {8, 0, 0});
+  other.tags = columns_.ids({9});
+  UpdateBatch batch = with(other);
+  batch.upsert = true;
+  apply(at_tick(2, batch));
+  const SnapshotPtr snapshot = scene_.latest();
+  EXPECT_EQ(find_scene_at(*snapshot, {1, 0.5f})->objects().find_ref(1).entry().tag, 0u);
+  EXPECT_EQ(find_scene_at(*snapshot, {2, 0})->objects().find_ref(1).entry().tag, 9u);
+}
+
+TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInItsBatchBeginsANewLife) {
+  apply(at_tick(1, with(points({1}, {4, 0, 0}))));
+  UpdateBatch batch = with(points({1}, {8, 0, 0}));
+  batch.remove_ids = columns_.ids({1});
+  batch.upsert = true;
+  apply(at_tick(2, batch));
+  EXPECT_EQ(x(1, 1, 0.5f), 4);
+  EXPECT_EQ(x(1, 2), 8);
+}
+
+TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInAnEarlierBatchOfTheTickBeginsANewLife) {
+  apply(at_tick(1, with(points({1}, {4, 0, 0}))));
+  apply(at_tick(2, removing({1})));
+  UpdateBatch batch = with(points({1}, {8, 0, 0}));
+  batch.upsert = true;
+  apply(at_tick(2, batch));
+  EXPECT_EQ(x(1, 1, 0.5f), 4);
+  EXPECT_EQ(x(1, 2), 8);
+}
+
+TEST_F(SceneAtTimeTest, AnUpsertInABatchThatClearsBeginsANewLife) {
+  apply(at_tick(1, with(points({1}, {4, 0, 0}))));
+  UpdateBatch batch = with(points({1}, {8, 0, 0}));
+  batch.clear = true;
+  batch.upsert = true;
+  apply(at_tick(2, batch));
+  EXPECT_EQ(x(1, 1, 0.5f), 4);
+  EXPECT_EQ(x(1, 2), 8);
+}
+
+TEST_F(SceneAtTimeTest, AnUpsertThatIsMovedByATeleportOfItsBatchBeginsANewLife) {
+  apply(at_tick(1, with(points({1}, {4, 0, 0}))));
+  UpdateBatch batch = jump(move_to({1}, {12, 0, 0}));
+  batch.inserts = {points({1}, {8, 0, 0})};
+  batch.upsert = true;
+  apply(at_tick(2, batch));
+  EXPECT_EQ(x(1, 1, 0.5f), 4);
+  EXPECT_EQ(x(1, 2), 12);
+}
+
 TEST_F(SceneAtTimeTest, AHandleOfAnEndedLifeIsNotTakenForIt) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, removing({1})));
