@@ -19,6 +19,8 @@ enum class PlantedBug {
   kGridBallMargin,     // float culls what balls reach without its error bound
   kNearestLimit,       // boxes as far as the farthest thing found near a point are left out
   kNearestTreePad,     // float decides distances to the boxes of triangles without its pad
+  kWidePlacedBounds,   // bounds of placed triangles are grown by what float rounds by
+  kPlacedBoundsAlone,  // balls and boxes meet placed bounds alone, not what rounding puts beside them
   // The ray kernels:
   kKernelEdgeBound,         // float decides edges without its error bound
   kKernelTBound,            // float decides t without its error bound

@@ -6,9 +6,11 @@
 #include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/region_kernels.h"
+#include "tests/support/conservative_answers.h"
 #include "tests/support/edge_on_cases.h"
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
+#include "tests/support/placed_scenes.h"
 #include "tests/support/region_trials.h"
 #include "tests/support/rewind_lockstep.h"
 #include "tests/support/scene_lockstep.h"
@@ -45,6 +47,18 @@ std::string compare_rewinds_with_model() { return search_rewind_lockstep(scaled_
 std::string compare_rewinds_of_busy_ticks_with_model() {
   return search_rewind_lockstep(scaled_count(10), 40, kTicksOfManyBatches);
 }
+
+std::string search_placed_scenes(QueryScene (*draw)(Random&), std::string (*fault)(const QueryScene&)) {
+  for (uint64_t seed = 0; seed < scaled_count(400); ++seed) {
+    Random random(seed);
+    if (std::string what = fault(draw(random)); !what.empty()) return what;
+  }
+  return "";
+}
+
+std::string compare_conservative_answers_with_bounds() { return search_placed_scenes(far_scene, placed_bounds_fault); }
+
+std::string compare_conservative_overlaps_with_exact() { return search_placed_scenes(touching_scene, superset_fault); }
 
 #ifdef LOCUS_X86_KERNELS
 // One object serves for all instruction sets: they are compiled from one source.
@@ -83,6 +97,8 @@ constexpr Trial kTrials[] = {
     {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
     {"RewindThatLooksOnlyWhereObjectsWere", PlantedBug::kRewindReach, compare_rewinds_with_model},
     {"RewindThatForgetsTheWayBack", PlantedBug::kRewindFastBox, compare_rewinds_of_busy_ticks_with_model},
+    {"PlacedBoundsAsWideAsFloatRounds", PlantedBug::kWidePlacedBounds, compare_conservative_answers_with_bounds},
+    {"PlacedBoundsAlone", PlantedBug::kPlacedBoundsAlone, compare_conservative_overlaps_with_exact},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

@@ -2,6 +2,7 @@
 // the service's own brute force.
 #include <gtest/gtest.h>
 
+#include "tests/support/placed_scenes.h"
 #include "tests/support/query_oracle.h"
 #include "tests/support/random_query.h"
 #include "tests/support/test_scale.h"
@@ -27,12 +28,15 @@ std::string oracle_difference(const QueryScene& scene, const SceneSnapshot& snap
   return "";
 }
 
+void expect_no_difference(const QueryScene& scene, uint64_t seed) {
+  ASSERT_EQ(oracle_difference(scene, *snapshot_of(scene.world)), "") << scene.world.name << ", seed " << seed;
+}
+
 template <class Draw>
 void expect_no_difference(uint64_t first, uint64_t count, const Draw& draw) {
   for (uint64_t seed = first; seed < first + count; ++seed) {
     Random random(seed);
-    const QueryScene scene = query_scene(draw(seed, random), random);
-    ASSERT_EQ(oracle_difference(scene, *snapshot_of(scene.world)), "") << scene.world.name << ", seed " << seed;
+    expect_no_difference(query_scene(draw(seed, random), random), seed);
   }
 }
 
@@ -41,6 +45,21 @@ TEST(QueryEqualsOracleTest, RandomScenesFirstHalf) { expect_no_difference(0, sca
 TEST(QueryEqualsOracleTest, RandomScenesSecondHalf) { expect_no_difference(5'000, scaled_count(5'000), random_sketch); }
 
 TEST(QueryEqualsOracleTest, AdversarialScenes) { expect_no_difference(0, scaled_count(1'200), troublesome_sketch); }
+
+TEST(QueryEqualsOracleTest, MeshesFarFromTheWorldsOriginByBoundsAndExactly) {
+  for (uint64_t seed = 0; seed < scaled_count(2'000); ++seed) {
+    Random random(seed);
+    QueryScene scene = far_scene(random);
+    std::vector<OwnedBlock> by_bounds = scene.blocks;
+    for (OwnedBlock& block : by_bounds) {
+      block.settings.precision = Precision::kConservative;
+      if (auto* rays = std::get_if<RayColumns>(&block.settings.kind); rays != nullptr)
+        rays->mode = random.chance(0.5) ? RayMode::kAll : RayMode::kFirst;
+    }
+    scene.blocks.insert(scene.blocks.end(), by_bounds.begin(), by_bounds.end());
+    expect_no_difference(scene, seed);
+  }
+}
 
 }  // namespace
 }  // namespace locus::test

@@ -41,6 +41,8 @@ class QueryOracle {
   }
 
  private:
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
   struct Row {
     float t = 0;
     Id id = 0;
@@ -94,24 +96,34 @@ class QueryOracle {
     const std::optional<float> whole = entry_of(slabs, instance.bounds);
     if (!whole) return;
     const Transform& transform = instance.transform;
-    const TriangleRay ray(transform, question.origin, question.direction, question.cull);
-    const PlacedTriangles placed(instance);
+    const Cull cull = question.conservative ? Cull::kNone : question.cull;
+    const TriangleRay ray(transform, question.origin, question.direction, cull);
+    const LoosePlacedTriangles loose(instance);
     for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
       const Triangle triangle = instance.mesh->triangle(number);
-      const std::optional<float> own = entry_of(slabs, placed.bounds_of_triangle(triangle));
-      if (!own) continue;
-      Row row{std::max(*own, *whole), instance.id, number, 0, nullptr, &instance, 0, 0, {}};
-      if (!question.conservative) {
-        const std::optional<TriangleHit> hit = ray.hit(triangle);
-        if (!hit) continue;
-        row.t = std::max(row.t, ray.from_scaled(hit->t));
+      Row row{kInfinity, instance.id, number, 0, nullptr, &instance, 0, 0, {}};
+      const std::optional<float> own = entry_of(slabs, loose.bounds_of_triangle(triangle));
+      const std::optional<TriangleHit> hit = ray.hit(triangle);
+      if (own && hit) {
+        row.t = std::max(std::max(*own, *whole), ray.from_scaled(hit->t));
         row.u = hit->u;
         row.v = hit->v;
         row.normal = normalized(transform.rotation.to_world(area_normal(triangle)));
         if (clockwise_) row.normal = -row.normal;
       }
-      rows.push_back(row);
+      if (question.conservative) {
+        row.t = std::min(row.t, entry_of_bounds(instance, triangle, question));
+        row.u = row.v = 0;
+        row.normal = {};
+      }
+      if (row.t < kInfinity) rows.push_back(row);
     }
+  }
+
+  // Returns infinity where the ray misses them.
+  static float entry_of_bounds(const Instance& instance, const Triangle& triangle, const Question& question) {
+    const SlabRay<double> slabs(Rayd{question.origin, question.direction}, kObjectPad);
+    return entry_of(slabs, PlacedTriangles(instance).bounds_of_triangle(triangle)).value_or(kInfinity);
   }
 
   void hit_on(const Object& object, const Question& question, Rows& rows) const {
@@ -198,13 +210,15 @@ class QueryOracle {
   void overlap_rows(const QueryBlock& block, StaticDetail detail, const Solid& solid, const Instance& instance,
                     Rows& rows) const {
     if (!meets(solid, instance.bounds)) return;
-    const PlacedTriangles placed(instance, reach(solid));
+    const PlacedTriangles placed(instance);
+    const LoosePlacedTriangles loose(instance, reach(solid));
     const auto mesh_solid = in_mesh(solid, instance.transform);
     const std::vector<uint32_t>& storage = storage_.at(instance.mesh.get());
     for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
       const Triangle triangle = instance.mesh->triangle(number);
-      if (!meets(solid, placed.bounds_of_triangle(triangle))) continue;
-      if (block.precision == Precision::kExact && !meets(mesh_solid, triangle)) continue;
+      const bool exactly = meets(mesh_solid, triangle) && meets(solid, loose.bounds_of_triangle(triangle));
+      const bool by_bounds = block.precision == Precision::kConservative;
+      if (!exactly && !(by_bounds && meets(solid, placed.bounds_of_triangle(triangle)))) continue;
       Row row{0, instance.id, kNoTriangle, 0, nullptr, &instance, 0, 0, {}};
       if (detail != StaticDetail::kInstances) row.triangle = number;
       if (detail == StaticDetail::kTriangles) row.storage = storage[number];

@@ -42,6 +42,24 @@ inline PlacedMesh placed(Id id, StaticMeshPtr mesh, Vec3d translation = {}) {
 // A wall at x = 0 of its own axes.
 inline StaticMeshPtr wall_mesh() { return mesh_of({wall_triangle(0)}); }
 
+// A cube from -1 to 1 in its own axes: six faces of two triangles each.
+inline StaticMeshPtr cube_mesh() {
+  std::vector<Triangle> triangles;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float side : {-1.0f, 1.0f}) {
+      const auto corner = [&](float first, float second) {
+        Vec3f vertex;
+        vertex[axis] = side;
+        vertex[(axis + 1) % 3] = first;
+        vertex[(axis + 2) % 3] = second;
+        return vertex;
+      };
+      triangles.push_back({corner(-1, -1), corner(1, -1), corner(1, 1)});
+      triangles.push_back({corner(-1, -1), corner(1, 1), corner(-1, 1)});
+    }
+  return mesh_of(triangles);
+}
+
 // Rays of equal mode from `origins` along the x axis.
 inline OwnedBlock rays_along_x(RayMode mode, std::vector<float> origins = {0, 0, 0}) {
   OwnedBlock block;

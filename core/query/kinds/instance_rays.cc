@@ -8,62 +8,94 @@
 namespace locus {
 namespace {
 
-// Triangles of one instance, exactly.
-class TriangleVisitor {
+// The exact verdict of one ray on triangles of one instance.
+class ExactTest {
  public:
   // `slabs`: of the same ray in world axes. `nearest`: no hit lies before it, where the ray enters the instance's
   // bounds.
-  TriangleVisitor(QueryTask& task, const TriangleRay& ray, const SlabRay<double>& slabs, const Instance& instance,
-                  float nearest, HitCollector& collector)
-      : task_(task), ray_(ray), slabs_(slabs), placed_(instance), nearest_(nearest), collector_(collector) {}
+  ExactTest(const TriangleRay& ray, const SlabRay<double>& slabs, const Instance& instance, float nearest)
+      : ray_(ray), slabs_(slabs), placed_(instance), nearest_(nearest) {}
 
-  float limit() const { return ray_.to_scaled(collector_.limit()); }
+  const TriangleRay& ray() const { return ray_; }
+  std::optional<float> hit(const Triangle& triangle) const {
+    const std::optional<TriangleHit> found = ray_.hit(triangle);
+    if (!found) return std::nullopt;
+    const std::optional<float> entered = entry(slabs_, placed_.bounds_of_triangle(triangle));
+    if (!entered) return std::nullopt;
+    return std::max(ray_.from_scaled(found->t), std::max(nearest_, *entered));
+  }
+
+ private:
+  const TriangleRay& ray_;
+  const SlabRay<double>& slabs_;
+  LoosePlacedTriangles placed_;
+  const float nearest_;
+};
+
+bool offer(const Instance& instance, const Triangle& triangle, float t, HitCollector& collector) {
+  Hit hit = hit_on(instance, t);
+  hit.triangle = triangle.number;
+  return collector.offer(hit);
+}
+
+// Triangles of one instance, exactly.
+class TriangleVisitor {
+ public:
+  TriangleVisitor(QueryTask& task, const ExactTest& exact, const Instance& instance, HitCollector& collector)
+      : task_(task), exact_(exact), instance_(instance), collector_(collector) {}
+
+  float limit() const { return exact_.ray().to_scaled(collector_.limit()); }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
-    const std::optional<TriangleHit> found = ray_.hit(triangle);
-    if (!found) return true;
-    const std::optional<float> entered = entry(slabs_, placed_.bounds_of_triangle(triangle));
-    if (!entered) return true;
-    Hit hit = hit_on(placed_.instance(), std::max(ray_.from_scaled(found->t), std::max(nearest_, *entered)));
-    hit.triangle = triangle.number;
-    return collector_.offer(hit);
+    const std::optional<float> t = exact_.hit(triangle);
+    return !t || offer(instance_, triangle, *t, collector_);
   }
 
  private:
   QueryTask& task_;
-  const TriangleRay& ray_;
-  const SlabRay<double>& slabs_;
-  PlacedTriangles placed_;
-  const float nearest_;
+  const ExactTest& exact_;
+  const Instance& instance_;
   HitCollector& collector_;
 };
 
-// Triangles of one instance by their placed bounds.
+// Triangles of one instance by their placed bounds, and what the exact test finds though rounding puts it beside or
+// before them: so all exact hits are found, no later.
 class PlacedBoundsVisitor {
  public:
-  PlacedBoundsVisitor(QueryTask& task, const SlabRay<double>& slabs, const Instance& instance, float nearest,
+  PlacedBoundsVisitor(QueryTask& task, const RayRequest& request, const ExactTest& exact, const Instance& instance,
                       HitCollector& collector)
-      : task_(task), slabs_(slabs), placed_(instance), nearest_(nearest), collector_(collector) {}
+      : task_(task),
+        slabs_(Rayd{request.origin, request.direction}, kObjectPad),
+        exact_(exact),
+        instance_(instance),
+        placed_(instance),
+        collector_(collector) {}
 
-  Aabbf bounds() const { return placed_.everything(); }
+  Aabbf bounds() const { return instance_.mesh->bounds(); }
   bool overlaps(const Aabbf& box) const {
     const std::optional<float> t = entry(slabs_, placed_.bounds_of_box(box));
-    return t && *t <= collector_.limit();
+    return (t && *t <= collector_.limit()) || exact_overlaps(box);
   }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
-    const std::optional<float> t = entry(slabs_, placed_.bounds_of_triangle(triangle));
-    if (!t) return true;
-    Hit hit = hit_on(placed_.instance(), std::max(*t, nearest_));
-    hit.triangle = triangle.number;
-    return collector_.offer(hit);
+    std::optional<float> t = entry(slabs_, placed_.bounds_of_triangle(triangle));
+    const std::optional<float> exact = exact_.hit(triangle);
+    if (exact) t = std::min(t.value_or(*exact), *exact);
+    return !t || offer(instance_, triangle, *t, collector_);
   }
 
  private:
+  bool exact_overlaps(const Aabbf& box) const {
+    const Interval<float> interval = exact_.ray().slabs().interval(box);
+    return interval.near <= interval.far && interval.far >= 0 &&
+           interval.near <= exact_.ray().to_scaled(collector_.limit());
+  }
+
   QueryTask& task_;
-  const SlabRay<double>& slabs_;
-  PlacedTriangles placed_;
-  const float nearest_;
+  const SlabRay<double> slabs_;
+  const ExactTest& exact_;
+  const Instance& instance_;
+  const PlacedTriangles placed_;
   HitCollector& collector_;
 };
 
@@ -71,13 +103,15 @@ class PlacedBoundsVisitor {
 
 void ask_instance(QueryTask& task, const RayRequest& request, const SlabRay<double>& slabs, const Instance& instance,
                   float nearest, HitCollector& collector) {
-  if (request.precision == Precision::kConservative) {
-    PlacedBoundsVisitor visitor(task, slabs, instance, nearest, collector);
+  const bool by_bounds = request.precision == Precision::kConservative;
+  const TriangleRay ray(instance.transform, request.origin, request.direction, by_bounds ? Cull::kNone : request.cull);
+  const ExactTest exact(ray, slabs, instance, nearest);
+  if (by_bounds) {
+    PlacedBoundsVisitor visitor(task, request, exact, instance, collector);
     task.visit_region(instance.mesh->tree(), visitor);
     return;
   }
-  const TriangleRay ray(instance.transform, request.origin, request.direction, request.cull);
-  TriangleVisitor visitor(task, ray, slabs, instance, nearest, collector);
+  TriangleVisitor visitor(task, exact, instance, collector);
   task.visit_ray(instance.mesh->tree(), ray.slabs(), visitor);
 }
 

@@ -147,19 +147,24 @@ class InstanceRows {
 class TrianglesNear {
  public:
   TrianglesNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
-      : task_(task), point_(request.point), placed_(instance), rows_(rows), pad_(pad(request, instance)) {}
+      : task_(task),
+        point_(request.point),
+        transform_(instance.transform),
+        placed_(instance),
+        rows_(rows),
+        pad_(pad(request, instance)) {}
 
   // In mesh axes.
   double limit() const {
     if (rows_.farthest() != farthest_) {
       farthest_ = rows_.farthest();
-      limit_ = squared_limit((raised(farthest_) + pad_) / placed_.instance().transform.scale);
+      limit_ = squared_limit((raised(farthest_) + pad_) / transform_.scale);
     }
     return limit_;
   }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
-    const PlacedTriangles::Corners corners = placed_.corners_of(triangle);
+    const Corners corners = corners_of(transform_, triangle);
     const double to_bounds = squared_distance(point_, placed_.bounds_of_corners(corners));
     if (to_bounds > rows_.limit()) return true;
     rows_.offer(triangle, std::max(to_bounds, squared_distance(point_, corners[0], corners[1], corners[2])));
@@ -177,6 +182,7 @@ class TrianglesNear {
 
   QueryTask& task_;
   const Vec3d point_;
+  const Transform& transform_;
   const PlacedTriangles placed_;
   InstanceRows& rows_;
   const double pad_;
@@ -188,9 +194,9 @@ class TrianglesNear {
 class PlacedBoundsNear {
  public:
   PlacedBoundsNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
-      : task_(task), point_(request.point), placed_(instance), rows_(rows) {}
+      : task_(task), point_(request.point), mesh_(*instance.mesh), placed_(instance), rows_(rows) {}
 
-  Aabbf bounds() const { return placed_.everything(); }
+  Aabbf bounds() const { return mesh_.bounds(); }
   bool overlaps(const Aabbf& box) const {
     return squared_distance(point_, placed_.bounds_of_box(box)) <= rows_.limit();
   }
@@ -203,6 +209,7 @@ class PlacedBoundsNear {
  private:
   QueryTask& task_;
   const Vec3d point_;
+  const StaticMesh& mesh_;
   const PlacedTriangles placed_;
   InstanceRows& rows_;
 };
@@ -272,9 +279,8 @@ Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
     shape.position = shape.position - point;
     return nearest_on_shape({}, shape);
   }
-  const PlacedTriangles placed(*row.instance);
-  const PlacedTriangles::Corners corners = placed.corners_of(row.instance->mesh->triangle(row.triangle));
-  if (by_bounds) return nearest_in(point, placed.bounds_of_corners(corners)) - point;
+  const Corners corners = corners_of(row.instance->transform, row.instance->mesh->triangle(row.triangle));
+  if (by_bounds) return nearest_in(point, PlacedTriangles(*row.instance).bounds_of_corners(corners)) - point;
   return nearest_on_triangle({}, corners[0] - point, corners[1] - point, corners[2] - point);
 }
 

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "core/base/planted_bug.h"
 #include "core/index/regions.h"
 #include "core/query/kinds/placed_triangle.h"
 #include "core/query/kinds/triangle_search.h"
@@ -151,50 +152,82 @@ class InstanceRows {
   size_t found_ = 0;
 };
 
+// The exact verdict of one ball or box on triangles of one instance.
+template <class Kind>
+class ExactTest {
+ public:
+  ExactTest(const typename Kind::World& world_shape, const Instance& instance)
+      : shape_(Kind::to_mesh(world_shape, instance.transform)),
+        world_shape_(world_shape),
+        placed_(instance, Kind::reach(world_shape)) {}
+
+  const typename Kind::Mesh& mesh_shape() const { return shape_; }
+  const LoosePlacedTriangles& placed() const { return placed_; }
+  bool overlaps(const Triangle& triangle) const {
+    return Kind::overlaps_triangle(shape_, triangle) &&
+           Kind::overlaps_bounds(world_shape_, placed_.bounds_of_triangle(triangle));
+  }
+
+ private:
+  const typename Kind::Mesh shape_;
+  const typename Kind::World& world_shape_;
+  const LoosePlacedTriangles placed_;
+};
+
 template <class Kind>
 class ExactTriangles {
  public:
-  // `world_shape` is `shape` in world axes.
-  ExactTriangles(QueryTask& task, const typename Kind::Mesh& shape, const typename Kind::World& world_shape,
-                 const PlacedTriangles& placed, InstanceRows rows)
-      : task_(task), shape_(shape), region_(shape), world_shape_(world_shape), placed_(placed), rows_(rows) {}
+  ExactTriangles(QueryTask& task, const ExactTest<Kind>& exact, InstanceRows rows)
+      : task_(task), region_(exact.mesh_shape()), exact_(exact), rows_(rows) {}
 
   Aabbf bounds() const { return region_.bounds(); }
   bool overlaps(const Aabbf& box) const { return region_.overlaps(box); }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
-    const bool found = Kind::overlaps_triangle(shape_, triangle) &&
-                       Kind::overlaps_bounds(world_shape_, placed_.bounds_of_triangle(triangle));
+    return !exact_.overlaps(triangle) || rows_.offer(triangle);
+  }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::MeshRegion region_;
+  const ExactTest<Kind>& exact_;
+  InstanceRows rows_;
+};
+
+// Triangles of one instance by their placed bounds, and what the exact test finds though rounding to the mesh's floats
+// puts it beside them.
+template <class Kind>
+class PlacedBounds {
+ public:
+  PlacedBounds(QueryTask& task, const typename Kind::World& shape, const Instance& instance, InstanceRows rows)
+      : task_(task),
+        shape_(shape),
+        region_(shape),
+        mesh_(*instance.mesh),
+        placed_(instance),
+        exact_(shape, instance),
+        mesh_region_(exact_.mesh_shape()),
+        rows_(rows) {}
+
+  Aabbf bounds() const { return mesh_.bounds(); }
+  bool overlaps(const Aabbf& box) const {
+    return region_.overlaps(placed_.bounds_of_box(box)) || mesh_region_.overlaps(box);
+  }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    const bool found = Kind::overlaps_bounds(shape_, placed_.bounds_of_triangle(triangle)) ||
+                       (exact_.overlaps(triangle) && !planted(PlantedBug::kPlacedBoundsAlone));
     return !found || rows_.offer(triangle);
   }
 
  private:
   QueryTask& task_;
-  const typename Kind::Mesh& shape_;
-  typename Kind::MeshRegion region_;
-  const typename Kind::World& world_shape_;
-  const PlacedTriangles& placed_;
-  InstanceRows rows_;
-};
-
-template <class Kind>
-class PlacedBounds {
- public:
-  PlacedBounds(QueryTask& task, const typename Kind::World& shape, const Instance& instance, InstanceRows rows)
-      : task_(task), shape_(shape), region_(shape), placed_(instance, Kind::reach(shape)), rows_(rows) {}
-
-  Aabbf bounds() const { return placed_.everything(); }
-  bool overlaps(const Aabbf& box) const { return region_.overlaps(placed_.bounds_of_box(box)); }
-  bool visit(const Triangle& triangle) {
-    if (!task_.count_test()) return false;
-    return !Kind::overlaps_bounds(shape_, placed_.bounds_of_triangle(triangle)) || rows_.offer(triangle);
-  }
-
- private:
-  QueryTask& task_;
   const typename Kind::World& shape_;
-  typename Kind::WorldRegion region_;
-  PlacedTriangles placed_;
+  const typename Kind::WorldRegion region_;
+  const StaticMesh& mesh_;
+  const PlacedTriangles placed_;
+  const ExactTest<Kind> exact_;
+  const typename Kind::MeshRegion mesh_region_;
   InstanceRows rows_;
 };
 
@@ -225,12 +258,12 @@ class InstanceSearch {
  private:
   void visit_exactly(const Instance& instance, InstanceRows& rows) {
     const TriangleBvh& tree = instance.mesh->tree();
-    const typename Kind::Mesh shape = Kind::to_mesh(shape_, instance.transform);
-    const PlacedTriangles placed(instance, Kind::reach(shape_));
+    const ExactTest<Kind> exact(shape_, instance);
+    const typename Kind::Mesh& shape = exact.mesh_shape();
     if (task_.searches_triangles() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
-        placed.bounds_follow(to_double(shape.center), Kind::size(shape)))
+        exact.placed().bounds_follow(to_double(shape.center), Kind::size(shape)))
       return search(tree, shape, rows);
-    ExactTriangles<Kind> visitor(task_, shape, shape_, placed, rows);
+    ExactTriangles<Kind> visitor(task_, exact, rows);
     task_.visit_region(tree, visitor);
   }
 

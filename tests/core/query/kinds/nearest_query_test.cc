@@ -220,5 +220,24 @@ TEST(NearestQueryTest, FewTrianglesOfALargeMeshAreMeasured) {
   EXPECT_LE(result.work.tests, 200u);
 }
 
+TEST(NearestQueryTest, WithoutTheExactShapeDistanceAndPointAreOfOneBoxFarFromTheOrigin) {
+  for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
+    QueryWorld world;
+    PlacedMesh cube = placed(4, cube_mesh(), {away, away, -away});
+    cube.rotation = {0, 0, 0.70710678f, 0.70710678f};
+    world.instances = {cube};
+    OwnedBlock block = one_point({-4, 5, 0.5f}, 1, StaticDetail::kTriangles);
+    block.settings.frame = {away, away, -away};
+    block.settings.precision = Precision::kConservative;
+    block.settings.columns = {Column::kT, Column::kPoint};
+    const BlockResult result = run_block(*snapshot_of(world), block);
+    ASSERT_EQ(result.t.size(), 1u);
+    EXPECT_NEAR(result.t[0], 5, std::max(1e-6, away * 0x1p-39)) << away;
+    const double x = -4 - double{result.points[0]}, y = 5 - double{result.points[1]},
+                 z = 0.5 - double{result.points[2]};
+    EXPECT_NEAR(std::sqrt(x * x + y * y + z * z), result.t[0], 1e-6) << away;
+  }
+}
+
 }  // namespace
 }  // namespace locus::test

@@ -229,5 +229,44 @@ TEST(OverlapQueryTest, InstancesAreFoundAtTheirScaleAndPlace) {
   }
 }
 
+TEST(OverlapQueryTest, ConservativeTurnedQueryBoxesCountAsTheirAxisAlignedBounds) {
+  QueryWorld world;
+  world.objects = {point_object(1, {1.41, 1.41, 0.9}), point_object(2, {1.42, 0, 0})};
+  world.instances = {placed(3, mesh_of({{{1.4f, 1.4f, 0}, {2, 1.4f, 0}, {1.4f, 2, 0}}})),
+                     placed(4, mesh_of({{{1.42f, 0, 0}, {2, 0, 0}, {2, 1, 0}}}))};
+  OwnedBlock block = one_box({0, 0, 0}, {1, 1, 1});
+  block.extras = {0, 0, std::sin(0.39269908f), std::cos(0.39269908f)};  // 45 degrees about z
+  EXPECT_THAT(run_block(*snapshot_of(world), block).ids, IsEmpty());
+  block.settings.precision = Precision::kConservative;
+  EXPECT_THAT(run_block(*snapshot_of(world), block).ids, ElementsAre(1, 3));
+}
+
+TEST(OverlapQueryTest, ConservativeBallsReachBoundsAsBalls) {
+  QueryWorld world;
+  world.objects = {ball_object(1, {1.6, 1.6, 0}, 1), ball_object(2, {1.75, 1.75, 0}, 1)};
+  world.instances = {placed(3, mesh_of({{{0.6f, 0.9f, 0}, {0.9f, 0.6f, 0}, {0.9f, 0.9f, 0}}})),
+                     placed(4, mesh_of({{{0.75f, 0.75f, 0}, {0.9f, 0.75f, 0}, {0.75f, 0.9f, 0}}}))};
+  OwnedBlock block = one_ball({0, 0, 0}, 1);
+  EXPECT_THAT(run_block(*snapshot_of(world), block).ids, IsEmpty());
+  block.settings.precision = Precision::kConservative;
+  EXPECT_THAT(run_block(*snapshot_of(world), block).ids, ElementsAre(1, 3));
+}
+
+TEST(OverlapQueryTest, ConservativeRegionsFarFromTheOriginReachWhatTheyReachNearIt) {
+  for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
+    QueryWorld world;
+    world.instances = {placed(4, mesh_of({wall_triangle(1), wall_triangle(8)}), {away, 0, -away})};
+    OwnedBlock blocks[] = {one_ball({3, 0, 0}, 2), one_ball({3, 0, 0}, 1.99f), one_box({3, 0, 0}, {2, 1, 1}),
+                           one_box({3, 0, 0}, {1.99f, 1, 1})};
+    std::vector<size_t> found;
+    for (OwnedBlock& block : blocks) {
+      block.settings.frame = {away, 0, -away};
+      block.settings.precision = Precision::kConservative;
+      found.push_back(run_block(*snapshot_of(world), block).ids.size());
+    }
+    EXPECT_THAT(found, ElementsAre(1, 0, 1, 0)) << away;
+  }
+}
+
 }  // namespace
 }  // namespace locus::test

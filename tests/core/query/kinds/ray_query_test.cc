@@ -355,5 +355,75 @@ TEST(RayQueryTest, ConservativeRaysEnterBoundsAndHaveNoSurface) {
   EXPECT_THAT(result.uvs, ElementsAre(0, 0));
 }
 
+// Bounds are grown by 2^-41 of the magnitudes, and the slab test by 2^-40 of those of origin and box.
+TEST(RayQueryTest, ConservativeRaysEnterBoundsOfPlacedTrianglesWhereTheyAreFarFromTheOrigin) {
+  for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
+    QueryWorld world;
+    world.instances = {placed(4, cube_mesh(), {away, -away, 0})};
+    OwnedBlock block = one_ray(RayMode::kFirst, {-11, 0.25f, 0.5f}, {1, 0, 0});
+    block.settings.frame = {away, -away, 0};
+    EXPECT_THAT(run_block(*snapshot_of(world), block).t, ElementsAre(10));
+    block.settings.precision = Precision::kConservative;
+    const BlockResult result = run_block(*snapshot_of(world), block);
+    EXPECT_THAT(result.ids, ElementsAre(4));
+    EXPECT_LE(result.t[0], 10);
+    EXPECT_GE(result.t[0], 10 - std::max(1e-6, away * 0x1p-38)) << away;
+  }
+}
+
+TEST(RayQueryTest, ConservativeRaysPassPlacedTrianglesThatTheyPassFarFromTheOrigin) {
+  QueryWorld world;
+  world.instances = {placed(4, cube_mesh(), {1e6, 0, 0})};
+  OwnedBlock block = one_ray(RayMode::kAny, {-11, 1.0001f, 0}, {1, 0, 0});
+  block.settings.frame = {1e6, 0, 0};
+  block.settings.precision = Precision::kConservative;
+  EXPECT_EQ(run_block(*snapshot_of(world), block).hits, std::string("\0", 1));
+}
+
+class FarHitTest : public ::testing::TestWithParam<Precision> {
+ protected:
+  // Walls 5e44 and 9e44 lengths of the direction away, a ball between them.
+  FarHitTest() {
+    world_.objects = {ball_object(3, {7, 0, 0})};
+    world_.instances = {placed(9, wall_mesh(), {5, 0, 0}), placed(2, wall_mesh(), {9, 0, 0})};
+  }
+  BlockResult answer(RayMode mode, float t_max) const {
+    OwnedBlock block = one_ray(mode, {0, 0, 0}, {1e-44f, 0, 0});
+    block.extras = {t_max};
+    block.settings.precision = GetParam();
+    return run_block(*snapshot_of(world_), block);
+  }
+
+  QueryWorld world_;
+};
+
+constexpr float kLargest = std::numeric_limits<float>::max();
+
+TEST_P(FarHitTest, BeyondTheLargestFloatIsAtTheLargestFloat) {
+  const BlockResult first = answer(RayMode::kFirst, kInf);
+  EXPECT_THAT(first.t, ElementsAre(kLargest));
+  EXPECT_THAT(first.ids, ElementsAre(2));
+  const BlockResult all = answer(RayMode::kAll, kInf);
+  EXPECT_THAT(all.t, ElementsAre(kLargest, kLargest, kLargest));
+  EXPECT_THAT(all.ids, ElementsAre(2, 3, 9));
+}
+
+TEST_P(FarHitTest, BeyondTheLargestFloatIsWithinALimitOfThatAndBeyondAnyOther) {
+  EXPECT_EQ(answer(RayMode::kAny, kLargest).hits, "\1");
+  EXPECT_THAT(answer(RayMode::kFirst, kLargest).ids, ElementsAre(2));
+  EXPECT_EQ(answer(RayMode::kAny, std::nextafter(kLargest, 0.0f)).hits, std::string("\0", 1));
+  EXPECT_THAT(answer(RayMode::kFirst, std::nextafter(kLargest, 0.0f)).t, ElementsAre(kInf));
+}
+
+TEST_P(FarHitTest, BeyondTheLargestFloatHasThePointAtTheLargestFloat) {
+  OwnedBlock block = one_ray(RayMode::kFirst, {1, 0, 0}, {1e-44f, 0, 0});
+  block.settings.columns = {Column::kPoint};
+  block.settings.precision = GetParam();
+  const BlockResult result = run_block(*snapshot_of(world_), block);
+  EXPECT_THAT(result.points, ElementsAre(static_cast<float>(1 + double{1e-44f} * double{kLargest}), 0, 0));
+}
+
+INSTANTIATE_TEST_SUITE_P(Precisions, FarHitTest, ::testing::Values(Precision::kExact, Precision::kConservative));
+
 }  // namespace
 }  // namespace locus::test

@@ -1,0 +1,225 @@
+// What is wrong with conservative answers: held against exact ones, which they must contain, and against bounds of
+// placed triangles in long double, which share no arithmetic with the product.
+#ifndef LOCUS_TESTS_SUPPORT_CONSERVATIVE_ANSWERS_H_
+#define LOCUS_TESTS_SUPPORT_CONSERVATIVE_ANSWERS_H_
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/support/random_query.h"
+#include "tests/support/real.h"
+
+namespace locus::test {
+
+namespace internal {
+
+struct FoundRow {
+  float t = 0;
+  Vec3f point;  // of what is nearest, relative to the frame
+};
+using Found = std::map<std::pair<Id, uint32_t>, FoundRow>;  // by id and triangle
+
+inline bool is_lookup(const OwnedBlock& block) { return std::holds_alternative<LookupColumns>(block.settings.kind); }
+
+// Returns everything found, triangle by triangle, whatever number of rows the block asks for.
+inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock block, Precision precision) {
+  block.settings.precision = precision;
+  block.settings.max_results = limits::kMaxMaxResults;
+  block.settings.columns = {Column::kId, Column::kTriangle};
+  if (auto* rays = std::get_if<RayColumns>(&block.settings.kind); rays != nullptr) {
+    rays->mode = RayMode::kAll;
+    block.settings.columns.add(Column::kT);
+  }
+  if (auto* nearest = std::get_if<NearestColumns>(&block.settings.kind); nearest != nullptr) {
+    nearest->detail = StaticDetail::kTriangles;
+    nearest->count = limits::kMaxNearest;
+    block.settings.columns.add(Column::kT);
+    block.settings.columns.add(Column::kPoint);
+  }
+  const BlockResult result = run_block(snapshot, block);
+  LOCUS_CHECK(result.truncated.empty());
+  std::vector<Found> found;
+  size_t row = 0;
+  for (const uint32_t rows : result.counts) {
+    found.emplace_back();
+    for (const size_t end = row + rows; row < end; ++row) {
+      FoundRow& one = found.back()[{result.ids[row], result.triangles[row]}];
+      if (!result.t.empty()) one.t = result.t[row];
+      if (!result.points.empty())
+        one.point = {result.points[3 * row], result.points[3 * row + 1], result.points[3 * row + 2]};
+    }
+  }
+  return found;
+}
+
+inline std::string name_of(std::pair<Id, uint32_t> key) {
+  return "id " + std::to_string(key.first) + " triangle " + std::to_string(key.second);
+}
+
+inline std::string lacking(const Found& exact, const Found& conservative) {
+  for (const auto& [key, row] : exact) {
+    const auto other = conservative.find(key);
+    if (other == conservative.end()) return name_of(key) + " is not found";
+    if (!(other->second.t <= row.t))
+      return name_of(key) + " is found at " + std::to_string(other->second.t) + ", after " + std::to_string(row.t);
+  }
+  return "";
+}
+
+using BoxReal = Aabb<Real>;
+
+inline BoxReal placed_bounds(const PlacedMesh& placed, const Triangle& triangle) {
+  BoxReal bounds;
+  for (const Vec3f corner : {triangle.a, triangle.b, triangle.c})
+    bounds = merge(bounds, to_real(placed.translation) + turned(placed.rotation, to_real(corner)) * Real{placed.scale});
+  return bounds;
+}
+
+// One query of a block, in long double.
+class RealQuery {
+ public:
+  RealQuery(const OwnedBlock& block, size_t i) : at_(to_real(block.settings.frame) + triple(block.points, i)) {
+    if (std::holds_alternative<RayColumns>(block.settings.kind)) direction_ = triple(block.sizes, i);
+    if (std::holds_alternative<BallColumns>(block.settings.kind)) radius_ = entry(block.sizes, i);
+    if (std::holds_alternative<BoxColumns>(block.settings.kind)) half_ = half_bounds(block, i);
+  }
+
+  // Returns nothing where it does not meet the box, else the distance to it, or along the ray.
+  std::optional<Real> meets(const BoxReal& box) const {
+    if (direction_) return entered(box);
+    const Vec3r gap = max(max(box.min - at_, at_ - box.max), Vec3r{});
+    if (half_)
+      return gap.x <= half_->x && gap.y <= half_->y && gap.z <= half_->z ? std::optional<Real>(0) : std::nullopt;
+    if (radius_) return length(gap) <= *radius_ ? std::optional<Real>(0) : std::nullopt;
+    return length(gap);
+  }
+  bool is_point() const { return !direction_ && !half_ && !radius_; }
+  // Returns the largest coordinate involved.
+  Real magnitude() const {
+    const Real size = half_ ? max_component(*half_) : radius_.value_or(0);
+    return max_component(abs(at_)) + size;
+  }
+
+ private:
+  static Vec3r triple(const std::vector<float>& column, size_t i) {
+    const size_t first = column.size() == 3 ? 0 : 3 * i;
+    return {column[first], column[first + 1], column[first + 2]};
+  }
+  static Real entry(const std::vector<float>& column, size_t i) { return column[column.size() == 1 ? 0 : i]; }
+
+  // Returns the half extents of the bounds of the box, which may be rotated.
+  static Vec3r half_bounds(const OwnedBlock& block, size_t i) {
+    const Vec3r half = triple(block.sizes, i);
+    if (block.extras.empty()) return half;
+    const float* q = &block.extras[block.extras.size() == 4 ? 0 : 4 * i];
+    Vec3r bounds;
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3r side;
+      side[axis] = half[axis];
+      bounds = bounds + abs(turned({q[0], q[1], q[2], q[3]}, side));
+    }
+    return bounds;
+  }
+
+  std::optional<Real> entered(const BoxReal& box) const {
+    Real near = 0, far = std::numeric_limits<Real>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      const Real o = at_[axis], d = (*direction_)[axis];
+      if (d == 0 && (o < box.min[axis] || o > box.max[axis])) return std::nullopt;
+      if (d == 0) continue;
+      near = std::max(near, ((d > 0 ? box.min[axis] : box.max[axis]) - o) / d);
+      far = std::min(far, ((d > 0 ? box.max[axis] : box.min[axis]) - o) / d);
+    }
+    return near <= far ? std::optional<Real>(near) : std::nullopt;
+  }
+
+  Vec3r at_;
+  std::optional<Vec3r> direction_, half_;
+  std::optional<Real> radius_;
+};
+
+// Describes what is wrong with the answer of one query about one triangle; empty for nothing.
+inline std::string triangle_fault(const RealQuery& query, const PlacedMesh& placed, uint32_t number, const Found& exact,
+                                  const Found& conservative) {
+  const std::pair<Id, uint32_t> key{placed.id, number};
+  const BoxReal bounds = placed_bounds(placed, placed.mesh->triangle(number));
+  const Real size =
+      max_component(abs(to_real(placed.translation))) + 4 * placed.scale * Real{magnitude(placed.mesh->bounds())};
+  const Real slack = 0x1p-38L * (size + query.magnitude());
+  const std::optional<Real> inner = query.meets(bounds), outer = query.meets(grown(bounds, slack));
+  const auto found = conservative.find(key);
+  if (found == conservative.end()) return inner ? name_of(key) + " is not found" : "";
+  const auto exactly = exact.find(key);
+  const float t = found->second.t;
+  if (exactly != exact.end() && exactly->second.t == t) return "";
+  if (!outer) return name_of(key) + " is found far outside of its bounds";
+  constexpr Real kRounding = 0x1p-22L;
+  if (t < *outer * (1 - kRounding) || (inner && t > *inner * (1 + kRounding)))
+    return name_of(key) + " is found at " + std::to_string(t) + ", where its bounds begin at " + std::to_string(*outer);
+  return "";
+}
+
+// Describes a point that is not as far as its distance says; empty for none.
+inline std::string point_fault(const OwnedBlock& block, size_t i, const FoundRow& row) {
+  const Vec3r from = {block.points[3 * i], block.points[3 * i + 1], block.points[3 * i + 2]};
+  const Real away = length(to_real(row.point) - from);
+  const Real rounding = 0x1p-21L * (length(from) + length(to_real(row.point))) +
+                        0x1p-50L * max_component(abs(to_real(block.settings.frame)));
+  if (std::abs(away - row.t) <= rounding) return "";
+  return "distance " + std::to_string(row.t) + ", but the point is " + std::to_string(away) + " away";
+}
+
+inline std::string query_fault(const QueryWorld& world, const OwnedBlock& block, size_t i, const Found& exact,
+                               const Found& conservative) {
+  const RealQuery query(block, i);
+  for (const PlacedMesh& placed : world.instances)
+    for (uint32_t number = 0; number < placed.mesh->triangle_count(); ++number)
+      if (std::string what = triangle_fault(query, placed, number, exact, conservative); !what.empty()) return what;
+  if (!query.is_point()) return "";
+  for (const auto& [key, row] : conservative)
+    if (const std::string what = point_fault(block, i, row); !what.empty()) return name_of(key) + ": " + what;
+  return "";
+}
+
+template <class Fault>
+std::string conservative_fault(const QueryScene& scene, const Fault& fault) {
+  const SnapshotPtr snapshot = snapshot_of(scene.world);
+  for (size_t b = 0; b < scene.blocks.size(); ++b) {
+    const OwnedBlock& block = scene.blocks[b];
+    if (is_lookup(block)) continue;
+    const auto exact = found_by(*snapshot, block, Precision::kExact);
+    const auto conservative = found_by(*snapshot, block, Precision::kConservative);
+    for (size_t i = 0; i < exact.size(); ++i)
+      if (const std::string what = fault(block, i, exact[i], conservative[i]); !what.empty())
+        return "block " + std::to_string(b) + ", query " + std::to_string(i) + ": " + what;
+  }
+  return "";
+}
+
+}  // namespace internal
+
+// Describes the first exact row that conservative ones lack, or have later; empty for none.
+inline std::string superset_fault(const QueryScene& scene) {
+  return internal::conservative_fault(
+      scene, [](const OwnedBlock& /*block*/, size_t /*query*/, const internal::Found& exact,
+                const internal::Found& conservative) { return internal::lacking(exact, conservative); });
+}
+
+// Describes the first conservative row that the bounds of its triangle, grown by 2^-38 of the magnitudes, do not
+// explain, or that is not there though they are met; empty for none. For scenes of instances alone, and queries without
+// filters, limits and culling.
+inline std::string placed_bounds_fault(const QueryScene& scene) {
+  return internal::conservative_fault(
+      scene, [&](const OwnedBlock& block, size_t i, const internal::Found& exact, const internal::Found& conservative) {
+        return internal::query_fault(scene.world, block, i, exact, conservative);
+      });
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_CONSERVATIVE_ANSWERS_H_
