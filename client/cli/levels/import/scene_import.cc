@@ -211,7 +211,7 @@ absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const Import
   // Before parsing: what this refuses makes the parser read beyond its data.
   ASSIGN_OR_RETURN(const std::optional<uint64_t> declared, declared_faces(path));
   Assimp::Importer importer;
-  ASSIGN_OR_RETURN(const const aiScene* parsed, parse(importer, path));
+  ASSIGN_OR_RETURN(const aiScene* const parsed, parse(importer, path));
   const FaceCounts found = count_faces(*parsed);
   RETURN_IF_ERROR(check_scene(*parsed, found, declared));
   const aiScene* scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
