@@ -20,6 +20,7 @@ constexpr std::array<absl::string_view, 18> kReasonNames = {
     "UNSPECIFIED",  "NOT_FINITE",      "UNKNOWN_ID", "DUPLICATE_ID",  "COLUMN_LENGTH",  "LIMIT",
     "OUT_OF_RANGE", "SCENE_RESTARTED", "NOT_SERVED", "NOT_FOUND",     "ALREADY_EXISTS", "DRAINING",
     "MALFORMED",    "BATCH_GAP",       "IN_USE",     "HASH_MISMATCH", "RECOVERING",     "DAMAGED"};
+static_assert(kReasonNames.size() == static_cast<size_t>(kLastReason) + 1 && !kReasonNames.back().empty());
 
 // Whole numbers without an exponent, as limits are.
 std::string number(double value) {

@@ -34,6 +34,7 @@ enum class Reason : uint8_t {
   kRecovering = 16,
   kDamaged = 17,
 };
+inline constexpr Reason kLastReason = Reason::kDamaged;
 
 // "NOT_FINITE" and so on: how messages and the command line print a reason.
 absl::string_view reason_name(Reason reason);

@@ -11,8 +11,7 @@
 namespace locus {
 namespace {
 
-absl::Status check_counts(const std::vector<float>& vertices, const std::vector<uint32_t>& indices,
-                          const std::vector<MeshPart>& parts) {
+absl::Status check_counts(const std::vector<float>& vertices, const std::vector<uint32_t>& indices) {
   if (vertices.size() % 3 != 0)
     return refuse_argument(Reason::kColumnLength, "vertices", {},
                            absl::StrCat("holds ", vertices.size(), " numbers; give x, y, z for each vertex"));
@@ -28,23 +27,6 @@ absl::Status check_counts(const std::vector<float>& vertices, const std::vector<
   if (indices.size() / 3 > limits::kMaxMeshTriangles)
     return refuse_limit("indices", "mesh_triangles", limits::kMaxMeshTriangles,
                         static_cast<double>(indices.size() / 3));
-  if (parts.size() > limits::kMaxMeshParts)
-    return refuse_limit("parts", "mesh_parts", limits::kMaxMeshParts, static_cast<double>(parts.size()));
-  return absl::OkStatus();
-}
-
-absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles) {
-  for (size_t i = 0; i < parts.size(); ++i) {
-    const auto index = static_cast<uint32_t>(i);
-    if (parts[i].name.size() > limits::kMaxLabelLength)
-      return refuse_limit(absl::StrCat("parts[", i, "].name"), "label_length", limits::kMaxLabelLength,
-                          static_cast<double>(parts[i].name.size()));
-    const uint32_t first = parts[i].first_triangle;
-    const bool in_order = i == 0 ? first == 0 : first > parts[i - 1].first_triangle;
-    if (!in_order || first >= triangles)
-      return refuse_argument(Reason::kMalformed, "parts", index,
-                             "parts begin at triangle 0, ascend and lie within the mesh");
-  }
   return absl::OkStatus();
 }
 
@@ -66,9 +48,26 @@ absl::Status check_values(const std::vector<float>& vertices, const std::vector<
 
 }  // namespace
 
+absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles) {
+  if (parts.size() > limits::kMaxMeshParts)
+    return refuse_limit("parts", "mesh_parts", limits::kMaxMeshParts, static_cast<double>(parts.size()));
+  for (size_t i = 0; i < parts.size(); ++i) {
+    const auto index = static_cast<uint32_t>(i);
+    if (parts[i].name.size() > limits::kMaxLabelLength)
+      return refuse_limit(absl::StrCat("parts[", i, "].name"), "label_length", limits::kMaxLabelLength,
+                          static_cast<double>(parts[i].name.size()));
+    const uint32_t first = parts[i].first_triangle;
+    const bool in_order = i == 0 ? first == 0 : first > parts[i - 1].first_triangle;
+    if (!in_order || first >= triangles)
+      return refuse_argument(Reason::kMalformed, "parts", index,
+                             "parts begin at triangle 0, ascend and lie within the mesh");
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<TriangleMesh> TriangleMesh::create(std::vector<float> vertices, std::vector<uint32_t> indices,
                                                   std::vector<MeshPart> parts) {
-  RETURN_IF_ERROR(check_counts(vertices, indices, parts));
+  RETURN_IF_ERROR(check_counts(vertices, indices));
   RETURN_IF_ERROR(check_values(vertices, indices));
   RETURN_IF_ERROR(check_parts(parts, indices.size() / 3));
   TriangleMesh mesh;

@@ -16,7 +16,13 @@ namespace locus {
 struct MeshPart {
   std::string name;
   uint32_t first_triangle = 0;
+
+  bool operator==(const MeshPart&) const = default;
 };
+
+// Checks the parts of a mesh of `triangles` triangles: their number and names, and that the first begins at 0 and all
+// ascend within the mesh. Refuses as TriangleMesh::create() does.
+absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles);
 
 class TriangleMesh {
  public:

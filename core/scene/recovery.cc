@@ -38,10 +38,10 @@ class Meshes {
  public:
   explicit Meshes(const FindMesh& find) : find_(find) {}
 
-  MeshPtr operator()(const Sha256& sha256) {
-    MeshPtr& mesh = known_[sha256];
-    if (mesh == nullptr) mesh = find_(sha256);
-    if (mesh == nullptr) mesh = stand_in(sha256);
+  MeshPtr operator()(const MeshKey& key) {
+    MeshPtr& mesh = known_[key];
+    if (mesh == nullptr) mesh = find_(key);
+    if (mesh == nullptr) mesh = stand_in(key);
     return mesh;
   }
 
@@ -49,23 +49,24 @@ class Meshes {
   absl::Status check(const StaticSet& statics) const {
     for (const MeshPtr& mesh : stand_ins_)
       if (statics.uses(mesh.get()) > 0)
-        return data_loss(
-            absl::StrCat("the mesh of content ", hex(mesh->sha256()), " is not there, but instances use it"));
+        return data_loss(absl::StrCat("the mesh of content ", hex(mesh->sha256()),
+                                      mesh->name().empty() ? "" : " named ", mesh->name(),
+                                      " is not there, but instances use it"));
     return absl::OkStatus();
   }
 
  private:
-  MeshPtr stand_in(const Sha256& sha256) {
+  MeshPtr stand_in(const MeshKey& key) {
     absl::StatusOr<TriangleMesh> triangle = TriangleMesh::create({0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 1, 2}, {});
     LOCUS_CHECK(triangle.ok());
-    absl::StatusOr<MeshPtr> mesh = StaticMesh::build("", sha256, *std::move(triangle));
+    absl::StatusOr<MeshPtr> mesh = StaticMesh::build(key.name, key.sha256, *std::move(triangle));
     LOCUS_CHECK(mesh.ok());
     stand_ins_.push_back(*mesh);
     return *mesh;
   }
 
   const FindMesh& find_;
-  std::map<Sha256, MeshPtr> known_;
+  std::map<MeshKey, MeshPtr> known_;
   std::vector<MeshPtr> stand_ins_;
 };
 
@@ -146,8 +147,7 @@ absl::StatusOr<SceneWriter> read_snapshot(const UpdateLog& log, SceneKey key, co
   StateReader reader;
   absl::Status status = log.read_snapshot(key, [&reader](absl::string_view chunk) { return reader.add(chunk); });
   if (!status.ok()) return named("snapshot", status);
-  absl::StatusOr<SceneState> state =
-      std::move(reader).finish([&meshes](const Sha256& sha256) { return meshes(sha256); });
+  absl::StatusOr<SceneState> state = std::move(reader).finish([&meshes](const MeshKey& mesh) { return meshes(mesh); });
   if (!state.ok()) return named("snapshot", state.status());
   absl::StatusOr<SceneWriter> writer = SceneWriter::restore(*std::move(state), spec.winding, spec.history);
   if (!writer.ok()) return named("snapshot", writer.status());
@@ -208,6 +208,29 @@ absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& sto
   if (!mesh.ok()) return named(name, mesh.status());
   log.keep_outline(stored.sha256, encode_outline((*mesh)->tree().topology()));
   return RecoveredMesh{*std::move(mesh), true};
+}
+
+absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& stored, const MeshPtr& content) {
+  const std::string name = absl::StrCat("mesh ", stored.name);
+  if (!stored.damage.ok()) return named(name, stored.damage);
+  if (stored.parts_in_content) return StaticMesh::share(stored.name, content->parts(), *content);
+  PartsReader reader;
+  absl::Status status = log.read_parts(stored.name, [&reader](absl::string_view chunk) { return reader.add(chunk); });
+  if (!status.ok()) return named(name, status);
+  absl::StatusOr<std::vector<MeshPart>> parts = std::move(reader).finish(content->triangle_count());
+  if (!parts.ok()) return named(name, parts.status());
+  return StaticMesh::share(stored.name, *std::move(parts), *content);
+}
+
+FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry) {
+  return [&log, &registry](const MeshKey& key) -> MeshPtr {
+    if (key.name.empty()) {
+      for (const StoredMesh& stored : log.stored_meshes())
+        if (stored.parts_in_content && stored.sha256 == key.sha256)
+          return registry.find_stored({key.sha256, stored.name});
+    }
+    return registry.find_stored(key);
+  };
 }
 
 }  // namespace locus

@@ -32,8 +32,17 @@ struct RecoveredMesh {
   bool built = false;  // its tree; otherwise it was restored from the outline that the log kept
 };
 
-// Where the tree is built, the log is given its outline for the next time.
+// Makes the content of a mesh again. It has the parts that stand with the content, which are those of format 1. Where
+// the tree is built, the log is given its outline for the next time.
 absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
+
+// Returns the mesh of a stored name with the parts of that name. `content` is what recover_mesh() made of any name of
+// the same content, which the mesh shares.
+absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& stored, const MeshPtr& content);
+
+// Finds the meshes that `registry` restored from `log`; both outlive the function. Records of format 1 name a content
+// only: they mean the lowest name that was written in format 1, which is in use and so never deleted before them.
+FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry);
 
 }  // namespace locus
 

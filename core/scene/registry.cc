@@ -166,6 +166,13 @@ MeshPtr Registry::find_content(const Sha256& sha256) const {
   return content(sha256);
 }
 
+MeshPtr Registry::find_stored(const MeshKey& key) const {
+  const MutexLock lock(mutex_);
+  if (key.name.empty()) return content(key.sha256);
+  const auto known = meshes_.find(key.name);
+  return known != meshes_.end() && known->second->sha256() == key.sha256 ? known->second : nullptr;
+}
+
 MeshPtr Registry::content(const Sha256& sha256) const {
   for (const auto& [name, mesh] : meshes_)
     if (mesh->sha256() == sha256) return mesh;
@@ -185,14 +192,22 @@ absl::StatusOr<MeshPtr> Registry::begin_mesh(const std::string& name, MeshPtr& m
   const MutexLock lock(mutex_);
   if (const auto damaged = damaged_meshes_.find(name); damaged != damaged_meshes_.end()) return damaged->second;
   if (const auto known = meshes_.find(name); known != meshes_.end()) {
-    if (known->second->sha256() == mesh->sha256()) return known->second;
+    const bool equal_content = known->second->sha256() == mesh->sha256();
+    if (equal_content && known->second->parts() == mesh->parts()) return known->second;
     return refuse_name(absl::StatusCode::kAlreadyExists, Reason::kAlreadyExists, "mesh",
-                       absl::StrCat("mesh ", name, " exists with other content; delete it or choose another name"));
+                       absl::StrCat("mesh ", name, " exists with other ", equal_content ? "parts" : "content",
+                                    "; delete it or choose another name"));
   }
   if (meshes_.size() >= limits::kMaxMeshes)
     return refuse_full("mesh", "meshes", limits::kMaxMeshes, static_cast<double>(meshes_.size() + 1), 0);
-  if (MeshPtr equal = content(mesh->sha256()); equal != nullptr) mesh = std::move(equal);
+  mesh = to_keep(name, std::move(mesh));
   return MeshPtr();
+}
+
+MeshPtr Registry::to_keep(const std::string& name, MeshPtr mesh) const {
+  const MeshPtr equal = content(mesh->sha256());
+  if (equal == nullptr && mesh->name() == name) return mesh;
+  return StaticMesh::share(name, mesh->parts(), equal == nullptr ? *mesh : *equal);
 }
 
 absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh) {
@@ -206,7 +221,9 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
       if (!content) content.emplace(mesh);
       return content->next();
     };
-    RETURN_IF_ERROR(log_->add_mesh(name, mesh->sha256(), next));
+    PartsWriter parts(mesh);
+    const auto next_parts = [&parts] { return parts.next(); };
+    RETURN_IF_ERROR(log_->add_mesh(name, mesh->sha256(), next, next_parts));
     if (content) log_->keep_outline(mesh->sha256(), encode_outline(mesh->tree().topology()));
   }
   const MutexLock lock(mutex_);
@@ -260,14 +277,15 @@ absl::Status Registry::delete_mesh(const std::string& name) {
 
 bool Registry::is_kept(const StaticMesh* mesh) const {
   const MutexLock lock(mutex_);
-  return content(mesh->sha256()).get() == mesh;
+  const auto known = meshes_.find(mesh->name());
+  return known != meshes_.end() && known->second.get() == mesh;
 }
 
 void Registry::restore_scene(const ScenePtr& scene) { put_in(scene); }
 
 void Registry::restore_mesh(const std::string& name, MeshPtr mesh) {
   const MutexLock lock(mutex_);
-  if (MeshPtr equal = content(mesh->sha256()); equal != nullptr) mesh = std::move(equal);
+  mesh = to_keep(name, std::move(mesh));
   meshes_.emplace(name, std::move(mesh));
 }
 

@@ -56,11 +56,14 @@ class Registry {
   std::vector<Damaged> damaged_scenes() const LOCUS_EXCLUDES(mutex_);
   size_t scene_count() const LOCUS_EXCLUDES(mutex_);
 
-  // The mesh of that content under whichever name, or null.
+  // Returns the mesh of that content with the lowest name, or null.
   MeshPtr find_content(const Sha256& sha256) const LOCUS_EXCLUDES(mutex_);
+  // Returns the mesh that has that name and that content, or null. Without a name as find_content().
+  MeshPtr find_stored(const MeshKey& key) const LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
-  // Puts `mesh` under `name`, or the mesh of the same content that is there under any name, so that equal content is
-  // held once; returns the one that counts. Other content under a known name is ALREADY_EXISTS.
+  // Puts `mesh` under `name` and returns it as it is kept: sharing the content of a mesh of equal content that is there
+  // under another name, so that equal content is held once. Each name keeps its own parts. A known name of equal
+  // content and parts is returned as it is; other content or other parts under a known name are ALREADY_EXISTS.
   absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
   // FAILED_PRECONDITION IN_USE with the count while instances of any scene use it, or are about to.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
@@ -71,11 +74,11 @@ class Registry {
   };
   std::vector<NamedMesh> list_meshes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
   size_t mesh_count() const LOCUS_EXCLUDES(mutex_);
-  // Instances of `mesh` in all scenes, under whichever of its names it was placed.
+  // Counts the instances in all scenes that were placed under the name of `mesh`.
   uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
   // What the log had when it was opened: see core/scene/recovery.h. Each name once; meshes first, so that scenes find
-  // them by find_content(), which holds equal content once.
+  // them by find_stored(). Equal content is held once.
   void restore_scene(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
   void restore_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
   // A scene or a mesh that cannot be believed: its name answers with `damage`, DATA_LOSS, until it is deleted.
@@ -101,8 +104,11 @@ class Registry {
   std::optional<SceneKey> damaged_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
   absl::Status delete_damaged_scene(const std::string& name, SceneKey key) LOCUS_REQUIRES(changes_mutex_)
       LOCUS_EXCLUDES(mutex_);
-  // The mesh that is under `name` already, or null where `mesh` may come to be there, which may become another.
+  // Returns the mesh that is under `name` already. Where there is none, returns null and makes `mesh` what is to be
+  // kept.
   absl::StatusOr<MeshPtr> begin_mesh(const std::string& name, MeshPtr& mesh) const LOCUS_EXCLUDES(mutex_);
+  // Returns `mesh` under `name`, sharing the content of a mesh that is kept where there is one.
+  MeshPtr to_keep(const std::string& name, MeshPtr mesh) const LOCUS_REQUIRES(mutex_);
   // The mesh's name is gone; what was there, null for one that is damaged.
   absl::StatusOr<MeshPtr> take_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
   bool is_kept(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);

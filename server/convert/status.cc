@@ -12,6 +12,7 @@ constexpr size_t kMaxText = 1024;
 constexpr uint32_t kDrainRetryMs = 1000;
 constexpr uint32_t kRecoveryRetryMs = 200;
 
+static_assert(static_cast<int>(kLastReason) == v1::Reason_MAX);
 static_assert(static_cast<int>(Reason::kDamaged) == v1::REASON_DAMAGED);
 static_assert(static_cast<int>(Reason::kHashMismatch) == v1::REASON_HASH_MISMATCH);
 static_assert(static_cast<int>(Reason::kMalformed) == v1::REASON_MALFORMED);

@@ -75,9 +75,10 @@ v1::Mesh describe_mesh(const Registry& registry, const std::string& name, MeshPt
   return to_proto(Registry::NamedMesh{name, std::move(mesh), uses});
 }
 
-// Puts a mesh of known content under another name.
-absl::Status reuse(Host& host, const std::string& name, MeshPtr known, v1::UploadMeshResponse* response) {
-  ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.add_mesh(name, std::move(known)));
+// Puts known content under another name, with the parts of that name.
+absl::Status reuse(Host& host, const std::string& name, const std::vector<MeshPart>& parts, const StaticMesh& known,
+                   v1::UploadMeshResponse* response) {
+  ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.add_mesh(name, StaticMesh::share(name, parts, known)));
   response->set_already_known(true);
   *response->mutable_mesh() = describe_mesh(host.registry, name, std::move(mesh));
   return absl::OkStatus();
@@ -90,9 +91,9 @@ absl::StatusOr<bool> answer_early(Host& host, const MeshUpload& upload, v1::Uplo
   if (!named.ok() && meshes >= host.config.max_meshes)
     return refuse_full("mesh", "meshes", host.config.max_meshes, static_cast<double>(meshes + 1), 0);
   if (!upload.announced()) return false;
-  MeshPtr known = host.registry.find_content(*upload.announced());
+  const MeshPtr known = host.registry.find_content(*upload.announced());
   if (known != nullptr && upload.has_counts_of(*known)) {
-    const absl::Status status = reuse(host, upload.name(), std::move(known), response);
+    const absl::Status status = reuse(host, upload.name(), upload.parts(), *known, response);
     if (!status.ok()) return status;
     return true;
   }
@@ -195,8 +196,8 @@ absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1
   if (status.ok()) status = caller.stop();
   if (!status.ok()) return status;
   ASSIGN_OR_RETURN(MeshUpload::Complete complete, upload.finish());
-  if (MeshPtr known = host.registry.find_content(complete.sha256); known != nullptr)
-    return reuse(host, upload.name(), std::move(known), response);
+  if (const MeshPtr known = host.registry.find_content(complete.sha256); known != nullptr)
+    return reuse(host, upload.name(), complete.mesh.parts(), *known, response);
   ASSIGN_OR_RETURN(MeshPtr built, build(host, upload.name(), std::move(complete)));
   ASSIGN_OR_RETURN(MeshPtr added, host.registry.add_mesh(upload.name(), std::move(built)));
   log(LogLevel::kInfo, "mesh uploaded", {{"mesh", upload.name()}});

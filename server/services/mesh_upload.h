@@ -32,6 +32,8 @@ class MeshUpload {
 
   const std::string& name() const { return name_; }
   const std::optional<Sha256>& announced() const { return announced_; }
+  // Returns the announced parts; none after finish().
+  const std::vector<MeshPart>& parts() const { return parts_; }
   // True for a mesh with as many vertices and triangles as were announced.
   bool has_counts_of(const StaticMesh& mesh) const;
 

@@ -50,7 +50,7 @@ class Recovery {
     if (total_ == 0) return absl::OkStatus();
     log(LogLevel::kInfo, "recovering",
         {{"scenes", absl::StrCat(scenes.size())}, {"meshes", absl::StrCat(meshes.size())}});
-    // Of each content one mesh, under its first name; other names share it.
+    // Each content is read once, and shared by its names.
     std::map<Sha256, std::vector<const StoredMesh*>> contents;
     for (const StoredMesh& mesh : meshes) contents[mesh.sha256].push_back(&mesh);
     std::vector<const std::vector<const StoredMesh*>*> lists;
@@ -82,10 +82,11 @@ class Recovery {
            {"tree", mesh->built ? "built" : "restored"},
            {"milliseconds", milliseconds_since(start)}});
     for (const StoredMesh* name : names) {
-      if (mesh.ok()) {
-        host_.registry.restore_mesh(name->name, mesh->mesh);
-      } else if (take_damage("mesh", name->name, mesh.status())) {
-        host_.registry.restore_damaged_mesh(name->name, damaged("mesh", mesh.status()));
+      const absl::StatusOr<MeshPtr> named = mesh.ok() ? recover_name(log_, *name, mesh->mesh) : mesh.status();
+      if (named.ok()) {
+        host_.registry.restore_mesh(name->name, *named);
+      } else if (take_damage("mesh", name->name, named.status())) {
+        host_.registry.restore_damaged_mesh(name->name, damaged("mesh", named.status()));
       }
       count();
     }
@@ -130,8 +131,7 @@ class Recovery {
       stored.epoch = new_epoch();
       RETURN_IF_ERROR(log_.restart_scene(stored.key, stored.epoch));
     }
-    const auto find_mesh = [this](const Sha256& sha256) { return host_.registry.find_content(sha256); };
-    return recover_scene(log_, stored, find_mesh);
+    return recover_scene(log_, stored, find_restored_meshes(log_, host_.registry));
   }
 
   // Whether it is damage; anything else ends the recovery.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
@@ -79,9 +78,10 @@ class Dump {
     add_labels(object, run);
   }
 
-  void add(const Instance& instance, const std::string& mesh) {
+  void add(const Instance& instance) {
     if (!make_room()) return;
-    if (piece_.instances().empty() || instance.mesh.get() != last_mesh_) piece_.add_instances()->set_mesh(mesh);
+    if (piece_.instances().empty() || instance.mesh.get() != last_mesh_)
+      piece_.add_instances()->set_mesh(instance.mesh->name());
     last_mesh_ = instance.mesh.get();
     v1::Placement* run = piece_.mutable_instances(piece_.instances_size() - 1);
     run->add_ids(instance.id);
@@ -125,26 +125,9 @@ class Dump {
   const StaticMesh* last_mesh_ = nullptr;
 };
 
-// Placed meshes can be known under several names, and not under the one they were first uploaded as, if that was
-// deleted before they were placed. Any name that is known will do; the lowest is taken.
-MeshName names_of(const Registry& registry) {
-  absl::flat_hash_map<const StaticMesh*, std::string> names;
-  std::string after;
-  while (true) {
-    const std::vector<Registry::NamedMesh> meshes = registry.list_meshes(after, limits::kMaxPageSize);
-    for (const Registry::NamedMesh& mesh : meshes) names.emplace(mesh.mesh.get(), mesh.name);
-    if (meshes.size() < limits::kMaxPageSize) break;
-    after = meshes.back().name;
-  }
-  return [names = std::move(names)](const StaticMesh& mesh) {
-    const auto name = names.find(&mesh);
-    return name == names.end() ? mesh.name() : name->second;
-  };
-}
-
 }  // namespace
 
-bool dump_snapshot(const SceneSnapshot& snapshot, const MeshName& mesh_name, const TakePiece& take) {
+bool dump_snapshot(const SceneSnapshot& snapshot, const TakePiece& take) {
   std::vector<GridRef> objects;
   objects.reserve(snapshot.objects.size());
   snapshot.objects.grid().for_each([&objects](const GridRef& object) {
@@ -158,11 +141,11 @@ bool dump_snapshot(const SceneSnapshot& snapshot, const MeshName& mesh_name, con
   std::sort(instances.begin(), instances.end(), [](const Instance* a, const Instance* b) { return a->id < b->id; });
   Dump dump(snapshot, take);
   for (const GridRef& object : objects) dump.add(object_of(object));
-  for (const Instance* instance : instances) dump.add(*instance, mesh_name(*instance->mesh));
+  for (const Instance* instance : instances) dump.add(*instance);
   return dump.finish();
 }
 
-absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request,
+absl::Status dump_scene(const Caller& caller, const v1::DumpSceneRequest& request,
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
   ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(caller, request.scene(), "scene"));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
@@ -171,7 +154,7 @@ absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneReq
   const auto take = [&](const v1::DumpSceneResponse& piece) {
     return snapshot.status().ok() && caller.stop().ok() && writer.Write(piece);
   };
-  if (dump_snapshot(*snapshot, names_of(host.registry), take)) return absl::OkStatus();
+  if (dump_snapshot(*snapshot, take)) return absl::OkStatus();
   RETURN_IF_ERROR(snapshot.status());
   const absl::Status status = caller.stop();
   return status.ok() ? absl::CancelledError("the caller stopped reading") : status;

@@ -13,15 +13,13 @@
 
 namespace locus::server {
 
-// A mesh's name as callers know it.
-using MeshName = std::function<std::string(const StaticMesh&)>;
 // Takes a piece; false ends the dump.
 using TakePiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
 // Objects, then instances, each ascending by id. At least one piece. False when `take` ended it.
-bool dump_snapshot(const SceneSnapshot& snapshot, const MeshName& mesh_name, const TakePiece& take);
+bool dump_snapshot(const SceneSnapshot& snapshot, const TakePiece& take);
 
-absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request,
+absl::Status dump_scene(const Caller& caller, const v1::DumpSceneRequest& request,
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer);
 
 }  // namespace locus::server

@@ -192,7 +192,7 @@ grpc::Status SceneService::ChangeInstances(grpc::ServerContext* context, const v
 grpc::Status SceneService::DumpScene(grpc::ServerContext* context, const v1::DumpSceneRequest* request,
                                      grpc::ServerWriter<v1::DumpSceneResponse>* writer) {
   return serve(host_, *context, Rpc::kDumpScene,
-               [&](const Caller& caller) { return dump_scene(host_, caller, *request, *writer); });
+               [&](const Caller& caller) { return dump_scene(caller, *request, *writer); });
 }
 
 }  // namespace locus::server

@@ -96,6 +96,7 @@ void RocksdbLog::list_stored() {
     StoredMesh& stored = stored_meshes_.emplace_back();
     stored.name = found.name;
     stored.sha256 = found.sha256;
+    stored.parts_in_content = !found.parts.has_value();
     if (!found.damage.empty())
       stored.damage = absl::DataLossError(
           absl::StrCat("mesh '", found.name, "' is damaged: ", found.damage, repair_hint(options_.path)));
@@ -121,6 +122,12 @@ absl::Status RocksdbLog::begin() {
         next_scene_ = std::max(next_scene_, ByteReader(absl::string_view(key).substr(1)).big_u64() + 1);
       LOCUS_CHECK(batch.Delete(database_->meta(), key).ok());
     }
+    // From now on records are written that programs of older formats do not know.
+    if (damage_report_.format < kFormat)
+      LOCUS_CHECK(
+          batch
+              .Put(database_->meta(), slice_of(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()))
+              .ok());
     const bool whole = said.generation == catalogue_.totals().generation &&
                        said.scene_sum == catalogue_.totals().scene_sum && said.mesh_sum == catalogue_.totals().mesh_sum;
     if (!whole || batch.Count() > 0) {

@@ -56,11 +56,12 @@ class RocksdbLog final : public UpdateLog {
       LOCUS_EXCLUDES(catalogue_mutex_);
   absl::Status read_snapshot(SceneKey scene, ChunkSink sink) const override LOCUS_EXCLUDES(catalogue_mutex_);
 
-  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content) override
-      LOCUS_EXCLUDES(catalogue_mutex_, adding_mesh_);
+  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
+                        ChunkSource parts) override LOCUS_EXCLUDES(catalogue_mutex_, adding_mesh_);
   absl::Status delete_mesh(absl::string_view name) override LOCUS_EXCLUDES(catalogue_mutex_, adding_mesh_);
   absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const override
       LOCUS_EXCLUDES(catalogue_mutex_);
+  absl::Status read_parts(absl::string_view name, ChunkSink sink) const override LOCUS_EXCLUDES(catalogue_mutex_);
   void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override;
   std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const override;
 
@@ -88,6 +89,11 @@ class RocksdbLog final : public UpdateLog {
                             const ContentRow& snapshot) LOCUS_EXCLUDES(catalogue_mutex_);
   // Whether the chunks of a pending key are those of a snapshot or mesh by now.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
+  // Returns the row of a mesh's name, or nothing.
+  std::optional<MeshRow> mesh_row(absl::string_view name) const LOCUS_REQUIRES(catalogue_mutex_);
+  // Returns whether `number` is that of the parts of any name of that content.
+  bool parts_in_use(absl::string_view sha256, uint64_t number) const LOCUS_REQUIRES(catalogue_mutex_);
+  absl::Status read_mesh_chunks(const Sha256& sha256, const ContentRow& row, ChunkSink sink) const;
   std::set<Sha256> contents() const LOCUS_REQUIRES(catalogue_mutex_);
   bool content_in_use(const Sha256& sha256, absl::string_view but) const LOCUS_REQUIRES(catalogue_mutex_);
 

@@ -254,47 +254,81 @@ bool RocksdbLog::in_use(absl::string_view pending) const {
   const absl::string_view sha256 = in.bytes(Sha256().size());
   const std::optional<absl::string_view> bytes = catalogue_.find(absl::StrCat(std::string(1, kContentTag), sha256));
   const std::optional<ContentRow> row = bytes ? decode_content(*bytes) : std::nullopt;
-  return row && row->number == in.big_u64();
+  const uint64_t number = in.big_u64();
+  return (row && row->number == number) || parts_in_use(sha256, number);
 }
 
-bool RocksdbLog::content_in_use(const Sha256& sha256, absl::string_view but) const {
-  const absl::string_view wanted(reinterpret_cast<const char*>(sha256.data()), sha256.size());
+std::optional<MeshRow> RocksdbLog::mesh_row(absl::string_view name) const {
+  const std::optional<absl::string_view> bytes = catalogue_.find(mesh_key(name));
+  return bytes ? decode_mesh(*bytes) : std::nullopt;
+}
+
+bool RocksdbLog::parts_in_use(absl::string_view sha256, uint64_t number) const {
   const std::string start(1, kMeshTag);
   for (auto row = catalogue_.rows().lower_bound(start); row != catalogue_.rows().end() && row->first[0] == kMeshTag;
        ++row) {
-    if (row->first.substr(1) != but && catalogue_.find(row->first) == wanted) return true;
+    const std::optional<MeshRow> mesh = mesh_row(absl::string_view(row->first).substr(1));
+    if (mesh && mesh->parts && mesh->parts->number == number && encode(MeshRow{mesh->sha256, {}}) == sha256)
+      return true;
   }
   return false;
 }
 
-absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, ChunkSource content) {
+bool RocksdbLog::content_in_use(const Sha256& sha256, absl::string_view but) const {
+  const std::string start(1, kMeshTag);
+  for (auto row = catalogue_.rows().lower_bound(start); row != catalogue_.rows().end() && row->first[0] == kMeshTag;
+       ++row) {
+    const absl::string_view name = absl::string_view(row->first).substr(1);
+    const std::optional<MeshRow> mesh = mesh_row(name);
+    if (name != but && mesh && mesh->sha256 == sha256) return true;
+  }
+  return false;
+}
+
+absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, ChunkSource content,
+                                  ChunkSource parts) {
   MutexLock adding(adding_mesh_);
   RETURN_IF_ERROR(room_for("a new mesh", 0));
-  const absl::string_view hash(reinterpret_cast<const char*>(sha256.data()), sha256.size());
   bool known = false;
   {
     MutexLock lock(catalogue_mutex_);
-    const std::optional<absl::string_view> there = catalogue_.find(mesh_key(name));
-    if (there == hash) return absl::OkStatus();
-    if (there)
+    const std::optional<MeshRow> there = mesh_row(name);
+    if (there && there->sha256 == sha256) return absl::OkStatus();
+    if (catalogue_.find(mesh_key(name)))
       return already_there("name", absl::StrCat("a mesh '", name,
                                                 "' of other content is stored already: delete it or "
                                                 "choose another name"));
     known = catalogue_.find(content_key(sha256)).has_value();
   }
-  CatalogueChange change{{{mesh_key(name), std::string(hash)}}, 0};
+  CatalogueChange change;
   rocksdb::WriteBatch batch;
-  const uint64_t number = new_number();
-  const std::string pending = pending_mesh_key(sha256, number);
-  const std::string prefix = mesh_prefix(sha256, number);
-  if (!known) {
-    ASSIGN_OR_RETURN(const ChunkList chunks, put_chunks(database_->mesh(), pending, prefix, content));
-    change.rows.push_back({content_key(sha256), encode(ContentRow{number, chunks})});
+  std::vector<uint64_t> written;
+  const auto drop = [&] {
+    for (const uint64_t number : written)
+      drop_chunks(database_->mesh(), pending_mesh_key(sha256, number), mesh_prefix(sha256, number));
+  };
+  const auto put = [&](ChunkSource source) -> absl::StatusOr<ContentRow> {
+    const uint64_t number = new_number();
+    const std::string pending = pending_mesh_key(sha256, number);
+    ASSIGN_OR_RETURN(const ChunkList chunks,
+                     put_chunks(database_->mesh(), pending, mesh_prefix(sha256, number), source));
+    written.push_back(number);
     LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
+    return ContentRow{number, chunks};
+  };
+  if (!known) {
+    ASSIGN_OR_RETURN(const ContentRow row, put(content));
+    change.rows.push_back({content_key(sha256), encode(row)});
   }
+  const absl::StatusOr<ContentRow> row = put(parts);
+  if (!row.ok()) {
+    drop();
+    return row.status();
+  }
+  change.rows.push_back({mesh_key(name), encode(MeshRow{sha256, *row})});
   MutexLock lock(catalogue_mutex_);
   if (absl::Status status = commit(change, batch); !status.ok()) {
-    if (!known) drop_chunks(database_->mesh(), pending, prefix);
+    drop();
     return status;
   }
   scenes_.set_catalogue(catalogue_.totals());
@@ -305,19 +339,20 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
 absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
   MutexLock adding(adding_mesh_);
   MutexLock lock(catalogue_mutex_);
-  const std::optional<absl::string_view> hash = catalogue_.find(mesh_key(name));
-  if (!hash) return not_there(absl::StrCat("the log has no mesh '", name, "'"));
-  Sha256 sha256 = {};
-  if (hash->size() == sha256.size()) std::copy(hash->begin(), hash->end(), sha256.begin());
+  if (!catalogue_.find(mesh_key(name))) return not_there(absl::StrCat("the log has no mesh '", name, "'"));
+  const MeshRow mesh = mesh_row(name).value_or(MeshRow());
   CatalogueChange change{{{mesh_key(name), std::nullopt}}, 0};
   rocksdb::WriteBatch batch;
-  if (!content_in_use(sha256, name)) {
-    change.rows.push_back({content_key(sha256), std::nullopt});
-    const std::string all = content_key(sha256).substr(1);
+  if (!content_in_use(mesh.sha256, name)) {
+    change.rows.push_back({content_key(mesh.sha256), std::nullopt});
+    const std::string all = content_key(mesh.sha256).substr(1);
     LOCUS_CHECK(batch.DeleteRange(database_->mesh(), all, end_of(all)).ok());
+  } else if (mesh.parts) {
+    const std::string prefix = mesh_prefix(mesh.sha256, mesh.parts->number);
+    LOCUS_CHECK(batch.DeleteRange(database_->mesh(), prefix, end_of(prefix)).ok());
   }
   RETURN_IF_ERROR(commit(change, batch));
-  if (change.rows.size() > 1) topologies_.drop(sha256);
+  if (change.rows.size() > 1) topologies_.drop(mesh.sha256);
   scenes_.set_catalogue(catalogue_.totals());
   write_high_water(false);
   return absl::OkStatus();
@@ -331,7 +366,21 @@ absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
     if (bytes) row = decode_content(*bytes);
   }
   if (!row) return not_there("the log has no mesh of this content");
-  absl::Status status = read_chunks(*database_, database_->mesh(), mesh_prefix(sha256, row->number), row->chunks, sink);
+  return read_mesh_chunks(sha256, *row, sink);
+}
+
+absl::Status RocksdbLog::read_parts(absl::string_view name, ChunkSink sink) const {
+  std::optional<MeshRow> row;
+  {
+    MutexLock lock(catalogue_mutex_);
+    row = mesh_row(name);
+  }
+  if (!row) return not_there(absl::StrCat("the log has no mesh '", name, "'"));
+  return row->parts ? read_mesh_chunks(row->sha256, *row->parts, sink) : absl::OkStatus();
+}
+
+absl::Status RocksdbLog::read_mesh_chunks(const Sha256& sha256, const ContentRow& row, ChunkSink sink) const {
+  absl::Status status = read_chunks(*database_, database_->mesh(), mesh_prefix(sha256, row.number), row.chunks, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(absl::StrCat("a mesh is damaged: ", status.message(), repair_hint(options_.path)));
 }

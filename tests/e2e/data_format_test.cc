@@ -47,12 +47,14 @@ class DataFormatTest : public ::testing::Test {
     return call(*daemon_.stubs().updates, &v1::UpdateService::Stub::ApplyUpdates, request).ack();
   }
 
-  void upload_cube() {
+  void upload_cube(const std::string& name, const std::string& part) {
     grpc::ClientContext context;
     set_timeout(context);
+    v1::UploadMeshRequest mesh = whole_mesh(name);
+    if (!part.empty()) mesh.add_parts()->set_name(part);
     v1::UploadMeshResponse uploaded;
     const auto upload = daemon_.stubs().scenes->UploadMesh(&context, &uploaded);
-    ASSERT_TRUE(upload->Write(whole_mesh("cube")));
+    ASSERT_TRUE(upload->Write(mesh));
     upload->WritesDone();
     ASSERT_TRUE(upload->Finish().ok());
   }
@@ -82,9 +84,11 @@ class DataFormatTest : public ::testing::Test {
 
   // Everything that a directory may hold, before and after a snapshot.
   void fill() {
-    upload_cube();
+    upload_cube("cube", "");
+    upload_cube("crate", "planks");
     create("arena", R"(labels { key: "level" value: "7" } history_ticks: 4 winding: WINDING_CLOCKWISE)");
     change_instances(R"(scene: "arena" place { mesh: "cube" translations: [5, 0, 0, 9, 0.25, 0] layers: [1, 6] })");
+    change_instances(R"(scene: "arena" place { mesh: "crate" translations: [5, 9, 0] })");
     apply("arena", R"(writer: 7 batch: 1 tick: 3
                       inserts { ids: [1, 2] positions_f64: [0.1, 2, 3, 4, 5, 6] point {} tags: [11, 12] }
                       inserts { ids: [3] positions: [1, 1, 1] ball { radii: 0.5 } groups: 9 }
@@ -98,7 +102,8 @@ class DataFormatTest : public ::testing::Test {
     gone.set_name("gone");
     call(*daemon_.stubs().scenes, &v1::SceneService::Stub::DeleteScene, gone);
     change_instances(R"(scene: "arena" remove_ids: [)" + first_instance() + R"(]
-                        place { mesh: "cube" translations: [0, 7, 0] rotations: [0, 0, 0.6, 0.8] tags: 5 })");
+                        place { mesh: "cube" translations: [0, 7, 0] rotations: [0, 0, 0.6, 0.8] tags: 5 }
+                        place { mesh: "crate" translations: [0, 9, 0] })");
     apply("arena", R"(writer: 7 batch: 2 tick: 4
                       moves { ids: [1, 3] positions: [1.5, 0, 0, 2.5, 0, 0] }
                       relabels { ids: 2 tags: 99 groups: 4 layers: 8 }
@@ -126,8 +131,10 @@ class DataFormatTest : public ::testing::Test {
     }
     const v1::ListMeshesResponse meshes =
         call(*daemon_.stubs().scenes, &v1::SceneService::Stub::ListMeshes, v1::ListMeshesRequest());
-    for (const v1::Mesh& mesh : meshes.meshes())
+    for (const v1::Mesh& mesh : meshes.meshes()) {
       absl::StrAppend(&words, "mesh ", mesh.name(), " triangles ", mesh.triangles(), "\n");
+      for (const v1::MeshPart& part : mesh.parts()) absl::StrAppend(&words, "part ", part.name(), "\n");
+    }
     return words;
   }
 
@@ -185,7 +192,7 @@ TEST_F(DataFormatTest, TheSampleOfThisFormatHoldsWhatIsWrittenIntoANewDirectory)
     copy_sample(daemon_.directory(), std::filesystem::path(folder) / "data");
     std::ofstream(std::filesystem::path(folder) / "holds.txt") << holds;
   } else {
-    EXPECT_EQ(without_epochs(holds), without_epochs(text_of((samples() / "format-1" / "holds.txt").string())));
+    EXPECT_EQ(without_epochs(holds), without_epochs(text_of((samples() / "format-2" / "holds.txt").string())));
   }
 }
 

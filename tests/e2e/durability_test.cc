@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "absl/strings/str_cat.h"
 #include "tests/support/kept_daemon.h"
 #include "tests/support/rpc_test.h"
 
@@ -9,6 +10,7 @@ namespace locus::test {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class DurabilityTest : public ::testing::Test {
  protected:
@@ -47,14 +49,26 @@ class DurabilityTest : public ::testing::Test {
     EXPECT_TRUE(status.ok()) << status.error_message();
   }
 
-  void place_cube(const std::string& scene) {
+  grpc::Status upload(const v1::UploadMeshRequest& mesh) {
     grpc::ClientContext context;
     set_timeout(context);
     v1::UploadMeshResponse uploaded;
     const auto upload = stubs().scenes->UploadMesh(&context, &uploaded);
-    ASSERT_TRUE(upload->Write(whole_mesh("cube")));
+    upload->Write(mesh);
     upload->WritesDone();
-    ASSERT_TRUE(upload->Finish().ok());
+    return upload->Finish();
+  }
+
+  // All meshes with their parts and uses, as text.
+  std::string meshes_now() {
+    v1::ListMeshesResponse meshes;
+    EXPECT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, v1::ListMeshesRequest(), &meshes).ok());
+    for (v1::Mesh& mesh : *meshes.mutable_meshes()) mesh.clear_bytes();
+    return meshes.DebugString();
+  }
+
+  void place_cube(const std::string& scene) {
+    ASSERT_TRUE(upload(whole_mesh("cube")).ok());
     v1::ChangeInstancesRequest request;
     request.set_scene(scene);
     v1::Placement* place = request.add_place();
@@ -156,6 +170,67 @@ TEST_F(DurabilityTest, ARestartLeavesEverythingAsItWas) {
   EXPECT_TRUE(ack.duplicate());
   ASSERT_TRUE(apply("arena", numbered(21, point(21, 21)), &ack).ok());
   EXPECT_EQ(ack.revision(), before.revision() + 1);
+}
+
+TEST_F(DurabilityTest, NamesOfEqualBytesKeepTheirPartsAndUsesOverRestarts) {
+  daemon_.start();
+  create_scene(stubs(), "arena");
+  for (const char* const name : {"a", "b"}) {
+    v1::UploadMeshRequest mesh = whole_mesh(name);
+    mesh.add_parts()->set_name(absl::StrCat("part of ", name));
+    ASSERT_TRUE(upload(mesh).ok());
+  }
+  v1::ChangeInstancesRequest request = place_one("b", 100, "arena");
+  v1::ChangeInstancesResponse response;
+  ASSERT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::ChangeInstances, request, &response).ok());
+  v1::SceneSpec spec;
+  spec.set_static_from("arena");
+  create_scene(stubs(), "twin", spec);
+  const std::string meshes = meshes_now(), dump = dump_of(stubs(), "arena"), twin = dump_of(stubs(), "twin");
+  EXPECT_THAT(meshes, HasSubstr("part of b"));
+  EXPECT_THAT(dump, HasSubstr("mesh: \"b\""));
+  for (const bool killed : {true, false}) {
+    if (killed) {
+      daemon_.kill();
+    } else {
+      EXPECT_EQ(daemon_.stop(), 0);
+    }
+    EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();
+    daemon_.start();
+    EXPECT_EQ(meshes_now(), meshes);
+    EXPECT_EQ(dump_of(stubs(), "arena"), dump);
+    EXPECT_EQ(dump_of(stubs(), "twin"), twin);
+  }
+  v1::DeleteMeshRequest removal;
+  v1::DeleteMeshResponse deleted;
+  removal.set_mesh("b");
+  expect_refused(call(*stubs().scenes, &v1::SceneService::Stub::DeleteMesh, removal, &deleted),
+                 {grpc::StatusCode::FAILED_PRECONDITION, v1::REASON_IN_USE, "mesh"});
+  removal.set_mesh("a");
+  ASSERT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::DeleteMesh, removal, &deleted).ok());
+  daemon_.kill();
+  daemon_.start();
+  EXPECT_EQ(dump_of(stubs(), "arena"), dump);
+  EXPECT_THAT(meshes_now(), HasSubstr("part of b"));
+  EXPECT_THAT(meshes_now(), Not(HasSubstr("part of a")));
+}
+
+TEST_F(DurabilityTest, RepairKeepsThePartsOfEveryName) {
+  daemon_.start();
+  create_scene(stubs(), "arena");
+  for (const char* const name : {"a", "b"}) {
+    v1::UploadMeshRequest mesh = whole_mesh(name);
+    mesh.add_parts()->set_name(absl::StrCat("part of ", name));
+    ASSERT_TRUE(upload(mesh).ok());
+  }
+  const std::string meshes = meshes_now();
+  EXPECT_EQ(daemon_.stop(), 0);
+  // Everything counts as damaged, and is copied as far as it is sound.
+  std::filesystem::remove(std::filesystem::path(daemon_.directory()) / "HIGH_WATER");
+  EXPECT_EQ(daemon_.maintain("repair"), 0) << daemon_.printed();
+  EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();
+  daemon_.start();
+  EXPECT_EQ(meshes_now(), meshes);
 }
 
 TEST_F(DurabilityTest, TreesAreRestoredFromTheirOutlinesAndBuiltWhereThoseAreDamagedOrGone) {

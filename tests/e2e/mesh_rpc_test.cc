@@ -35,6 +35,15 @@ class MeshRpcTest : public RpcTest {
     return call(*stubs().scenes, &v1::SceneService::Stub::DeleteMesh, request, &response);
   }
 
+  // The cube with one part from triangle 0 and another from `second` on.
+  static v1::UploadMeshRequest cube_of_parts(const std::string& name, const std::string& part, uint32_t second) {
+    v1::UploadMeshRequest request = whole_mesh(name);
+    request.add_parts()->set_name(part + " 0");
+    request.add_parts()->set_name(part + " 1");
+    request.mutable_parts(1)->set_first_triangle(second);
+    return request;
+  }
+
   // After any refused upload.
   void expect_nothing_kept() { EXPECT_TRUE(list().empty()); }
 };
@@ -115,6 +124,84 @@ TEST_F(MeshRpcTest, UploadingTheSameAgainIsFineAndOtherBytesUnderTheNameAreNot) 
   with_hash.set_sha256(hash_of(other));
   expect_refused(upload({with_hash}), taken);
   EXPECT_EQ(list()[0].sha256(), hash_of({}));
+}
+
+TEST_F(MeshRpcTest, OtherPartsUnderAKnownNameAreRefused) {
+  ASSERT_TRUE(upload({cube_of_parts("cube", "wall", 2)}).ok());
+  v1::UploadMeshRequest again = cube_of_parts("cube", "wall", 2);
+  again.set_sha256(hash_of({}));
+  ASSERT_TRUE(upload({again}).ok());
+  again.mutable_parts(1)->set_first_triangle(3);
+  const Refused taken{grpc::StatusCode::ALREADY_EXISTS, v1::REASON_ALREADY_EXISTS, "mesh"};
+  expect_refused(upload({again}), taken);
+  expect_refused(upload({whole_mesh("cube")}), taken);
+  ASSERT_EQ(list()[0].parts_size(), 2);
+  EXPECT_EQ(list()[0].parts(1).first_triangle(), 2u);
+}
+
+TEST_F(MeshRpcTest, NamesOfEqualBytesKeepTheirOwnPartsAndUses) {
+  v1::UploadMeshRequest announced = cube_of_parts("b", "door", 8);
+  announced.set_sha256(hash_of({}));
+  v1::UploadMeshResponse response;
+  ASSERT_TRUE(upload({cube_of_parts("a", "wall", 2)}).ok());
+  ASSERT_TRUE(upload({announced}, &response).ok());
+  EXPECT_TRUE(response.already_known());
+  EXPECT_EQ(response.mesh().parts(0).name(), "door 0");
+  ASSERT_TRUE(upload({cube_of_parts("c", "roof", 4)}, &response).ok());
+  EXPECT_TRUE(response.already_known());
+
+  v1::ChangeInstancesRequest request = place_one("b", 100);
+  request.mutable_place(0)->add_ids(102);
+  fill(request.mutable_place(0)->mutable_translations(), {10.0, 0.0, 0.0, 30.0, 0.0, 0.0});
+  *request.add_place() = place_one("c", 101).place(0);
+  request.mutable_place(1)->set_translations(0, 20);
+  ASSERT_TRUE(change(request).ok());
+  const std::vector<v1::Mesh> meshes = list();
+  ASSERT_EQ(meshes.size(), 3u);
+  EXPECT_EQ(meshes[0].uses(), 0u);
+  EXPECT_EQ(meshes[1].uses(), 2u);
+  EXPECT_EQ(meshes[2].uses(), 1u);
+  EXPECT_EQ(meshes[0].parts(1).name(), "wall 1");
+  EXPECT_EQ(meshes[1].parts(1).name(), "door 1");
+  EXPECT_EQ(meshes[2].parts(1).first_triangle(), 4u);
+
+  std::vector<v1::DumpSceneResponse> pieces;
+  ASSERT_TRUE(RpcTest::dump("world", &pieces).ok());
+  ASSERT_EQ(pieces.size(), 1u);
+  std::vector<std::string> placed;
+  for (const v1::Placement& run : pieces[0].instances()) placed.push_back(run.mesh());
+  EXPECT_EQ(placed, (std::vector<std::string>{"b", "c", "b"})) << "one run for each neighbour of another name";
+
+  // From x = 0 each cube's near side is hit, in the part of its own name that has the triangle.
+  v1::QueryBatch ray = ray_along_x();
+  fill(ray.mutable_blocks(0)->mutable_rays()->mutable_origins(), {0.f, 0.25f, 0.f});
+  ray.mutable_blocks(0)->mutable_rays()->set_mode(v1::RAY_MODE_ALL);
+  v1::QueryResult result;
+  ASSERT_TRUE(query(ray, &result).ok());
+  EXPECT_THAT(result.blocks(0).ids(), ::testing::ElementsAre(100, 100, 101, 101, 102, 102));
+  const uint32_t triangle = result.blocks(0).triangles(0);
+  EXPECT_EQ(result.blocks(0).triangles(2), triangle);
+  EXPECT_TRUE(triangle == 8 || triangle == 9) << triangle;
+}
+
+TEST_F(MeshRpcTest, EitherOfTwoNamesOfEqualBytesIsDeletedFirst) {
+  for (const bool first_in_use : {false, true}) {
+    ASSERT_TRUE(upload({whole_mesh("a")}).ok());
+    ASSERT_TRUE(upload({whole_mesh("b")}).ok());
+    const std::string used = first_in_use ? "a" : "b", unused = first_in_use ? "b" : "a";
+    ASSERT_TRUE(change(place_one(used, 100)).ok());
+    expect_refused(remove_mesh(used), {grpc::StatusCode::FAILED_PRECONDITION, v1::REASON_IN_USE, "mesh"});
+    EXPECT_TRUE(remove_mesh(unused).ok());
+    v1::QueryResult result;
+    ASSERT_TRUE(query(ray_along_x(), &result).ok());
+    EXPECT_THAT(result.blocks(0).ids(), ::testing::ElementsAre(100));
+    v1::ChangeInstancesRequest removal;
+    removal.set_scene("world");
+    removal.add_remove_ids(100);
+    ASSERT_TRUE(change(removal).ok());
+    EXPECT_TRUE(remove_mesh(used).ok());
+    expect_nothing_kept();
+  }
 }
 
 TEST_F(MeshRpcTest, BytesOfAnotherHashAreRefused) {

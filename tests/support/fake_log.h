@@ -35,9 +35,12 @@ class FakeLog final : public UpdateLog {
   absl::StatusOr<uint64_t> latest(SceneKey) const override { return refusal(); }
   absl::Status write_snapshot(SceneKey, uint64_t, ChunkSource) override { return refusal(); }
   absl::Status read_snapshot(SceneKey, ChunkSink) const override { return refusal(); }
-  absl::Status add_mesh(absl::string_view, const std::array<uint8_t, 32>&, ChunkSource) override { return refusal(); }
+  absl::Status add_mesh(absl::string_view, const std::array<uint8_t, 32>&, ChunkSource, ChunkSource) override {
+    return refusal();
+  }
   absl::Status delete_mesh(absl::string_view) override { return refusal(); }
   absl::Status read_mesh(const std::array<uint8_t, 32>&, ChunkSink) const override { return refusal(); }
+  absl::Status read_parts(absl::string_view, ChunkSink) const override { return refusal(); }
   void keep_outline(const std::array<uint8_t, 32>&, absl::string_view) override {}
   std::optional<std::string> read_outline(const std::array<uint8_t, 32>&) const override { return std::nullopt; }
 

@@ -41,6 +41,7 @@ class MemoryLog : public UpdateLog {
     std::map<SceneKey, KeptScene> scenes;
     std::map<std::string, std::array<uint8_t, 32>> meshes;
     std::map<std::array<uint8_t, 32>, std::vector<Bytes>> contents;
+    std::map<std::string, std::vector<Bytes>> parts;  // by name; none for a mesh of format 1
     std::map<std::array<uint8_t, 32>, std::string> topologies;
     SceneKey last_key = 0;
   };
@@ -192,16 +193,20 @@ class MemoryLog : public UpdateLog {
     return give(chunks, sink);
   }
 
-  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content) override {
+  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
+                        ChunkSource parts) override {
     std::vector<Bytes> chunks;
     if (!knows(sha256)) {
       absl::StatusOr<std::vector<Bytes>> all = all_of(content);
       if (!all.ok()) return all.status();
       chunks = *std::move(all);
     }
+    absl::StatusOr<std::vector<Bytes>> own = all_of(parts);
+    if (!own.ok()) return own.status();
     const MutexLock lock(mutex_);
     if (!failure_.ok()) return failure_;
     LOCUS_CHECK(kept_.meshes.emplace(name, sha256).second);
+    kept_.parts.emplace(name, *std::move(own));
     kept_.contents.emplace(sha256, std::move(chunks));
     return absl::OkStatus();
   }
@@ -214,6 +219,7 @@ class MemoryLog : public UpdateLog {
     if (found == kept_.meshes.end()) return absl::NotFoundError("no such mesh");
     const std::array<uint8_t, 32> sha256 = found->second;
     kept_.meshes.erase(found);
+    kept_.parts.erase(std::string(name));
     const bool used = std::any_of(kept_.meshes.begin(), kept_.meshes.end(),
                                   [&sha256](const auto& mesh) { return mesh.second == sha256; });
     if (!used) kept_.contents.erase(sha256);
@@ -227,6 +233,17 @@ class MemoryLog : public UpdateLog {
       const MutexLock lock(mutex_);
       const auto found = kept_.contents.find(sha256);
       if (found == kept_.contents.end()) return absl::DataLossError("no such content");
+      chunks = found->second;
+    }
+    return give(chunks, sink);
+  }
+
+  absl::Status read_parts(absl::string_view name, ChunkSink sink) const override {
+    std::vector<Bytes> chunks;
+    {
+      const MutexLock lock(mutex_);
+      const auto found = kept_.parts.find(std::string(name));
+      if (found == kept_.parts.end()) return absl::DataLossError("no such parts");
       chunks = found->second;
     }
     return give(chunks, sink);
@@ -281,7 +298,8 @@ class MemoryLog : public UpdateLog {
       stored_scenes_.push_back(
           {key, scene.name, scene.spec, scene.epoch, scene.snapshot_sequence, scene.last(), bytes, false, {}});
     }
-    for (const auto& [name, sha256] : kept.meshes) stored_meshes_.push_back({name, sha256, {}});
+    for (const auto& [name, sha256] : kept.meshes)
+      stored_meshes_.push_back({name, sha256, {}, !kept.parts.contains(name)});
   }
 
   mutable Mutex mutex_;

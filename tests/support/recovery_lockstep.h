@@ -234,7 +234,8 @@ class RecoveryLockstep {
     log_ = std::make_unique<MemoryLog>(log_->crash(memory ? random_.below(20) : 0, random_.below(4)));
     const StoredScene& stored = log_->stored_scenes().front();
     if (!memory && stored.last_sequence < acknowledged) return "the log lost something";
-    absl::StatusOr<ScenePtr> recovered = recover_scene(*log_, stored, [this](const Sha256& sha256) {
+    absl::StatusOr<ScenePtr> recovered = recover_scene(*log_, stored, [this](const MeshKey& key) {
+      const Sha256& sha256 = key.sha256;
       return sha256[0] == 0 || sha256[0] > meshes_.size() ? nullptr : meshes_[size_t{sha256[0]} - 1];
     });
     if (!recovered.ok()) return recovered.status().ToString();

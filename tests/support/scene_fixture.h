@@ -115,7 +115,7 @@ class SceneFixture : public ::testing::Test {
   }
 
   Columns columns_;
-  std::shared_ptr<const StaticMesh> mesh_ = make_mesh("triangle", 1);
+  std::shared_ptr<const StaticMesh> mesh_ = make_mesh("m", 1);
   Scene scene_;
 };
 

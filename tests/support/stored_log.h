@@ -115,6 +115,16 @@ inline absl::StatusOr<std::vector<std::string>> read_mesh(const UpdateLog& log, 
   return chunks;
 }
 
+inline absl::StatusOr<std::vector<std::string>> read_parts(const UpdateLog& log, absl::string_view name) {
+  std::vector<std::string> chunks;
+  absl::Status status = log.read_parts(name, [&](absl::string_view chunk) {
+    chunks.emplace_back(chunk);
+    return absl::OkStatus();
+  });
+  if (!status.ok()) return status;
+  return chunks;
+}
+
 inline std::array<uint8_t, 32> hash_of(uint8_t number) {
   std::array<uint8_t, 32> sha256 = {};
   sha256[0] = number;

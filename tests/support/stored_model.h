@@ -138,7 +138,8 @@ class StoredModel {
     if (found == meshes_.end()) {
       const auto number = static_cast<uint8_t>(1 + random.below(3));
       ChunksFrom content({bytes_of(number, 400)});
-      const bool known = log.add_mesh(name, hash_of(number), content).ok();
+      ChunksFrom parts({parts_of(name)});
+      const bool known = log.add_mesh(name, hash_of(number), content, parts).ok();
       meshes_[name] = {number, known ? kThere : kUnknown};
       if (known) log.keep_outline(hash_of(number), outline_bytes(number));
     } else if (found->second.second == kThere) {
@@ -150,6 +151,7 @@ class StoredModel {
     }
   }
 
+  static std::string parts_of(const std::string& name) { return "parts of " + name; }
   static std::string outline_bytes(uint8_t number) { return bytes_of(100u + number, 60); }
 
   static std::string scene_difference(const UpdateLog& log, const std::string& name, const Scene& scene) {
@@ -196,6 +198,11 @@ class StoredModel {
       if (!chunks.ok()) return std::string(chunks.status().message());
       if (*chunks != std::vector<std::string>{bytes_of(known->second.first, 400)})
         return absl::StrCat("mesh ", mesh.name, " has other bytes");
+      const auto parts = read_parts(log, mesh.name);
+      if (absl::IsDataLoss(parts.status()) && refusals == Refusals::kAllowed) continue;
+      if (!parts.ok()) return std::string(parts.status().message());
+      if (*parts != std::vector<std::string>{parts_of(mesh.name)})
+        return absl::StrCat("mesh ", mesh.name, " has other parts");
     }
     if (!log.catalogue_damage().ok())
       return refusals == Refusals::kAllowed ? "" : std::string(log.catalogue_damage().message());

@@ -49,8 +49,8 @@ class Round {
     while (!stops_.empty() && !task_.ended()) {
       now_.swap(stops_);
       stops_.clear();
-      sort_by_mesh();
-      for (size_t first = 0; first < now_.size();) first = ask_mesh(first);
+      sort_by_tree();
+      for (size_t first = 0; first < now_.size();) first = ask_tree(first);
       if (only_ != nullptr) return;
       for (const Stop& stop : now_) walk_on(stop.ray);
     }
@@ -86,21 +86,22 @@ class Round {
     stops_.push_back({number, *nearest, only_});
   }
 
-  void sort_by_mesh() {
-    const auto mesh = [](const Stop& stop) { return stop.instance->mesh.get(); };
-    const auto other = [&](const Stop& a, const Stop& b) { return mesh(a) != mesh(b); };
+  void sort_by_tree() {
+    const auto tree = [](const Stop& stop) { return &stop.instance->mesh->tree(); };
+    const auto other = [&](const Stop& a, const Stop& b) { return tree(a) != tree(b); };
     if (std::adjacent_find(now_.begin(), now_.end(), other) == now_.end()) return;
     std::stable_sort(now_.begin(), now_.end(),
-                     [&](const Stop& a, const Stop& b) { return std::less<const StaticMesh*>()(mesh(a), mesh(b)); });
+                     [&](const Stop& a, const Stop& b) { return std::less<const TriangleBvh*>()(tree(a), tree(b)); });
   }
 
-  // All stops at the mesh of the first of them. Returns the first stop at another.
-  size_t ask_mesh(size_t first) {
-    const StaticMesh& mesh = *now_[first].instance->mesh;
+  // Asks all stops at the tree of the first of them, which meshes of equal bytes share. Returns the first stop at
+  // another.
+  size_t ask_tree(size_t first) {
+    const TriangleBvh& tree = now_[first].instance->mesh->tree();
     kernel_rays_.clear();
     asked_.clear();
     size_t last = first;
-    for (; last < now_.size() && now_[last].instance->mesh.get() == &mesh; ++last) {
+    for (; last < now_.size() && &now_[last].instance->mesh->tree() == &tree; ++last) {
       const std::optional<KernelRay> ray = kernel_ray(now_[last]);
       if (!ray) {
         ask_triangles(now_[last]);
@@ -109,7 +110,7 @@ class Round {
       kernel_rays_.push_back(*ray);
       asked_.push_back(last);
     }
-    ask_kernels(mesh.tree().tree());
+    ask_kernels(tree.tree());
     return last;
   }
 

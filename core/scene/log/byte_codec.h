@@ -166,16 +166,19 @@ class AlignedBytes {
 enum class BytesKind : uint32_t {
   kBatch = 0x4842'534c,
   kJoinedBatches = 0x4a42'534c,
-  kStaticChange = 0x4353'534c,
+  kStaticChange = 0x4353'534c,  // format 1: meshes by content; read only
+  kNamedChange = 0x434e'534c,
   kSceneSpec = 0x5053'534c,
   kStateHeader = 0x4854'534c,
   kStateWriters = 0x5754'534c,
-  kStateInstances = 0x4954'534c,
+  kStateInstances = 0x4954'534c,  // likewise
+  kNamedInstances = 0x494e'534c,
   kStateObjects = 0x4f54'534c,
   kMeshHeader = 0x484d'534c,
   kMeshVertices = 0x564d'534c,
   kMeshIndices = 0x494d'534c,
   kMeshParts = 0x504d'534c,
+  kPartsHeader = 0x4850'534c,
   kTreeOutline = 0x5254'534c,
 };
 inline constexpr uint32_t kBytesVersion = 1;

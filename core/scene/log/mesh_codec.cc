@@ -18,6 +18,16 @@ constexpr size_t kPartsChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kPartsChunk + limits::kMaxLabelLength + 64 <= UpdateLog::kMaxChunkBytes);
 constexpr size_t kMinPart = 2 * 8;
 
+// Appends the parts of one chunk.
+void read_parts(ByteReader& reader, std::vector<MeshPart>& parts) {
+  while (reader.good() && reader.left() >= kMinPart) {
+    MeshPart& part = parts.emplace_back();
+    part.first_triangle =
+        static_cast<uint32_t>(reader.number_upto(limits::kMaxMeshTriangles, "the first triangle of a part"));
+    part.name = std::string(reader.text(limits::kMaxLabelLength, "the name of a part"));
+  }
+}
+
 }  // namespace
 
 MeshWriter::MeshWriter(std::shared_ptr<const StaticMesh> mesh)
@@ -31,8 +41,6 @@ absl::StatusOr<std::optional<std::string>> MeshWriter::next() {
     chunk = next_vertices();
   } else if (next_index_ < size_t{3} * mesh_->triangle_count()) {
     chunk = next_indices();
-  } else if (next_part_ < mesh_->parts().size()) {
-    chunk = next_parts();
   } else {
     return std::optional<std::string>();
   }
@@ -46,7 +54,7 @@ std::string MeshWriter::header() const {
   write_kind(writer, BytesKind::kMeshHeader);
   writer.number(uint64_t{vertices_.size()});
   writer.number(uint64_t{3} * mesh_->triangle_count());
-  writer.number(uint64_t{mesh_->parts().size()});
+  writer.number(uint64_t{0});  // the number of parts; format 1 had them here
   return chunk;
 }
 
@@ -71,16 +79,23 @@ std::string MeshWriter::next_indices() {
   return chunk;
 }
 
-std::string MeshWriter::next_parts() {
+absl::StatusOr<std::optional<std::string>> PartsWriter::next() {
+  const std::vector<MeshPart>& parts = mesh_->parts();
+  if (begun_ && next_part_ == parts.size()) return std::optional<std::string>();
   std::string chunk;
   ByteWriter writer(chunk);
-  write_kind(writer, BytesKind::kMeshParts);
-  for (; next_part_ < mesh_->parts().size() && chunk.size() < kPartsChunk; ++next_part_) {
-    const MeshPart& part = mesh_->parts()[next_part_];
-    writer.number(uint64_t{part.first_triangle});
-    writer.text(part.name);
+  if (!std::exchange(begun_, true)) {
+    write_kind(writer, BytesKind::kPartsHeader);
+    writer.number(uint64_t{parts.size()});
+    return std::optional<std::string>(std::move(chunk));
   }
-  return chunk;
+  write_kind(writer, BytesKind::kMeshParts);
+  for (; next_part_ < parts.size() && chunk.size() < kPartsChunk; ++next_part_) {
+    writer.number(uint64_t{parts[next_part_].first_triangle});
+    writer.text(parts[next_part_].name);
+  }
+  LOCUS_CHECK_LE(chunk.size(), UpdateLog::kMaxChunkBytes);
+  return std::optional<std::string>(std::move(chunk));
 }
 
 absl::Status MeshReader::add(absl::string_view chunk) {
@@ -97,7 +112,7 @@ absl::Status MeshReader::add(absl::string_view chunk) {
     const auto numbers = reader.column<uint32_t>("indices");
     indices_.insert(indices_.end(), numbers.begin(), numbers.end());
   } else if (kind == BytesKind::kMeshParts) {
-    read_parts(reader);
+    read_parts(reader, parts_);
   } else {
     reader.fail("the kind of a chunk", "is not known");
   }
@@ -114,15 +129,6 @@ void MeshReader::read_header(ByteReader& reader) {
   part_count_ = reader.number_upto(limits::kMaxMeshParts, "the number of parts");
 }
 
-void MeshReader::read_parts(ByteReader& reader) {
-  while (reader.good() && reader.left() >= kMinPart) {
-    MeshPart& part = parts_.emplace_back();
-    part.first_triangle =
-        static_cast<uint32_t>(reader.number_upto(limits::kMaxMeshTriangles, "the first triangle of a part"));
-    part.name = std::string(reader.text(limits::kMaxLabelLength, "the name of a part"));
-  }
-}
-
 absl::StatusOr<TriangleMesh> MeshReader::finish() && {
   if (!begun_) return data_loss("the header is not there");
   if (vertices_.size() != vertex_numbers_ || indices_.size() != index_numbers_ || parts_.size() != part_count_)
@@ -133,6 +139,33 @@ absl::StatusOr<TriangleMesh> MeshReader::finish() && {
       TriangleMesh::create(std::move(vertices_), std::move(indices_), std::move(parts_));
   if (!mesh.ok()) return data_loss(absl::StrCat("what is there is no mesh: ", mesh.status().message()));
   return mesh;
+}
+
+absl::Status PartsReader::add(absl::string_view chunk) {
+  const AlignedBytes aligned(chunk);
+  ByteReader reader(aligned.bytes());
+  const BytesKind kind = read_kind(reader);
+  if (reader.good() && (kind == BytesKind::kPartsHeader) == begun_) reader.fail("the header of parts", "is not first");
+  if (kind == BytesKind::kPartsHeader) {
+    begun_ = true;
+    part_count_ = reader.number_upto(limits::kMaxMeshParts, "the number of parts");
+  } else if (kind == BytesKind::kMeshParts) {
+    read_parts(reader, parts_);
+  } else {
+    reader.fail("the kind of a chunk", "is not known");
+  }
+  if (parts_.size() > part_count_) reader.fail("a chunk", "is one too many");
+  reader.end("a chunk");
+  return reader.status();
+}
+
+absl::StatusOr<std::vector<MeshPart>> PartsReader::finish(size_t triangles) && {
+  if (!begun_) return data_loss("the header of parts is not there");
+  if (parts_.size() != part_count_)
+    return data_loss(absl::StrCat("of ", part_count_, " parts ", parts_.size(), " are there"));
+  if (absl::Status status = check_parts(parts_, triangles); !status.ok())
+    return data_loss(absl::StrCat("the parts do not fit the mesh: ", status.message()));
+  return std::move(parts_);
 }
 
 }  // namespace locus

@@ -1,5 +1,5 @@
-// A mesh's columns as chunks for the log, and the mesh again from them. The tree is not among them: what saves building
-// it again is tree_codec.h. One thread at a time.
+// A mesh's columns as chunks for the log, and the mesh again from them; likewise the parts, which belong to a name and
+// not to the bytes. The tree is not among them: what saves building it again is tree_codec.h. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 
@@ -28,7 +28,6 @@ class MeshWriter {
   std::string header() const;
   std::string next_vertices();
   std::string next_indices();
-  std::string next_parts();
 
   const std::shared_ptr<const StaticMesh> mesh_;
   const std::vector<float> vertices_;
@@ -36,9 +35,23 @@ class MeshWriter {
   bool begun_ = false;
   size_t next_vertex_ = 0;  // number of a coordinate
   size_t next_index_ = 0;
+};
+
+// Writes the parts of one name: a header that says how many there are, then the parts.
+class PartsWriter {
+ public:
+  explicit PartsWriter(std::shared_ptr<const StaticMesh> mesh) : mesh_(std::move(mesh)) {}
+
+  // Returns the next chunk, as MeshWriter::next() does.
+  absl::StatusOr<std::optional<std::string>> next();
+
+ private:
+  const std::shared_ptr<const StaticMesh> mesh_;
+  bool begun_ = false;
   size_t next_part_ = 0;
 };
 
+// Reads what MeshWriter wrote, and meshes of format 1, whose parts stand with the columns.
 class MeshReader {
  public:
   // The next chunk; all in the order in which they were written. DATA_LOSS saying what is wrong.
@@ -48,7 +61,6 @@ class MeshReader {
 
  private:
   void read_header(ByteReader& reader);
-  void read_parts(ByteReader& reader);
 
   bool begun_ = false;
   uint64_t vertex_numbers_ = 0;  // how many there are to be
@@ -56,6 +68,20 @@ class MeshReader {
   uint64_t part_count_ = 0;
   std::vector<float> vertices_;
   std::vector<uint32_t> indices_;
+  std::vector<MeshPart> parts_;
+};
+
+// Reads what PartsWriter wrote.
+class PartsReader {
+ public:
+  // Takes the next chunk, as MeshReader::add() does.
+  absl::Status add(absl::string_view chunk);
+  // Returns the parts once all chunks came. DATA_LOSS where they do not fit a mesh of `triangles` triangles.
+  absl::StatusOr<std::vector<MeshPart>> finish(size_t triangles) &&;
+
+ private:
+  bool begun_ = false;
+  uint64_t part_count_ = 0;  // how many there are to be
   std::vector<MeshPart> parts_;
 };
 

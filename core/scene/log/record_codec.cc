@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
+#include "core/base/limits.h"
 #include "core/scene/log/batch_codec.h"
 
 namespace locus {
@@ -28,6 +29,7 @@ Record::Joined read_joined(ByteReader& reader) {
 
 void write_placement(const PlacementColumns& place, absl::Span<const Id> ids, ByteWriter& writer) {
   writer.column(absl::MakeConstSpan(place.mesh->sha256()));
+  writer.text(place.mesh->name());
   writer.column(ids);
   writer.column(place.translations);
   writer.column(place.rotations);
@@ -37,12 +39,14 @@ void write_placement(const PlacementColumns& place, absl::Span<const Id> ids, By
   writer.column(place.tags);
 }
 
-PlacementColumns read_placement(ByteReader& reader, Sha256& mesh) {
+PlacementColumns read_placement(ByteReader& reader, BytesKind kind, MeshKey& mesh) {
   const auto sha256 = reader.column<uint8_t>("the name of a mesh's content");
-  if (sha256.size() == mesh.size())
-    std::copy(sha256.begin(), sha256.end(), mesh.begin());
+  if (sha256.size() == mesh.sha256.size())
+    std::copy(sha256.begin(), sha256.end(), mesh.sha256.begin());
   else
     reader.fail("the name of a mesh's content", "has a wrong length");
+  if (kind == BytesKind::kNamedChange)
+    mesh.name = std::string(reader.text(limits::kMaxNameLength, "the name of a mesh"));
   PlacementColumns place;
   place.ids = reader.column<uint64_t>("ids");
   place.translations = reader.column<double>("translations");
@@ -55,14 +59,14 @@ PlacementColumns read_placement(ByteReader& reader, Sha256& mesh) {
   return place;
 }
 
-Record::Change read_change(ByteReader& reader) {
+Record::Change read_change(ByteReader& reader, BytesKind kind) {
   Record::Change read;
   read.change.remove_ids = reader.column<uint64_t>("remove_ids");
   read.change.remove_groups = reader.column<uint64_t>("remove_groups");
   const uint64_t count = reader.count(kMinPlacement, "the number of placements");
   read.change.place.reserve(count);
   for (uint64_t i = 0; i < count && reader.good(); ++i)
-    read.change.place.push_back(read_placement(reader, read.meshes.emplace_back()));
+    read.change.place.push_back(read_placement(reader, kind, read.meshes.emplace_back()));
   return read;
 }
 
@@ -83,7 +87,7 @@ void encode_joined(absl::Span<const UpdateBatch* const> batches, std::string& to
 
 void encode_change(const StaticChange& change, absl::Span<const Id> placed, std::string& to) {
   ByteWriter writer(to);
-  write_kind(writer, BytesKind::kStaticChange);
+  write_kind(writer, BytesKind::kNamedChange);
   writer.column(change.remove_ids);
   writer.column(change.remove_groups);
   writer.number(uint64_t{change.place.size()});
@@ -104,8 +108,8 @@ absl::StatusOr<Record> Record::decode(absl::string_view bytes) {
     record.content_ = read_batch(reader);
   } else if (kind == BytesKind::kJoinedBatches) {
     record.content_ = read_joined(reader);
-  } else if (kind == BytesKind::kStaticChange) {
-    record.content_ = read_change(reader);
+  } else if (kind == BytesKind::kStaticChange || kind == BytesKind::kNamedChange) {
+    record.content_ = read_change(reader, kind);
   } else {
     reader.fail("the kind of a record", "is not known");
   }

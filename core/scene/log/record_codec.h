@@ -36,8 +36,8 @@ class Record {
     std::vector<UpdateBatch> batches;  // at least one; all may_join()
   };
   struct Change {
-    StaticChange change;         // without meshes, with ids
-    std::vector<Sha256> meshes;  // of each placement
+    StaticChange change;          // without meshes, with ids
+    std::vector<MeshKey> meshes;  // of each placement; without names in format 1
   };
   using Content = std::variant<UpdateBatch, Joined, Change>;  // batches pass check_form()
   Content& content() { return content_; }

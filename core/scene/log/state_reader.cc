@@ -8,6 +8,7 @@
 #include "core/base/column.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
+#include "core/base/refusal.h"
 #include "core/scene/log/state_limits.h"
 
 namespace locus {
@@ -30,7 +31,7 @@ UpdateAck read_ack(ByteReader& reader) {
     ItemError& error = ack.errors.emplace_back();
     const ByteReader::Pair pair = reader.pair("an error of an ack");
     error.index = pair.first;
-    if (pair.second > static_cast<uint32_t>(Reason::kHashMismatch)) reader.fail("the reason of an error", "is unknown");
+    if (pair.second > static_cast<uint32_t>(kLastReason)) reader.fail("the reason of an error", "is unknown");
     error.reason = static_cast<Reason>(pair.second);
     error.id = reader.number("the id of an error");
     error.field = std::string(reader.text(kMaxErrorField, "the field of an error"));
@@ -106,8 +107,8 @@ absl::Status StateReader::add(absl::string_view chunk) {
     read_header(reader);
   } else if (kind == BytesKind::kStateWriters) {
     read_writers(reader);
-  } else if (kind == BytesKind::kStateInstances) {
-    read_instances(reader);
+  } else if (kind == BytesKind::kStateInstances || kind == BytesKind::kNamedInstances) {
+    read_instances(reader, kind);
   } else if (kind == BytesKind::kStateObjects) {
     read_objects(reader);
   } else {
@@ -142,8 +143,11 @@ void StateReader::read_writers(ByteReader& reader) {
   }
 }
 
-void StateReader::read_instances(ByteReader& reader) {
-  const absl::Span<const Sha256> meshes = reader.column<Sha256>("the contents of meshes");
+void StateReader::read_instances(ByteReader& reader, BytesKind kind) {
+  std::vector<MeshKey> meshes;
+  for (const Sha256& sha256 : reader.column<Sha256>("the contents of meshes")) meshes.push_back({sha256, ""});
+  if (kind == BytesKind::kNamedInstances)
+    for (MeshKey& mesh : meshes) mesh.name = std::string(reader.text(limits::kMaxNameLength, "the name of a mesh"));
   const LabelColumns labels(reader, kInstancesPerChunk);
   const size_t n = labels.ids.size();
   const auto numbers = reader.shared_column<uint32_t>(n, 1, "the meshes of instances");
@@ -200,9 +204,9 @@ void StateReader::read_objects(ByteReader& reader) {
 // As the scene had them: a transform is stored as it is placed.
 absl::Status StateReader::place(const FindMesh& find_mesh) {
   StaticChange change;
-  for (const auto& [content, placed] : placed_) {
-    PlacementColumns place{find_mesh(content), placed.ids,    placed.translations, placed.rotations,
-                           placed.scales,      placed.layers, placed.groups,       placed.tags};
+  for (const auto& [mesh, placed] : placed_) {
+    PlacementColumns place{find_mesh(mesh), placed.ids,    placed.translations, placed.rotations,
+                           placed.scales,   placed.layers, placed.groups,       placed.tags};
     if (place.mesh == nullptr) return data_loss("a mesh that instances use is not there");
     change.place.push_back(std::move(place));
   }

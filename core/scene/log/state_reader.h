@@ -15,8 +15,8 @@
 
 namespace locus {
 
-// The mesh of that content, or null.
-using FindMesh = std::function<std::shared_ptr<const StaticMesh>(const Sha256&)>;
+// Returns the mesh of that name and content, or null. Without a name (format 1), any mesh of that content.
+using FindMesh = std::function<std::shared_ptr<const StaticMesh>(const MeshKey&)>;
 
 class StateReader {
  public:
@@ -35,7 +35,7 @@ class StateReader {
   };
   void read_header(ByteReader& reader);
   void read_writers(ByteReader& reader);
-  void read_instances(ByteReader& reader);
+  void read_instances(ByteReader& reader, BytesKind kind);
   void read_objects(ByteReader& reader);
   absl::Status place(const FindMesh& find_mesh);
 
@@ -46,7 +46,7 @@ class StateReader {
   uint64_t objects_ = 0;
   uint64_t instances_read_ = 0;
   uint64_t objects_read_ = 0;
-  std::map<Sha256, Placed> placed_;
+  std::map<MeshKey, Placed> placed_;
 };
 
 }  // namespace locus

@@ -126,14 +126,18 @@ std::string StateWriter::next_instances() {
   const absl::Span<const Instance> things = all.subspan(next_instance_, kInstancesPerChunk);
   next_instance_ += things.size();
   absl::flat_hash_map<const StaticMesh*, uint32_t> numbers_of_meshes;
-  std::vector<Sha256> meshes;
-  for (const Instance& instance : things)
-    if (numbers_of_meshes.emplace(instance.mesh.get(), static_cast<uint32_t>(meshes.size())).second)
-      meshes.push_back(instance.mesh->sha256());
+  std::vector<Sha256> contents;
+  std::vector<absl::string_view> names;
+  for (const Instance& instance : things) {
+    if (!numbers_of_meshes.emplace(instance.mesh.get(), static_cast<uint32_t>(contents.size())).second) continue;
+    contents.push_back(instance.mesh->sha256());
+    names.push_back(instance.mesh->name());
+  }
   std::string chunk;
   ByteWriter writer(chunk);
-  write_kind(writer, BytesKind::kStateInstances);
-  writer.column(absl::MakeConstSpan(meshes));
+  write_kind(writer, BytesKind::kNamedInstances);
+  writer.column(absl::MakeConstSpan(contents));
+  for (const absl::string_view name : names) writer.text(name);
   write_labels(writer, things);
   write_each(writer, things,
              [&](const Instance& one) { return Numbers<uint32_t, 1>{numbers_of_meshes.at(one.mesh.get())}; });

@@ -64,7 +64,8 @@ struct StoredScene {
 struct StoredMesh {
   std::string name;
   std::array<uint8_t, 32> sha256 = {};
-  absl::Status damage;  // likewise
+  absl::Status damage;            // likewise
+  bool parts_in_content = false;  // written in format 1, whose content holds the parts; read_parts() has none
 };
 
 // The next piece of something long, nothing at its end, or why it cannot be had.
@@ -110,10 +111,13 @@ class UpdateLog {
   virtual absl::Status write_snapshot(SceneKey scene, uint64_t sequence, ChunkSource state) = 0;
   virtual absl::Status read_snapshot(SceneKey scene, ChunkSink sink) const = 0;
 
-  // The mesh's bytes are kept once however many names they have: `content` is not asked for bytes that are known.
-  virtual absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content) = 0;
+  // Keeps the mesh's bytes once however many names they have: `content` is not asked for bytes that are known. Keeps
+  // `parts` for each name.
+  virtual absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
+                                ChunkSource parts) = 0;
   virtual absl::Status delete_mesh(absl::string_view name) = 0;
   virtual absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const = 0;
+  virtual absl::Status read_parts(absl::string_view name, ChunkSink sink) const = 0;
 
   // Beside the mesh of this content what saves time when it is recovered (core/scene/log/tree_codec.h). A cache: bytes
   // come back as they were kept or not at all, and what cannot be kept is not. Gone with the mesh; not in a copy. Of

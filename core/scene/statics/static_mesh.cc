@@ -18,63 +18,74 @@ std::vector<Triangle> triangles_of(TriangleMesh mesh) {
 
 }  // namespace
 
+StaticMesh::StaticMesh(std::string name, std::vector<MeshPart> parts, std::shared_ptr<const Content> content)
+    : name_(std::move(name)), parts_(std::move(parts)), content_(std::move(content)) {
+  parts_.shrink_to_fit();
+}
+
 absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::build(std::string name, const Sha256& sha256,
                                                                     TriangleMesh mesh, const BvhOptions& options) {
-  const std::shared_ptr<StaticMesh> built(new StaticMesh(std::move(name), sha256));
-  built->keep_columns(mesh);
+  auto content = std::make_shared<Content>();
+  content->sha256 = sha256;
+  content->keep_columns(mesh);
+  std::vector<MeshPart> parts = mesh.parts();
   ASSIGN_OR_RETURN(TriangleBvh tree, TriangleBvh::build(triangles_of(std::move(mesh)), options));
-  built->tree_ = std::move(tree);
-  built->number_blocks();
-  return built;
+  content->tree = std::move(tree);
+  content->number_blocks();
+  return std::shared_ptr<const StaticMesh>(new StaticMesh(std::move(name), std::move(parts), std::move(content)));
 }
 
 absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::restore(std::string name, const Sha256& sha256,
                                                                       const TriangleMesh& mesh,
                                                                       const TreeTopology& topology,
                                                                       const BvhOptions& options) {
-  const std::shared_ptr<StaticMesh> restored(new StaticMesh(std::move(name), sha256));
+  auto content = std::make_shared<Content>();
+  content->sha256 = sha256;
   const auto triangle = [&mesh](uint32_t number) { return mesh.triangle(number); };
   ASSIGN_OR_RETURN(TriangleBvh tree, TriangleBvh::restore(topology, mesh.triangle_count(), triangle, options));
-  restored->tree_ = std::move(tree);
-  restored->keep_columns(mesh);
-  restored->number_blocks();
-  return restored;
+  content->tree = std::move(tree);
+  content->keep_columns(mesh);
+  content->number_blocks();
+  return std::shared_ptr<const StaticMesh>(new StaticMesh(std::move(name), mesh.parts(), std::move(content)));
 }
 
-void StaticMesh::keep_columns(const TriangleMesh& mesh) {
-  vertex_count_ = static_cast<uint32_t>(mesh.vertices().size() / 3);
-  zero_area_count_ = mesh.zero_area_count();
-  parts_ = mesh.parts();
-  parts_.shrink_to_fit();
-  indices_ = PackedIndices(mesh.indices());
-  std::vector<bool> used(vertex_count_);
+std::shared_ptr<const StaticMesh> StaticMesh::share(std::string name, std::vector<MeshPart> parts,
+                                                    const StaticMesh& other) {
+  return std::shared_ptr<const StaticMesh>(new StaticMesh(std::move(name), std::move(parts), other.content_));
+}
+
+void StaticMesh::Content::keep_columns(const TriangleMesh& mesh) {
+  vertex_count = static_cast<uint32_t>(mesh.vertices().size() / 3);
+  zero_area_count = mesh.zero_area_count();
+  indices = PackedIndices(mesh.indices());
+  std::vector<bool> used(vertex_count);
   for (const uint32_t index : mesh.indices()) used[index] = true;
-  unused_vertices_.reserve(static_cast<size_t>(std::count(used.begin(), used.end(), false)));
-  for (uint32_t number = 0; number < vertex_count_; ++number) {
+  unused_vertices.reserve(static_cast<size_t>(std::count(used.begin(), used.end(), false)));
+  for (uint32_t number = 0; number < vertex_count; ++number) {
     const float* at = &mesh.vertices()[size_t{3} * number];
-    if (!used[number]) unused_vertices_.push_back({number, {at[0], at[1], at[2]}});
+    if (!used[number]) unused_vertices.push_back({number, {at[0], at[1], at[2]}});
   }
 }
 
-void StaticMesh::number_blocks() {
-  const TriangleTree tree = tree_.tree();
-  blocks_ = PackedNumbers(triangle_count(), static_cast<uint32_t>(tree_.block_count() - 1));
-  for (uint32_t number = 0; number < tree_.block_count(); ++number) {
-    const TriangleBlock& block = tree.blocks[number];
-    for (uint32_t place = 0; place < block.count; ++place) blocks_.set(tree.numbers[block.first + place], number);
+void StaticMesh::Content::number_blocks() {
+  const TriangleTree nodes = tree.tree();
+  blocks = PackedNumbers(static_cast<uint32_t>(tree.size()), static_cast<uint32_t>(tree.block_count() - 1));
+  for (uint32_t number = 0; number < tree.block_count(); ++number) {
+    const TriangleBlock& block = nodes.blocks[number];
+    for (uint32_t place = 0; place < block.count; ++place) blocks.set(nodes.numbers[block.first + place], number);
   }
 }
 
 Triangle StaticMesh::triangle(uint32_t number) const {
-  const uint32_t* const numbers = tree_.tree().numbers;
-  const TriangleBlock& block = tree_.tree().blocks[blocks_[number]];
+  const uint32_t* const numbers = tree().tree().numbers;
+  const TriangleBlock& block = tree().tree().blocks[content_->blocks[number]];
   uint32_t place = 0;
   while (numbers[block.first + place] != number) ++place;
-  return tree_.triangle(block, place);
+  return tree().triangle(block, place);
 }
 
 std::vector<float> StaticMesh::vertices() const {
-  std::vector<float> vertices(size_t{3} * vertex_count_);
+  std::vector<float> vertices(size_t{3} * vertex_count());
   const auto put = [&](uint32_t number, float x, float y, float z) {
     float* at = &vertices[size_t{3} * number];
     at[0] = x;
@@ -86,16 +97,20 @@ std::vector<float> StaticMesh::vertices() const {
     const Triangle corners = triangle(number);
     for (const Vec3f corner : {corners.a, corners.b, corners.c}) put(reader.next(), corner.x, corner.y, corner.z);
   }
-  for (const UnusedVertex& unused : unused_vertices_)
+  for (const UnusedVertex& unused : content_->unused_vertices)
     put(unused.number, unused.position[0], unused.position[1], unused.position[2]);
   return vertices;
 }
 
 uint64_t StaticMesh::bytes() const {
-  uint64_t bytes = sizeof(*this) + name_.capacity() + tree_.bytes() + indices_.bytes() + blocks_.bytes();
-  bytes += unused_vertices_.capacity() * sizeof(UnusedVertex) + parts_.capacity() * sizeof(MeshPart);
+  uint64_t bytes = sizeof(*this) + name_.capacity() + shared_bytes() + parts_.capacity() * sizeof(MeshPart);
   for (const MeshPart& part : parts_) bytes += part.name.capacity();
   return bytes;
+}
+
+uint64_t StaticMesh::shared_bytes() const {
+  return sizeof(Content) + content_->tree.bytes() + content_->indices.bytes() + content_->blocks.bytes() +
+         content_->unused_vertices.capacity() * sizeof(UnusedVertex);
 }
 
 }  // namespace locus

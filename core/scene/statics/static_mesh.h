@@ -1,10 +1,13 @@
-// A mesh with its tree, ready to be asked: built once from the uploaded bytes, shared by all scenes and instances. The
-// tree holds every corner of every triangle, so the columns are not kept beside it: what it does not tell is kept
-// packed, and the columns come back as they were uploaded, byte for byte. Immutable; safe to share between threads.
+// A named mesh with its parts and its tree, ready to be asked: built once from the uploaded bytes, shared by all scenes
+// and instances. Meshes of equal bytes share the tree and all else that comes from the bytes, and keep names and parts
+// of their own: see share(). The tree holds every corner of every triangle, so the columns are not kept beside it: what
+// it does not tell is kept packed, and the columns come back as they were uploaded, byte for byte. Immutable; safe to
+// share between threads.
 #ifndef LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 #define LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 
 #include <array>
+#include <compare>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,6 +21,14 @@ namespace locus {
 
 using Sha256 = std::array<uint8_t, 32>;
 
+// Identifies a mesh in stored data. The name is empty in records and snapshots of format 1.
+struct MeshKey {
+  Sha256 sha256 = {};
+  std::string name;
+
+  auto operator<=>(const MeshKey&) const = default;
+};
+
 class StaticMesh {
  public:
   // Builds the tree. Errors: as TriangleBvh::build(). `sha256` names the bytes and is taken on trust.
@@ -30,25 +41,33 @@ class StaticMesh {
                                                                    const TreeTopology& topology,
                                                                    const BvhOptions& options = {});
 
+  // Returns a mesh of the bytes of `other`, which shares its tree, under another name and with other parts. `parts`
+  // have passed check_parts().
+  static std::shared_ptr<const StaticMesh> share(std::string name, std::vector<MeshPart> parts,
+                                                 const StaticMesh& other);
+
   const std::string& name() const { return name_; }
-  const Sha256& sha256() const { return sha256_; }
+  const Sha256& sha256() const { return content_->sha256; }
+  MeshKey key() const { return {sha256(), name_}; }
   // Its storage order is the order of TRIANGLES rows.
-  const TriangleBvh& tree() const { return tree_; }
-  uint32_t vertex_count() const { return vertex_count_; }
-  uint32_t triangle_count() const { return static_cast<uint32_t>(tree_.size()); }
-  uint32_t zero_area_count() const { return zero_area_count_; }
+  const TriangleBvh& tree() const { return content_->tree; }
+  uint32_t vertex_count() const { return content_->vertex_count; }
+  uint32_t triangle_count() const { return static_cast<uint32_t>(tree().size()); }
+  uint32_t zero_area_count() const { return content_->zero_area_count; }
   // Of all triangles.
-  const Aabbf& bounds() const { return tree_.bounds(); }
+  const Aabbf& bounds() const { return tree().bounds(); }
   const std::vector<MeshPart>& parts() const { return parts_; }
   // By its number in the uploaded index list, below triangle_count().
   Triangle triangle(uint32_t number) const;
 
   // The uploaded columns, made anew: 3 coordinates a vertex; 3 vertex numbers a triangle, read in order. O(size).
   std::vector<float> vertices() const;
-  PackedIndices::Reader indices() const { return PackedIndices::Reader(indices_); }
+  PackedIndices::Reader indices() const { return PackedIndices::Reader(content_->indices); }
 
-  // All memory that stays taken.
+  // Returns all memory that stays taken.
   uint64_t bytes() const;
+  // Returns the part of bytes() that meshes of equal bytes share.
+  uint64_t shared_bytes() const;
 
  private:
   struct UnusedVertex {
@@ -56,19 +75,25 @@ class StaticMesh {
     std::array<float, 3> position;
   };
 
-  StaticMesh(std::string name, const Sha256& sha256) : name_(std::move(name)), sha256_(sha256) {}
-  void keep_columns(const TriangleMesh& mesh);
-  void number_blocks();
+  // Holds all that comes from the bytes.
+  struct Content {
+    Sha256 sha256 = {};
+    TriangleBvh tree;
+    PackedIndices indices;
+    PackedNumbers blocks;  // by triangle number: the block that holds it
+    std::vector<UnusedVertex> unused_vertices;
+    uint32_t vertex_count = 0;
+    uint32_t zero_area_count = 0;
+
+    void keep_columns(const TriangleMesh& mesh);
+    void number_blocks();
+  };
+
+  StaticMesh(std::string name, std::vector<MeshPart> parts, std::shared_ptr<const Content> content);
 
   std::string name_;
-  Sha256 sha256_;
-  TriangleBvh tree_;
-  PackedIndices indices_;
-  PackedNumbers blocks_;  // by triangle number: the block that holds it
-  std::vector<UnusedVertex> unused_vertices_;
   std::vector<MeshPart> parts_;
-  uint32_t vertex_count_ = 0;
-  uint32_t zero_area_count_ = 0;
+  std::shared_ptr<const Content> content_;  // never null
 };
 
 }  // namespace locus

@@ -142,11 +142,14 @@ absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copy& co
     status = copy_chunks(source, source.mesh(), copy.target().mesh(), mesh_prefix(found.sha256, found.content.number),
                          found.content.chunks, copy);
   }
+  if (status.ok() && found.parts)
+    status = copy_chunks(source, source.mesh(), copy.target().mesh(), mesh_prefix(found.sha256, found.parts->number),
+                         found.parts->chunks, copy);
   if (!status.ok() && !absl::IsDataLoss(status)) return status;
   if (status.ok()) {
     keep_row(content, with_checksum(content, encode(found.content)), result, copy);
     const std::string key = mesh_key(found.name);
-    keep_row(key, with_checksum(key, content.substr(1)), result, copy);
+    keep_row(key, with_checksum(key, encode(MeshRow{found.sha256, found.parts})), result, copy);
   }
   if (!found.damage.empty()) report.meshes.push_back({found.name, found.damage, !status.ok()});
   return absl::OkStatus();

@@ -36,11 +36,12 @@ absl::Status read_meta(const Database& database, DamageReport& found) {
     if (!bytes || key == kFamilyMark) continue;
     if (key == kFormatKey) {
       const uint32_t format = ByteReader(*bytes).u32();
-      if (format != kFormat)
+      if (format < kOldestFormat || format > kFormat)
         return absl::FailedPreconditionError(absl::StrCat("the data directory has format ", format,
-                                                          ", of another version of locusd; this one knows format ",
-                                                          kFormat));
+                                                          ", of another version of locusd; this one knows formats ",
+                                                          kOldestFormat, " to ", kFormat));
       found.has_format = true;
+      found.format = format;
     } else if (key == kCatalogueKey) {
       found.catalogue = decode_catalogue(*bytes);
     } else if (key[0] == kPendingSnapshotTag || key[0] == kPendingMeshTag) {
@@ -179,16 +180,22 @@ absl::Status find_meshes(const Database& database, Depth depth, DamageReport& fo
     MeshHealth& mesh = found.meshes.emplace_back();
     mesh.name = row->first.substr(1);
     mesh.damage = found.catalogue_damage;
-    const absl::string_view sha256 = *verified(row->first, row->second);
-    if (sha256.size() == mesh.sha256.size()) std::copy(sha256.begin(), sha256.end(), mesh.sha256.begin());
+    if (const std::optional<MeshRow> name = decode_mesh(*verified(row->first, row->second))) {
+      mesh.sha256 = name->sha256;
+      mesh.parts = name->parts;
+    }
     const auto content = found.rows.find(content_key(mesh.sha256));
     const std::optional<ContentRow> list =
         content == found.rows.end() ? std::nullopt : decode_content(*verified(content->first, content->second));
     if (list) mesh.content = *list;
     if (!list && mesh.damage.empty()) mesh.damage = "its content is lost";
     if (!mesh.damage.empty() || depth == Depth::kKeys) continue;
-    const absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.content.number),
-                                          mesh.content.chunks, [](absl::string_view) { return absl::OkStatus(); });
+    const auto nowhere = [](absl::string_view) { return absl::OkStatus(); };
+    absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.content.number),
+                                    mesh.content.chunks, nowhere);
+    if (read.ok() && mesh.parts)
+      read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.parts->number), mesh.parts->chunks,
+                         nowhere);
     mesh.damage = damage_of(read, disk);
   }
   return disk;

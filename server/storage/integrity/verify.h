@@ -33,11 +33,13 @@ struct MeshHealth {
   std::string name;
   Sha256 sha256 = {};
   ContentRow content;
+  std::optional<ContentRow> parts;  // none where they stand with the content
   std::string damage;
 };
 
 struct DamageReport {
   bool has_format = false;
+  uint32_t format = kFormat;
   Catalogue::Rows rows;  // all that are sound by themselves
   std::optional<CatalogueRow> catalogue;
   std::vector<SceneHealth> scenes;   // those that are there and those that must be, by key

@@ -2,6 +2,8 @@
 
 #include <xxhash.h>
 
+#include <algorithm>
+
 #include "server/storage/rocksdb/bytes.h"
 
 namespace locus::server {
@@ -78,6 +80,13 @@ std::string encode(const ContentRow& row) {
   return ByteWriter().u64(row.number).u64(row.chunks.chunks).u64(row.chunks.bytes).u64(row.chunks.digest).take();
 }
 
+std::string encode(const MeshRow& row) {
+  ByteWriter out;
+  out.bytes(view_of(row.sha256));
+  if (row.parts) out.bytes(encode(*row.parts));
+  return out.take();
+}
+
 std::string encode(const SceneRow& row) {
   ByteWriter out;
   out.u64(row.key)
@@ -101,6 +110,17 @@ std::optional<ContentRow> decode_content(absl::string_view bytes) {
   row.chunks.bytes = in.u64();
   row.chunks.digest = in.u64();
   return in.ended() ? std::optional(row) : std::nullopt;
+}
+
+std::optional<MeshRow> decode_mesh(absl::string_view bytes) {
+  ByteReader in(bytes);
+  MeshRow row;
+  const absl::string_view sha256 = in.bytes(row.sha256.size());
+  if (!in.ok()) return std::nullopt;
+  std::copy(sha256.begin(), sha256.end(), row.sha256.begin());
+  if (in.ended()) return row;
+  row.parts = decode_content(in.rest());
+  return row.parts ? std::optional(row) : std::nullopt;
 }
 
 std::optional<SceneRow> decode_scene(absl::string_view bytes) {

@@ -1,12 +1,15 @@
-// Format 1 of what stands in RocksDB: the keys and values of its column families, each value with a checksum over key
+// Format 2 of what stands in RocksDB: the keys and values of its column families, each value with a checksum over key
 // and value, so that one in a wrong place is noticed. Free functions on plain data; any thread.
+//
+// Format 1 is read, too: its rows of meshes have no parts, which stood among the content's chunks. A directory of
+// format 1 becomes one of format 2 when it is opened.
 //
 // meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene number
 //           and 'q' sha256 number: chunks on their way into a snapshot or mesh
 // log       scene sequence: a record. Each checksum takes in the one before, from the scene's first record on: none can
 //           be left out, taken from another scene or come back from an earlier time without breaking this chain.
 // snapshot  scene number index: a chunk
-// mesh      sha256 number index: a chunk
+// mesh      sha256 number index: a chunk of the content, or of the parts of one name
 // Numbers of snapshots and meshes are random and never used again: what was deleted is not looked at in reading, so
 // that nothing may stand where something else was. In each family, under the key "\0", which sorts before all others,
 // stands a mark that makes it show up in some table.
@@ -23,7 +26,8 @@
 
 namespace locus::server {
 
-inline constexpr uint32_t kFormat = 1;
+inline constexpr uint32_t kFormat = 2;
+inline constexpr uint32_t kOldestFormat = 1;
 inline constexpr absl::string_view kFormatKey = "format";
 inline constexpr absl::string_view kCatalogueKey = "catalogue";
 inline constexpr absl::string_view kFamilyMark("\0", 1);
@@ -47,10 +51,16 @@ struct ChunkList {
   bool operator==(const ChunkList&) const = default;
 };
 
-// A mesh's content.
+// A mesh's content, or the parts of one name.
 struct ContentRow {
   uint64_t number = 0;
   ChunkList chunks;
+};
+
+// A mesh's name.
+struct MeshRow {
+  Sha256 sha256 = {};
+  std::optional<ContentRow> parts;  // none in format 1
 };
 
 struct SceneRow {
@@ -97,9 +107,11 @@ uint64_t stored_checksum(absl::string_view value);
 std::string encode(const SceneRow& row);
 std::string encode(const CatalogueRow& row);
 std::string encode(const ContentRow& row);
+std::string encode(const MeshRow& row);
 std::optional<SceneRow> decode_scene(absl::string_view bytes);
 std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes);
 std::optional<ContentRow> decode_content(absl::string_view bytes);
+std::optional<MeshRow> decode_mesh(absl::string_view bytes);
 
 // A record's value is head, bytes, checksum; the three are made apart, so that the bytes are copied once.
 inline constexpr size_t kRecordHeadBytes = 1 + 8 + 8 + 8 + 4;

@@ -69,7 +69,7 @@ TEST(RefusalTest, EveryReasonHasItsOwnName) {
   EXPECT_EQ(reason_name(Reason::kSceneRestarted), "SCENE_RESTARTED");
   EXPECT_EQ(reason_name(Reason::kHashMismatch), "HASH_MISMATCH");
   EXPECT_EQ(reason_name(Reason::kDamaged), "DAMAGED");
-  for (int a = 0; a < static_cast<int>(Reason::kDamaged); ++a)
+  for (int a = 0; a < static_cast<int>(kLastReason); ++a)
     EXPECT_NE(reason_name(static_cast<Reason>(a)), reason_name(static_cast<Reason>(a + 1)));
   EXPECT_EQ(reason_name(static_cast<Reason>(200)), "UNKNOWN_REASON");
 }

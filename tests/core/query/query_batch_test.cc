@@ -322,6 +322,37 @@ TEST(CheckBatchTest, RowsThatCannotBeCutMustFitTheReply) {
   EXPECT_TRUE(check_batch(batch).ok());
 }
 
+TEST(CheckBatchTest, TheIndexOfAWrongValueIsItsQueryInEveryColumnAndAWrongLengthHasNone) {
+  OwnedBlock rays = twenty_rays();
+  rays.sizes[3 * 7 + 2] = std::numeric_limits<float>::infinity();
+  Refusal refusal = refusal_for({rays});
+  EXPECT_EQ(refusal.field, "blocks[0].rays.directions");
+  EXPECT_EQ(refusal.index, std::optional<uint32_t>(7));
+  rays.sizes = {0, 0, 0};
+  refusal = refusal_for({rays});
+  EXPECT_EQ(refusal.field, "blocks[0].rays.directions");
+  EXPECT_EQ(refusal.index, std::optional<uint32_t>(0)) << "one direction for all";
+  rays.sizes.assign(57, 1);
+  refusal = refusal_for({rays});
+  EXPECT_EQ(refusal.reason, Reason::kColumnLength);
+  EXPECT_EQ(refusal.index, std::nullopt);
+}
+
+TEST(CheckBatchTest, CountsCannotBeCutEither) {
+  OwnedBlock balls = one_ball({}, 1);
+  balls.points.assign(3 * 1000, 1);
+  const std::vector<OwnedBlock> blocks = {balls};
+  QueryBatch batch = batch_of(blocks);
+  batch.max_reply_bytes = 1000 * (4 + 4) + 2 * 256;  // counts, room for a list of cut queries, a block and a reply
+  EXPECT_TRUE(check_batch(batch).ok());
+  --batch.max_reply_bytes;
+  const Refusal refusal = refusal_of(check_batch(batch)).value_or(Refusal{});
+  EXPECT_EQ(refusal.reason, Reason::kLimit);
+  EXPECT_EQ(refusal.field, "max_reply_bytes");
+  EXPECT_EQ(refusal.limit_value, 8511);
+  EXPECT_EQ(refusal.asked, 8512);
+}
+
 TEST(CheckBatchTest, RaysOfAnyHaveNoColumns) {
   OwnedBlock block = rays_along_x(RayMode::kAny);
   block.settings.columns = {Column::kT};

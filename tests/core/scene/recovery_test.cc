@@ -53,7 +53,7 @@ class RecoverTest : public SceneFixture {
   Registry registry_{&log_};
   ScenePtr logged_;
   std::unique_ptr<MemoryLog> again_;
-  FindMesh find_ = [this](const Sha256& sha256) { return sha256 == mesh_->sha256() ? mesh_ : nullptr; };
+  FindMesh find_ = [this](const MeshKey& key) { return key == mesh_->key() ? mesh_ : nullptr; };
 };
 
 TEST_F(RecoverTest, ARecordThatIsMissingIsSeen) {
@@ -164,7 +164,7 @@ TEST_F(RecoverTest, AMeshMayHaveGoneThatNothingUsesAnyMore) {
   StaticChange removal;
   removal.remove_ids = columns_.ids({5});
   ASSERT_TRUE(logged_->change_instances(removal).ok());
-  find_ = [](const Sha256&) { return nullptr; };
+  find_ = [](const MeshKey&) { return nullptr; };
   EXPECT_THAT(message(used), HasSubstr("scene arena: the mesh of content 0100"));
   const absl::StatusOr<ScenePtr> scene = recover(log_.crash());
   ASSERT_TRUE(scene.ok()) << scene.status();

@@ -110,7 +110,7 @@ TEST_F(RecoveryThreadsTest, WhatWasAcknowledgedWhileAllWereAtWorkIsThereAfterwar
   for (std::thread& thread : others) thread.join();
 
   MemoryLog again(log_.crash());
-  const auto recovered = recover_scene(again, again.stored_scenes().front(), [this](const Sha256&) { return mesh_; });
+  const auto recovered = recover_scene(again, again.stored_scenes().front(), [this](const MeshKey&) { return mesh_; });
   ASSERT_TRUE(recovered.ok()) << recovered.status();
   Random random(1);
   EXPECT_EQ(scene_difference(**recovered, *logged_, random), "");

@@ -40,11 +40,12 @@ class RegistryLogTest : public SceneFixture {
       const absl::StatusOr<RecoveredMesh> mesh = recover_mesh(*log_, stored);
       ASSERT_TRUE(mesh.ok()) << mesh.status();
       EXPECT_FALSE(mesh->built) << "the outline was kept with the mesh";
-      registry_->restore_mesh(stored.name, mesh->mesh);
+      const absl::StatusOr<MeshPtr> named = recover_name(*log_, stored, mesh->mesh);
+      ASSERT_TRUE(named.ok()) << named.status();
+      registry_->restore_mesh(stored.name, *named);
     }
     for (const StoredScene& stored : log_->stored_scenes()) {
-      const absl::StatusOr<ScenePtr> scene =
-          recover_scene(*log_, stored, [this](const Sha256& sha256) { return registry_->find_content(sha256); });
+      const absl::StatusOr<ScenePtr> scene = recover_scene(*log_, stored, find_restored_meshes(*log_, *registry_));
       ASSERT_TRUE(scene.ok()) << scene.status();
       registry_->restore_scene(*scene);
     }
@@ -70,9 +71,69 @@ TEST_F(RegistryLogTest, ScenesMeshesAndWhatWasPlacedAreThereAfterARestart) {
   EXPECT_EQ(scene_difference(**registry_->find_scene("second"), *second, random), "");
   const MeshPtr mesh = *registry_->find_mesh("m", "mesh");
   EXPECT_EQ(mesh->triangle(0).b, mesh_->triangle(0).b);
-  EXPECT_EQ(*registry_->find_mesh("alias", "mesh"), mesh);
+  EXPECT_EQ(&(*registry_->find_mesh("alias", "mesh"))->tree(), &mesh->tree());
   EXPECT_EQ(registry_->mesh_uses(mesh.get()), 2u);
   EXPECT_EQ(registry_->delete_mesh("m").code(), absl::StatusCode::kFailedPrecondition);
+}
+
+TEST_F(RegistryLogTest, NamesOfEqualContentKeepPartsAndUsesOverARestart) {
+  const std::vector<MeshPart> walls = {{"walls", 0}}, doors = {{"doors", 0}};
+  PlacementColumns first = placement({5, 6}, {1, 2, 3}), second = placement({7}, {4, 5, 6});
+  first.mesh = *registry_->add_mesh("m", StaticMesh::share("m", walls, *mesh_));
+  second.mesh = *registry_->add_mesh("alias", StaticMesh::share("alias", doors, *mesh_));
+  StaticChange change = placing(first);
+  change.place.push_back(second);
+  ASSERT_TRUE(create("recorded")->scene->change_instances(change).ok());
+  ASSERT_TRUE(create("snapshotted", "recorded").ok());
+  for (int times = 0; times < 2; ++times) {
+    restart();
+    const MeshPtr m = *registry_->find_mesh("m", "mesh"), alias = *registry_->find_mesh("alias", "mesh");
+    EXPECT_EQ(m->parts(), walls);
+    EXPECT_EQ(alias->parts(), doors);
+    EXPECT_EQ(&m->tree(), &alias->tree());
+    EXPECT_EQ(registry_->mesh_uses(m.get()), 4u);
+    EXPECT_EQ(registry_->mesh_uses(alias.get()), 2u);
+    for (const char* const scene : {"recorded", "snapshotted"}) {
+      const SnapshotPtr latest = (*registry_->find_scene(scene))->latest();
+      EXPECT_EQ(latest->statics->find(6)->mesh, m) << scene;
+      EXPECT_EQ(latest->statics->find(7)->mesh, alias) << scene;
+    }
+  }
+  StaticChange removal;
+  removal.remove_ids = columns_.ids({5, 6});
+  for (const char* const scene : {"recorded", "snapshotted"})
+    ASSERT_TRUE((*registry_->find_scene(scene))->change_instances(removal).ok());
+  EXPECT_TRUE(registry_->delete_mesh("m").ok());
+  restart();
+  EXPECT_EQ((*registry_->find_mesh("alias", "mesh"))->parts(), doors);
+  EXPECT_EQ(registry_->delete_mesh("alias").code(), absl::StatusCode::kFailedPrecondition);
+}
+
+TEST_F(RegistryLogTest, ARecordWithoutANameMeansTheLowestNameOfFormat1) {
+  for (const char* const name : {"b", "c", "d"}) ASSERT_TRUE(registry_->add_mesh(name, mesh_).ok());
+  MemoryLog::Kept kept = log_->crash();
+  for (const char* const name : {"c", "d"}) kept.parts.erase(name);  // as format 1 kept them
+  const MemoryLog log(kept);
+  EXPECT_TRUE(log.stored_meshes()[1].parts_in_content);
+  const FindMesh find = find_restored_meshes(log, *registry_);
+  EXPECT_EQ(find({mesh_->sha256(), ""})->name(), "c");
+  EXPECT_EQ(find({mesh_->sha256(), "d"})->name(), "d");
+  ASSERT_TRUE(registry_->delete_mesh("d").ok());
+  EXPECT_EQ(find({mesh_->sha256(), "d"}), nullptr);
+}
+
+TEST_F(RegistryLogTest, DamagedPartsAreTheDamageOfTheirNameAlone) {
+  ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
+  ASSERT_TRUE(registry_->add_mesh("alias", mesh_).ok());
+  MemoryLog::Kept kept = log_->crash();
+  kept.parts.at("m").clear();
+  MemoryLog log(kept);
+  ASSERT_EQ(log.stored_meshes().size(), 2u);
+  const absl::StatusOr<RecoveredMesh> content = recover_mesh(log, log.stored_meshes()[0]);
+  ASSERT_TRUE(content.ok()) << content.status();
+  EXPECT_TRUE(recover_name(log, log.stored_meshes()[0], content->mesh).ok());
+  EXPECT_EQ(recover_name(log, log.stored_meshes()[1], content->mesh).status(),
+            absl::DataLossError("mesh m: the header of parts is not there"));
 }
 
 TEST_F(RegistryLogTest, WhatWasDeletedStaysSo) {
@@ -176,10 +237,11 @@ TEST_F(RegistryLogTest, ADamagedMeshAnswersWithItsDamageUntilItIsDeleted) {
 // Writes meshes only when it is told to.
 class SlowMeshLog : public MemoryLog {
  public:
-  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content) override {
+  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
+                        ChunkSource parts) override {
     begun.release();
     go_on.acquire();
-    return MemoryLog::add_mesh(name, sha256, content);
+    return MemoryLog::add_mesh(name, sha256, content, parts);
   }
   std::binary_semaphore begun{0}, go_on{0};
 };

@@ -30,6 +30,7 @@ class RegistryTest : public SceneFixture {
 };
 
 using Names = std::vector<std::string>;
+using MeshParts = std::vector<MeshPart>;
 
 TEST_F(RegistryTest, SceneNamesFollowTheirRule) {
   for (const std::string& name :
@@ -152,9 +153,57 @@ TEST_F(RegistryTest, OtherContentUnderAKnownNameIsRefused) {
 
 TEST_F(RegistryTest, EqualContentUnderTwoNamesIsHeldOnce) {
   ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
-  EXPECT_EQ(*registry_.add_mesh("alias", make_mesh("alias", 1)), mesh_);
-  EXPECT_EQ(*registry_.find_mesh("alias", "mesh"), mesh_);
+  const MeshPtr alias = *registry_.add_mesh("alias", make_mesh("alias", 1));
+  EXPECT_EQ(&alias->tree(), &mesh_->tree());
+  EXPECT_EQ(*registry_.find_mesh("alias", "mesh"), alias);
+  EXPECT_EQ(alias->name(), "alias");
   EXPECT_EQ(registry_.mesh_count(), 2u);
+}
+
+TEST_F(RegistryTest, NamesOfEqualContentKeepTheirOwnParts) {
+  const MeshParts walls = {{"walls", 0}}, doors = {{"doors", 0}};
+  ASSERT_TRUE(registry_.add_mesh("m", StaticMesh::share("m", walls, *mesh_)).ok());
+  ASSERT_TRUE(registry_.add_mesh("alias", StaticMesh::share("alias", doors, *mesh_)).ok());
+  EXPECT_EQ((*registry_.find_mesh("m", "mesh"))->parts(), walls);
+  EXPECT_EQ((*registry_.find_mesh("alias", "mesh"))->parts(), doors);
+}
+
+TEST_F(RegistryTest, OtherPartsUnderAKnownNameAreRefused) {
+  ASSERT_TRUE(registry_.add_mesh("m", StaticMesh::share("m", {{"walls", 0}}, *mesh_)).ok());
+  EXPECT_TRUE(registry_.add_mesh("m", StaticMesh::share("m", {{"walls", 0}}, *mesh_)).ok());
+  expect_refusal(registry_.add_mesh("m", mesh_).status(), absl::StatusCode::kAlreadyExists, Reason::kAlreadyExists,
+                 "mesh");
+  EXPECT_EQ((*registry_.find_mesh("m", "mesh"))->parts(), (MeshParts{{"walls", 0}}));
+}
+
+TEST_F(RegistryTest, InstancesUseTheNameThatTheyWerePlacedUnder) {
+  for (const char* const unused : {"m", "alias"}) {
+    Registry registry;
+    ASSERT_TRUE(registry.add_mesh("m", mesh_).ok());
+    ASSERT_TRUE(registry.add_mesh("alias", mesh_).ok());
+    const std::string used = unused == std::string("m") ? "alias" : "m";
+    const ScenePtr scene = registry.create_scene("a", {}, 1, "", false)->scene;
+    PlacementColumns place = placement({1, 2}, {0, 0, 0});
+    place.mesh = *registry.find_mesh(used, "mesh");
+    ASSERT_TRUE(scene->change_instances(placing(place)).ok());
+    for (const Registry::NamedMesh& mesh : registry.list_meshes("", 5))
+      EXPECT_EQ(mesh.uses, mesh.name == used ? 2u : 0u) << mesh.name;
+    expect_refusal(registry.delete_mesh(used), absl::StatusCode::kFailedPrecondition, Reason::kInUse, "mesh");
+    EXPECT_TRUE(registry.delete_mesh(unused).ok());
+    EXPECT_EQ(registry.find_content(mesh_->sha256()), place.mesh) << "the content lives under the other name";
+    EXPECT_TRUE(registry.delete_scene("a").ok());
+    EXPECT_TRUE(registry.delete_mesh(used).ok());
+    EXPECT_EQ(registry.find_content(mesh_->sha256()), nullptr);
+  }
+}
+
+TEST_F(RegistryTest, AStoredMeshIsFoundByNameAndContentOrWithoutANameByContent) {
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  const MeshPtr alias = *registry_.add_mesh("alias", mesh_);
+  EXPECT_EQ(registry_.find_stored(mesh_->key()), mesh_);
+  EXPECT_EQ(registry_.find_stored({mesh_->sha256(), ""}), alias) << "the lowest name";
+  EXPECT_EQ(registry_.find_stored({mesh_->sha256(), "gone"}), nullptr);
+  EXPECT_EQ(registry_.find_stored({Sha256{9}, "m"}), nullptr);
 }
 
 TEST_F(RegistryTest, AnUnusedMeshIsDeleted) {

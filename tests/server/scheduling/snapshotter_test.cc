@@ -56,7 +56,7 @@ class SnapshotterTest : public testing::Test {
   ScenePtr recovered() {
     crashed_ = std::make_unique<test::MemoryLog>(log_.crash());
     absl::StatusOr<ScenePtr> scene =
-        recover_scene(*crashed_, crashed_->stored_scenes().front(), [](const Sha256&) { return MeshPtr(); });
+        recover_scene(*crashed_, crashed_->stored_scenes().front(), [](const MeshKey&) { return MeshPtr(); });
     EXPECT_TRUE(scene.ok()) << scene.status();
     return scene.value_or(nullptr);
   }

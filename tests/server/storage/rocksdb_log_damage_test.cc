@@ -75,7 +75,8 @@ StorageOptions small_options(const std::string& path, rocksdb::Env* env) {
 // Whether the log takes anything.
 bool write_mesh(UpdateLog& log) {
   const test::ChunksFrom content({"content"});
-  return log.add_mesh("probe", test::hash_of(99), content).ok() && log.delete_mesh("probe").ok();
+  return log.add_mesh("probe", test::hash_of(99), content, test::ChunksFrom({"parts"})).ok() &&
+         log.delete_mesh("probe").ok();
 }
 
 // A few scenes with snapshots and records, in tables and in the log, and meshes.

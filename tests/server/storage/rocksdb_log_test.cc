@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <filesystem>
 #include <thread>
 
 #include "core/base/refusal.h"
+#include "rocksdb/db.h"
+#include "server/storage/rocksdb/rows.h"
 #include "tests/support/faulty_files.h"
 #include "tests/support/stored_log.h"
 #include "tests/support/test_scale.h"
@@ -59,8 +62,8 @@ class RocksdbLogTest : public ::testing::Test {
     EXPECT_EQ(*chunks, snapshot_chunks(scene, sequence));
   }
   absl::Status add_mesh(const std::string& name, uint8_t number, const std::vector<std::string>& chunks) {
-    const test::ChunksFrom content(chunks);
-    const absl::Status status = log_->add_mesh(name, hash_of(number), content);
+    const test::ChunksFrom content(chunks), parts({"parts of", name});
+    const absl::Status status = log_->add_mesh(name, hash_of(number), content, parts);
     asked_ = content.asked();
     return status;
   }
@@ -220,6 +223,67 @@ TEST_F(RocksdbLogTest, MeshIsKeptOnceAndGoesWithItsLastName) {
   EXPECT_EQ(log_->stored_meshes()[0].name, "b");
   EXPECT_EQ(read_mesh(*log_, hash_of(1)).value(), content);
   ASSERT_EQ(log_->delete_mesh("b"), absl::OkStatus());
+  EXPECT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(RocksdbLogTest, PartsAreKeptForEachNameAndGoWithIt) {
+  using Chunks = std::vector<std::string>;
+  for (const char* const name : {"a", "b", "c"}) ASSERT_EQ(add_mesh(name, 1, {"content"}), absl::OkStatus());
+  open();
+  ASSERT_EQ(log_->stored_meshes().size(), 3u);
+  EXPECT_FALSE(log_->stored_meshes()[1].parts_in_content);
+  EXPECT_EQ(test::read_parts(*log_, "a").value(), (Chunks{"parts of", "a"}));
+  EXPECT_EQ(test::read_parts(*log_, "b").value(), (Chunks{"parts of", "b"}));
+  ASSERT_EQ(log_->delete_mesh("a"), absl::OkStatus());
+  open();
+  EXPECT_EQ(test::read_parts(*log_, "a").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(test::read_parts(*log_, "b").value(), (Chunks{"parts of", "b"}));
+  EXPECT_EQ(read_mesh(*log_, hash_of(1)).value(), Chunks{"content"});
+  ASSERT_EQ(log_->delete_mesh("b"), absl::OkStatus());
+  ASSERT_EQ(log_->delete_mesh("c"), absl::OkStatus());
+  EXPECT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kNotFound);
+}
+
+// The format that a directory, which nobody has open, says it has.
+uint32_t format_of(const std::string& path) {
+  rocksdb::DB* raw = nullptr;
+  const rocksdb::Status opened = rocksdb::DB::OpenForReadOnly(rocksdb::Options(), path + "/rocksdb", &raw);
+  EXPECT_TRUE(opened.ok()) << opened.ToString();
+  const std::unique_ptr<rocksdb::DB> database(raw);
+  std::string value;
+  EXPECT_TRUE(database->Get(rocksdb::ReadOptions(), std::string(kFormatKey), &value).ok());
+  const std::optional<absl::string_view> bytes = verified(kFormatKey, value);
+  return bytes ? static_cast<uint32_t>(static_cast<unsigned char>(bytes->front())) : 0;
+}
+
+TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat2AndItsMeshesKeepTheirPartsInTheContent) {
+  options_.path = folder_.file("sample");
+  std::filesystem::copy(LOCUS_SOURCE_DIR "/tests/golden/data/format-1/data", options_.path,
+                        std::filesystem::copy_options::recursive);
+  EXPECT_EQ(format_of(options_.path), 1u);
+  open();
+  ASSERT_EQ(log_->stored_meshes().size(), 1u);
+  const StoredMesh stored = log_->stored_meshes()[0];
+  EXPECT_TRUE(stored.parts_in_content);
+  EXPECT_TRUE(test::read_parts(*log_, stored.name)->empty());
+  const test::ChunksFrom content({}), parts({"parts"});
+  ASSERT_EQ(log_->add_mesh("another", stored.sha256, content, parts), absl::OkStatus());
+  ASSERT_EQ(log_->delete_mesh(stored.name), absl::OkStatus());
+  log_ = nullptr;
+  EXPECT_EQ(format_of(options_.path), 2u);
+  open();
+  ASSERT_EQ(log_->stored_meshes().size(), 1u);
+  EXPECT_FALSE(log_->stored_meshes()[0].parts_in_content);
+  EXPECT_EQ(test::read_parts(*log_, "another").value(), std::vector<std::string>{"parts"});
+  EXPECT_FALSE(read_mesh(*log_, stored.sha256)->empty());
+}
+
+TEST_F(RocksdbLogTest, WhereThePartsCannotBeHadNeitherNameNorContentIsKept) {
+  const test::ChunksFrom content({"content"});
+  const auto parts = [] { return absl::StatusOr<std::optional<std::string>>(absl::CancelledError("enough")); };
+  EXPECT_EQ(log_->add_mesh("a", hash_of(1), content, parts), absl::CancelledError("enough"));
+  open();
+  EXPECT_TRUE(log_->stored_meshes().empty());
   EXPECT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kNotFound);
 }
 

@@ -9,9 +9,10 @@
 namespace locus::test {
 namespace {
 
+template <class Writer>
 std::vector<std::string> chunks_of(const std::shared_ptr<const StaticMesh>& mesh) {
   std::vector<std::string> chunks;
-  MeshWriter writer(mesh);
+  Writer writer(mesh);
   while (std::optional<std::string> chunk = *writer.next()) {
     EXPECT_LE(chunk->size(), UpdateLog::kMaxChunkBytes);
     chunks.push_back(*std::move(chunk));
@@ -24,6 +25,13 @@ absl::StatusOr<TriangleMesh> read(const std::vector<std::string>& chunks) {
   for (const std::string& chunk : chunks)
     if (absl::Status status = reader.add(chunk); !status.ok()) return status;
   return std::move(reader).finish();
+}
+
+absl::StatusOr<std::vector<MeshPart>> read_parts(const std::vector<std::string>& chunks, size_t triangles) {
+  PartsReader reader;
+  for (const std::string& chunk : chunks)
+    if (absl::Status status = reader.add(chunk); !status.ok()) return status;
+  return std::move(reader).finish(triangles);
 }
 
 // Vertices that no triangle uses, parts, and triangles without area.
@@ -41,9 +49,9 @@ std::shared_ptr<const StaticMesh> random_mesh(Random& random, uint32_t vertices,
 TEST(MeshCodecTest, AMeshComesBackAsItWasUploadedHoweverManyChunksItTakes) {
   Random random(1);
   for (const uint32_t triangles : {1u, 300u, 150'000u}) {
-    const auto mesh = random_mesh(random, 200'000, triangles, triangles / 40);
-    const std::vector<std::string> chunks = chunks_of(mesh);
-    EXPECT_LT(4u, chunks.size());
+    const auto mesh = random_mesh(random, 200'000, triangles, triangles / 20);
+    const std::vector<std::string> chunks = chunks_of<MeshWriter>(mesh);
+    EXPECT_LE(4u, chunks.size());
     const absl::StatusOr<TriangleMesh> again = read(chunks);
     ASSERT_TRUE(again.ok()) << again.status();
     EXPECT_EQ(again->vertices(), mesh->vertices());
@@ -51,17 +59,45 @@ TEST(MeshCodecTest, AMeshComesBackAsItWasUploadedHoweverManyChunksItTakes) {
     PackedIndices::Reader reader = mesh->indices();
     for (uint32_t& index : indices) index = reader.next();
     EXPECT_EQ(again->indices(), indices);
-    ASSERT_EQ(again->parts().size(), mesh->parts().size());
-    for (size_t i = 0; i < mesh->parts().size(); ++i) {
-      EXPECT_EQ(again->parts()[i].name, mesh->parts()[i].name);
-      EXPECT_EQ(again->parts()[i].first_triangle, mesh->parts()[i].first_triangle);
-    }
+    EXPECT_TRUE(again->parts().empty());
+    const std::vector<std::string> parts = chunks_of<PartsWriter>(mesh);
+    EXPECT_EQ(parts.size(), triangles == 1 ? 1u : triangles == 300 ? 2u : 3u);
+    EXPECT_EQ(read_parts(parts, triangles).value(), mesh->parts());
   }
+}
+
+// Format 1 had the parts behind the indices, and their number in the header.
+TEST(MeshCodecTest, PartsThatStandWithTheColumnsAreRead) {
+  Random random(4);
+  const auto mesh = random_mesh(random, 90, 60, 3);
+  std::vector<std::string> chunks = chunks_of<MeshWriter>(mesh);
+  const std::vector<std::string> parts = chunks_of<PartsWriter>(mesh);
+  chunks.front().back() = 0;
+  chunks.front()[chunks.front().size() - 8] = 3;
+  chunks.push_back(parts.at(1));
+  const absl::StatusOr<TriangleMesh> again = read(chunks);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->parts(), mesh->parts());
+}
+
+TEST(MeshCodecTest, PartsThatDoNotFitTheirMeshAreDamage) {
+  Random random(5);
+  const std::vector<std::string> chunks = chunks_of<PartsWriter>(random_mesh(random, 90, 60, 3));
+  EXPECT_TRUE(read_parts(chunks, 41).ok());
+  EXPECT_EQ(read_parts(chunks, 40).status().code(), absl::StatusCode::kDataLoss);
 }
 
 TEST(MeshCodecTest, AChunkThatIsMissingOrThereTwiceIsSeen) {
   Random random(2);
-  const std::vector<std::string> chunks = chunks_of(random_mesh(random, 90, 60, 3));
+  const auto mesh = random_mesh(random, 90, 60, 3);
+  const std::vector<std::string> chunks = chunks_of<MeshWriter>(mesh), parts = chunks_of<PartsWriter>(mesh);
+  for (size_t i = 0; i < parts.size(); ++i) {
+    std::vector<std::string> fewer = parts, more = parts;
+    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
+    more.insert(more.begin() + static_cast<std::ptrdiff_t>(i), parts[i]);
+    EXPECT_EQ(read_parts(fewer, 60).status().code(), absl::StatusCode::kDataLoss) << i;
+    EXPECT_EQ(read_parts(more, 60).status().code(), absl::StatusCode::kDataLoss) << i;
+  }
   for (size_t i = 0; i < chunks.size(); ++i) {
     std::vector<std::string> fewer = chunks, more = chunks;
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
@@ -74,7 +110,8 @@ TEST(MeshCodecTest, AChunkThatIsMissingOrThereTwiceIsSeen) {
 
 TEST(MeshCodecTest, DamagedBytesNeverHarm) {
   Random random(3);
-  const std::vector<std::string> chunks = chunks_of(random_mesh(random, 90, 60, 3));
+  const auto mesh = random_mesh(random, 90, 60, 3);
+  const std::vector<std::string> chunks = chunks_of<MeshWriter>(mesh), parts = chunks_of<PartsWriter>(mesh);
   uint64_t refused = 0;
   for (uint64_t i = 0; i < scaled_count(20000); ++i) {
     std::vector<std::string> wrong = chunks;
@@ -83,6 +120,11 @@ TEST(MeshCodecTest, DamagedBytesNeverHarm) {
     const absl::Status status = read(wrong).status();
     EXPECT_TRUE(status.ok() || absl::IsDataLoss(status)) << status;
     refused += status.ok() ? 0 : 1;
+    wrong = parts;
+    std::string& of_parts = wrong[random.below(wrong.size())];
+    of_parts = damaged(of_parts, random);
+    const absl::Status parts_status = read_parts(wrong, 60).status();
+    EXPECT_TRUE(parts_status.ok() || absl::IsDataLoss(parts_status)) << parts_status;
   }
   EXPECT_NE(refused, 0u);
 }

@@ -120,7 +120,7 @@ TEST_F(RecordCodecTest, BatchesThatCannotHaveBeenJoinedAreRefused) {
   EXPECT_EQ(Record::decode(bytes).status(), absl::DataLossError("batch 1 cannot have been joined"));
 }
 
-TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesContents) {
+TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesNamesAndContents) {
   PlacementColumns chosen = placement({}, {1, 2, 3, 4, 5, 6});
   chosen.scales = columns_.floats({2});
   chosen.tags = columns_.ids({7, 8});
@@ -135,7 +135,7 @@ TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesContents
   const auto& read = std::get<Record::Change>(record->content());
   EXPECT_THAT(read.change.remove_ids, ElementsAre(3));
   EXPECT_THAT(read.change.remove_groups, ElementsAre(4, 4));
-  EXPECT_THAT(read.meshes, ElementsAre(mesh_->sha256(), mesh_->sha256()));
+  EXPECT_THAT(read.meshes, ElementsAre(mesh_->key(), mesh_->key()));
   ASSERT_EQ(read.change.place.size(), 2u);
   EXPECT_THAT(read.change.place[0].ids, ElementsAre(5));
   EXPECT_THAT(read.change.place[1].ids, ElementsAre(kChosenIdBit | 1, kChosenIdBit | 2));
@@ -143,6 +143,25 @@ TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesContents
   EXPECT_THAT(read.change.place[1].scales, ElementsAre(2));
   EXPECT_THAT(read.change.place[1].tags, ElementsAre(7, 8));
   EXPECT_TRUE(read.change.place[1].rotations.empty());
+}
+
+TEST_F(RecordCodecTest, AStaticChangeOfFormat1NamesContentsOnly) {
+  std::string bytes;
+  ByteWriter writer(bytes);
+  write_kind(writer, BytesKind::kStaticChange);
+  for (int column = 0; column < 2; ++column) writer.column(absl::Span<const uint64_t>());  // removed ids and groups
+  writer.number(uint64_t{1});
+  writer.column(absl::MakeConstSpan(mesh_->sha256()));
+  const uint64_t ids[] = {5};
+  const double translations[] = {1, 2, 3};
+  writer.column(absl::MakeConstSpan(ids));
+  writer.column(absl::MakeConstSpan(translations));
+  for (int column = 0; column < 5; ++column) writer.column(absl::Span<const uint64_t>());
+  absl::StatusOr<Record> record = Record::decode(bytes);
+  ASSERT_TRUE(record.ok()) << record.status();
+  const auto& read = std::get<Record::Change>(record->content());
+  EXPECT_THAT(read.meshes, ElementsAre(MeshKey{mesh_->sha256(), ""}));
+  EXPECT_THAT(read.change.place.at(0).ids, ElementsAre(5));
 }
 
 TEST_F(RecordCodecTest, WhatIsWrongIsNamed) {

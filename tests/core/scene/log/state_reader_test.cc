@@ -34,7 +34,7 @@ class StateReaderTest : public SceneFixture {
     StateReader reader;
     for (const std::string& chunk : chunks)
       if (absl::Status status = reader.add(chunk); !status.ok()) return status;
-    absl::StatusOr<SceneState> state = std::move(reader).finish([this](const Sha256&) { return mesh_; });
+    absl::StatusOr<SceneState> state = std::move(reader).finish([this](const MeshKey&) { return mesh_; });
     if (!state.ok()) return state.status();
     absl::StatusOr<SceneWriter> writer = SceneWriter::restore(*std::move(state), {}, {});
     if (!writer.ok()) return writer.status();
@@ -117,6 +117,31 @@ TEST_F(StateReaderTest, ManyWritersWithManyErrorsTakeManyChunks) {
   const auto again = read(chunks);
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_EQ(scene_difference(**again, scene_, random_), "");
+}
+
+TEST_F(StateReaderTest, EveryReasonOfARefusedItemComesBackAndNoLaterOne) {
+  for (uint32_t number = 0; number <= static_cast<uint32_t>(kLastReason) + 1; ++number) {
+    WriterTable::Writer writer;
+    writer.number = 7;
+    writer.batch = 1;
+    writer.heard = 1;
+    writer.ack.epoch = kEpoch;
+    writer.ack.errors = {{"moves[0].ids", 3, 9, static_cast<Reason>(number)}};
+    FrozenScene frozen = scene_.freeze();
+    ASSERT_TRUE(frozen.writers.restore(writer));
+    const Chunks chunks = write(StateWriter(frozen));
+    StateReader reader;
+    absl::Status status;
+    for (const std::string& chunk : chunks) status.Update(reader.add(chunk));
+    if (number > static_cast<uint32_t>(kLastReason)) {
+      EXPECT_EQ(status, absl::DataLossError("the reason of an error is unknown"));
+      continue;
+    }
+    ASSERT_TRUE(status.ok()) << number << ": " << status;
+    const absl::StatusOr<SceneState> state = std::move(reader).finish([](const MeshKey&) { return nullptr; });
+    ASSERT_TRUE(state.ok()) << state.status();
+    EXPECT_EQ(state->writers.writers().at(0).ack.errors.at(0).reason, static_cast<Reason>(number));
+  }
 }
 
 TEST_F(StateReaderTest, TheSceneMayGoOnWhileItsStateIsWritten) {

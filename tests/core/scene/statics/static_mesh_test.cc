@@ -108,6 +108,23 @@ TEST(StaticMeshTest, CountsWhatItKeepsBesideTheTree) {
   EXPECT_GE(rich->bytes(), lean->bytes() + 16 + sizeof(MeshPart) + 200);
 }
 
+TEST(StaticMeshTest, AMeshThatSharesHasANameAndPartsOfItsOwnAndAllElseIsTheOthers) {
+  const auto first = build({0, 0, 0, 2, 0, 0, 0, 3, 0, 9, 9, 9}, {0, 1, 2, 0, 2, 1}, {{"a", 0}, {"b", 1}});
+  const auto second = StaticMesh::share("second", {{std::string(100, 'c'), 0}}, *first);
+  EXPECT_EQ(second->name(), "second");
+  ASSERT_EQ(second->parts().size(), 1u);
+  EXPECT_EQ(first->parts().size(), 2u);
+  EXPECT_EQ(second->sha256(), first->sha256());
+  EXPECT_EQ(second->vertices(), first->vertices());
+  EXPECT_EQ(uploaded_indices(*second), uploaded_indices(*first));
+  EXPECT_EQ(&second->tree(), &first->tree());
+  // Shared memory is the same, and counted in both.
+  EXPECT_EQ(second->shared_bytes(), first->shared_bytes());
+  EXPECT_GT(second->shared_bytes(), second->tree().bytes());
+  EXPECT_GE(second->bytes(), second->shared_bytes() + sizeof(MeshPart) + 100);
+  EXPECT_LT(second->bytes(), second->shared_bytes() + sizeof(StaticMesh) + sizeof(MeshPart) + 200);
+}
+
 TEST(StaticMeshTest, RestoredFromItsOutlineItIsTheSameToTheLastByteItGives) {
   const Columns columns = welded(box_city(9, 3));
   const std::vector<MeshPart> parts = {{"a", 0}, {"b", 7}};

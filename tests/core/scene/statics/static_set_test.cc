@@ -192,6 +192,40 @@ TEST_F(StaticSetTest, RotationsMustBeFiniteAndOfUnitLength) {
   expect_refused(placing(place), Reason::kNotFinite, "place[0].rotations", 0);
 }
 
+TEST_F(StaticSetTest, LimitsOfAPlacementIncludeTheirEnds) {
+  PlacementColumns place = placement({1, 2, 3, 4}, {1e9, -1e9, 1e9, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  place.scales = columns_.floats({1e-12f, 1e-12f, 1e9f, 1});
+  place.rotations = columns_.floats({0, 0, 0, 1, 0, 0, 0, 0.9991f, 0, 0, 0, 1.0009f, 0, 0.6f, 0, 0.8f});
+  change(placing(place));
+  EXPECT_EQ(instance(2)->transform.quaternion, (Quaternion{0, 0, 0, 1})) << "normalised";
+  const auto refused = [this](double x, float scale, float w, const std::string& column) {
+    PlacementColumns one = placement({9}, {x, 0, 0});
+    one.scales = columns_.floats({scale});
+    one.rotations = columns_.floats({0, 0, 0, w});
+    expect_refused(placing(one), Reason::kOutOfRange, "place[0]." + column, 0);
+  };
+  refused(std::nextafter(1e9, 2e9), 1, 1, "translations");
+  refused(0, std::nextafter(1e-12f, 0.f), 1, "scales");
+  refused(0, std::nextafter(1e12f, kInfinity), 1, "scales");
+  refused(0, 1, 0.9989f, "rotations");
+  refused(0, 1, 1.0011f, "rotations");
+}
+
+TEST_F(StaticSetTest, AMeshThatReachesBeyondTheWorldIsNamedByItsScaleEvenWithoutThatColumn) {
+  mesh_ = make_mesh("wide", 2, {0, 0, 0, 1e9f, 0, 0, 0, 1e9f, 0});
+  change(placing(placement({1}, {9.9e8, 0, 0})));
+  PlacementColumns turned = placement({3, 2}, {0, 0, 0, 9.9e8, 0, 0});
+  turned.scales = columns_.floats({1, 1.1f});
+  expect_refused(placing(turned), Reason::kOutOfRange, "place[0].scales", 1);
+  turned.scales = {};
+  turned.rotations = columns_.floats({0, 0, -0.38268343f, 0.92387953f});
+  expect_refused(placing(turned), Reason::kOutOfRange, "place[0].scales", 1);
+}
+
+TEST_F(StaticSetTest, ATranslationForAllThatIsWrongIsNamedWithTheFirstItem) {
+  expect_refused(placing(placement({1, 2}, {0, kNan, 0})), Reason::kNotFinite, "place[0].translations", 0);
+}
+
 TEST_F(StaticSetTest, TooManyInstancesNameTheLimit) {
   const StaticChange what = placing(placement({}, std::vector<double>(3 * (size_t{limits::kMaxInstances} + 1))));
   expect_refused(what, Reason::kLimit, "place[0]", {}, absl::StatusCode::kResourceExhausted);

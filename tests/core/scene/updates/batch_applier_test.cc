@@ -132,6 +132,75 @@ TEST_F(BatchApplierTest, UpsertReplacesShapeAndLabels) {
   EXPECT_EQ(*object(1), expected);
 }
 
+TEST_F(BatchApplierTest, OfTwoUpsertsOfAnIdInOneBatchTheLaterStaysAndBothAreApplied) {
+  UpdateBatch batch = with(points({1, 1}, {1, 1, 1, 2, 2, 2}));
+  batch.inserts.push_back(balls({1}, {7}));
+  batch.upsert = true;
+  const UpdateAck ack = apply(batch);
+  EXPECT_EQ(ack.applied, 3u);
+  EXPECT_EQ(ack.refused, 0u);
+  EXPECT_EQ(object(1)->shape.kind, ShapeKind::kBall);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{0, 0, 0}));
+}
+
+TEST_F(BatchApplierTest, ARefusedUpsertLeavesWhatTheOneBeforeItMade) {
+  UpdateBatch batch = with(points({1, 1}, {1, 1, 1, kNan, 2, 2}));
+  batch.upsert = true;
+  expect_error(batch, "inserts[0].positions", 1, 1, Reason::kNotFinite);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
+}
+
+TEST_F(BatchApplierTest, ARemovedIdIsInsertedAgainOnceUnlessUpsertIsSet) {
+  for (const bool upsert : {false, true}) {
+    apply(with(points({1}, {9, 9, 9})));
+    UpdateBatch batch = with(points({1, 1}, {1, 1, 1, 2, 2, 2}));
+    batch.remove_ids = columns_.ids({1});
+    batch.upsert = upsert;
+    const UpdateAck ack = apply(batch);
+    EXPECT_EQ(ack.applied, upsert ? 3u : 2u);
+    EXPECT_EQ(ack.refused, upsert ? 0u : 1u);
+    const double x = upsert ? 2 : 1;
+    EXPECT_EQ(object(1)->shape.position, (Vec3d{x, x, x}));
+    apply(removing({1}));
+  }
+}
+
+TEST_F(BatchApplierTest, TheLaterOfTwoMovesKeepsTheRotationOfTheFirstWhereItHasNone) {
+  apply(with(points({1}, {0, 0, 0})));
+  MoveColumns first = move_to({1}, {1, 1, 1});
+  first.rotations = columns_.floats({1, 0, 0, 0});
+  UpdateBatch batch = with(first);
+  batch.moves.push_back(move_to({1}, {2, 2, 2}));
+  EXPECT_EQ(apply(batch).applied, 2u);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{2, 2, 2}));
+  EXPECT_EQ(object(1)->shape.rotation, (Quaternion{1, 0, 0, 0}));
+}
+
+TEST_F(BatchApplierTest, AnEntryForAllThatIsWrongRefusesEachItemUnderItsOwnIndex) {
+  const UpdateAck ack = apply(with(balls({4, 5}, {-1})));
+  ASSERT_EQ(ack.errors.size(), 2u);
+  for (uint32_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(ack.errors[i].field, "inserts[0].ball.radii");
+    EXPECT_EQ(ack.errors[i].index, i);
+    EXPECT_EQ(ack.errors[i].id, 4 + i);
+  }
+}
+
+TEST_F(BatchApplierTest, TheIndexOfAWrongRotationIsThatOfItsItem) {
+  InsertColumns insert = points({4, 5}, {0, 0, 0});
+  insert.rotations = columns_.floats({0, 0, 0, 1, 0, 0, 0, 2});
+  expect_error(with(insert), "inserts[0].rotations", 1, 5, Reason::kOutOfRange);
+}
+
+TEST_F(BatchApplierTest, OfAnItemWithSeveralFaultsTheFirstColumnIsNamed) {
+  InsertColumns insert = balls({4}, {-1});
+  insert.positions = columns_.floats({kNan, 0, 0});
+  insert.rotations = columns_.floats({0, 0, 0, 2});
+  expect_error(with(insert), "inserts[0].positions", 0, 4, Reason::kNotFinite);
+  insert.positions = columns_.floats({0, 0, 0});
+  expect_error(with(insert), "inserts[0].rotations", 0, 4, Reason::kOutOfRange);
+}
+
 TEST_F(BatchApplierTest, TheIdOfAnInstanceIsRefusedEvenByUpsert) {
   ASSERT_TRUE(scene_.change_instances(placing(placement({8}, {0, 0, 0}))).ok());
   UpdateBatch batch = with(points({8}, {0, 0, 0}));
