@@ -13,6 +13,7 @@ sets:
   python     what building and using the Python package needs
   test       what tests/run.sh needs on top of build
   bench      the libraries and servers that build/release/bin/locus-bench compares with
+  clang      the compiler of the asan preset and its sanitizers
   lint       what tests/run.sh --long needs on top of these
   container  what tests/container.sh needs to build and run the image without a registry or a daemon
   runtime    what locusd and locus need to run once they are built; the image has nothing else
@@ -34,6 +35,8 @@ test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutil
   python3-prometheus-client python3-yaml zsh fish mandoc groff-base haproxy"
 # redis-tools holds the server too, without the service that redis-server would start.
 bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev libnanoflann-dev redis-tools"
+# The compiler of the asan preset, and the libraries of its sanitizers.
+clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"
 # systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
@@ -49,6 +52,7 @@ for argument in "$@"; do
     python) packages="$packages $python_packages" ;;
     test) packages="$packages $test_packages" ;;
     bench) packages="$packages $bench_packages" ;;
+    clang) packages="$packages $clang_packages" ;;
     lint) packages="$packages $lint_packages" ;;
     container) packages="$packages $container_packages" ;;
     runtime) packages="$packages $runtime_packages" ;;

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Installs what the tests need, builds, runs every suite and ends with one line: N passed, M failed, K skipped.
 #
-#   ./tests/run.sh                  release (everything), tsan (what has threads), asan (everything but the long ones)
+#   ./tests/run.sh                  everything once, in a release build
+#   ./tests/run.sh --sanitizers     also the benchmarks' own tests, ThreadSanitizer, and AddressSanitizer with UBSan
 #   ./tests/run.sh --only asan      one suite: release, tsan or asan
-#   ./tests/run.sh --long           also the tests labelled long, clang-tidy and the container
+#   ./tests/run.sh --long           also the sanitizers, the tests labelled long, clang-tidy and the container
 #   ./tests/run.sh --jobs 8         compile and test with 8 jobs (default: one a processor)
 #
 # Exits 0 only if nothing failed. A suite that cannot be installed, configured or built counts as one failure.
@@ -11,15 +12,17 @@ set -uo pipefail
 cd "$(dirname "$0")/.." || exit
 exec < /dev/null
 
-suites="release tsan asan"
+suites=release
 long=no
+bench=no
 jobs=$(nproc)
 while [ $# -gt 0 ]; do
   case "$1" in
+    --sanitizers) suites="release tsan asan"; bench=yes ;;
     --only) suites=${2-}; shift ;;
     --jobs) jobs=${2-}; shift ;;
-    --long) long=yes ;;
-    -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    --long) suites="release tsan asan"; bench=yes; long=yes ;;
+    -h | --help) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "run.sh: unknown option $1; see --help" >&2; exit 2 ;;
   esac
   shift || true
@@ -86,8 +89,9 @@ run_suite() {
   local suite=$1 wrapper=() labels=(-LE long)
   if [ "$suite" = tsan ]; then wrapper=(${steady_addresses[@]+"${steady_addresses[@]}"}); fi
   local options=(-DLOCUS_TESTS=ON -DLOCUS_PYTHON=ON)
-  # clang-tidy asks for each file by itself.
-  if [ "$long" = no ]; then options+=(-DLOCUS_UNITY=ON); else options+=(-DLOCUS_UNITY=OFF); fi
+  # clang-tidy checks each file by itself.
+  if [ "$long" = yes ]; then options+=(-DLOCUS_UNITY=OFF); fi
+  if [ "$suite" = release ]; then options+=(-DLOCUS_BENCH=$([ "$bench" = yes ] && echo ON || echo OFF)); fi
   if [ "$suite" = release ] && [ "$long" = yes ]; then labels=(); fi
   # The command line costs AddressSanitizer half an hour of compiling: its readers of files are judged always, all of it
   # in the long run.
@@ -106,7 +110,9 @@ run_suite() {
 }
 
 say "packages"
-sets=(build python test bench)
+sets=(build python test)
+if [ "$bench" = yes ]; then sets+=(bench); fi
+case "$suites" in *asan*) sets+=(clang) ;; esac
 if [ "$long" = yes ]; then sets+=(lint); fi
 ./deploy/packages.sh "${sets[@]}" || { fail "install packages"; finish; }
 
