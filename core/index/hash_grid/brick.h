@@ -27,7 +27,7 @@ struct BrickGeometry {
   double edge = 0;
   Vec3d low, high;
   double cells_per_unit = 1;
-  int exponent = 0;  // of the cell edge
+  int exponent = 0;  // cell edge = 2^exponent
 
   static BrickGeometry of(const GridKey& key, int exponent);
   // Returns the cell of a position in the brick: 0 to 63, z most significant.

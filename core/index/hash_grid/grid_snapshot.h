@@ -83,8 +83,8 @@ class GridSnapshot {
 
   // Calls visit(GridRef) for every value whose bounds have an interval on the ray with near <= far, far >= 0 and
   // near <= limit(), and for some others near the ray; roughly near to far on each level. limit() may fall during the
-  // visit. Ends if visit() returns false. `displacement_bound` is an upper bound of the distance between
-  // the true and the stored position of a value.
+  // visit. Ends if visit() returns false. `displacement_bound` is an upper bound of the distance between the true and
+  // the stored position of a value.
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
                  double displacement_bound = 0) const;
@@ -112,7 +112,7 @@ class GridSnapshot {
   // slot in this snapshot.
   GridRef find_like(const GridRef& value) const;
 
-  // O(bricks).
+  // Returns counts and memory of this snapshot. O(values).
   GridStatistics statistics() const;
   // Returns the bytes of this snapshot that `other`, another snapshot of the grid, does not share. O(bricks that
   // differ).

@@ -11,7 +11,7 @@
 // time of a batch; until all have moved, levels of the old and the new size exist side by side.
 //
 // Invariants: every value is stored in the brick that contains its position, on a level whose cells are at least as
-// wide as the value; no brick is empty; slots_ holds the position of each value. |position| <= limits::kMaxCoordinate
+// wide as the value; no brick is empty; slots_ holds the location of each value. |position| <= limits::kMaxCoordinate
 // on each axis.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
@@ -73,13 +73,14 @@ class HashGrid {
   // the brick table of that level.
   GridSnapshot snapshot();
 
+  // Returns the cell edge of the base level.
   double cell_size() const;
 
  private:
   struct Level {
-    explicit Level(int of_exponent) : exponent(of_exponent) {}
+    explicit Level(int level_exponent) : exponent(level_exponent) {}
 
-    int exponent;
+    int exponent;  // cell edge = 2^exponent
     double cells_per_unit = internal::cells_per_unit(exponent);
     double max_extent = 0;  // largest extent of all values since the level was created
     Aabbd bounds;           // bounds of all bricks since the level was created
