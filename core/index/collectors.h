@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/index/regions.h"
 #include "core/index/spatial_index.h"
 
@@ -116,7 +117,10 @@ class NearestFewVisitor {
   }
 
   // Sorts the appended hits. The collector must not be used afterwards.
-  void finish() { std::sort_heap(result_.begin() + begin_, result_.end(), comes_before<V>); }
+  void finish() {
+    LOCUS_DCHECK(std::is_heap(result_.begin() + begin_, result_.end(), comes_before<V>));
+    std::sort_heap(result_.begin() + begin_, result_.end(), comes_before<V>);
+  }
 
  private:
   bool full() const { return result_.size() - static_cast<size_t>(begin_) == max_hits_; }
@@ -130,6 +134,7 @@ class NearestFewVisitor {
       result_.push_back(hit);
     }
     std::push_heap(result_.begin() + begin_, result_.end(), comes_before<V>);
+    LOCUS_DCHECK_LE(result_.size() - static_cast<size_t>(begin_), max_hits_);
     if (full()) limit_ = ray_.to_scaled(result_[static_cast<size_t>(begin_)].distance);
   }
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/index/index_queries.h"
 
 namespace locus {
@@ -46,7 +47,10 @@ class NearestValuesVisitor {
   }
 
   // Sorts the appended values. The collector must not be used afterwards.
-  void finish() { std::sort_heap(result_.begin() + begin_, result_.end()); }
+  void finish() {
+    LOCUS_DCHECK(std::is_heap(result_.begin() + begin_, result_.end()));
+    std::sort_heap(result_.begin() + begin_, result_.end());
+  }
 
  private:
   bool full() const { return result_.size() - static_cast<size_t>(begin_) == max_values_; }
@@ -60,6 +64,7 @@ class NearestValuesVisitor {
       result_.push_back(found);
     }
     std::push_heap(result_.begin() + begin_, result_.end());
+    LOCUS_DCHECK_LE(result_.size() - static_cast<size_t>(begin_), max_values_);
     if (full()) limit_ = squared_limit(result_[static_cast<size_t>(begin_)].distance);
   }
 

@@ -7,6 +7,7 @@
 #include <concepts>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/geometry/ball.h"
 #include "core/geometry/obb.h"
 
@@ -22,6 +23,8 @@ Aabb<S> rounded_outward(const Aabbd& box) {
     const S low = static_cast<S>(box.min[axis]), high = static_cast<S>(box.max[axis]);
     result.min[axis] = double{low} > box.min[axis] ? std::nextafter(low, -kInfinity) : low;
     result.max[axis] = double{high} < box.max[axis] ? std::nextafter(high, kInfinity) : high;
+    LOCUS_DCHECK_LE(double{result.min[axis]}, box.min[axis]);
+    LOCUS_DCHECK_GE(double{result.max[axis]}, box.max[axis]);
   }
   return result;
 }

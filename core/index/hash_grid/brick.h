@@ -50,6 +50,10 @@ struct BrickGeometry {
     return ((position.x >= low.x) & (position.x < high.x) & (position.y >= low.y) & (position.y < high.y) &
             (position.z >= low.z) & (position.z < high.z)) != 0;
   }
+  // Returns true if the position lies in the given cell, or in the brick, within the rounding of cell_along(). For
+  // checks.
+  bool cell_nearly_holds(int cell, Vec3d position) const;
+  bool nearly_holds(Vec3d position) const;
   // Returns the cell index on one axis, 0 to 3. Rounding of the difference may give the neighbour of the exact cell
   // next to their border; every query widens its range by more than this error.
   int cell_along(double from_low) const {
@@ -111,6 +115,9 @@ struct Brick {
     return sizeof(Brick) + (dead.size() <= kInlineDeadWords ? 0 : dead.size() * sizeof(dead[0])) +
            (shares_sorted ? 0 : sorted->bytes()) + (shares_recent ? 0 : recent->bytes());
   }
+
+  // Checks the blocks, the counts and the dead bits of a complete version. O(words of dead bits), as a copy.
+  void check_invariants() const;
 };
 
 using BrickPtr = std::shared_ptr<const Brick>;

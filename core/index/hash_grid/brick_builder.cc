@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/check.h"
+#include "core/base/planted_bug.h"
 
 namespace locus::internal {
 namespace {
@@ -21,6 +22,8 @@ bool arrives(const BrickChange& change) { return change.slot == BrickChange::kAr
 }  // namespace
 
 void BrickBuilder::begin(const BatchParts& parts, std::vector<GridSlot>& slots) {
+  LOCUS_DCHECK_LT(parts.moves.moves.size(), size_t{kStays});
+  LOCUS_DCHECK_LT(parts.arrivals.size(), size_t{BrickSource::kArrival});
   parts_ = parts;
   slots_ = &slots;
   sources_.clear();
@@ -28,6 +31,8 @@ void BrickBuilder::begin(const BatchParts& parts, std::vector<GridSlot>& slots) 
 
 BrickPtr BrickBuilder::apply(const Brick* old, const BrickGeometry& geometry, uint32_t index,
                              absl::Span<const BrickChange> changes) {
+  LOCUS_DCHECK(slots_ != nullptr);
+  check_changes(old, changes);
   geometry_ = &geometry;
   index_ = index;
   max_extent_ = old == nullptr ? 0 : old->max_extent;
@@ -43,10 +48,72 @@ BrickPtr BrickBuilder::build(const Brick* old, const BrickGeometry& geometry, ui
   geometry_ = &geometry;
   index_ = index;
   max_extent_ = old == nullptr ? 0 : old->max_extent;
+  LOCUS_DCHECK(slots_ != nullptr);
+  LOCUS_DCHECK(std::all_of(changes.begin(), changes.end(), arrives));
+  check_changes(old, changes);
   if (changes.empty()) return sorted_by_cell(old, sources);
   sources_.assign(sources.begin(), sources.end());
   add_arrivals(changes);
   return sorted_by_cell(old, sources_);
+}
+
+// Checks that each change refers to a live slot of `old`, or to an arrival, and to an existing move. O(changes).
+void BrickBuilder::check_changes(const Brick* old, absl::Span<const BrickChange> changes) const {
+  if constexpr (kDebugChecks) {
+    for (const BrickChange& change : changes) {
+      if (arrives(change)) {
+        LOCUS_DCHECK_LT(change.index, parts_.arrivals.size());
+        continue;
+      }
+      LOCUS_DCHECK(old != nullptr);
+      if (change.index != BrickChange::kLeaves) LOCUS_DCHECK_LT(change.index, parts_.moves.moves.size());
+      const uint32_t slot = change.slot & ~GridSlot::kRecent;
+      const bool recent = (change.slot & GridSlot::kRecent) != 0;
+      LOCUS_DCHECK_LT(slot, recent ? old->recent_count : old->sorted->count());
+      const bool dead = recent ? old->is_recent_dead(slot) : old->is_dead(slot);
+      LOCUS_DCHECK(!dead || planted(PlantedBug::kGhostAfterMove));
+    }
+  }
+}
+
+// Checks that the writer's location of a written value is its slot, and that its extent is within the bound.
+void BrickBuilder::check_value(const Brick& brick, const GridBlock& block, uint32_t slot, uint32_t flag) const {
+  LOCUS_DCHECK_LT(block.handle(slot), slots_->size());
+  LOCUS_DCHECK_LE(block.extent(slot), brick.max_extent);
+  if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+  const GridSlot& location = (*slots_)[block.handle(slot)];
+  LOCUS_DCHECK_EQ(location.brick, index_);
+  LOCUS_DCHECK_EQ(location.slot, slot | flag);
+}
+
+// Checks a version whose values have all been sorted. O(values), as the sort.
+void BrickBuilder::check_sorted(const Brick& brick) const {
+  if constexpr (kDebugChecks) {
+    brick.check_invariants();
+    const GridBlock& sorted = *brick.sorted;
+    sorted.check_invariants();
+    for (int cell = 0; cell < kBrickCells; ++cell) {
+      const auto begin = static_cast<size_t>(cell);
+      for (uint32_t slot = sorted.offsets()[begin]; slot < sorted.offsets()[begin + 1]; ++slot) {
+        check_value(brick, sorted, slot, 0);
+        LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
+                     brick.geometry.cell_nearly_holds(cell, sorted.entry(slot).position));
+      }
+    }
+  }
+}
+
+// Checks a version whose log has new values from slot `begin` on. O(new values), and O(words of dead bits).
+void BrickBuilder::check_recent(const Brick& brick, uint32_t begin) const {
+  if constexpr (kDebugChecks) {
+    brick.check_invariants();
+    for (uint32_t slot = begin; slot < brick.recent_count; ++slot) {
+      check_value(brick, *brick.recent, slot, GridSlot::kRecent);
+      LOCUS_DCHECK(!brick.is_recent_dead(slot));
+      LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
+                   brick.geometry.nearly_holds(brick.recent->entry(slot).position));
+    }
+  }
 }
 
 bool BrickBuilder::is_few(const Brick* old, absl::Span<const BrickChange> changes) {
@@ -64,7 +131,8 @@ void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> 
     if (change.index != BrickChange::kLeaves) __builtin_prefetch(&parts_.moves.moves[change.index]);
     const uint32_t slot = change.slot & ~GridSlot::kRecent;
     std::vector<uint32_t>& marks = (change.slot & GridSlot::kRecent) != 0 ? recent_changes_ : sorted_changes_;
-    LOCUS_DCHECK(slot < marks.size());
+    LOCUS_DCHECK_LT(slot, marks.size());
+    LOCUS_DCHECK_EQ(marks[slot], kStays);
     marks[slot] = change.index;
   }
 }
@@ -140,6 +208,7 @@ inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* ol
     if (i + kAhead < sources.size()) prefetch(from, sources[i + kAhead]);
     const BrickSource source = sources[i];
     const uint32_t slot = slot_of(source);
+    LOCUS_DCHECK_LT(slot, block.count());
     uint32_t handle = 0;
     if ((source.origin & BrickSource::kArrival) != 0) {
       const GridItem& arrival = parts_.arrivals[source.origin & ~BrickSource::kArrival];
@@ -178,7 +247,10 @@ BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSo
   if (sources.empty()) return nullptr;
   const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources.size()), any_form(old, sources));
   std::array<uint32_t, kBrickCells + 1>& offsets = block->offsets();
-  for (const BrickSource& source : sources) ++offsets[source.cell + 1];
+  for (const BrickSource& source : sources) {
+    LOCUS_DCHECK_LT(source.cell, uint32_t{kBrickCells});
+    ++offsets[source.cell + 1];
+  }
   for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] += offsets[cell];
   std::array<uint32_t, kBrickCells + 1> next = offsets;
   write(*block, 0, old, sources, [&next](const BrickSource& source) { return next[source.cell]++; });
@@ -187,6 +259,7 @@ BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSo
   brick->index = index_;
   brick->sorted = block;
   brick->max_extent = max_extent_;
+  check_sorted(*brick);
   return brick;
 }
 
@@ -212,6 +285,7 @@ BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange
   brick->max_extent = max_extent_;
   if (brick->recent_count == 0) brick->recent = nullptr;
   if (brick->size() == 0) return nullptr;
+  check_recent(*brick, old.recent_count);
   return brick;
 }
 

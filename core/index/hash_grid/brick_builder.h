@@ -60,6 +60,10 @@ class BrickBuilder {
   GridForm form_of(const Brick* old, const BrickSource& source) const;
   bool any_form(const Brick* old, absl::Span<const BrickSource> sources) const;
   bool any_form_arrives(absl::Span<const BrickChange> changes) const;
+  void check_changes(const Brick* old, absl::Span<const BrickChange> changes) const;
+  void check_sorted(const Brick& brick) const;
+  void check_recent(const Brick& brick, uint32_t begin) const;
+  void check_value(const Brick& brick, const GridBlock& block, uint32_t slot, uint32_t flag) const;
 
   const BrickGeometry* geometry_ = nullptr;
   uint32_t index_ = 0;

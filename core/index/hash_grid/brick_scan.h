@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/ball.h"
 #include "core/geometry/ray.h"
@@ -22,7 +23,9 @@ class GridRef {
  public:
   GridRef() = default;
   GridRef(const internal::GridBlock& block, uint32_t slot, uint32_t brick)
-      : block_(&block), slot_(slot), brick_(brick) {}
+      : block_(&block), slot_(slot), brick_(brick) {
+    LOCUS_DCHECK_LT(slot, block.count());
+  }
 
   explicit operator bool() const { return block_ != nullptr; }
   const GridEntry& entry() const { return block_->entry(slot_); }
@@ -173,6 +176,7 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   rows.dead = brick.dead_count == 0 ? nullptr : brick.dead.data();
   rows.count = 0;
   if (cells.empty()) return rows;
+  LOCUS_DCHECK(kAllCells.contains(cells.lo) && kAllCells.contains(cells.hi));
   constexpr uint32_t kRow = 1 << kBrickBits, kLayer = kRow << kBrickBits;
   const GridKey& lo = cells.lo;
   const auto x_cells = static_cast<uint32_t>(cells.hi.x - lo.x + 1),
@@ -194,6 +198,7 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
       cell += kLayer - runs_a_layer * kRow;
     }
   }
+  LOCUS_DCHECK_LE(rows.count, GridRows::kMax);
   if (planted(PlantedBug::kDropCell)) rows.end[0] = rows.begin[0];
   return rows;
 }
@@ -224,6 +229,7 @@ bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work
   return for_each_part(all, [&](const GridRows& rows) {
     uint32_t slots[GridRows::kMaxValues + GridBlock::kLanes];
     const uint32_t kept = cull(rows, slots);
+    LOCUS_DCHECK_LE(kept, GridRows::kMaxValues);
     work.cells += rows.count;
     for (uint32_t i = 0; i < kept; ++i) block.prefetch_entry(slots[i]);
     for (uint32_t i = 0; i < kept; ++i) {

@@ -51,7 +51,10 @@ struct BrickSource {
 // Lookup of the move of a handle. Precondition: the batch has moves, and by_handle is given.
 class MoveFinder {
  public:
-  explicit MoveFinder(const GridMoves& moves) : moves_(moves.moves), index_by_handle_(moves.by_handle) {}
+  explicit MoveFinder(const GridMoves& moves) : moves_(moves.moves), index_by_handle_(moves.by_handle) {
+    LOCUS_DCHECK(!moves_.empty());
+    LOCUS_DCHECK(!index_by_handle_.empty());
+  }
 
   // Returns the index of the move of `handle`; for a handle without a move the index of any other move.
   uint32_t index_of(uint32_t handle) const {

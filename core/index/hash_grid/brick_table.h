@@ -51,6 +51,8 @@ class BrickTable {
   static uint32_t hash_of(const GridKey& key) { return static_cast<uint32_t>(GridKeyHash()(key)); }
   size_t mask() const { return slots_.size() - 1; }
   void put(const Slot& slot);
+  // Checks the load, and that find() reaches `brick` under `key` exactly if `expected`. O(length of the probe).
+  void check_invariants(const GridKey& key, uint32_t brick, bool expected) const;
 
   std::vector<Slot> slots_ = std::vector<Slot>(8);
   size_t size_ = 0;

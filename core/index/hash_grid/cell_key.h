@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/aabb.h"
 
@@ -83,6 +84,7 @@ inline int index_in_brick(const GridKey& cell) {
 
 // Returns the smallest e with 2^e >= `length`, clamped to [min_exponent, max_exponent].
 inline int exponent_covering(double length, int min_exponent, int max_exponent) {
+  LOCUS_DCHECK_LE(min_exponent, max_exponent);
   if (!(length > 0)) return min_exponent;
   int exponent = 0;
   const double mantissa = std::frexp(length, &exponent);  // in [0.5, 1)
@@ -110,6 +112,7 @@ struct KeyRange {
 
 // Returns the cells of one level that contain the positions within `box`. Precondition: the box is not empty.
 inline KeyRange cells_within(const Aabbd& box, double per_unit) {
+  LOCUS_DCHECK(!box.empty());
   KeyRange range;
   for (int axis = 0; axis < 3; ++axis) {
     range.lo[axis] = cell_index(box.min[axis], per_unit);

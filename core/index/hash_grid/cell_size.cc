@@ -58,10 +58,13 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
       std::max(kMaxMeanPerCell, mean_others_per_cell(sample, population, exponent) + kMaxAddedPerCell);
   const int max_exponent = exponent_of_all(sample);
   while (exponent < max_exponent && mean_others_per_cell(sample, population, exponent + 1) <= allowed) ++exponent;
+  LOCUS_DCHECK_GE(exponent, kMinCellExponent);
+  LOCUS_DCHECK_LE(exponent, kMaxBaseExponent);
   return exponent;
 }
 
 bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent) {
+  LOCUS_DCHECK_GE(population, sample.size());
   const double others = mean_others_per_cell(sample, population, exponent);
   return others >= kMinOthersPerCell && others <= kMaxOthersPerCell;
 }

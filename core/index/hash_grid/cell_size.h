@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/geometry/vec3.h"
 
 namespace locus::internal {
@@ -45,6 +46,7 @@ class EvenSample {
   explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}
   void offer(Vec3d position, double diameter) {
     if (offered_++ % stride_ == 0) values_.push_back({position, diameter});
+    LOCUS_DCHECK_LE(values_.size(), 2 * kCellSizeSample);
   }
   absl::Span<const SampledValue> values() const { return values_; }
 

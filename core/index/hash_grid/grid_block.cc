@@ -21,6 +21,17 @@ GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((c
   std::fill(handles_ + count, handles_ + stride_, ~0u);  // not a valid handle
 }
 
+void GridBlock::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_EQ(offsets_[0], 0u);
+    LOCUS_DCHECK_EQ(offsets_[kBrickCells], count_);
+    for (size_t cell = 0; cell < kBrickCells; ++cell) LOCUS_DCHECK_LE(offsets_[cell], offsets_[cell + 1]);
+    LOCUS_DCHECK_EQ(stride_ % kLanes, 0u);
+    for (uint32_t slot = count_; slot < stride_; ++slot)
+      for (int axis = 0; axis < 4; ++axis) LOCUS_DCHECK_EQ(column(axis)[slot], 0.0f);
+  }
+}
+
 uint32_t GridBlock::find(uint32_t handle) const {
   uint32_t slot = 0;
   for (; slot + kLanes <= count_; slot += kLanes) {
@@ -33,6 +44,7 @@ uint32_t GridBlock::find(uint32_t handle) const {
 }
 
 uint32_t GridBlock::find_last(uint32_t handle, uint32_t count) const {
+  LOCUS_DCHECK_LE(count, count_);
   for (uint32_t slot = count; slot != 0; --slot)
     if (handles_[slot - 1] == handle) return slot - 1;
   return count;

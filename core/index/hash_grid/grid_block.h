@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "core/base/check.h"
 #include "core/base/ids.h"
 #include "core/geometry/shape.h"
 
@@ -64,11 +65,27 @@ class GridBlock {
   uint32_t count() const { return count_; }
   bool has_forms() const { return forms_ != nullptr; }
   // Returns a column: 0 to 2 = x, y, z relative to the centre of the brick, 3 = extent.
-  const float* column(int index) const { return floats_ + size_t{stride_} * static_cast<size_t>(index); }
-  const GridEntry& entry(uint32_t slot) const { return entries_[slot]; }
-  float extent(uint32_t slot) const { return column(3)[slot]; }
-  GridForm form(uint32_t slot) const { return forms_ == nullptr ? GridForm() : forms_[slot]; }
-  uint32_t handle(uint32_t slot) const { return handles_[slot]; }
+  const float* column(int index) const {
+    LOCUS_DCHECK(0 <= index && index < 4);
+    return floats_ + size_t{stride_} * static_cast<size_t>(index);
+  }
+  // Return the parts of a value. Precondition: slot < count().
+  const GridEntry& entry(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return entries_[slot];
+  }
+  float extent(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return column(3)[slot];
+  }
+  GridForm form(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return forms_ == nullptr ? GridForm() : forms_[slot];
+  }
+  uint32_t handle(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return handles_[slot];
+  }
   GridItem item(uint32_t slot) const { return {entry(slot), handle(slot), extent(slot), form(slot)}; }
   // Returns the slot of the handle, or count() if there is none. O(count), a vector at a time.
   uint32_t find(uint32_t handle) const;
@@ -137,7 +154,14 @@ class GridBlock {
     Vec3d center_;
   };
   // Writes the form of a slot. Precondition: has_forms().
-  void put_form(uint32_t slot, const GridForm& form) { forms_[slot] = form; }
+  void put_form(uint32_t slot, const GridForm& form) {
+    LOCUS_DCHECK(has_forms());
+    LOCUS_DCHECK_LT(slot, count_);
+    forms_[slot] = form;
+  }
+
+  // Checks the offsets and the padding of a block that is not a log and whose slots have all been written. O(cells).
+  void check_invariants() const;
 
   size_t bytes() const { return sizeof(GridBlock) + bytes_; }
 

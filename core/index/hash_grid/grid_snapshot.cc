@@ -4,6 +4,9 @@
 #include <bit>
 #include <utility>
 
+#include "core/base/check.h"
+#include "core/base/planted_bug.h"
+
 namespace locus {
 namespace internal {
 
@@ -37,6 +40,23 @@ GridSnapshot::GridSnapshot(std::vector<internal::GridLevel> levels, internal::Br
       bricks_by_handle_(std::move(bricks_by_handle)),
       cell_size_(cell_size) {
   for (const internal::GridLevel& level : levels_) size_ += level.size;
+  check_invariants();
+}
+
+void GridSnapshot::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      const internal::GridLevel& level = levels_[i];
+      if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1].exponent, level.exponent);
+      LOCUS_DCHECK_GT(level.size, 0u);
+      LOCUS_DCHECK(level.table != nullptr);
+      LOCUS_DCHECK_LE(level.table->size(), level.size);
+      LOCUS_DCHECK(!level.geometry.bounds.empty());
+      LOCUS_DCHECK_GE(level.geometry.max_extent, 0.0);
+      LOCUS_DCHECK_EQ(level.geometry.cells_per_unit, internal::cells_per_unit(level.exponent));
+    }
+    LOCUS_DCHECK(size_ <= bricks_by_handle_.size() || planted(PlantedBug::kGhostAfterMove));
+  }
 }
 
 GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
@@ -48,6 +68,7 @@ GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
 }
 
 GridRef GridSnapshot::at(uint32_t handle) const {
+  LOCUS_DCHECK_LT(handle, bricks_by_handle_.size());
   const GridRef value = find_in(*bricks_[bricks_by_handle_[handle]], handle);
   LOCUS_CHECK(value);
   return value;
@@ -61,6 +82,7 @@ GridRef GridSnapshot::find(uint32_t handle) const {
 }
 
 GridRef GridSnapshot::find_like(const GridRef& value) const {
+  LOCUS_DCHECK(value);
   const uint32_t handle = value.handle();
   if (value.brick() < bricks_.size() && bricks_[value.brick()] != nullptr) {
     const internal::Brick& brick = *bricks_[value.brick()];

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
+#include "core/base/check.h"
 #include "core/base/persistent_array.h"
 #include "core/index/hash_grid/brick_scan.h"
 #include "core/index/hash_grid/brick_table.h"
@@ -119,6 +120,8 @@ class GridSnapshot {
   size_t unshared_bytes(const GridSnapshot& other) const;
 
  private:
+  // Checks the order and the sizes of the levels. O(levels).
+  void check_invariants() const;
   const internal::Brick* find_brick(const internal::GridLevel& level, const internal::GridKey& key) const;
   static GridRef find_in(const internal::Brick& brick, uint32_t handle);
   // Calls fn(brick) for the existing bricks of a range until it returns false. Returns false if a call did. Looks up
@@ -201,6 +204,7 @@ bool GridSnapshot::for_few_bricks(const Aabbd& region, size_t max_bricks, Work& 
     const internal::KeyRange bricks = internal::bricks_of(cells);
     if (bricks.empty()) continue;
     if (bricks.count() > static_cast<double>(left)) return false;
+    LOCUS_DCHECK_LE(left, max_bricks);
     for_each_brick(level, bricks, work, [&](const internal::Brick& brick) {
       fn(brick, internal::within_brick(cells, brick.geometry.key));
       --left;
@@ -226,6 +230,7 @@ void GridSnapshot::visit_cells(const Aabbd& region, Work& work, const CullOf& cu
 template <class Limit, class Visit>
 void GridSnapshot::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
                              double displacement_bound) const {
+  LOCUS_DCHECK_GE(displacement_bound, 0.0);
   for (const internal::GridLevel& level : levels_) {
     internal::LevelGeometry geometry = level.geometry;
     if (displacement_bound > 0) {
@@ -380,6 +385,7 @@ bool GridSnapshot::for_each_from(GridCursor& cursor, const Visit& visit) const {
   for (; cursor.brick < bricks_.size(); cursor = {cursor.brick + 1, 0}) {
     const internal::Brick* const brick = bricks_[cursor.brick].get();
     if (brick == nullptr) continue;
+    LOCUS_DCHECK_LE(cursor.values, size_t{brick->size()});
     size_t index = 0;
     const bool keep_going = internal::for_each_value(*brick, [&](const GridRef& value) {
       if (index++ < cursor.values) return true;

@@ -31,10 +31,67 @@ HashGrid::HashGrid(const HashGridOptions& options)
 double HashGrid::cell_size() const { return std::ldexp(1.0, base_exponent_); }
 
 GridRef HashGrid::at(uint32_t handle) const {
+  LOCUS_DCHECK_LT(handle, slots_.size());
   const GridSlot& slot = slots_[handle];
   const internal::Brick& brick = *bricks_[slot.brick];
   const bool recent = (slot.slot & GridSlot::kRecent) != 0;
   return {recent ? *brick.recent : *brick.sorted, slot.slot & ~GridSlot::kRecent, slot.brick};
+}
+
+// Checks that the location of a handle is a slot with that handle in an existing brick. O(1).
+void HashGrid::check_in_use(uint32_t handle) const {
+  if constexpr (kDebugChecks) {
+    if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+    LOCUS_DCHECK_LT(handle, slots_.size());
+    LOCUS_DCHECK_LT(slots_[handle].brick, bricks_.size());
+    LOCUS_DCHECK(bricks_[slots_[handle].brick] != nullptr);
+    LOCUS_DCHECK_EQ(at(handle).handle(), handle);
+  }
+}
+
+// Checks the invariants of the class for the bricks and values that the batch has changed. O(changes + levels).
+void HashGrid::check_invariants(const GridBatch& batch) const {
+  if constexpr (kDebugChecks) {
+    size_t values = 0, bricks = 0;
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1]->exponent, levels_[i]->exponent);
+      LOCUS_DCHECK_GT(levels_[i]->size, 0u);
+      LOCUS_DCHECK_GT(levels_[i]->table->size(), 0u);
+      values += levels_[i]->size;
+      bricks += levels_[i]->table->size();
+    }
+    LOCUS_DCHECK_EQ(values, size_);
+    LOCUS_DCHECK_EQ(bricks, brick_info_.size() - free_bricks_.size());
+    LOCUS_DCHECK_EQ(touched_indices_.size(), brick_info_.size());
+    for (const uint32_t brick : touched_) check_brick(brick);
+    check_locations(batch);
+  }
+}
+
+// Checks that a brick agrees with its entry in brick_info_ and with its level; a dropped brick passes. O(1).
+void HashGrid::check_brick(uint32_t brick) const {
+  if (bricks_[brick] == nullptr) return;
+  const internal::Brick& version = *bricks_[brick];
+  const BrickInfo& info = brick_info_[brick];
+  LOCUS_DCHECK_EQ(version.index, brick);
+  LOCUS_DCHECK(version.geometry.key == info.geometry.key);
+  LOCUS_DCHECK_EQ(version.geometry.exponent, info.level->exponent);
+  LOCUS_DCHECK_LE(double{version.max_extent}, info.level->max_extent);
+  LOCUS_DCHECK(contains(info.level->bounds, Aabbd{version.geometry.low, version.geometry.high}));
+  const auto has_key = [&](uint32_t candidate) { return brick_info_[candidate].geometry.key == info.geometry.key; };
+  LOCUS_DCHECK_EQ(info.level->table->find(info.geometry.key, has_key), brick);
+}
+
+// Checks the locations of the values that the batch has moved or inserted. O(changes).
+void HashGrid::check_locations(const GridBatch& batch) const {
+  if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+  const auto check = [this](uint32_t handle, Vec3d position) {
+    check_in_use(handle);
+    LOCUS_DCHECK(at(handle).entry().position == position);
+    LOCUS_DCHECK_EQ(bricks_by_handle_[handle], slots_[handle].brick);
+  };
+  for (const GridMove& move : batch.moves.moves) check(move.handle, move.position);
+  for (const GridItem& item : batch.inserted) check(item.handle, item.entry.position);
 }
 
 int HashGrid::exponent_for(float extent) const {
@@ -94,6 +151,7 @@ void HashGrid::change(uint32_t brick, const BrickChange& change) {
 
 void HashGrid::remove(uint32_t handle) {
   LOCUS_CHECK_LT(handle, slots_.size());
+  check_in_use(handle);
   const GridSlot slot = slots_[handle];
   --brick_info_[slot.brick].level->size;
   --size_;
@@ -137,6 +195,7 @@ void HashGrid::move_all(const GridMoves& batch) {
   leaving_moves_.clear();
   for (size_t i = 0; i < moves.size(); ++i) {
     const GridMove& move = moves[i];
+    check_in_use(move.handle);
     const GridSlot slot = slots_[move.handle];
     if (!brick_info_[slot.brick].geometry.holds(move.position)) {
       leaving_moves_.push_back(static_cast<uint32_t>(i));
@@ -151,6 +210,7 @@ void HashGrid::move_all(const GridMoves& batch) {
 }
 
 void HashGrid::group_changes() {
+  LOCUS_DCHECK_EQ(change_counts_.size(), touched_.size());
   uint32_t begin = 0;
   for (uint32_t& count : change_counts_) begin += std::exchange(count, begin);
   grouped_.resize(changes_.size());
@@ -191,6 +251,7 @@ void HashGrid::replace_brick(uint32_t brick, internal::BrickPtr next) {
 
 // Returns the changes of the brick touched_[touched].
 absl::Span<const BrickChange> HashGrid::changes_of(size_t touched) const {
+  LOCUS_DCHECK_LT(touched, touched_.size());
   const uint32_t begin = touched == 0 ? 0 : change_counts_[touched - 1];
   return absl::MakeConstSpan(grouped_).subspan(begin, change_counts_[touched] - begin);
 }
@@ -234,6 +295,7 @@ void HashGrid::apply_to_bricks(const GridBatch& batch) {
   rebuild_bricks(batch.moves);
   clear_batch();
   std::erase_if(levels_, [](const std::unique_ptr<Level>& level) { return level->size == 0; });
+  check_invariants(batch);
 }
 
 void HashGrid::clear_batch() {
@@ -269,6 +331,7 @@ void HashGrid::gather_all(const GridMoves& moves) {
     };
     size_t moved = 0;
     internal::BrickSource* const end = internal::gather_brick(*brick, finder, next, moved, leave);
+    LOCUS_DCHECK_LE(end, sources_.data() + sources_.size());
     if (moved == 0) continue;
     const uint32_t touched = touch(index);
     if (gathered_.size() <= touched) gathered_.resize(touched + 1);

@@ -123,6 +123,10 @@ class HashGrid {
   void choose_cell_size();
   void start_refiling(int base_exponent);
   void refile(size_t max_values);
+  void check_in_use(uint32_t handle) const;
+  void check_invariants(const GridBatch& batch) const;
+  void check_brick(uint32_t brick) const;
+  void check_locations(const GridBatch& batch) const;
 
   int base_exponent_;
   size_t first_choice_;

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/base/check.h"
+
 namespace locus::internal {
 namespace {
 
@@ -65,6 +67,7 @@ double values_per_cell(const LevelGeometry& level, size_t values) {
 
 NearestShells::NearestShells(const Vec3d& point, const LevelGeometry& level, double per_cell)
     : point_(point), level_(level), epsilon_(epsilon_of(point, level)) {
+  LOCUS_DCHECK_GT(per_cell, 0.0);
   constexpr float kBall = 4.18879f;  // volume of a ball of radius 1
   const double cells = std::cbrt(static_cast<float>(kFirstShellValues) / (kBall * static_cast<float>(per_cell)));
   bounds_distance_ = std::sqrt(squared_distance(point, level.bounds));
@@ -84,9 +87,11 @@ bool NearestShells::next(double limit) {
   region_ = region_within(squared);
   if (squared < limit && !contains(region_, level_.bounds)) {
     up_to_ = key_limit(squared);
+    LOCUS_DCHECK_LE(above_, up_to_);
     return true;
   }
   up_to_ = last;
+  LOCUS_DCHECK_LT(above_, up_to_);
   region_ = region_within(limit);
   return true;
 }
@@ -130,20 +135,22 @@ void NearCandidates::collect_rows(const GridBlock& block, uint32_t brick, const 
 }
 
 void NearCandidates::add(const uint32_t* slots, const float* keys, uint32_t count) {
+  LOCUS_DCHECK(!sources_.empty());
   const auto source = static_cast<uint32_t>(sources_.size() - 1);
   const size_t before = candidates_.size();
   candidates_.resize(before + count);
   for (uint32_t i = 0; i < count; ++i) {
+    LOCUS_DCHECK_GE(keys[i], 0.0f);
     candidates_[before + i] = {keys[i], slots[i], source};
     sources_[source].block->prefetch_entry(slots[i]);
   }
 }
 
 void NearCandidates::sort() {
+  const auto before = [](const Candidate& a, const Candidate& b) { return a.key < b.key; };
   const auto count = static_cast<uint32_t>(candidates_.size());
   if (count > kMaxSorted) {
-    std::sort(candidates_.begin(), candidates_.end(),
-              [](const Candidate& a, const Candidate& b) { return a.key < b.key; });
+    std::sort(candidates_.begin(), candidates_.end(), before);
     return;
   }
   // Sorts integers: the bits of a key, which is not negative, are ordered like the key. Their lowest bits are replaced
@@ -159,6 +166,7 @@ void NearCandidates::sort() {
     candidates_[i] = given[packed[i] & kIndexMask];
     candidates_[i].key = std::bit_cast<float>(packed[i] & ~kIndexMask);
   }
+  LOCUS_DCHECK(std::is_sorted(candidates_.begin(), candidates_.end(), before));
 }
 
 }  // namespace locus::internal

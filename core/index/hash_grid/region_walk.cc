@@ -19,11 +19,13 @@ void prefetch_rows(const GridRows& rows) {
 }  // namespace
 
 void RegionSteps::find_bricks(const GridRegion& region) {
+  LOCUS_DCHECK(region.grid != nullptr);
   region_ = region;
   part_count_ = slot_count_ = 0;
   Work work;
   is_small_ =
       region.grid->for_few_bricks(region.bounds, kMaxBricks, work, [&](const Brick& brick, const KeyRange& cells) {
+        LOCUS_DCHECK_LT(part_count_, kMaxBricks);
         brick.prefetch_head();
         parts_[part_count_].brick = &brick;
         parts_[part_count_++].cells = cells;
@@ -90,6 +92,7 @@ void RegionSteps::cull(const CullOf& cull_of) {
 
 RegionWalk::RegionWalk(size_t begin, size_t end, std::function<GridRegion(size_t)> region_of)
     : region_of_(std::move(region_of)), next_(begin), end_(end) {
+  LOCUS_DCHECK_LE(begin, end);
   for (size_t ahead = 0; ahead < kAhead; ++ahead) {
     for (size_t step = 0; step <= ahead; ++step) take_step(begin + ahead - step, step);
   }

@@ -14,6 +14,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/index/hash_grid/grid_snapshot.h"
 
 namespace locus {
@@ -83,6 +84,8 @@ void RegionSteps::visit(Work& work, const Visit& visit) const {
   };
   for (uint32_t i = 0; i < part_count_; ++i) {
     const BrickPart& part = parts_[i];
+    LOCUS_DCHECK_LE(part.sorted_end, part.recent_end);
+    LOCUS_DCHECK_LE(part.recent_end, slot_count_);
     if (!visit_up_to(part.sorted_end, *part.brick->sorted, part.brick->index)) return;
     if (next != part.recent_end && !visit_up_to(part.recent_end, *part.brick->recent, part.brick->index)) return;
   }
@@ -104,6 +107,7 @@ class RegionWalk {
   // been visited.
   template <class Visit>
   void visit(Work& work, const Visit& visit) {
+    LOCUS_DCHECK_LT(next_, end_);
     take_steps();
     steps_[next_++ % steps_.size()].visit(work, visit);
   }

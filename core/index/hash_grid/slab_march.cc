@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus::internal {
 namespace {
 
@@ -26,6 +28,9 @@ SlabMarch::SlabMarch(const SlabRay<double>& ray, const LevelGeometry& level, dou
       per_unit_(level.cells_per_unit),
       slab_edge_((1 << kBrickBits) / level.cells_per_unit),
       axis_(dominant_axis(ray.direction())) {
+  LOCUS_DCHECK(!level.bounds.empty());
+  LOCUS_DCHECK_GE(level.max_extent, 0.0);
+  LOCUS_DCHECK_GT(level.cells_per_unit, 0.0);
   const Interval<double> part = ray.interval(bounds_);
   if (part.near > part.far || part.far < 0 || part.near > limit) return;
   part_ = {part.near, part.far};
@@ -61,6 +66,7 @@ SlabMarch::Crossing SlabMarch::cross(double index, double edge, double limit) co
 }
 
 SlabMarch::Slab SlabMarch::slab(int64_t n, double limit) const {
+  LOCUS_DCHECK(0 <= n && n < slabs_);
   const int64_t index = first_ + n * step_;
   const Crossing crossing = cross(static_cast<double>(index), slab_edge_, limit);
   Slab slab{crossing.near, {{0, 0, 0}, {-1, -1, -1}}};
@@ -71,6 +77,8 @@ SlabMarch::Slab SlabMarch::slab(int64_t n, double limit) const {
 }
 
 SlabMarch::Layer SlabMarch::layer(int64_t n, int layer_index, double limit) const {
+  LOCUS_DCHECK(0 <= n && n < slabs_);
+  LOCUS_DCHECK(0 <= layer_index && layer_index < 1 << kBrickBits);
   const int64_t within = step_ > 0 ? layer_index : (1 << kBrickBits) - 1 - layer_index;
   const int64_t index = ((first_ + n * step_) << kBrickBits) + within;
   const Crossing crossing = cross(static_cast<double>(index), slab_edge_ / (1 << kBrickBits), limit);

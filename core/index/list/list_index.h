@@ -31,6 +31,7 @@ class ListIndex {
     const bool added = slots_.try_emplace(Traits::id(value), values_.size()).second;
     LOCUS_CHECK(added);
     values_.push_back(value);
+    check_invariants(values_.size() - 1);
   }
 
   // Removes the value with the id of `value`. Returns false and changes nothing if there is none. O(1): the last value
@@ -45,6 +46,7 @@ class ListIndex {
       slots_[Traits::id(values_[slot])] = slot;
     }
     values_.pop_back();
+    check_invariants(slot);
     return true;
   }
 
@@ -68,6 +70,17 @@ class ListIndex {
   }
 
  private:
+  // Checks the sizes and, if it exists, the entry of `slot`, which has changed. O(1).
+  void check_invariants(size_t slot) const {
+    if constexpr (kDebugChecks) {
+      LOCUS_DCHECK_EQ(values_.size(), slots_.size());
+      if (slot >= values_.size()) return;
+      const auto found = slots_.find(Traits::id(values_[slot]));
+      LOCUS_DCHECK(found != slots_.end());
+      LOCUS_DCHECK_EQ(found->second, slot);
+    }
+  }
+
   template <class Visitor>
   void visit_all(Visitor& visitor, Work& work) const {
     for (const V& value : values_) {
