@@ -183,10 +183,10 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
              y_rows = static_cast<uint32_t>(cells.hi.y - lo.y + 1);
   const auto layers = static_cast<uint32_t>(cells.hi.z - lo.z + 1);
   const bool whole_rows = x_cells == kRow, whole_layers = whole_rows && y_rows == kRow;
-  const uint32_t runs_a_layer = whole_rows ? 1 : y_rows, runs = whole_layers ? 1 : runs_a_layer * layers;
+  const uint32_t runs_per_layer = whole_rows ? 1 : y_rows, runs = whole_layers ? 1 : runs_per_layer * layers;
   const uint32_t run_cells = whole_layers ? layers * kLayer : whole_rows ? y_rows * kRow : x_cells;
   auto cell = static_cast<uint32_t>(lo.z << (2 * kBrickBits) | lo.y << kBrickBits | lo.x);
-  uint32_t left = runs_a_layer;
+  uint32_t left = runs_per_layer;
   for (uint32_t run = 0; run < runs; ++run) {
     const uint32_t begin = sorted.offsets()[cell], end = sorted.offsets()[cell + run_cells];
     rows.begin[rows.count] = begin;
@@ -194,8 +194,8 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
     rows.count += begin != end ? 1 : 0;
     cell += kRow;
     if (--left == 0) {
-      left = runs_a_layer;
-      cell += kLayer - runs_a_layer * kRow;
+      left = runs_per_layer;
+      cell += kLayer - runs_per_layer * kRow;
     }
   }
   LOCUS_DCHECK_LE(rows.count, GridRows::kMax);

@@ -124,7 +124,7 @@ class GridBlock {
     const uint32_t* handles;
     const float* extents;
   };
-  // Pointers to the columns of a block for writing, likewise.
+  // Pointers to the columns of a block for writing.
   class Places {
    public:
     explicit Places(const GridBlock& block, Vec3d center)

@@ -214,10 +214,10 @@ TEST(HashGridTest, AfterANewCellSizeEachBatchRefilesAFewValuesAndResultsStayCorr
   int batches = 1;
   for (; grid.statistics().levels > 1; ++batches) {
     const double radius = random.chance(0.5) ? 1 : 200;
-    const Balld asked{random.vector(3), radius};
+    const Balld ball_query{random.vector(3), radius};
     size_t expected = 0;
-    for (const Object& object : objects) expected += ball_overlaps(asked, object.shape) ? 1 : 0;
-    EXPECT_EQ(ids_near(grid, asked.center, radius).size(), expected);
+    for (const Object& object : objects) expected += ball_overlaps(ball_query, object.shape) ? 1 : 0;
+    EXPECT_EQ(ids_near(grid, ball_query.center, radius).size(), expected);
     EXPECT_LT(insert_in_the_middle(), grid.statistics().bytes / 2);
     ASSERT_LT(batches, 100) << "refiling does not end";
   }
