@@ -1,6 +1,6 @@
-// Collectors: what to do with the candidates that a structure hands over. Each is a visitor for one thread and one
-// query: the nearest hit, any hit, the nearest few hits of a ray, the values a ray's or a region's bounds meet. Kept
-// apart from traversal, so that every structure serves every kind of question. They borrow the query.
+// Collectors: visitors that decide about the candidates of a structure and keep the results: the nearest hit, any hit,
+// the nearest k hits of a ray, or the values whose bounds meet a ray or a region. They are separate from traversal, so
+// that every structure serves every kind of query. One object per query and thread; each borrows the query.
 #ifndef LOCUS_CORE_INDEX_COLLECTORS_H_
 #define LOCUS_CORE_INDEX_COLLECTORS_H_
 
@@ -9,12 +9,13 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/index/regions.h"
 #include "core/index/spatial_index.h"
 
 namespace locus {
 
-// Nearest hit before a limit, strictly; the lower id wins at equal distance.
+// Collector of the nearest hit at a distance strictly less than a limit; at equal distance the lower id wins.
 template <Primitive V>
 class NearestVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -34,9 +35,9 @@ class NearestVisitor {
     return true;
   }
 
-  // Nothing when nothing was hit before the limit.
+  // Returns the nearest hit value, or no value if there was no hit before the limit.
   const std::optional<V>& best() const { return best_; }
-  // Of the best hit; the limit as given without one.
+  // Returns the distance of best(), or the given limit if there was no hit.
   S distance() const { return distance_; }
 
  private:
@@ -50,7 +51,7 @@ class NearestVisitor {
   std::optional<V> best_;
 };
 
-// Whether anything is hit before a limit, strictly. Ends the visit at the first hit.
+// Collector that checks for any hit at a distance strictly less than a limit. Ends the visit at the first hit.
 template <Primitive V>
 class AnyHitVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -75,6 +76,7 @@ class AnyHitVisitor {
   bool found_ = false;
 };
 
+// Hit of a ray: the value and its distance, in units of the ray's direction.
 template <Bounded V>
 struct RayHit {
   ScalarOf<V> distance;
@@ -83,15 +85,15 @@ struct RayHit {
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
-// Order of hits: by distance, then by id.
+// Returns true if hit `a` precedes `b`: by distance, then by id.
 template <Bounded V>
 bool comes_before(const RayHit<V>& a, const RayHit<V>& b) {
   if (a.distance != b.distance) return a.distance < b.distance;
   return PrimitiveTraits<V>::id(a.value) < PrimitiveTraits<V>::id(b.value);
 }
 
-// The nearest `max_hits` hits before a limit, appended to `result`. Until finish() the appended part is a heap with its
-// last hit on top, which a nearer one replaces.
+// Collector of the nearest `max_hits` hits at distances strictly less than a limit, appended to `result`. Until
+// finish() the appended part is a heap whose top is its farthest hit, which a nearer hit replaces.
 template <Primitive V>
 class NearestFewVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -114,8 +116,11 @@ class NearestFewVisitor {
     return true;
   }
 
-  // Sorts what was appended. The visitor is done after it.
-  void finish() { std::sort_heap(result_.begin() + begin_, result_.end(), comes_before<V>); }
+  // Sorts the appended hits. The collector must not be used afterwards.
+  void finish() {
+    LOCUS_DCHECK(std::is_heap(result_.begin() + begin_, result_.end(), comes_before<V>));
+    std::sort_heap(result_.begin() + begin_, result_.end(), comes_before<V>);
+  }
 
  private:
   bool full() const { return result_.size() - static_cast<size_t>(begin_) == max_hits_; }
@@ -129,6 +134,7 @@ class NearestFewVisitor {
       result_.push_back(hit);
     }
     std::push_heap(result_.begin() + begin_, result_.end(), comes_before<V>);
+    LOCUS_DCHECK_LE(result_.size() - static_cast<size_t>(begin_), max_hits_);
     if (full()) limit_ = ray_.to_scaled(result_[static_cast<size_t>(begin_)].distance);
   }
 
@@ -140,7 +146,7 @@ class NearestFewVisitor {
   std::vector<RayHit<V>>& result_;
 };
 
-// Values whose bounds the ray meets at or before a limit, appended: decided by the slab test alone.
+// Collector of the values whose bounds the ray meets at or before a limit, by the slab test alone. Appends to `result`.
 template <Primitive V>
 class BoundsOnRayVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -152,8 +158,8 @@ class BoundsOnRayVisitor {
 
   S limit() const { return limit_; }
   bool visit(const V& value) {
-    const Interval<S> own = slabs_.interval(Traits::bounds(value));
-    if (own.near <= own.far && own.far >= 0 && own.near <= limit_) result_.push_back(value);
+    const Interval<S> interval = slabs_.interval(Traits::bounds(value));
+    if (interval.near <= interval.far && interval.far >= 0 && interval.near <= limit_) result_.push_back(value);
     return true;
   }
 
@@ -163,8 +169,9 @@ class BoundsOnRayVisitor {
   std::vector<V>& result_;
 };
 
-// Values whose bounds a region reaches and that pass `test`, appended. The bounds are part of the verdict, so that the
-// exact answer lies within the conservative one and no structure can change either.
+// Collector of the values whose bounds overlap a region and that pass `test`. Appends to `result`. The test of the
+// bounds is part of the decision, so exact results are a subset of the conservative ones, and both are the same for
+// every structure.
 template <Bounded V, class Region, class Test>
 class RegionCollector {
   using Traits = PrimitiveTraits<V>;

@@ -1,9 +1,10 @@
-// The questions an index answers, written once for every structure: rays (first, any, all) and overlaps of balls and
-// boxes, exact by the values' own predicates or conservative by their bounds. Results are appended to what a vector
-// holds, never written over it; overlap results come in the structure's order. Answers are the same for all structures.
+// Queries of an index, written once for every structure: rays (first, any, all) and overlaps with balls and boxes,
+// exact by the predicates of the values or conservative by their bounds. Results are appended to the given vector and
+// never overwrite its contents; overlap results are in the order of the structure. All structures give the same
+// results.
 //
-// A ray's end is the `distance` given here; the ray's own t_max plays no part. Distances are in units of the ray's
-// direction. `work`, where given, is added to. Cost: that of the structure's visit. Threads: as the index.
+// A ray ends at the `distance` given here; its own t_max is ignored. Distances are in units of the ray's direction. If
+// `work` is not null, the cost is added to it. Cost: that of the structure's visit. Threads: as for the index.
 // Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query interface).
 #ifndef LOCUS_CORE_INDEX_INDEX_QUERIES_H_
 #define LOCUS_CORE_INDEX_INDEX_QUERIES_H_
@@ -23,7 +24,7 @@ template <class Index>
 using BoxQueryOf = typename PrimitiveTraits<typename Index::Value>::BoxQuery;
 
 namespace internal {
-// Counts into the caller's counter or, without one, into its own.
+// Counter of the cost of a query: the caller's counter or, if that is null, one of its own.
 class CostCounter {
  public:
   explicit CostCounter(Work* work) : work_(work != nullptr ? *work : own_) {}
@@ -36,64 +37,64 @@ class CostCounter {
 
 template <class Value, class Index, class Region, class Test>
 void collect_region(const Index& index, const Region& region, Test test, std::vector<Value>& result, Work* work) {
-  CostCounter sink(work);
+  CostCounter counter(work);
   RegionCollector<Value, Region, Test> collector(region, test, result);
-  index.visit_region(collector, sink.get());
+  index.visit_region(collector, counter.get());
 }
 
 inline constexpr auto kBoundsDecide = [](const auto&) { return true; };
 }  // namespace internal
 
-// First hit among several indices of one value type, in distance and out: a hit at r < distance (strictly) sets `value`
-// and `distance` and returns true; otherwise both stay untouched. Every index is asked, with what the ones before it
-// found as the limit; at equal r the lower id wins, also across indices. (Joining two first_ray() by || would skip the
-// second index, which may hold the nearer hit.)
+// Finds the first hit among several indices of one value type. A hit at r < distance (strictly) sets `value` and
+// `distance` and returns true; otherwise both are unchanged and the result is false. Every index is queried, with the
+// distance found in the earlier indices as its limit; at equal r the lower id wins, also across indices. (Two calls of
+// first_ray() joined by || would skip the second index, which may hold the nearer hit.)
 template <class V, SpatialIndex... Indices>
 bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, ScalarOf<V>& distance, Work* work,
                   const Indices&... indices) {
-  internal::CostCounter sink(work);
+  internal::CostCounter counter(work);
   NearestVisitor<V> nearest(ray, distance);
-  (indices.visit_ray(ray.slabs(), nearest, sink.get()), ...);
+  (indices.visit_ray(ray.slabs(), nearest, counter.get()), ...);
   if (!nearest.best()) return false;
   value = *nearest.best();
   distance = nearest.distance();
   return true;
 }
 
-// As above for one index.
+// Finds the first hit in one index; see first_ray_of().
 template <SpatialIndex Index>
 bool first_ray(const Index& index, const RayQueryOf<Index>& ray, typename Index::Value& value,
                ScalarOf<typename Index::Value>& distance, Work* work = nullptr) {
   return first_ray_of(ray, value, distance, work, index);
 }
 
-// Whether there is a hit at r < distance.
+// Returns true if there is a hit at r < distance.
 template <SpatialIndex Index>
 bool any_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
              Work* work = nullptr) {
-  internal::CostCounter sink(work);
+  internal::CostCounter counter(work);
   AnyHitVisitor<typename Index::Value> any(ray, distance);
-  index.visit_ray(ray.slabs(), any, sink.get());
+  index.visit_ray(ray.slabs(), any, counter.get());
   return any.found();
 }
 
-// Appends the hits at r < distance sorted by (r, id), only the first `max_hits` of them.
+// Appends the first `max_hits` hits at r < distance, sorted by (r, id).
 template <SpatialIndex Index>
 void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
               size_t max_hits, std::vector<RayHit<typename Index::Value>>& result, Work* work = nullptr) {
-  internal::CostCounter sink(work);
+  internal::CostCounter counter(work);
   NearestFewVisitor<typename Index::Value> few(ray, distance, max_hits, result);
-  index.visit_ray(ray.slabs(), few, sink.get());
+  index.visit_ray(ray.slabs(), few, counter.get());
   few.finish();
 }
 
-// Appends the values whose bounds the ray meets at r <= distance: a superset of what all_rays() hits.
+// Appends the values whose bounds the ray meets at r <= distance: a superset of the hits of all_rays().
 template <SpatialIndex Index>
 void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
                       std::vector<typename Index::Value>& result, Work* work = nullptr) {
-  internal::CostCounter sink(work);
+  internal::CostCounter counter(work);
   BoundsOnRayVisitor<typename Index::Value> on_ray(ray, distance, result);
-  index.visit_ray(ray.slabs(), on_ray, sink.get());
+  index.visit_ray(ray.slabs(), on_ray, counter.get());
 }
 
 // Appends the values that share a point with the ball.
@@ -112,7 +113,7 @@ void conservative_ball(const Index& index, const BallQueryOf<Index>& ball, std::
   internal::collect_region(index, BallRegion(ball), internal::kBoundsDecide, result, work);
 }
 
-// Appends the values that share a point with the box, which may be turned.
+// Appends the values that share a point with the box, which may be rotated.
 template <SpatialIndex Index>
 void box_overlap(const Index& index, const BoxQueryOf<Index>& box, std::vector<typename Index::Value>& result,
                  Work* work = nullptr) {

@@ -1,5 +1,5 @@
-// What is nearest to a point, written once for every structure: exactly, by the values' own distances in double.
-// Answers are the same for all structures.
+// Query for the values nearest to a point, written once for every structure. Exact: by the distances of the values in
+// double. All structures give the same results.
 #ifndef LOCUS_CORE_INDEX_NEAREST_VALUES_H_
 #define LOCUS_CORE_INDEX_NEAREST_VALUES_H_
 
@@ -7,24 +7,26 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/index/index_queries.h"
 
 namespace locus {
 
+// Value and its distance from the point of a query.
 template <Measurable V>
 struct ValueAt {
   double distance;
   V value;
 
-  // Order: by distance, then by id.
+  // Orders by distance, then by id.
   friend bool operator<(const ValueAt& a, const ValueAt& b) {
     if (a.distance != b.distance) return a.distance < b.distance;
     return PrimitiveTraits<V>::id(a.value) < PrimitiveTraits<V>::id(b.value);
   }
 };
 
-// The visitor behind nearest_values(): keeps what was appended as a heap with the farthest on top. One thread, one
-// query.
+// Collector of nearest_values(): keeps the appended values as a heap with the farthest on top. One object per query and
+// thread.
 template <Measurable V>
 class NearestValuesVisitor {
  public:
@@ -44,8 +46,11 @@ class NearestValuesVisitor {
     return true;
   }
 
-  // Sorts what was appended. The visitor is done after it.
-  void finish() { std::sort_heap(result_.begin() + begin_, result_.end()); }
+  // Sorts the appended values. The collector must not be used afterwards.
+  void finish() {
+    LOCUS_DCHECK(std::is_heap(result_.begin() + begin_, result_.end()));
+    std::sort_heap(result_.begin() + begin_, result_.end());
+  }
 
  private:
   bool full() const { return result_.size() - static_cast<size_t>(begin_) == max_values_; }
@@ -59,6 +64,7 @@ class NearestValuesVisitor {
       result_.push_back(found);
     }
     std::push_heap(result_.begin() + begin_, result_.end());
+    LOCUS_DCHECK_LE(result_.size() - static_cast<size_t>(begin_), max_values_);
     if (full()) limit_ = squared_limit(result_[static_cast<size_t>(begin_)].distance);
   }
 
@@ -70,15 +76,15 @@ class NearestValuesVisitor {
   std::vector<ValueAt<V>>& result_;
 };
 
-// Appends the `max_values` values nearest to `point` within `max_distance`, both ends included, ascending by (distance,
-// id). `work`, where given, is added to. Cost: that of the structure's visit, and O(log max_values) for each value
-// kept.
+// Appends the `max_values` values nearest to `point` at distances <= max_distance, ascending by (distance, id). If
+// `work` is not null, the cost is added to it. Cost: that of the structure's visit, and O(log max_values) for each
+// value kept.
 template <SpatialIndex Index>
 void nearest_values(const Index& index, const Vec3d& point, double max_distance, size_t max_values,
                     std::vector<ValueAt<typename Index::Value>>& result, Work* work = nullptr) {
-  internal::CostCounter sink(work);
+  internal::CostCounter counter(work);
   NearestValuesVisitor<typename Index::Value> visitor(point, max_distance, max_values, result);
-  index.visit_nearest(point, visitor, sink.get());
+  index.visit_nearest(point, visitor, counter.get());
   visitor.finish();
 }
 

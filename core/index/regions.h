@@ -1,5 +1,5 @@
-// Regions: the culling half of ball and box queries, for the scalar type of an index. A region knows its axis-aligned
-// bounds and tells which boxes it reaches; what it wants of a value is left to visitors. Immutable; cheap to copy.
+// Regions: the culling part of ball and box queries, for the scalar type of an index. A region has axis-aligned bounds
+// and a test of overlap with boxes; decisions about values are left to visitors. Immutable; cheap to copy; any thread.
 #ifndef LOCUS_CORE_INDEX_REGIONS_H_
 #define LOCUS_CORE_INDEX_REGIONS_H_
 
@@ -7,13 +7,14 @@
 #include <concepts>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/geometry/ball.h"
 #include "core/geometry/obb.h"
 
 namespace locus {
 
 namespace internal {
-// The smallest box of S that contains `box`.
+// Returns the smallest box with coordinates of type S that contains `box`.
 template <std::floating_point S>
 Aabb<S> rounded_outward(const Aabbd& box) {
   constexpr S kInfinity = std::numeric_limits<S>::infinity();
@@ -22,17 +23,20 @@ Aabb<S> rounded_outward(const Aabbd& box) {
     const S low = static_cast<S>(box.min[axis]), high = static_cast<S>(box.max[axis]);
     result.min[axis] = double{low} > box.min[axis] ? std::nextafter(low, -kInfinity) : low;
     result.max[axis] = double{high} < box.max[axis] ? std::nextafter(high, kInfinity) : high;
+    LOCUS_DCHECK_LE(double{result.min[axis]}, box.min[axis]);
+    LOCUS_DCHECK_GE(double{result.max[axis]}, box.max[axis]);
   }
   return result;
 }
 }  // namespace internal
 
-// What a ball reaches, by reaches().
+// Region of a ball: overlaps the boxes for which reaches() holds.
 template <std::floating_point S>
 class BallRegion {
  public:
   explicit BallRegion(const Ball<S>& ball)
-      // Squares of gaps below 2^-537 vanish, so such gaps are reached by a ball of radius zero.
+      // Squares of gaps below 2^-537 underflow to zero, so reaches() holds even for a ball of radius zero at such a
+      // gap.
       : ball_(ball), bounds_(internal::rounded_outward<S>(grown(to_double(bounds_of(ball)), 0x1p-530))) {}
 
   const Aabb<S>& bounds() const { return bounds_; }
@@ -43,7 +47,7 @@ class BallRegion {
   Aabb<S> bounds_;
 };
 
-// What a box reaches: boxes that overlap its axis-aligned bounds. Exact comparisons.
+// Region of a box, which may be rotated: overlaps the boxes that overlap its axis-aligned bounds. Exact comparisons.
 template <std::floating_point S>
 class BoxRegion {
  public:

@@ -1,6 +1,6 @@
-// The interface of every spatial structure, as concepts, and the queries written once for all of them. A structure only
-// culls: it hands candidates to a visitor, which decides by the value's own predicates. Verdicts therefore cannot
-// depend on the structure, and the list, which culls nothing, is the oracle of all others.
+// Interface of every spatial structure, as concepts. A structure only culls: it passes candidates to a visitor, which
+// decides by the exact predicates of the values. Results therefore do not depend on the structure, and the list, which
+// culls no value, is the test oracle of the others.
 //
 // Threads: const members of one index may run concurrently; insert and remove need exclusive use.
 #ifndef LOCUS_CORE_INDEX_SPATIAL_INDEX_H_
@@ -14,17 +14,17 @@
 
 namespace locus {
 
-// Takes candidates of a ray. limit(): boxes whose near value exceeds it may be skipped, and only those (not ones that
-// equal it: a lower id may wait there); it may fall during the visit. visit(): false ends the visit;
-// the value may be gone afterwards, unless the structure promises more.
+// Visitor of the candidates of a ray. limit(): boxes whose near value exceeds it may be skipped, but not boxes whose
+// near value equals it, which may hold a lower id; it may fall during the visit. visit(): false ends the visit. The
+// reference passed to visit() is valid only during the call, unless the structure documents a longer lifetime.
 template <class Visitor, class Value>
 concept RayVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<ScalarOf<Value>>;
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Takes candidates of a region. overlaps(box): false if nothing within the box can be wanted; monotone, so that it
-// holds for every superset of a box for which it holds. bounds(): whatever is wanted has bounds that overlap this box.
+// Visitor of the candidates of a region. overlaps(box): false if no value within the box can be a result; monotone:
+// true for every superset of a box for which it is true. bounds(): a box that overlaps the bounds of every result.
 template <class Visitor, class Value>
 concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aabb<ScalarOf<Value>>& box) {
   { std::as_const(visitor).bounds() } -> std::same_as<Aabb<ScalarOf<Value>>>;
@@ -32,8 +32,9 @@ concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aab
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Takes candidates around a point. limit(): values whose bounds have a greater squared_distance() from it may be
-// skipped, and only those (not ones that equal it); it may fall during the visit. visit(): false ends the visit.
+// Visitor of the candidates around a point. limit(): values whose bounds have a squared_distance() from the point that
+// exceeds it may be skipped, but not values at equal distance; it may fall during the visit. visit(): false ends the
+// visit.
 template <class Visitor, class Value>
 concept PointVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<double>;
@@ -42,7 +43,7 @@ concept PointVisitor = requires(Visitor& visitor, const Value& value) {
 
 namespace internal {
 template <class Value>
-struct AnyVisitor {  // stands for every visitor in the concept below
+struct AnyVisitor {  // placeholder for every visitor in the concept below
   ScalarOf<Value> limit() const { return 0; }
   Aabb<ScalarOf<Value>> bounds() const { return {}; }
   bool overlaps(const Aabb<ScalarOf<Value>>&) const { return false; }
@@ -55,9 +56,10 @@ struct AnyPointVisitor {
 };
 }  // namespace internal
 
-// visit_ray hands over, at least once each and at most once each, all values whose own interval satisfies near <= far,
-// far >= 0 and near <= limit(); roughly near to far; possibly others. visit_region likewise for overlaps(bounds of
-// value), and visit_nearest for squared_distance(point, bounds of value) <= limit(), nearer ones roughly first.
+// Structure that can be queried. visit_ray passes each value exactly once whose bounds have an interval on the ray with
+// near <= far, far >= 0 and near <= limit(), roughly from near to far, and may pass further values, each at most once.
+// visit_region does the same for values with overlaps(bounds of the value), and visit_nearest for values with
+// squared_distance(point, bounds of the value) <= limit(), roughly from near to far.
 template <class Index>
 concept SpatialIndex = Bounded<typename Index::Value> &&
     requires(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs,
@@ -70,8 +72,8 @@ concept SpatialIndex = Bounded<typename Index::Value> &&
   { index.visit_nearest(point, visitor, work) } -> std::same_as<void>;
 };
 
-// insert() of an id that is in the index is a programmer error; remove() and contains() compare ids and take the value
-// as inserted, since a grid finds it by its position.
+// Structure that can be changed. Precondition of insert(): the id is not in the index. remove() and contains() compare
+// ids, but take the value as it was inserted, since a grid finds it by its position.
 template <class Index>
 concept MutableSpatialIndex = SpatialIndex<Index> &&
     requires(Index& index, const Index& const_index, const typename Index::Value& value) {

@@ -1,5 +1,5 @@
-// Work counters: what a query cost, in units that do not depend on the machine. Plain data, one per query or batch; the
-// same query on the same structure always counts the same.
+// Work counters: the cost of a query in units that do not depend on the machine. Plain data, one per query or batch. A
+// repeated query on the same structure gives the same counts.
 #ifndef LOCUS_CORE_INDEX_WORK_H_
 #define LOCUS_CORE_INDEX_WORK_H_
 
@@ -9,8 +9,8 @@ namespace locus {
 
 struct Work {
   uint64_t nodes = 0;  // tree nodes opened
-  uint64_t cells = 0;  // grid bricks and cells looked into
-  uint64_t tests = 0;  // values given to a visitor
+  uint64_t cells = 0;  // grid bricks and cells visited
+  uint64_t tests = 0;  // values passed to a visitor
 
   Work& operator+=(const Work& other) {
     nodes += other.nodes;

@@ -3,17 +3,18 @@
 #include <algorithm>
 
 #include "core/base/check.h"
+#include "core/base/planted_bug.h"
 
 namespace locus::internal {
 namespace {
 
-// A brick of fewer values is sorted anew whatever changes: that costs no more.
-constexpr uint32_t kFewestSorted = 48;
-constexpr uint32_t kSortedPerChange = 8;  // sorted values for each change of one batch
-constexpr uint32_t kSortedPerGone = 4;    // sorted values for each that is gone
-constexpr size_t kAhead = 16;             // values whose memory is asked for before their turn
+// A brick with fewer sorted values is always sorted again, which costs no more than a log.
+constexpr uint32_t kMinSorted = 48;
+constexpr uint32_t kSortedPerChange = 8;  // min ratio of sorted values to changes of one batch, for a log
+constexpr uint32_t kSortedPerDead = 4;    // min ratio of sorted values to dead ones, for a log
+constexpr size_t kAhead = 16;             // prefetch distance in values
 
-// In the lists of changes by slot. Numbers of moves are smaller.
+// Mark of an unchanged value in the lists of changes by slot. Move indices are smaller.
 constexpr uint32_t kStays = ~0u - 1;
 
 bool arrives(const BrickChange& change) { return change.slot == BrickChange::kArrives; }
@@ -21,16 +22,20 @@ bool arrives(const BrickChange& change) { return change.slot == BrickChange::kAr
 }  // namespace
 
 void BrickBuilder::begin(const BatchParts& parts, std::vector<GridSlot>& slots) {
+  LOCUS_DCHECK_LT(parts.moves.moves.size(), size_t{kStays});
+  LOCUS_DCHECK_LT(parts.arrivals.size(), size_t{BrickSource::kArrival});
   parts_ = parts;
   slots_ = &slots;
   sources_.clear();
 }
 
-BrickPtr BrickBuilder::apply(const Brick* old, const BrickPlace& place, uint32_t number,
+BrickPtr BrickBuilder::apply(const Brick* old, const BrickGeometry& geometry, uint32_t index,
                              absl::Span<const BrickChange> changes) {
-  place_ = &place;
-  number_ = number;
-  largest_reach_ = old == nullptr ? 0 : old->largest_reach;
+  LOCUS_DCHECK(slots_ != nullptr);
+  check_changes(old, changes);
+  geometry_ = &geometry;
+  index_ = index;
+  max_extent_ = old == nullptr ? 0 : old->max_extent;
   if (is_few(old, changes) &&
       (old->sorted->has_forms() || (parts_.moves.rotations.empty() && !any_form_arrives(changes))))
     return change_few(*old, changes);
@@ -38,22 +43,84 @@ BrickPtr BrickBuilder::apply(const Brick* old, const BrickPlace& place, uint32_t
   return sort_anew(old, changes);
 }
 
-BrickPtr BrickBuilder::build(const Brick* old, const BrickPlace& place, uint32_t number,
+BrickPtr BrickBuilder::build(const Brick* old, const BrickGeometry& geometry, uint32_t index,
                              absl::Span<const BrickSource> sources, absl::Span<const BrickChange> changes) {
-  place_ = &place;
-  number_ = number;
-  largest_reach_ = old == nullptr ? 0 : old->largest_reach;
+  geometry_ = &geometry;
+  index_ = index;
+  max_extent_ = old == nullptr ? 0 : old->max_extent;
+  LOCUS_DCHECK(slots_ != nullptr);
+  LOCUS_DCHECK(std::all_of(changes.begin(), changes.end(), arrives));
+  check_changes(old, changes);
   if (changes.empty()) return sorted_by_cell(old, sources);
   sources_.assign(sources.begin(), sources.end());
   add_arrivals(changes);
   return sorted_by_cell(old, sources_);
 }
 
+// Checks that each change refers to a live slot of `old`, or to an arrival, and to an existing move. O(changes).
+void BrickBuilder::check_changes(const Brick* old, absl::Span<const BrickChange> changes) const {
+  if constexpr (kDebugChecks) {
+    for (const BrickChange& change : changes) {
+      if (arrives(change)) {
+        LOCUS_DCHECK_LT(change.index, parts_.arrivals.size());
+        continue;
+      }
+      LOCUS_DCHECK(old != nullptr);
+      if (change.index != BrickChange::kLeaves) LOCUS_DCHECK_LT(change.index, parts_.moves.moves.size());
+      const uint32_t slot = change.slot & ~GridSlot::kRecent;
+      const bool recent = (change.slot & GridSlot::kRecent) != 0;
+      LOCUS_DCHECK_LT(slot, recent ? old->recent_count : old->sorted->count());
+      const bool dead = recent ? old->is_recent_dead(slot) : old->is_dead(slot);
+      LOCUS_DCHECK(!dead || planted(PlantedBug::kGhostAfterMove));
+    }
+  }
+}
+
+// Checks that the writer's location of a written value is its slot, and that its extent is within the bound.
+void BrickBuilder::check_value(const Brick& brick, const GridBlock& block, uint32_t slot, uint32_t flag) const {
+  LOCUS_DCHECK_LT(block.handle(slot), slots_->size());
+  LOCUS_DCHECK_LE(block.extent(slot), brick.max_extent);
+  if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+  const GridSlot& location = (*slots_)[block.handle(slot)];
+  LOCUS_DCHECK_EQ(location.brick, index_);
+  LOCUS_DCHECK_EQ(location.slot, slot | flag);
+}
+
+// Checks a version whose values have all been sorted. O(values), as the sort.
+void BrickBuilder::check_sorted(const Brick& brick) const {
+  if constexpr (kDebugChecks) {
+    brick.check_invariants();
+    const GridBlock& sorted = *brick.sorted;
+    sorted.check_invariants();
+    for (int cell = 0; cell < kBrickCells; ++cell) {
+      const auto begin = static_cast<size_t>(cell);
+      for (uint32_t slot = sorted.offsets()[begin]; slot < sorted.offsets()[begin + 1]; ++slot) {
+        check_value(brick, sorted, slot, 0);
+        LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
+                     brick.geometry.cell_nearly_holds(cell, sorted.entry(slot).position));
+      }
+    }
+  }
+}
+
+// Checks a version whose log has new values from slot `begin` on. O(new values), and O(words of dead bits).
+void BrickBuilder::check_recent(const Brick& brick, uint32_t begin) const {
+  if constexpr (kDebugChecks) {
+    brick.check_invariants();
+    for (uint32_t slot = begin; slot < brick.recent_count; ++slot) {
+      check_value(brick, *brick.recent, slot, GridSlot::kRecent);
+      LOCUS_DCHECK(!brick.is_recent_dead(slot));
+      LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
+                   brick.geometry.nearly_holds(brick.recent->entry(slot).position));
+    }
+  }
+}
+
 bool BrickBuilder::is_few(const Brick* old, absl::Span<const BrickChange> changes) {
-  if (old == nullptr || old->sorted->count() < kFewestSorted) return false;
+  if (old == nullptr || old->sorted->count() < kMinSorted) return false;
   return changes.size() * kSortedPerChange <= old->sorted->count() &&
          old->recent_count + changes.size() <= old->recent_room() &&
-         (old->gone_count + changes.size()) * kSortedPerGone <= old->sorted->count();
+         (old->dead_count + changes.size()) * kSortedPerDead <= old->sorted->count();
 }
 
 void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> changes) {
@@ -61,11 +128,12 @@ void BrickBuilder::mark_changes(const Brick& old, absl::Span<const BrickChange> 
   recent_changes_.assign(old.recent_count, kStays);
   for (const BrickChange& change : changes) {
     if (arrives(change)) continue;
-    if (change.number != BrickChange::kLeaves) __builtin_prefetch(&parts_.moves.moves[change.number]);
+    if (change.index != BrickChange::kLeaves) __builtin_prefetch(&parts_.moves.moves[change.index]);
     const uint32_t slot = change.slot & ~GridSlot::kRecent;
     std::vector<uint32_t>& marks = (change.slot & GridSlot::kRecent) != 0 ? recent_changes_ : sorted_changes_;
-    LOCUS_DCHECK(slot < marks.size());
-    marks[slot] = change.number;
+    LOCUS_DCHECK_LT(slot, marks.size());
+    LOCUS_DCHECK_EQ(marks[slot], kStays);
+    marks[slot] = change.index;
   }
 }
 
@@ -74,15 +142,16 @@ inline void BrickBuilder::add_source(const GridBlock& block, uint32_t origin, ui
   const bool stays = change == kStays;
   const Vec3d position =
       stays ? block.entry(origin & ~GridSlot::kRecent).position : parts_.moves.moves[change].position;
-  sources_.push_back({origin, stays ? BrickSource::kNoMove : change, static_cast<uint32_t>(place_->cell_of(position))});
+  sources_.push_back(
+      {origin, stays ? BrickSource::kNoMove : change, static_cast<uint32_t>(geometry_->cell_of(position))});
 }
 
 void BrickBuilder::add_arrivals(absl::Span<const BrickChange> changes) {
   for (const BrickChange& change : changes) {
     if (!arrives(change)) continue;
-    const Vec3d position = parts_.arrivals[change.number].entry.position;
-    sources_.push_back({change.number | BrickSource::kArrival, BrickSource::kNoMove,
-                        static_cast<uint32_t>(place_->cell_of(position))});
+    const Vec3d position = parts_.arrivals[change.index].entry.position;
+    sources_.push_back({change.index | BrickSource::kArrival, BrickSource::kNoMove,
+                        static_cast<uint32_t>(geometry_->cell_of(position))});
   }
 }
 
@@ -98,19 +167,19 @@ GridForm BrickBuilder::form_of(const Brick* old, const BrickSource& source) cons
 
 bool BrickBuilder::any_form_arrives(absl::Span<const BrickChange> changes) const {
   return std::any_of(changes.begin(), changes.end(), [this](const BrickChange& change) {
-    return arrives(change) && !(parts_.arrivals[change.number].form == GridForm());
+    return arrives(change) && !(parts_.arrivals[change.index].form == GridForm());
   });
 }
 
 bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickSource> sources) const {
   if (!parts_.moves.rotations.empty() || (old != nullptr && old->sorted->has_forms())) return true;
-  // Arrivals are last.
+  // Arrivals are at the end.
   for (size_t i = sources.size(); i != 0 && (sources[i - 1].origin & BrickSource::kArrival) != 0; --i)
     if (!(parts_.arrivals[sources[i - 1].origin & ~BrickSource::kArrival].form == GridForm())) return true;
   return false;
 }
 
-// `from`: the old brick's sorted and recent values.
+// Prefetches a source. `from` holds the sorted and the recent values of the old brick.
 inline void BrickBuilder::prefetch(const GridBlock::Values* from, const BrickSource& source) const {
   if (source.move != BrickSource::kNoMove) __builtin_prefetch(&parts_.moves.moves[source.move]);
   if ((source.origin & BrickSource::kArrival) != 0) return;
@@ -120,29 +189,31 @@ inline void BrickBuilder::prefetch(const GridBlock::Values* from, const BrickSou
   __builtin_prefetch(&(*slots_)[values.handles[slot]], 1);
 }
 
-// Puts the sources into the slots that place_of() gives, which is called for one after the other.
-template <class PlaceOf>
+// Writes the sources to the slots that slot_of(source) returns; it is called once per source, in order. `flag` is
+// GridSlot::kRecent if `block` is a log, else 0.
+template <class SlotOf>
 inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* old,
-                                absl::Span<const BrickSource> sources, const PlaceOf& place_of) {
-  const GridBlock::Places places(block, place_->center);
-  // Of the recent values, where there are none, nothing is asked.
+                                absl::Span<const BrickSource> sources, const SlotOf& slot_of) {
+  const GridBlock::Places places(block, geometry_->center);
+  // Placeholders stand in for missing blocks: no source refers to them.
   const GridBlock& sorted = old == nullptr ? block : *old->sorted;
   const GridBlock::Values from[2] = {
       GridBlock::Values(sorted), GridBlock::Values(old == nullptr || old->recent == nullptr ? sorted : *old->recent)};
   const GridMove* const moves = parts_.moves.moves.data();
   GridSlot* const slots = slots_->data();
-  const uint32_t number = number_;
+  const uint32_t index = index_;
   const bool has_forms = block.has_forms();
-  float largest_reach = largest_reach_;
+  float max_extent = max_extent_;
   for (size_t i = 0; i < sources.size(); ++i) {
     if (i + kAhead < sources.size()) prefetch(from, sources[i + kAhead]);
     const BrickSource source = sources[i];
-    const uint32_t slot = place_of(source);
+    const uint32_t slot = slot_of(source);
+    LOCUS_DCHECK_LT(slot, block.count());
     uint32_t handle = 0;
     if ((source.origin & BrickSource::kArrival) != 0) {
       const GridItem& arrival = parts_.arrivals[source.origin & ~BrickSource::kArrival];
       handle = arrival.handle;
-      largest_reach = std::max(largest_reach, arrival.reach);
+      max_extent = std::max(max_extent, arrival.reach);
       places.put(slot, arrival.entry, arrival.entry.position, handle, arrival.reach);
     } else {
       const GridBlock::Values& values = from[source.origin >> 31];
@@ -150,64 +221,71 @@ inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* ol
       const GridEntry& entry = values.entries[before];
       handle = values.handles[before];
       const Vec3d position = source.move == BrickSource::kNoMove ? entry.position : moves[source.move].position;
-      places.put(slot, entry, position, handle, values.reaches[before]);
+      places.put(slot, entry, position, handle, values.extents[before]);
     }
     if (has_forms) block.put_form(slot, form_of(old, source));
-    slots[handle] = {number, slot | flag};
+    slots[handle] = {index, slot | flag};
   }
-  largest_reach_ = largest_reach;
+  max_extent_ = max_extent;
 }
 
 BrickPtr BrickBuilder::sort_anew(const Brick* old, absl::Span<const BrickChange> changes) {
   if (old != nullptr) {
     mark_changes(*old, changes);
     for (uint32_t slot = 0; slot < old->sorted->count(); ++slot)
-      if (!old->is_gone(slot)) add_source(*old->sorted, slot, sorted_changes_[slot]);
+      if (!old->is_dead(slot)) add_source(*old->sorted, slot, sorted_changes_[slot]);
     for (uint32_t slot = 0; slot < old->recent_count; ++slot)
-      if (!old->is_recent_gone(slot)) add_source(*old->recent, slot | GridSlot::kRecent, recent_changes_[slot]);
+      if (!old->is_recent_dead(slot)) add_source(*old->recent, slot | GridSlot::kRecent, recent_changes_[slot]);
   }
   add_arrivals(changes);
   return sorted_by_cell(old, sources_);
 }
 
-// Counting sort.
+// Returns a version whose sorted block holds all sources and whose log is empty; null if there are none. Counting sort
+// by cell.
 BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSource> sources) {
   if (sources.empty()) return nullptr;
   const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources.size()), any_form(old, sources));
   std::array<uint32_t, kBrickCells + 1>& offsets = block->offsets();
-  for (const BrickSource& source : sources) ++offsets[source.cell + 1];
+  for (const BrickSource& source : sources) {
+    LOCUS_DCHECK_LT(source.cell, uint32_t{kBrickCells});
+    ++offsets[source.cell + 1];
+  }
   for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] += offsets[cell];
   std::array<uint32_t, kBrickCells + 1> next = offsets;
   write(*block, 0, old, sources, [&next](const BrickSource& source) { return next[source.cell]++; });
   auto brick = std::make_shared<Brick>();
-  brick->place = *place_;
-  brick->number = number_;
+  brick->geometry = *geometry_;
+  brick->index = index_;
   brick->sorted = block;
-  brick->largest_reach = largest_reach_;
+  brick->max_extent = max_extent_;
+  check_sorted(*brick);
   return brick;
 }
 
-// What earlier versions do not know of follows in their log.
+// Returns a version that shares both blocks of `old`: changed values are appended to the log behind the slots of
+// earlier versions, and their old slots are marked dead.
 BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange> changes) {
   auto brick = std::make_shared<Brick>(old);
-  if (brick->gone.empty()) brick->gone.resize(old.sorted->count() / 64 + 2);
+  if (brick->dead.empty()) brick->dead.resize(old.sorted->count() / 64 + 2);
   if (brick->recent == nullptr) brick->recent = std::make_shared<GridBlock>(old.recent_room(), old.sorted->has_forms());
   sources_.clear();
   for (const BrickChange& change : changes) {
     if (arrives(change)) {
-      sources_.push_back({change.number | BrickSource::kArrival, BrickSource::kNoMove, 0});
+      sources_.push_back({change.index | BrickSource::kArrival, BrickSource::kNoMove, 0});
       continue;
     }
     const bool recent = (change.slot & GridSlot::kRecent) != 0;
     const uint32_t slot = change.slot & ~GridSlot::kRecent;
-    (recent ? brick->recent_gone.data() : brick->gone.data())[slot / 64] |= uint64_t{1} << (slot % 64);
-    ++(recent ? brick->recent_gone_count : brick->gone_count);
-    if (change.number != BrickChange::kLeaves) sources_.push_back({change.slot, change.number, 0});
+    (recent ? brick->recent_dead.data() : brick->dead.data())[slot / 64] |= uint64_t{1} << (slot % 64);
+    ++(recent ? brick->recent_dead_count : brick->dead_count);
+    if (change.index != BrickChange::kLeaves) sources_.push_back({change.slot, change.index, 0});
   }
   write(*brick->recent, GridSlot::kRecent, &old, sources_, [&](const BrickSource&) { return brick->recent_count++; });
-  brick->largest_reach = largest_reach_;
+  brick->max_extent = max_extent_;
   if (brick->recent_count == 0) brick->recent = nullptr;
   if (brick->size() == 0) return nullptr;
+  check_recent(*brick, old.recent_count);
   return brick;
 }
 

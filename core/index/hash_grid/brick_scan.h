@@ -1,5 +1,5 @@
-// Goes through the values of one brick, or of some of its cells: float culls them eight at a time, and what remains is
-// handed to the caller. Plain functions; any thread.
+// Scans of the values of one brick or of some of its cells: float kernels cull eight values at a time, and the
+// remaining values are passed to the caller. Plain functions; any thread.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 
@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/ball.h"
 #include "core/geometry/ray.h"
@@ -17,20 +18,23 @@
 
 namespace locus {
 
-// A value in the grid. Borrows from the snapshot that gave it.
+// Reference to a value in the grid. Valid as long as the snapshot it came from. The accessors require a value.
 class GridRef {
  public:
   GridRef() = default;
   GridRef(const internal::GridBlock& block, uint32_t slot, uint32_t brick)
-      : block_(&block), slot_(slot), brick_(brick) {}
+      : block_(&block), slot_(slot), brick_(brick) {
+    LOCUS_DCHECK_LT(slot, block.count());
+  }
 
   explicit operator bool() const { return block_ != nullptr; }
   const GridEntry& entry() const { return block_->entry(slot_); }
   uint32_t handle() const { return block_->handle(slot_); }
-  float reach() const { return block_->reach(slot_); }
+  // Returns the extent of the value; see GridItem::reach.
+  float reach() const { return block_->extent(slot_); }
   GridForm form() const { return block_->form(slot_); }
   GridItem item() const { return block_->item(slot_); }
-  // Where it lies: its place in its block, and the number of its brick.
+  // Return the location of the value: its slot in its block, and the index of its brick.
   uint32_t slot() const { return slot_; }
   uint32_t brick() const { return brick_; }
 
@@ -42,62 +46,67 @@ class GridRef {
 
 namespace internal {
 
-// Bounds of values are wider than their reach by the rounding of predicates: 2^-40 of the magnitudes, as
-// core/geometry/shape.h says. This much of the magnitudes covers that and the sums here.
+// Rounding allowance, relative to the magnitudes involved: bounds of values exceed their extent by the rounding of
+// predicates, 2^-40 of the magnitudes (core/geometry/shape.h). This factor covers that and the sums in this room.
 inline constexpr double kBoundsGrowth = 0x1p-38;
 
 inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};
 
-// How much wider than its reach a value of `brick` may be, and how far off its columns in float.
-inline double cull_margin(const Brick& brick) {
-  const double coordinate = brick.place.edge;  // twice the largest of the float columns
-  const double reach = brick.largest_reach;
-  const double magnitude = max_component(abs(brick.place.center)) + brick.place.edge;
-  return double{kCullSlack} * (coordinate + reach) + kBoundsGrowth * (magnitude + reach);
+// Returns the epsilon for culling values of `brick` in float: it covers the difference between bounds and extent of a
+// value and the rounding of its float columns.
+inline double cull_epsilon(const Brick& brick) {
+  const double coordinate = brick.geometry.edge;  // twice the largest of the float columns
+  const double extent = brick.max_extent;
+  const double magnitude = max_component(abs(brick.geometry.center)) + brick.geometry.edge;
+  return double{kCullEpsilon} * (coordinate + extent) + kBoundsGrowth * (magnitude + extent);
 }
 
-// Contains the bounds of every value of the brick, of which none extends farther than `reach` from its position.
-inline Aabbd box_of_values(const Brick& brick, double reach) {
-  const BrickPlace& place = brick.place;
-  const double half = place.edge / 2 + reach;
-  return grown(Aabbd{place.center, place.center}, half + kBoundsGrowth * (max_component(abs(place.center)) + half));
+// Returns a box that contains the bounds of every value of the brick. Precondition: no extent exceeds `max_extent`.
+inline Aabbd box_of_values(const Brick& brick, double max_extent) {
+  const BrickGeometry& geometry = brick.geometry;
+  const double half = geometry.edge / 2 + max_extent;
+  return grown(Aabbd{geometry.center, geometry.center},
+               half + kBoundsGrowth * (max_component(abs(geometry.center)) + half));
 }
 
+// Returns `region` relative to the brick, widened so that float culling keeps every value whose bounds overlap it.
 inline GridBox cull_box_of(const Brick& brick, const Aabbd& region) {
-  const double margin = cull_margin(brick);
+  const double epsilon = cull_epsilon(brick);
   GridBox box;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = region.min[axis] - brick.place.center[axis] - margin;
-    const double high = region.max[axis] - brick.place.center[axis] + margin;
-    box.low[axis] = static_cast<float>(low - std::abs(low) * double{kCullSlack});
-    box.high[axis] = static_cast<float>(high + std::abs(high) * double{kCullSlack});
+    const double low = region.min[axis] - brick.geometry.center[axis] - epsilon;
+    const double high = region.max[axis] - brick.geometry.center[axis] + epsilon;
+    box.low[axis] = static_cast<float>(low - std::abs(low) * double{kCullEpsilon});
+    box.high[axis] = static_cast<float>(high + std::abs(high) * double{kCullEpsilon});
   }
   return box;
 }
 
+// Returns `ball` relative to the brick, widened so that float culling keeps every value that shares a point with it.
 inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
-  const Vec3d center = ball.center - brick.place.center;
-  const double magnitude = max_component(abs(center)) + brick.place.edge + ball.radius + brick.largest_reach;
+  const Vec3d center = ball.center - brick.geometry.center;
+  const double magnitude = max_component(abs(center)) + brick.geometry.edge + ball.radius + brick.max_extent;
   GridBall cull;
   for (int axis = 0; axis < 3; ++axis) cull.center[axis] = static_cast<float>(center[axis]);
   if (planted(PlantedBug::kGridBallMargin))
     return {{cull.center[0], cull.center[1], cull.center[2]}, static_cast<float>(ball.radius)};
-  // The differences, squares and their sum below are off by less than four 2^-24 of the distance.
-  cull.radius = static_cast<float>((ball.radius + cull_margin(brick) + 4 * double{kCullSlack} * magnitude) *
-                                   (1 + 2 * double{kCullSlack}));
+  // The kernel's differences, squares and their sum have an error of less than 4 * 2^-24 of the distance.
+  cull.radius = static_cast<float>((ball.radius + cull_epsilon(brick) + 4 * double{kCullEpsilon} * magnitude) *
+                                   (1 + 2 * double{kCullEpsilon}));
   return cull;
 }
 
-// The ray as seen from the brick: its line by the point nearest to the centre, so that the numbers are small.
+// Ray relative to a brick, as input of float culling: a line through its point nearest to the centre of the brick,
+// which keeps the coordinates small.
 class CullRay {
  public:
-  // `ray_margin`: how far values may be beside where they are filed, and the pad of the ray's slabs.
-  CullRay(const Brick& brick, const SlabRay<double>& ray, double ray_margin) {
+  // `ray_radius`: displacement bound of the values plus the padding of the slab test.
+  CullRay(const Brick& brick, const SlabRay<double>& ray, double ray_radius) {
     const double longest = max_component(abs(ray.direction()));
     const Vec3d direction = ray.direction() * (1 / longest);
     const double length = std::sqrt(squared_length(direction));
     const Vec3d toward = direction * (1 / length);
-    const Vec3d to_origin = ray.origin() - brick.place.center;
+    const Vec3d to_origin = ray.origin() - brick.geometry.center;
     start_ = dot(to_origin, toward);
     speed_ = longest * length;
     const Vec3d point = to_origin - toward * start_;
@@ -106,31 +115,34 @@ class CullRay {
       line_.point[axis] = static_cast<float>(point[axis]);
       line_.direction[axis] = static_cast<float>(toward[axis]);
     }
-    // Along the brick the line's direction and its point are off by a few 2^-24 of the lengths, and by 2^-50 of the
-    // way.
-    line_.margin = static_cast<float>((cull_margin(brick) + ray_margin + 0x1p-46 * far +
-                                       4 * double{kCullSlack} * (max_component(abs(point)) + 2 * brick.place.edge)) *
-                                      (1 + 2 * double{kCullSlack}));
-    line_.from = static_cast<float>(start_ - kEndSlack * std::abs(start_));
+    // Within the brick the error of the line's direction and point is a few 2^-24 of the lengths, plus 2^-50 of the
+    // distance to the origin of the ray.
+    line_.radius =
+        static_cast<float>((cull_epsilon(brick) + ray_radius + 0x1p-46 * far +
+                            4 * double{kCullEpsilon} * (max_component(abs(point)) + 2 * brick.geometry.edge)) *
+                           (1 + 2 * double{kCullEpsilon}));
+    line_.from = static_cast<float>(start_ - kEndEpsilon * std::abs(start_));
     end_at(std::numeric_limits<double>::infinity());
   }
 
-  // Nothing beyond `limit`, in lengths of the direction, is asked for any more.
+  // Ends the line at the ray parameter `limit`, in units of the ray's direction.
   void end_at(double limit) {
     const double end = start_ + limit * speed_;
-    line_.to = static_cast<float>(std::clamp(end + kEndSlack * std::abs(end), -kFar, kFar));
+    line_.to = static_cast<float>(std::clamp(end + kEndEpsilon * std::abs(end), -kFar, kFar));
   }
   const GridLine& line() const { return line_; }
 
  private:
-  static constexpr double kEndSlack = 2 * double{kCullSlack};
+  static constexpr double kEndEpsilon = 2 * double{kCullEpsilon};
   static constexpr double kFar = 0x1p120;
 
   GridLine line_;
-  double start_, speed_;  // where it starts, by its distance from the point, and how far one of its lengths is
+  double start_;  // position of the ray's origin along the line
+  double speed_;  // length of the ray's direction
 };
 
-// What culls the values of a brick for a box, and for a ball.
+// Factories of culling functions for a box and for a ball: called with a brick, they return a function (rows, slots)
+// that runs the kernel. Borrow their argument.
 class BoxCull {
  public:
   explicit BoxCull(const Aabbd& region) : region_(&region) {}
@@ -154,26 +166,27 @@ class BallCull {
   const Balld* ball_;
 };
 
-// The rows of cells, numbered within the brick, of its sorted block: those that hold values, and rows that follow on
-// each other as one.
+// Returns the slots of `cells`, which are relative to the brick, in its sorted block, as rows of consecutive slots.
+// Empty rows are left out, and adjacent ones are joined.
 inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   static_assert(GridRows::kMax == 1 << (2 * kBrickBits));
   const GridBlock& sorted = *brick.sorted;
   GridRows rows;
-  rows.x = sorted.column(0), rows.y = sorted.column(1), rows.z = sorted.column(2), rows.reach = sorted.column(3);
-  rows.gone = brick.gone_count == 0 ? nullptr : brick.gone.data();
+  rows.x = sorted.column(0), rows.y = sorted.column(1), rows.z = sorted.column(2), rows.extent = sorted.column(3);
+  rows.dead = brick.dead_count == 0 ? nullptr : brick.dead.data();
   rows.count = 0;
   if (cells.empty()) return rows;
+  LOCUS_DCHECK(kAllCells.contains(cells.lo) && kAllCells.contains(cells.hi));
   constexpr uint32_t kRow = 1 << kBrickBits, kLayer = kRow << kBrickBits;
   const GridKey& lo = cells.lo;
   const auto x_cells = static_cast<uint32_t>(cells.hi.x - lo.x + 1),
              y_rows = static_cast<uint32_t>(cells.hi.y - lo.y + 1);
   const auto layers = static_cast<uint32_t>(cells.hi.z - lo.z + 1);
   const bool whole_rows = x_cells == kRow, whole_layers = whole_rows && y_rows == kRow;
-  const uint32_t runs_a_layer = whole_rows ? 1 : y_rows, runs = whole_layers ? 1 : runs_a_layer * layers;
+  const uint32_t runs_per_layer = whole_rows ? 1 : y_rows, runs = whole_layers ? 1 : runs_per_layer * layers;
   const uint32_t run_cells = whole_layers ? layers * kLayer : whole_rows ? y_rows * kRow : x_cells;
   auto cell = static_cast<uint32_t>(lo.z << (2 * kBrickBits) | lo.y << kBrickBits | lo.x);
-  uint32_t left = runs_a_layer;
+  uint32_t left = runs_per_layer;
   for (uint32_t run = 0; run < runs; ++run) {
     const uint32_t begin = sorted.offsets()[cell], end = sorted.offsets()[cell + run_cells];
     rows.begin[rows.count] = begin;
@@ -181,15 +194,17 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
     rows.count += begin != end ? 1 : 0;
     cell += kRow;
     if (--left == 0) {
-      left = runs_a_layer;
-      cell += kLayer - runs_a_layer * kRow;
+      left = runs_per_layer;
+      cell += kLayer - runs_per_layer * kRow;
     }
   }
+  LOCUS_DCHECK_LE(rows.count, GridRows::kMax);
   if (planted(PlantedBug::kDropCell)) rows.end[0] = rows.begin[0];
   return rows;
 }
 
-// fn(rows) for these, or parts of them of at most kMaxValues; false once fn() was.
+// Calls fn(rows) once, or for parts of at most kMaxValues values if there are more, until fn() returns false. Returns
+// false if a call did.
 template <class Fn>
 bool for_each_part(const GridRows& rows, const Fn& fn) {
   uint32_t values = 0;
@@ -206,13 +221,15 @@ bool for_each_part(const GridRows& rows, const Fn& fn) {
   return true;
 }
 
-// Those values of the rows that cull(rows, slots) keeps; false once visit() was.
+// Calls visit(GridRef) for the values of `all` that cull(rows, slots) keeps, until it returns false. Returns false if a
+// call did.
 template <class Cull, class Visit>
 bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work& work, const Cull& cull,
                const Visit& visit) {
   return for_each_part(all, [&](const GridRows& rows) {
     uint32_t slots[GridRows::kMaxValues + GridBlock::kLanes];
     const uint32_t kept = cull(rows, slots);
+    LOCUS_DCHECK_LE(kept, GridRows::kMaxValues);
     work.cells += rows.count;
     for (uint32_t i = 0; i < kept; ++i) block.prefetch_entry(slots[i]);
     for (uint32_t i = 0; i < kept; ++i) {
@@ -223,45 +240,45 @@ bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work
   });
 }
 
-// Those values of `cells`, which are numbered within the brick, that cull(rows, slots) keeps; false once visit() was.
+// Scans the sorted values of `cells`, which are relative to the brick, like scan_rows().
 template <class Cull, class Visit>
 bool scan_cells(const Brick& brick, const KeyRange& cells, Work& work, const Cull& cull, const Visit& visit) {
-  return scan_rows(*brick.sorted, brick.number, rows_of(brick, cells), work, cull, visit);
+  return scan_rows(*brick.sorted, brick.index, rows_of(brick, cells), work, cull, visit);
 }
 
-// The same for the values that came or moved lately, wherever in the brick they are.
+// Scans the values of the log, in whatever cell they are, like scan_rows().
 template <class Cull, class Visit>
 bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& visit) {
   if (brick.recent_count == 0) return true;
   const GridBlock& recent = *brick.recent;
-  const uint32_t whole = brick.recent_count / GridBlock::kLanes * GridBlock::kLanes;
+  const uint32_t vector_end = brick.recent_count / GridBlock::kLanes * GridBlock::kLanes;
   const GridRows vectors = {
-      recent.column(0), recent.column(1), recent.column(2), recent.column(3), brick.recent_gone.data(), 1, {0},
-      {whole}};
-  if (!scan_rows(recent, brick.number, vectors, work, cull, visit)) return false;
-  if (whole == brick.recent_count) return true;
-  // Copied: the rest of their vector belongs to the writer.
-  const uint32_t rest = brick.recent_count - whole;
+      recent.column(0), recent.column(1), recent.column(2), recent.column(3), brick.recent_dead.data(), 1, {0},
+      {vector_end}};
+  if (!scan_rows(recent, brick.index, vectors, work, cull, visit)) return false;
+  if (vector_end == brick.recent_count) return true;
+  // The tail of the last vector is copied, since the writer may write its other lanes meanwhile.
+  const uint32_t tail = brick.recent_count - vector_end;
   float columns[4][GridBlock::kLanes] = {};
-  for (int number = 0; number < 4; ++number) std::copy_n(recent.column(number) + whole, rest, columns[number]);
-  const uint64_t gone[2] = {brick.recent_gone[whole / 64] >> (whole % 64), 0};
-  const GridRows rows = {columns[0], columns[1], columns[2], columns[3], gone, 1, {0}, {rest}};
+  for (int column = 0; column < 4; ++column) std::copy_n(recent.column(column) + vector_end, tail, columns[column]);
+  const uint64_t dead[2] = {brick.recent_dead[vector_end / 64] >> (vector_end % 64), 0};
+  const GridRows rows = {columns[0], columns[1], columns[2], columns[3], dead, 1, {0}, {tail}};
   uint32_t slots[2 * GridBlock::kLanes];
   const uint32_t kept = cull(rows, slots);
   for (uint32_t i = 0; i < kept; ++i) {
     ++work.tests;
-    if (!visit(GridRef(recent, whole + slots[i], brick.number))) return false;
+    if (!visit(GridRef(recent, vector_end + slots[i], brick.index))) return false;
   }
   return true;
 }
 
-// Each value, until visit() is false, which is then returned.
+// Calls visit(GridRef) for each live value until it returns false. Returns false if a call did.
 template <class Visit>
 bool for_each_value(const Brick& brick, const Visit& visit) {
   for (uint32_t slot = 0; slot < brick.sorted->count(); ++slot)
-    if (!brick.is_gone(slot) && !visit(GridRef(*brick.sorted, slot, brick.number))) return false;
+    if (!brick.is_dead(slot) && !visit(GridRef(*brick.sorted, slot, brick.index))) return false;
   for (uint32_t slot = 0; slot < brick.recent_count; ++slot)
-    if (!brick.is_recent_gone(slot) && !visit(GridRef(*brick.recent, slot, brick.number))) return false;
+    if (!brick.is_recent_dead(slot) && !visit(GridRef(*brick.recent, slot, brick.index))) return false;
   return true;
 }
 

@@ -1,4 +1,5 @@
-// What the next version of a brick is made from. For the one writer of a grid.
+// Moves of a batch, and the sources (values that stay, move or arrive) from which the next version of a brick is built.
+// For the one writer of a grid.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_SOURCES_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SOURCES_H_
 
@@ -9,109 +10,113 @@
 
 namespace locus {
 
-// A new pose for a value that the grid holds.
+// New pose of a value in the grid.
 struct alignas(32) GridMove {
   static constexpr uint32_t kKeeps = ~0u;
 
   Vec3d position;
   uint32_t handle = 0;
-  uint32_t rotation = kKeeps;  // the number of its new one among the batch's
+  uint32_t rotation = kKeeps;  // index in GridMoves::rotations; kKeeps = unchanged
 };
 
-// The moves of a batch. All borrowed.
+// Moves of a batch. All borrowed.
 struct GridMoves {
   absl::Span<const GridMove> moves;  // of distinct handles
   absl::Span<const Quaternion> rotations = {};
-  // By handle the number of its move; means nothing for a handle that moves[number] is not of. May be empty: with it,
-  // moves of nearly all values cost less.
+  // Index of the move, by handle. The entry of a handle without a move may be any number: readers compare
+  // moves[i].handle. May be empty; if it is given, a batch that moves nearly all values costs less.
   absl::Span<const uint32_t> by_handle = {};
 };
 
 namespace internal {
 
-// Where the writer finds a value again.
+// Location of a value in the grid, for the writer.
 struct GridSlot {
-  static constexpr uint32_t kRecent = 1u << 31;  // in `slot`: of Brick::recent, else of Brick::sorted
+  static constexpr uint32_t kRecent = 1u << 31;  // bit of `slot`: set for Brick::recent, clear for Brick::sorted
 
   uint32_t brick = 0;
   uint32_t slot = 0;
 };
 
-// A value of the next version of a brick.
+// Source of one value in the next version of a brick.
 struct BrickSource {
-  static constexpr uint32_t kArrival = 1u << 30;  // in `origin`: an arrival's number, else as GridSlot::slot
+  static constexpr uint32_t kArrival = 1u << 30;  // bit of `origin`: set for the index of an arrival
   static constexpr uint32_t kNoMove = ~0u;
 
-  uint32_t origin;
-  uint32_t move;  // its number; kNoMove where the value stays as it was
-  uint32_t cell;  // where it is to be; not of what goes to the recent values
+  uint32_t origin;  // with kArrival the index of an arrival, else the present slot, as GridSlot::slot
+  uint32_t move;    // index of the move; kNoMove if the value is unchanged
+  uint32_t cell;    // new cell; unused for values that go to the log
 };
 
-// The moves of a batch, as values ask for them. There are some, by handle, too.
+// Lookup of the move of a handle. Precondition: the batch has moves, and by_handle is given.
 class MoveFinder {
  public:
-  explicit MoveFinder(const GridMoves& moves) : moves_(moves.moves), numbers_(moves.by_handle) {}
-
-  // Of any handle; it may be the number of another one's move.
-  uint32_t number_of(uint32_t handle) const {
-    const uint32_t number = handle < numbers_.size() ? numbers_[handle] : 0;
-    return number < moves_.size() ? number : 0;
+  explicit MoveFinder(const GridMoves& moves) : moves_(moves.moves), index_by_handle_(moves.by_handle) {
+    LOCUS_DCHECK(!moves_.empty());
+    LOCUS_DCHECK(!index_by_handle_.empty());
   }
-  const GridMove& operator[](uint32_t number) const { return moves_.data()[number]; }
+
+  // Returns the index of the move of `handle`; for a handle without a move the index of any other move.
+  uint32_t index_of(uint32_t handle) const {
+    const uint32_t index = handle < index_by_handle_.size() ? index_by_handle_[handle] : 0;
+    return index < moves_.size() ? index : 0;
+  }
+  const GridMove& operator[](uint32_t index) const { return moves_.data()[index]; }
 
  private:
   absl::Span<const GridMove> moves_;
-  absl::Span<const uint32_t> numbers_;
+  absl::Span<const uint32_t> index_by_handle_;
 };
 
-// Writes what remains of the first `count` values of a block to `to`, which has room for all, but for those that
-// is_gone(slot); leave(block, slot, move) for each that moves out of the brick. Adds to `moved` how many move, those
-// included. Returns the end of what it wrote.
-template <class IsGone, class Leave>
-BrickSource* gather_block(const BrickPlace& place, const GridBlock& block, uint32_t count, uint32_t flag,
-                          const MoveFinder& moves, BrickSource* to, size_t& moved, const IsGone& is_gone,
+// Writes to `out` the sources of those of the first `count` values of a block that stay in the brick; skips slots for
+// which is_dead(slot). Calls leave(block, slot, move) for each value that moves out of the brick. Adds to `moved` the
+// number of values that move, within the brick or out of it. `out` has room for `count` sources. Returns the end of the
+// written sources.
+template <class IsDead, class Leave>
+BrickSource* gather_block(const BrickGeometry& geometry, const GridBlock& block, uint32_t count, uint32_t flag,
+                          const MoveFinder& moves, BrickSource* out, size_t& moved, const IsDead& is_dead,
                           const Leave& leave) {
-  constexpr uint32_t kAtOnce = 16;  // whose moves are on their way before they are needed
-  uint32_t numbers[kAtOnce];
-  for (uint32_t begin = 0; begin < count; begin += kAtOnce) {
-    const uint32_t end = std::min(count, begin + kAtOnce);
+  constexpr uint32_t kGroup = 16;  // values whose moves are prefetched together
+  uint32_t indices[kGroup];
+  for (uint32_t begin = 0; begin < count; begin += kGroup) {
+    const uint32_t end = std::min(count, begin + kGroup);
     for (uint32_t slot = begin; slot < end; ++slot) {
-      numbers[slot - begin] = moves.number_of(block.handle(slot));
-      __builtin_prefetch(&moves[numbers[slot - begin]]);
+      indices[slot - begin] = moves.index_of(block.handle(slot));
+      __builtin_prefetch(&moves[indices[slot - begin]]);
     }
     for (uint32_t slot = begin; slot < end; ++slot) {
-      if (is_gone(slot)) continue;
-      const uint32_t number = numbers[slot - begin];
-      const GridMove& move = moves[number];
+      if (is_dead(slot)) continue;
+      const uint32_t index = indices[slot - begin];
+      const GridMove& move = moves[index];
       if (move.handle != block.handle(slot)) {
         const Vec3d position = block.entry(slot).position;
-        *to++ = {slot | flag, BrickSource::kNoMove, static_cast<uint32_t>(place.cell_of(position))};
+        *out++ = {slot | flag, BrickSource::kNoMove, static_cast<uint32_t>(geometry.cell_of(position))};
         continue;
       }
       ++moved;
-      if (const int cell = place.cell_if_here(move.position); cell >= 0) {
-        *to++ = {slot | flag, number, static_cast<uint32_t>(cell)};
+      if (const int cell = geometry.cell_if_here(move.position); cell >= 0) {
+        *out++ = {slot | flag, index, static_cast<uint32_t>(cell)};
       } else {
         leave(block, slot, move);
       }
     }
   }
-  return to;
+  return out;
 }
 
-// The same of a brick.
+// Calls gather_block() for both blocks of a brick.
 template <class Leave>
-BrickSource* gather_brick(const Brick& brick, const MoveFinder& moves, BrickSource* to, size_t& moved,
+BrickSource* gather_brick(const Brick& brick, const MoveFinder& moves, BrickSource* out, size_t& moved,
                           const Leave& leave) {
-  const BrickPlace place = brick.place;  // a copy, so that nothing written can change it
-  const auto stays = [](uint32_t) { return false; };
-  const auto is_gone = [&brick](uint32_t slot) { return brick.is_gone(slot); };
-  const auto is_recent_gone = [&brick](uint32_t slot) { return brick.is_recent_gone(slot); };
+  const BrickGeometry geometry = brick.geometry;  // a copy, so that the compiler knows that no store changes it
+  const auto none_dead = [](uint32_t) { return false; };
+  const auto is_dead = [&brick](uint32_t slot) { return brick.is_dead(slot); };
+  const auto is_recent_dead = [&brick](uint32_t slot) { return brick.is_recent_dead(slot); };
   const GridBlock& sorted = *brick.sorted;
-  to = brick.gone_count == 0 ? gather_block(place, sorted, sorted.count(), 0, moves, to, moved, stays, leave)
-                             : gather_block(place, sorted, sorted.count(), 0, moves, to, moved, is_gone, leave);
-  if (brick.recent_count == 0) return to;
-  return gather_block(place, *brick.recent, brick.recent_count, GridSlot::kRecent, moves, to, moved, is_recent_gone,
+  out = brick.dead_count == 0 ? gather_block(geometry, sorted, sorted.count(), 0, moves, out, moved, none_dead, leave)
+                              : gather_block(geometry, sorted, sorted.count(), 0, moves, out, moved, is_dead, leave);
+  if (brick.recent_count == 0) return out;
+  return gather_block(geometry, *brick.recent, brick.recent_count, GridSlot::kRecent, moves, out, moved, is_recent_dead,
                       leave);
 }
 

@@ -5,31 +5,44 @@
 namespace locus::internal {
 
 void BrickTable::put(const Slot& slot) {
-  size_t at = slot.hash & mask();
-  while (slots_[at].number != kNone) at = (at + 1) & mask();
-  slots_[at] = slot;
+  size_t slot_index = slot.hash & mask();
+  while (slots_[slot_index].brick != kNone) slot_index = (slot_index + 1) & mask();
+  slots_[slot_index] = slot;
 }
 
-void BrickTable::insert(const GridKey& key, uint32_t number) {
+void BrickTable::check_invariants(const GridKey& key, uint32_t brick, bool expected) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(size_ * 2, slots_.size());
+    LOCUS_DCHECK_EQ(slots_.size() & mask(), 0u);
+    const uint32_t found = find(key, [brick](uint32_t candidate) { return candidate == brick; });
+    LOCUS_DCHECK_EQ(found, expected ? brick : kNone);
+  }
+}
+
+void BrickTable::insert(const GridKey& key, uint32_t brick) {
+  LOCUS_DCHECK_NE(brick, kNone);
+  check_invariants(key, brick, false);
   if (++size_ * 2 > slots_.size()) {
-    const std::vector<Slot> before = std::exchange(slots_, std::vector<Slot>(slots_.size() * 2));
-    for (const Slot& slot : before)
-      if (slot.number != kNone) put(slot);
+    const std::vector<Slot> old_slots = std::exchange(slots_, std::vector<Slot>(slots_.size() * 2));
+    for (const Slot& slot : old_slots)
+      if (slot.brick != kNone) put(slot);
   }
-  put({hash_of(key), number});
+  put({hash_of(key), brick});
+  check_invariants(key, brick, true);
 }
 
-void BrickTable::erase(const GridKey& key, uint32_t number) {
-  size_t at = hash_of(key) & mask();
-  while (slots_[at].number != number) {
-    LOCUS_CHECK_NE(slots_[at].number, kNone);
-    at = (at + 1) & mask();
+void BrickTable::erase(const GridKey& key, uint32_t brick) {
+  size_t slot_index = hash_of(key) & mask();
+  while (slots_[slot_index].brick != brick) {
+    LOCUS_CHECK_NE(slots_[slot_index].brick, kNone);
+    slot_index = (slot_index + 1) & mask();
   }
-  slots_[at] = {};
+  slots_[slot_index] = {};
   --size_;
-  // Those that had to go past the gap come again.
-  for (size_t next = (at + 1) & mask(); slots_[next].number != kNone; next = (next + 1) & mask())
+  // Reinserts the entries up to the next free slot: the gap must not hide them from find().
+  for (size_t next = (slot_index + 1) & mask(); slots_[next].brick != kNone; next = (next + 1) & mask())
     put(std::exchange(slots_[next], Slot()));
+  check_invariants(key, brick, false);
 }
 
 }  // namespace locus::internal

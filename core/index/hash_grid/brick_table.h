@@ -1,6 +1,9 @@
-// Finds the bricks of one level by their keys: open addressing with linear probing, at most half full. Entries carry
-// a part of the hash only; whoever finds one looks at the brick itself. A value type; threads as for a standard
-// container.
+// Hash table from the keys of one level to the indices of its bricks: open addressing with linear probing, at most half
+// full. An entry stores the index and part of the hash but no key, so callers compare the key of the brick itself.
+// A value type; threads as for a standard container.
+//
+// Invariant: size_ entries are occupied, at most half of them all; no free entry lies between an entry and the slot of
+// its hash.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_TABLE_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_TABLE_H_
 
@@ -17,24 +20,25 @@ class BrickTable {
   static constexpr uint32_t kNone = ~0u;
 
   size_t size() const { return size_; }
-  // The brick's number for which is_it(number) holds, among those with `key`'s hash; kNone if there is none.
-  template <class IsIt>
-  uint32_t find(const GridKey& key, const IsIt& is_it) const {
+  // Returns the brick for which has_key(brick) holds, among those with the hash of `key`; kNone if there is none.
+  template <class HasKey>
+  uint32_t find(const GridKey& key, const HasKey& has_key) const {
     const uint32_t hash = hash_of(key);
-    for (size_t at = hash & mask();; at = (at + 1) & mask()) {
-      const Slot& slot = slots_[at];
-      if (slot.number == kNone) return kNone;
-      if (slot.hash == hash && is_it(slot.number)) return slot.number;
+    for (size_t slot_index = hash & mask();; slot_index = (slot_index + 1) & mask()) {
+      const Slot& slot = slots_[slot_index];
+      if (slot.brick == kNone) return kNone;
+      if (slot.hash == hash && has_key(slot.brick)) return slot.brick;
     }
   }
-  void insert(const GridKey& key, uint32_t number);
-  // `number` is there under `key`.
-  void erase(const GridKey& key, uint32_t number);
-  // fn(number) for each, until it returns false, which is then returned.
+  // Adds an entry. Precondition: `brick` is not in the table. Amortised O(1).
+  void insert(const GridKey& key, uint32_t brick);
+  // Removes an entry. Precondition: `brick` was inserted under `key`.
+  void erase(const GridKey& key, uint32_t brick);
+  // Calls fn(brick) for each brick until it returns false. Returns false if a call did.
   template <class Fn>
   bool for_each(const Fn& fn) const {
     for (const Slot& slot : slots_)
-      if (slot.number != kNone && !fn(slot.number)) return false;
+      if (slot.brick != kNone && !fn(slot.brick)) return false;
     return true;
   }
   size_t bytes() const { return slots_.capacity() * sizeof(Slot); }
@@ -42,11 +46,13 @@ class BrickTable {
  private:
   struct Slot {
     uint32_t hash = 0;
-    uint32_t number = kNone;
+    uint32_t brick = kNone;
   };
   static uint32_t hash_of(const GridKey& key) { return static_cast<uint32_t>(GridKeyHash()(key)); }
   size_t mask() const { return slots_.size() - 1; }
   void put(const Slot& slot);
+  // Checks the load, and that find() reaches `brick` under `key` exactly if `expected`. O(length of the probe).
+  void check_invariants(const GridKey& key, uint32_t brick, bool expected) const;
 
   std::vector<Slot> slots_ = std::vector<Slot>(8);
   size_t size_ = 0;

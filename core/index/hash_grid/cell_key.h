@@ -1,6 +1,6 @@
-// How the hash grid names places: cells with an edge of 2^exponent, numbered by 64-bit integers per axis, and bricks of
-// 4x4x4 cells. Plain functions without state. Cell edges are powers of two, so that a coordinate scales exactly; every
-// index here is monotone in its coordinate.
+// Keys of cells and bricks: a cell of one level has an edge of 2^exponent and is named by a 64-bit integer per axis; a
+// brick is 4x4x4 cells. Plain functions without state; any thread. Cell edges are powers of two, so scaling a
+// coordinate is exact; every index is monotone in its coordinate.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_CELL_KEY_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_CELL_KEY_H_
 
@@ -10,18 +10,19 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/aabb.h"
 
 namespace locus::internal {
 
-inline constexpr int kMinCellExponent = -20;      // of the base level, about a micrometre where the unit is a metre
+inline constexpr int kMinCellExponent = -20;      // of the base level; about a micrometre if the unit is a metre
 inline constexpr int kMaxBaseExponent = 31;       // of the base level: one cell holds the world
-inline constexpr int kMaxCellExponent = 40;       // of any level; larger values are filed there too
+inline constexpr int kMaxCellExponent = 40;       // of any level; still larger values are stored there too
 inline constexpr int kBrickBits = 2;              // a brick is 2^kBrickBits cells wide
-inline constexpr double kMaxCellIndex = 0x1p+62;  // far beyond the world; keeps every cast defined
+inline constexpr double kMaxCellIndex = 0x1p+62;  // far outside the world; keeps every cast defined
 
-// A cell or a brick of one level.
+// Integer coordinates of a cell or a brick of one level.
 struct GridKey {
   int64_t x = 0, y = 0, z = 0;
 
@@ -30,7 +31,7 @@ struct GridKey {
   friend constexpr auto operator<=>(const GridKey&, const GridKey&) = default;
 };
 
-// The same in every process, so that visiting order and work counters are too.
+// Hash of a key: equal in every process, which makes visiting order and work counters reproducible.
 struct GridKeyHash {
   static constexpr uint64_t mix(uint64_t h) {
     h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9u;
@@ -47,10 +48,11 @@ inline int64_t to_cell_index(double scaled) {
   return static_cast<int64_t>(std::clamp(scaled, -kMaxCellIndex, kMaxCellIndex));
 }
 
-// The inverse of a cell's edge, exactly: what the functions below take.
+// Returns the inverse of the cell edge, which is exact. The functions below take it as `per_unit`.
 inline double cells_per_unit(int exponent) { return std::ldexp(1.0, -exponent); }
 
-// The cell that holds `coordinate` on one axis. Rounds down by hand: std::floor() is a call on the oldest processors.
+// Returns the index of the cell that contains `coordinate` on one axis. Does not use std::floor(), which is a library
+// call without SSE4.1.
 inline int64_t cell_index(double coordinate, double per_unit) {
   const double scaled = std::clamp(coordinate * per_unit, -kMaxCellIndex, kMaxCellIndex);
   const auto towards_zero = static_cast<int64_t>(scaled);
@@ -60,7 +62,7 @@ inline int64_t brick_index(double coordinate, double per_unit) {
   return cell_index(coordinate, per_unit) >> kBrickBits;
 }
 
-// The cell under which a value at `position` is filed.
+// Returns the cell in which a value at `position` is stored.
 inline GridKey cell_of(Vec3d position, double per_unit) {
   GridKey cell;
   for (int axis = 0; axis < 3; ++axis) {
@@ -74,26 +76,27 @@ inline GridKey brick_of(const GridKey& cell) {
   return {cell.x >> kBrickBits, cell.y >> kBrickBits, cell.z >> kBrickBits};
 }
 
-// The number of a cell within its brick, 0 to 63, z most significant.
-inline int number_in_brick(const GridKey& cell) {
+// Returns the index of a cell within its brick, 0 to 63, z most significant.
+inline int index_in_brick(const GridKey& cell) {
   constexpr int64_t kMask = (int64_t{1} << kBrickBits) - 1;
   return static_cast<int>((cell.x & kMask) | (cell.y & kMask) << kBrickBits | (cell.z & kMask) << (2 * kBrickBits));
 }
 
-// Smallest e with 2^e >= `length`, within [lowest, highest].
-inline int exponent_covering(double length, int lowest, int highest) {
-  if (!(length > 0)) return lowest;
+// Returns the smallest e with 2^e >= `length`, clamped to [min_exponent, max_exponent].
+inline int exponent_covering(double length, int min_exponent, int max_exponent) {
+  LOCUS_DCHECK_LE(min_exponent, max_exponent);
+  if (!(length > 0)) return min_exponent;
   int exponent = 0;
   const double mantissa = std::frexp(length, &exponent);  // in [0.5, 1)
-  return std::clamp(mantissa == 0.5 ? exponent - 1 : exponent, lowest, highest);
+  return std::clamp(mantissa == 0.5 ? exponent - 1 : exponent, min_exponent, max_exponent);
 }
 
-// How far a value with `bounds` extends from its position, at most, along any axis.
-inline double reach_of(const Aabbd& bounds, Vec3d position) {
+// Returns the extent of a value: the largest distance from its position to its bounds along any axis.
+inline double extent_of(const Aabbd& bounds, Vec3d position) {
   return std::max(max_component(position - bounds.min), max_component(bounds.max - position));
 }
 
-// Bricks, or cells, from `lo` to `hi`, both included.
+// Box of keys of bricks or cells, from `lo` to `hi`, both included.
 struct KeyRange {
   GridKey lo, hi;
 
@@ -107,8 +110,9 @@ struct KeyRange {
   }
 };
 
-// Cells of one level that hold every position within `box`, which is not empty.
+// Returns the cells of one level that contain the positions within `box`. Precondition: the box is not empty.
 inline KeyRange cells_within(const Aabbd& box, double per_unit) {
+  LOCUS_DCHECK(!box.empty());
   KeyRange range;
   for (int axis = 0; axis < 3; ++axis) {
     range.lo[axis] = cell_index(box.min[axis], per_unit);
@@ -117,7 +121,7 @@ inline KeyRange cells_within(const Aabbd& box, double per_unit) {
   return range;
 }
 
-// The bricks of those cells.
+// Returns the bricks of a range of cells, or of the positions within a box.
 inline KeyRange bricks_of(const KeyRange& cells) { return {brick_of(cells.lo), brick_of(cells.hi)}; }
 inline KeyRange bricks_within(const Aabbd& box, double per_unit) { return bricks_of(cells_within(box, per_unit)); }
 

@@ -18,7 +18,8 @@ double median_diameter(absl::Span<const SampledValue> sample) {
   return *middle;
 }
 
-// Wider cells would tell nothing apart, and their float columns would say nothing either.
+// Returns the largest useful exponent: still wider cells separate no values, and their float columns lose all
+// precision.
 int exponent_of_all(absl::Span<const SampledValue> sample) {
   Vec3d low = sample[0].position, high = low;
   for (const SampledValue& value : sample) {
@@ -26,12 +27,13 @@ int exponent_of_all(absl::Span<const SampledValue> sample) {
     high = max(high, value.position);
   }
   const double width = max_component(high - low), magnitude = max_component(max(abs(low), abs(high)));
-  // Where all are in one place, that is no reason for cells that they leave with every move.
+  // The term with the magnitude keeps cells above zero width if all values coincide: they would leave such cells with
+  // every move.
   return exponent_covering(std::max(4 * width, 0x1p-16 * magnitude), kMinCellExponent, kMaxBaseExponent);
 }
 
-// Expected number of other values in the cell of a random value. A pair of the sample stands for the pairs of the
-// population, so the estimate is not biased by the sample's size.
+// Returns the expected number of other values in the cell of a random value. The share of sample pairs in one cell
+// estimates the share of pairs of the population, so the sample size does not bias the estimate.
 double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
   if (sample.size() < 2) return 0;
   std::vector<GridKey> cells;
@@ -53,15 +55,18 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
   LOCUS_CHECK(!sample.empty() && population >= sample.size());
   int exponent = exponent_covering(median_diameter(sample), kMinCellExponent, kMaxBaseExponent);
   const double allowed =
-      std::max(kMaxMeanPerCell, mean_others_per_cell(sample, population, exponent) + kMeanPerCellMargin);
-  const int widest = exponent_of_all(sample);
-  while (exponent < widest && mean_others_per_cell(sample, population, exponent + 1) <= allowed) ++exponent;
+      std::max(kMaxMeanPerCell, mean_others_per_cell(sample, population, exponent) + kMaxAddedPerCell);
+  const int max_exponent = exponent_of_all(sample);
+  while (exponent < max_exponent && mean_others_per_cell(sample, population, exponent + 1) <= allowed) ++exponent;
+  LOCUS_DCHECK_GE(exponent, kMinCellExponent);
+  LOCUS_DCHECK_LE(exponent, kMaxBaseExponent);
   return exponent;
 }
 
-bool cell_exponent_serves(absl::Span<const SampledValue> sample, size_t population, int exponent) {
+bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent) {
+  LOCUS_DCHECK_GE(population, sample.size());
   const double others = mean_others_per_cell(sample, population, exponent);
-  return others >= kFewestServing && others <= kMaxServing;
+  return others >= kMinOthersPerCell && others <= kMaxOthersPerCell;
 }
 
 }  // namespace locus::internal

@@ -1,4 +1,5 @@
-// The choice of the grid's base cell size from a sample of what it holds. It decides cost only, never an answer.
+// Choice of the base cell size of the hash grid from a sample of its values. The choice affects only cost, never the
+// result of a query. Pure functions; any thread.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_CELL_SIZE_H_
 
@@ -7,38 +8,45 @@
 #include <vector>
 
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/geometry/vec3.h"
 
 namespace locus::internal {
 
-inline constexpr size_t kCellSizeSample = 2048;   // values looked at for one choice, about
-inline constexpr double kMaxMeanPerCell = 24;     // values that share the cell of a random value, at most ...
-inline constexpr double kMeanPerCellMargin = 12;  // ... or so many more than at the smallest sensible cell
-
-inline constexpr double kFewestServing = 6;  // a choice is kept while as many share a cell, at least ...
-inline constexpr double kMaxServing = 64;    // ... and at most
+// Approximate number of sampled values.
+inline constexpr size_t kCellSizeSample = 2048;
+// Max mean number of other values in the cell of a random value: kMaxMeanPerCell, or kMaxAddedPerCell more than at the
+// smallest cell that is considered, whichever is larger.
+inline constexpr double kMaxMeanPerCell = 24;
+inline constexpr double kMaxAddedPerCell = 12;
+// Range of that mean in which a cell size chosen before is kept.
+inline constexpr double kMinOthersPerCell = 6;
+inline constexpr double kMaxOthersPerCell = 64;
 
 struct SampledValue {
   Vec3d position;
   double diameter = 0;
 };
 
-// The exponent of the largest cell edge, at least the median diameter, at which a random value shares its cell with at
-// most kMaxMeanPerCell others on average, estimated for `population` values of which `sample` is an even selection.
-// Values that no cell size separates do not count against larger cells; but for the diameter, no cell is much wider
-// than all values together. `sample` is not empty. Cost: at most about fifty sorts of the sample. Pure.
+// Returns the exponent of the largest cell edge, at least the median diameter, at which a random value shares its cell
+// with at most kMaxMeanPerCell others on average. The mean is estimated for `population` values, of which `sample` is
+// an even selection. Values that no cell size separates raise the limit, so they do not prevent larger cells. Unless
+// the median diameter requires it, no cell is much wider than the bounds of all values. Preconditions: `sample` is not
+// empty, population >= sample.size(). Cost: at most about fifty sorts of the sample.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
-// Whether cells of that exponent still do: a random value shares its cell with neither too few others nor too many. For
-// the many times when nothing has changed: one sort of the sample instead of fifty. Pure.
-bool cell_exponent_serves(absl::Span<const SampledValue> sample, size_t population, int exponent);
+// Returns true if cells of that exponent are still suitable: a random value shares its cell with kMinOthersPerCell to
+// kMaxOthersPerCell others on average. Cost: one sort of the sample, so it is the cheap check for an unchanged world.
+bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
-// Every value whose turn it is in an even selection of about kCellSizeSample of `population`.
+// Even selection among `population` values, which are offered one by one: all of them if they are fewer than
+// kCellSizeSample, else kCellSizeSample to twice as many.
 class EvenSample {
  public:
   explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}
   void offer(Vec3d position, double diameter) {
     if (offered_++ % stride_ == 0) values_.push_back({position, diameter});
+    LOCUS_DCHECK_LE(values_.size(), 2 * kCellSizeSample);
   }
   absl::Span<const SampledValue> values() const { return values_; }
 

@@ -5,7 +5,8 @@
 namespace locus::internal {
 
 GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((count + kLanes - 1) / kLanes * kLanes) {
-  // A vector that starts at the last value of the last column of floats ends within the handles or entries.
+  // A vector load at the last value of the last float column ends within the handles or entries, so it stays in
+  // memory_.
   const size_t floats = size_t{4} * stride_ * sizeof(float);
   const size_t handles = size_t{stride_} * sizeof(uint32_t);
   const size_t entries = count * sizeof(GridEntry);
@@ -15,9 +16,20 @@ GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((c
   handles_ = reinterpret_cast<uint32_t*>(memory_.get() + floats);
   entries_ = reinterpret_cast<GridEntry*>(memory_.get() + floats + handles);
   if (has_forms) forms_ = reinterpret_cast<GridForm*>(memory_.get() + floats + handles + entries);
-  for (int number = 0; number < 4; ++number)
-    std::fill(floats_ + number * stride_ + count, floats_ + (number + 1) * stride_, 0.0f);
-  std::fill(handles_ + count, handles_ + stride_, ~0u);  // no value's
+  for (int column = 0; column < 4; ++column)
+    std::fill(floats_ + column * stride_ + count, floats_ + (column + 1) * stride_, 0.0f);
+  std::fill(handles_ + count, handles_ + stride_, ~0u);  // not a valid handle
+}
+
+void GridBlock::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_EQ(offsets_[0], 0u);
+    LOCUS_DCHECK_EQ(offsets_[kBrickCells], count_);
+    for (size_t cell = 0; cell < kBrickCells; ++cell) LOCUS_DCHECK_LE(offsets_[cell], offsets_[cell + 1]);
+    LOCUS_DCHECK_EQ(stride_ % kLanes, 0u);
+    for (uint32_t slot = count_; slot < stride_; ++slot)
+      for (int axis = 0; axis < 4; ++axis) LOCUS_DCHECK_EQ(column(axis)[slot], 0.0f);
+  }
 }
 
 uint32_t GridBlock::find(uint32_t handle) const {
@@ -32,6 +44,7 @@ uint32_t GridBlock::find(uint32_t handle) const {
 }
 
 uint32_t GridBlock::find_last(uint32_t handle, uint32_t count) const {
+  LOCUS_DCHECK_LE(count, count_);
   for (uint32_t slot = count; slot != 0; --slot)
     if (handles_[slot - 1] == handle) return slot - 1;
   return count;
@@ -41,9 +54,9 @@ uint32_t GridBlock::find_near(uint32_t handle, uint32_t slot) const {
   constexpr uint32_t kSlots = 2 * kLanes;
   if (stride_ < kSlots) return find(handle);
   const uint32_t begin = std::min(slot < kLanes ? 0 : slot - kLanes, stride_ - kSlots);
-  uint32_t place = 0;  // counted from 1; the handle is there once at most
-  for (uint32_t i = 0; i < kSlots; ++i) place |= handles_[begin + i] == handle ? i + 1 : 0;
-  return place == 0 ? count_ : begin + place - 1;
+  uint32_t position_plus_one = 0;  // 0 if not found; a handle occurs at most once
+  for (uint32_t i = 0; i < kSlots; ++i) position_plus_one |= handles_[begin + i] == handle ? i + 1 : 0;
+  return position_plus_one == 0 ? count_ : begin + position_plus_one - 1;
 }
 
 }  // namespace locus::internal

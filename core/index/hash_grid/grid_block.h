@@ -1,10 +1,11 @@
-// The values of one brick of the hash grid, in columns: what culls in float, relative to the brick's centre, eight at a
-// time, and what decides in double, one entry a value. Immutable once shared, but for a log, which has room for values
-// that its one writer adds behind those that readers know of; any thread.
+// Block: values of one brick of the hash grid, in columns. Float columns, relative to the centre of the brick, serve
+// culling of eight values at a time; the exact values in double are one entry each.
 //
-// Invariants: values lie in the order of their cells, those of cell c at offsets[c] to offsets[c + 1], but not in logs,
-// where they lie in the order they came; float columns
-// are padded with zeros to whole vectors, and so many more that a vector may start at any value.
+// Threads: immutable once shared; any thread. A log is the exception: its one writer appends values behind those that
+// readers of earlier versions know, which share its memory.
+// Invariants: in a sorted block values are ordered by cell, and those of cell c occupy the slots offsets[c] to
+// offsets[c + 1] - 1; in a log they are in order of arrival. Float columns are padded with zeros to whole vectors, and
+// a vector load may start at any value.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 
@@ -13,12 +14,13 @@
 #include <cstdint>
 #include <memory>
 
+#include "core/base/check.h"
 #include "core/base/ids.h"
 #include "core/geometry/shape.h"
 
 namespace locus {
 
-// One value as the grid stores it, but for its form, its reach and its handle.
+// Value as the grid stores it, without its form, its extent and its handle, which have columns of their own.
 struct GridEntry {
   Vec3d position;
   Id id = kNoId;
@@ -29,17 +31,18 @@ struct GridEntry {
 };
 static_assert(sizeof(GridEntry) == 56);
 
-// What most values go without: as in Shape.
+// Rotation, size and radius of a shape, as in Shape. Default for most values.
 struct GridForm {
   Quaternion rotation;
   Vec3f size;
-  float radius = 0;  // not of balls, whose radius is their reach
+  float radius = 0;  // 0 for balls: their radius is their extent
 
   friend constexpr bool operator==(const GridForm&, const GridForm&) = default;
 };
 
-// A value on its way into the grid. `handle` is the caller's number for it. `reach`: how far it extends from its
-// position in any direction, whatever its rotation, but for the rounding of bounds; the exact radius of balls.
+// Value with all its parts, for example to be inserted. `handle` is the identifier that the caller assigned. `reach` is
+// the extent of the value: an upper bound of the distance from its position to its bounds along any axis and under any
+// rotation, without the rounding of bounds; for balls the exact radius.
 struct GridItem {
   GridEntry entry;
   uint32_t handle = 0;
@@ -55,29 +58,48 @@ class GridBlock {
  public:
   static constexpr uint32_t kLanes = 8;
 
-  // `count` values, to be put() once each: before the block is shared or, in a log, before their number is.
+  // Allocates `count` slots. The caller writes each slot once by Places::put(), before it shares the block or, in a
+  // log, before it shares a brick version whose recent_count includes the slot.
   GridBlock(uint32_t count, bool has_forms);
 
   uint32_t count() const { return count_; }
   bool has_forms() const { return forms_ != nullptr; }
-  // Columns x, y, z relative to the centre, and reach.
-  const float* column(int number) const { return floats_ + size_t{stride_} * static_cast<size_t>(number); }
-  const GridEntry& entry(uint32_t slot) const { return entries_[slot]; }
-  float reach(uint32_t slot) const { return column(3)[slot]; }
-  GridForm form(uint32_t slot) const { return forms_ == nullptr ? GridForm() : forms_[slot]; }
-  uint32_t handle(uint32_t slot) const { return handles_[slot]; }
-  GridItem item(uint32_t slot) const { return {entry(slot), handle(slot), reach(slot), form(slot)}; }
-  // Where the value of that handle is; count() if it is not here. O(count), a vector at a time.
+  // Returns a column: 0 to 2 = x, y, z relative to the centre of the brick, 3 = extent.
+  const float* column(int index) const {
+    LOCUS_DCHECK(0 <= index && index < 4);
+    return floats_ + size_t{stride_} * static_cast<size_t>(index);
+  }
+  // Return the parts of a value. Precondition: slot < count().
+  const GridEntry& entry(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return entries_[slot];
+  }
+  float extent(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return column(3)[slot];
+  }
+  GridForm form(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return forms_ == nullptr ? GridForm() : forms_[slot];
+  }
+  uint32_t handle(uint32_t slot) const {
+    LOCUS_DCHECK_LT(slot, count_);
+    return handles_[slot];
+  }
+  GridItem item(uint32_t slot) const { return {entry(slot), handle(slot), extent(slot), form(slot)}; }
+  // Returns the slot of the handle, or count() if there is none. O(count), a vector at a time.
   uint32_t find(uint32_t handle) const;
-  // Of the first `count` values of a log the last one of that handle; `count` if there is none.
+  // Returns the last slot of the handle among the first `count` slots of a log, or `count` if there is none.
   uint32_t find_last(uint32_t handle, uint32_t count) const;
-  // As find(), looking only at the few places around `slot`.
+  // Returns the slot of the handle if it is one of the 16 slots around `slot`, else count(). A block of one vector is
+  // searched whole.
   uint32_t find_near(uint32_t handle, uint32_t slot) const;
 
   std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }
   const std::array<uint32_t, kBrickCells + 1>& offsets() const { return offsets_; }
 
-  // Asks for the memory of a value that is to be read or put() soon: an entry lies in two lines more often than in one.
+  // Prefetch the memory of a slot: prefetch_entry() its entry, which spans two cache lines more often than one;
+  // prefetch_value() also its handle and extent; prefetch_target() all columns, for a put().
   [[gnu::always_inline]] void prefetch_entry(uint32_t slot) const {
     const char* const entry = reinterpret_cast<const char*>(&entries_[slot]);
     __builtin_prefetch(entry);
@@ -88,51 +110,58 @@ class GridBlock {
     __builtin_prefetch(&handles_[slot]);
     __builtin_prefetch(&column(3)[slot]);
   }
-  [[gnu::always_inline]] void prefetch_place(uint32_t slot) const {
-    for (int number = 0; number < 3; ++number) __builtin_prefetch(&column(number)[slot], 1);
+  [[gnu::always_inline]] void prefetch_target(uint32_t slot) const {
+    for (int axis = 0; axis < 3; ++axis) __builtin_prefetch(&column(axis)[slot], 1);
     prefetch_value(slot);
   }
 
-  // What a writer's loop keeps in registers: where values are read from,
+  // Pointers to the columns of a block for reading, which a loop can keep in registers.
   struct Values {
     explicit Values(const GridBlock& block)
-        : entries(block.entries_), handles(block.handles_), reaches(block.column(3)) {}
+        : entries(block.entries_), handles(block.handles_), extents(block.column(3)) {}
 
     const GridEntry* entries;
     const uint32_t* handles;
-    const float* reaches;
+    const float* extents;
   };
-  // and where they are put.
+  // Pointers to the columns of a block for writing.
   class Places {
    public:
     explicit Places(const GridBlock& block, Vec3d center)
         : x_(block.floats_),
           y_(x_ + block.stride_),
           z_(y_ + block.stride_),
-          reach_(z_ + block.stride_),
+          extent_(z_ + block.stride_),
           handles_(block.handles_),
           entries_(block.entries_),
           center_(center) {}
 
-    // `entry` at another position, perhaps.
-    void put(uint32_t slot, const GridEntry& entry, Vec3d position, uint32_t handle, float reach) const {
+    // Writes one slot: `entry` with its position replaced by `position`.
+    void put(uint32_t slot, const GridEntry& entry, Vec3d position, uint32_t handle, float extent) const {
       x_[slot] = static_cast<float>(position.x - center_.x);
       y_[slot] = static_cast<float>(position.y - center_.y);
       z_[slot] = static_cast<float>(position.z - center_.z);
-      reach_[slot] = reach;
+      extent_[slot] = extent;
       handles_[slot] = handle;
       entries_[slot] = entry;
       entries_[slot].position = position;
     }
 
    private:
-    float *x_, *y_, *z_, *reach_;
+    float *x_, *y_, *z_, *extent_;
     uint32_t* handles_;
     GridEntry* entries_;
     Vec3d center_;
   };
-  // Only where has_forms().
-  void put_form(uint32_t slot, const GridForm& form) { forms_[slot] = form; }
+  // Writes the form of a slot. Precondition: has_forms().
+  void put_form(uint32_t slot, const GridForm& form) {
+    LOCUS_DCHECK(has_forms());
+    LOCUS_DCHECK_LT(slot, count_);
+    forms_[slot] = form;
+  }
+
+  // Checks the offsets and the padding of a block that is not a log and whose slots have all been written. O(cells).
+  void check_invariants() const;
 
   size_t bytes() const { return sizeof(GridBlock) + bytes_; }
 

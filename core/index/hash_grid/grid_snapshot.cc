@@ -4,17 +4,21 @@
 #include <bit>
 #include <utility>
 
+#include "core/base/check.h"
+#include "core/base/planted_bug.h"
+
 namespace locus {
 namespace internal {
 
 KeyRange cells_near(const GridLevel& level, const Aabbd& region) {
-  // Positions lie within the extent, so that cells of what is cut to it have numbers; its reach covers the rounding.
-  const Aabbd& bounds = level.extent.bounds;
-  const Aabbd near = grown(region, level.extent.reach);
+  // All positions lie within the bounds of the level. Clipping to them keeps the cell indices in range, and max_extent
+  // includes the rounding.
+  const Aabbd& bounds = level.geometry.bounds;
+  const Aabbd near = grown(region, level.geometry.max_extent);
   const Aabbd inside{max(near.min, bounds.min), min(near.max, bounds.max)};
   if (inside.min.x > inside.max.x || inside.min.y > inside.max.y || inside.min.z > inside.max.z)
     return {{0, 0, 0}, {-1, -1, -1}};
-  return cells_within(inside, level.extent.cells_per_unit);
+  return cells_within(inside, level.geometry.cells_per_unit);
 }
 
 KeyRange within_brick(const KeyRange& range, const GridKey& brick) {
@@ -30,23 +34,41 @@ KeyRange within_brick(const KeyRange& range, const GridKey& brick) {
 }  // namespace internal
 
 GridSnapshot::GridSnapshot(std::vector<internal::GridLevel> levels, internal::BrickArray bricks,
-                           internal::BrickNumbers bricks_by_handle, double cell_size)
+                           internal::BrickIndices bricks_by_handle, double cell_size)
     : levels_(std::move(levels)),
       bricks_(std::move(bricks)),
       bricks_by_handle_(std::move(bricks_by_handle)),
       cell_size_(cell_size) {
   for (const internal::GridLevel& level : levels_) size_ += level.size;
+  check_invariants();
+}
+
+void GridSnapshot::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      const internal::GridLevel& level = levels_[i];
+      if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1].exponent, level.exponent);
+      LOCUS_DCHECK_GT(level.size, 0u);
+      LOCUS_DCHECK(level.table != nullptr);
+      LOCUS_DCHECK_LE(level.table->size(), level.size);
+      LOCUS_DCHECK(!level.geometry.bounds.empty());
+      LOCUS_DCHECK_GE(level.geometry.max_extent, 0.0);
+      LOCUS_DCHECK_EQ(level.geometry.cells_per_unit, internal::cells_per_unit(level.exponent));
+    }
+    LOCUS_DCHECK(size_ <= bricks_by_handle_.size() || planted(PlantedBug::kGhostAfterMove));
+  }
 }
 
 GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
-  // A value that moved within the brick may lie in both; the one in `sorted` is gone then.
+  // A value that moved within the brick may have a slot in both blocks; the one in `sorted` is then dead.
   if (const uint32_t slot = brick.find_recent(handle); slot != brick.recent_count)
-    return {*brick.recent, slot, brick.number};
+    return {*brick.recent, slot, brick.index};
   const uint32_t slot = brick.sorted->find(handle);
-  return slot == brick.sorted->count() || brick.is_gone(slot) ? GridRef() : GridRef(*brick.sorted, slot, brick.number);
+  return slot == brick.sorted->count() || brick.is_dead(slot) ? GridRef() : GridRef(*brick.sorted, slot, brick.index);
 }
 
 GridRef GridSnapshot::at(uint32_t handle) const {
+  LOCUS_DCHECK_LT(handle, bricks_by_handle_.size());
   const GridRef value = find_in(*bricks_[bricks_by_handle_[handle]], handle);
   LOCUS_CHECK(value);
   return value;
@@ -54,27 +76,28 @@ GridRef GridSnapshot::at(uint32_t handle) const {
 
 GridRef GridSnapshot::find(uint32_t handle) const {
   if (handle >= bricks_by_handle_.size()) return {};
-  const uint32_t number = bricks_by_handle_[handle];  // where it was last, if it is not in use
-  if (number >= bricks_.size() || bricks_[number] == nullptr) return {};
-  return find_in(*bricks_[number], handle);
+  const uint32_t index = bricks_by_handle_[handle];  // stale if the handle is not in use
+  if (index >= bricks_.size() || bricks_[index] == nullptr) return {};
+  return find_in(*bricks_[index], handle);
 }
 
 GridRef GridSnapshot::find_like(const GridRef& value) const {
+  LOCUS_DCHECK(value);
   const uint32_t handle = value.handle();
   if (value.brick() < bricks_.size() && bricks_[value.brick()] != nullptr) {
     const internal::Brick& brick = *bricks_[value.brick()];
     const uint32_t slot = brick.sorted->find_near(handle, value.slot());
-    if (slot < brick.sorted->count() && !brick.is_gone(slot)) return {*brick.sorted, slot, brick.number};
+    if (slot < brick.sorted->count() && !brick.is_dead(slot)) return {*brick.sorted, slot, brick.index};
   }
   return find(handle);
 }
 
 double GridSnapshot::values_per_cell(const internal::GridLevel& level, const Vec3d& point) const {
-  const Vec3d inside = nearest_in(point, level.extent.bounds);
+  const Vec3d inside = nearest_in(point, level.geometry.bounds);
   const internal::Brick* brick =
-      find_brick(level, internal::brick_of(internal::cell_of(inside, level.extent.cells_per_unit)));
+      find_brick(level, internal::brick_of(internal::cell_of(inside, level.geometry.cells_per_unit)));
   const double nearby = brick == nullptr ? 0 : internal::values_per_cell(*brick, inside);
-  return nearby > 0 ? nearby : internal::values_per_cell(level.extent, level.size);
+  return nearby > 0 ? nearby : internal::values_per_cell(level.geometry, level.size);
 }
 
 size_t GridSnapshot::unshared_bytes(const GridSnapshot& other) const {
@@ -100,12 +123,12 @@ GridStatistics GridSnapshot::statistics() const {
   for (const internal::GridLevel& level : levels_) {
     result.bricks += level.table->size();
     result.bytes += level.table->bytes();
-    level.table->for_each([&](uint32_t number) {
-      const internal::Brick& brick = *bricks_[number];
+    level.table->for_each([&](uint32_t index) {
+      const internal::Brick& brick = *bricks_[index];
       result.bytes += brick.bytes();
       uint64_t occupied = 0;
       internal::for_each_value(brick, [&](GridRef value) {
-        occupied |= uint64_t{1} << brick.place.cell_of(value.entry().position);
+        occupied |= uint64_t{1} << brick.geometry.cell_of(value.entry().position);
         return true;
       });
       result.cells += static_cast<size_t>(std::popcount(occupied));

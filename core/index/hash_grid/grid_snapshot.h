@@ -1,11 +1,13 @@
-// The hash grid at one moment: what readers hold. Immutable, copied in O(1), any thread. It only culls: every value
-// that may be wanted is handed to the caller, once, and the caller decides by the value's own predicate in double.
+// Snapshot of the hash grid: the structure that readers query. Immutable, copied in O(1), any thread. It only culls:
+// each value that may satisfy a query is passed to the caller once, and the caller decides by the exact predicate of
+// the value in double.
 //
-// A value is filed by its position in one cell of the level whose cells are at least as wide as the value, so that a
-// query looks half a cell around itself on each level and misses nothing, and no single large value makes all lookups
-// wide. Levels are visited coarse to fine, so that a large near thing shortens a ray before the many small ones are
-// asked. Source: Ericson, Real-Time Collision Detection, 2005, 7.2 (one cell a value); Schornbaum, Hierarchical Hash
-// Grids for Coupled Particle Simulations, 2009.
+// A value is stored in the one cell that contains its position, on the level whose cells are at least as wide as the
+// value. A query therefore widens its range on each level by the largest extent of that level, at most half a cell for
+// values that fit the largest level. It misses no value, and a large value does not widen the lookups on other levels.
+// Levels are visited coarse to fine, so that a hit on a large near value shortens a ray before the many small values
+// are tested. Source: Ericson, Real-Time Collision Detection, 2005, 7.2 (one cell per value); Schornbaum, Hierarchical
+// Hash Grids for Coupled Particle Simulations, 2009.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
+#include "core/base/check.h"
 #include "core/base/persistent_array.h"
 #include "core/index/hash_grid/brick_scan.h"
 #include "core/index/hash_grid/brick_table.h"
@@ -24,130 +27,140 @@ struct GridStatistics {
   size_t values = 0;
   size_t levels = 0;
   size_t bricks = 0;
-  size_t cells = 0;      // occupied
-  double cell_size = 0;  // of the base level
-  size_t bytes = 0;      // of bricks and values, shared with copies or not, and of the tables that find them
+  size_t cells = 0;      // occupied cells
+  double cell_size = 0;  // cell edge of the base level
+  size_t bytes = 0;      // memory of bricks, values and brick tables, whether shared with other snapshots or not
 };
 
 namespace internal {
 
 inline constexpr size_t kBricksPerLeaf = 64;
 using BrickArray = PersistentArray<BrickPtr, kBricksPerLeaf>;
-// The number of the brick that each handle's value is in.
-using BrickNumbers = PersistentArray<uint32_t, 1024>;
+// Index of the brick of each value, by handle.
+using BrickIndices = PersistentArray<uint32_t, 1024>;
 
 struct GridLevel {
-  int exponent = 0;    // of the cell edge
-  LevelExtent extent;  // covers every value; does not shrink until the level is empty
-  size_t size = 0;     // values
+  int exponent = 0;        // cell edge = 2^exponent
+  LevelGeometry geometry;  // covers every value; does not shrink until the level is empty
+  size_t size = 0;         // number of values
   std::shared_ptr<const BrickTable> table;
 };
 
-// What of a level a region can reach.
+// Returns the cells of a level that can contain the position of a value whose bounds overlap `region`.
 KeyRange cells_near(const GridLevel& level, const Aabbd& region);
-// The cells of `range` that lie in the brick, numbered within it.
+// Returns the cells of `range` that lie in the brick, relative to it: coordinates 0 to 3.
 KeyRange within_brick(const KeyRange& range, const GridKey& brick);
 
 }  // namespace internal
 
-// How far a walk through a snapshot has come; of no meaning to another snapshot.
+// Position of an iteration over a snapshot by for_each_from(). Valid for that snapshot only.
 struct GridCursor {
   size_t brick = 0;
-  size_t values = 0;  // of that brick that are done with
+  size_t values = 0;  // values of that brick that have been visited
 };
 
 class GridSnapshot {
  public:
   GridSnapshot() = default;
   GridSnapshot(std::vector<internal::GridLevel> levels, internal::BrickArray bricks,
-               internal::BrickNumbers bricks_by_handle, double cell_size);
+               internal::BrickIndices bricks_by_handle, double cell_size);
 
   size_t size() const { return size_; }
-  // Of the base level.
+  // Returns the cell edge of the base level.
   double cell_size() const { return cell_size_; }
 
-  // visit(GridRef) for every value whose bounds overlap `region`, and for others near it; false ends the visit.
+  // Calls visit(GridRef) for every value whose bounds overlap `region`, and for some others near it. Ends if visit()
+  // returns false.
   template <class Visit>
   void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
-  // The same for a ball with those bounds: visit(GridRef) for every value of which a part lies in the ball, and for
-  // others near it. Fewer than by the bounds alone, but not all whose own bounds overlap them.
+  // Calls visit(GridRef) for every value that shares a point with the ball, and for some others near it. `bounds` are
+  // the bounds of the ball. Visits fewer values than visit_region(bounds), and not all whose bounds overlap `bounds`.
   template <class Visit>
   void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
-  // fn(brick, cells) for each brick, and its own cells, where such a visit looks; false, after some of them, if they
-  // are more than `most`.
+  // Calls fn(brick, cells) for each brick that visit_region(region) would scan, with the cells relative to the brick.
+  // Returns false, possibly after some calls, if the region may need more than `max_bricks` bricks.
   template <class Fn>
-  bool for_few_bricks(const Aabbd& region, size_t most, Work& work, const Fn& fn) const;
+  bool for_few_bricks(const Aabbd& region, size_t max_bricks, Work& work, const Fn& fn) const;
 
-  // visit(GridRef) for every value whose own interval on the ray has near <= far, far >= 0 and near <= limit(), and for
-  // others near the ray; roughly near to far on each level. limit() may fall meanwhile; false ends the visit. For
-  // values that are elsewhere than filed, by up to `astray`, likewise.
+  // Calls visit(GridRef) for every value whose bounds have an interval on the ray with near <= far, far >= 0 and
+  // near <= limit(), and for some others near the ray; roughly near to far on each level. limit() may fall during the
+  // visit. Ends if visit() returns false. `displacement_bound` is an upper bound of the distance between the true and
+  // the stored position of a value.
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
                  double displacement_bound = 0) const;
 
-  // visit(GridRef) for every value whose bounds have a squared_distance() from `point` of at most limit(), and for
-  // others near it; on each level about from near to far. limit() may fall meanwhile; false ends the visit. Cost: the
-  // cells within the last value's distance, or a look at every brick where those are fewer.
+  // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
+  // for some others near it; roughly near to far on each level. limit() may fall during the visit. Ends if visit()
+  // returns false. Cost: the cells within the final limit(), or one test per brick of the level if bricks are fewer.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 
-  // visit(GridRef) for each value, until it returns false, which is then returned.
+  // Calls visit(GridRef) for each value until it returns false. Returns false if a call did.
   template <class Visit>
   bool for_each(const Visit& visit) const;
-  // The same for those from the cursor on, which it moves beyond each that is visited: so that a long walk can be made
-  // in steps. O(visited values, and a look at those of the brick where it goes on).
+  // Calls visit(GridRef) for the values from the cursor on and advances the cursor behind each visited value, so that a
+  // long iteration can be split into steps. Returns false if a call did. O(visited values + values of the first brick).
   template <class Visit>
   bool for_each_from(GridCursor& cursor, const Visit& visit) const;
 
-  // The value of a handle that is in use here. O(values in its brick).
+  // Returns the value of a handle. Precondition: the handle is in use in this snapshot. O(values in its brick).
   GridRef at(uint32_t handle) const;
-  // The value of any handle that was ever in use in the grid; nothing where it is not in use here. O(values in a
+  // Returns the value of a handle, or an empty reference if the handle is not in use in this snapshot. O(values in a
   // brick).
   GridRef find(uint32_t handle) const;
-  // The same for the handle of a value of another snapshot of the grid: quick where it lies about there here, too.
+  // Returns find(value.handle()) for a value of another snapshot of the grid. Faster if the value has about the same
+  // slot in this snapshot.
   GridRef find_like(const GridRef& value) const;
 
-  // O(bricks).
+  // Returns counts and memory of this snapshot. O(values).
   GridStatistics statistics() const;
-  // Bytes of what `other`, another snapshot of the grid, does not share. O(bricks that differ).
+  // Returns the bytes of this snapshot that `other`, another snapshot of the grid, does not share. O(bricks that
+  // differ).
   size_t unshared_bytes(const GridSnapshot& other) const;
 
  private:
+  // Checks the order and the sizes of the levels. O(levels).
+  void check_invariants() const;
   const internal::Brick* find_brick(const internal::GridLevel& level, const internal::GridKey& key) const;
   static GridRef find_in(const internal::Brick& brick, uint32_t handle);
-  // fn(brick) for those bricks of the range that exist, until fn returns false, which is then returned.
+  // Calls fn(brick) for the existing bricks of a range until it returns false. Returns false if a call did. Looks up
+  // each key, or iterates over the bricks of the level if they are fewer.
   template <class Fn>
   bool for_each_brick(const internal::GridLevel& level, const internal::KeyRange& bricks, Work& work,
                       const Fn& fn) const;
-  // cull_of(brick) says which values of the brick are visited: as RowScan's Cull.
+  // Visits the values of all cells near `region` that the culling function cull_of(brick) keeps (see scan_rows()).
   template <class CullOf, class Visit>
   void visit_cells(const Aabbd& region, Work& work, const CullOf& cull_of, const Visit& visit) const;
+  // Visits the bricks of one level slab by slab. Returns false if visit() did.
   template <class Limit, class Visit>
-  bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double margin,
+  bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double ray_radius,
              const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
-  // About how many values share a cell there.
+  // Returns the estimated number of values per cell near `point`.
   double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
-  // For shells that would name more bricks than there are, from the present one on.
+  // Visits the present shell and all later ones brick by brick, from near to far: used if a shell would name more
+  // bricks than the level has. Returns false if visit() did.
   template <class Limit, class Visit>
   bool visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells, const Vec3d& point,
                             const Limit& limit, Work& work, const Visit& visit) const;
-  // For rays that would name more bricks than there are.
+  // Visits all bricks of a level that the ray meets, from near to far: used if march() would name more bricks than the
+  // level has. Returns false if visit() did.
   template <class Limit, class Visit>
-  bool visit_by_distance(const internal::GridLevel& level, double reach, double margin, const SlabRay<double>& ray,
-                         const Limit& limit, Work& work, const Visit& visit) const;
+  bool visit_by_distance(const internal::GridLevel& level, double max_extent, double ray_radius,
+                         const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
 
   std::vector<internal::GridLevel> levels_;  // coarse to fine
   internal::BrickArray bricks_;
-  internal::BrickNumbers bricks_by_handle_;
+  internal::BrickIndices bricks_by_handle_;
   size_t size_ = 0;
   double cell_size_ = 0;
 };
 
 inline const internal::Brick* GridSnapshot::find_brick(const internal::GridLevel& level,
                                                        const internal::GridKey& key) const {
-  const uint32_t number =
-      level.table->find(key, [&](uint32_t candidate) { return bricks_[candidate]->place.key == key; });
-  return number == internal::BrickTable::kNone ? nullptr : bricks_[number].get();
+  const uint32_t index =
+      level.table->find(key, [&](uint32_t candidate) { return bricks_[candidate]->geometry.key == key; });
+  return index == internal::BrickTable::kNone ? nullptr : bricks_[index].get();
 }
 
 template <class Fn>
@@ -156,9 +169,9 @@ bool GridSnapshot::for_each_brick(const internal::GridLevel& level, const intern
   if (bricks.empty()) return true;
   if (bricks.count() > static_cast<double>(level.table->size())) {
     work.cells += level.table->size();
-    return level.table->for_each([&](uint32_t number) {
-      const internal::Brick& brick = *bricks_[number];
-      return !bricks.contains(brick.place.key) || fn(brick);
+    return level.table->for_each([&](uint32_t index) {
+      const internal::Brick& brick = *bricks_[index];
+      return !bricks.contains(brick.geometry.key) || fn(brick);
     });
   }
   for (int64_t z = bricks.lo.z; z <= bricks.hi.z; ++z) {
@@ -184,15 +197,16 @@ void GridSnapshot::visit_ball(const Balld& ball, const Aabbd& bounds, Work& work
 }
 
 template <class Fn>
-bool GridSnapshot::for_few_bricks(const Aabbd& region, size_t most, Work& work, const Fn& fn) const {
-  size_t left = most;
+bool GridSnapshot::for_few_bricks(const Aabbd& region, size_t max_bricks, Work& work, const Fn& fn) const {
+  size_t left = max_bricks;
   for (const internal::GridLevel& level : levels_) {
     const internal::KeyRange cells = internal::cells_near(level, region);
     const internal::KeyRange bricks = internal::bricks_of(cells);
     if (bricks.empty()) continue;
     if (bricks.count() > static_cast<double>(left)) return false;
+    LOCUS_DCHECK_LE(left, max_bricks);
     for_each_brick(level, bricks, work, [&](const internal::Brick& brick) {
-      fn(brick, internal::within_brick(cells, brick.place.key));
+      fn(brick, internal::within_brick(cells, brick.geometry.key));
       --left;
       return true;
     });
@@ -204,69 +218,70 @@ template <class CullOf, class Visit>
 void GridSnapshot::visit_cells(const Aabbd& region, Work& work, const CullOf& cull_of, const Visit& visit) const {
   for (const internal::GridLevel& level : levels_) {
     const internal::KeyRange cells = internal::cells_near(level, region);
-    const bool go_on = for_each_brick(level, internal::bricks_of(cells), work, [&](const internal::Brick& brick) {
+    const bool keep_going = for_each_brick(level, internal::bricks_of(cells), work, [&](const internal::Brick& brick) {
       const auto cull = cull_of(brick);
-      return internal::scan_cells(brick, internal::within_brick(cells, brick.place.key), work, cull, visit) &&
+      return internal::scan_cells(brick, internal::within_brick(cells, brick.geometry.key), work, cull, visit) &&
              internal::scan_recent(brick, work, cull, visit);
     });
-    if (!go_on) return;
+    if (!keep_going) return;
   }
 }
 
 template <class Limit, class Visit>
 void GridSnapshot::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
                              double displacement_bound) const {
+  LOCUS_DCHECK_GE(displacement_bound, 0.0);
   for (const internal::GridLevel& level : levels_) {
-    internal::LevelExtent extent = level.extent;
+    internal::LevelGeometry geometry = level.geometry;
     if (displacement_bound > 0) {
-      extent.reach += displacement_bound;
-      extent.bounds = grown(extent.bounds, displacement_bound);
+      geometry.max_extent += displacement_bound;
+      geometry.bounds = grown(geometry.bounds, displacement_bound);
     }
-    const internal::SlabMarch slabs(ray, extent, limit());
-    const double margin = displacement_bound + 2 * ray.margin(magnitude(extent.bounds));
-    const bool go_on = slabs.bricks() > static_cast<double>(level.table->size())
-                           ? visit_by_distance(level, extent.reach, margin, ray, limit, work, visit)
-                           : march(level, slabs, margin, ray, limit, work, visit);
-    if (!go_on) return;
+    const internal::SlabMarch slabs(ray, geometry, limit());
+    const double ray_radius = displacement_bound + 2 * ray.margin(magnitude(geometry.bounds));
+    const bool keep_going = slabs.bricks() > static_cast<double>(level.table->size())
+                                ? visit_by_distance(level, geometry.max_extent, ray_radius, ray, limit, work, visit)
+                                : march(level, slabs, ray_radius, ray, limit, work, visit);
+    if (!keep_going) return;
   }
 }
 
 template <class Limit, class Visit>
-bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double margin,
+bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double ray_radius,
                          const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const {
   constexpr int kLayers = 1 << internal::kBrickBits;
   const GridKernels& kernels = active_grid_kernels();
-  struct Met {
+  struct CrossedBrick {
     const internal::Brick* brick;
     internal::CullRay ray;
   };
-  absl::InlinedVector<Met, 16> met;
+  absl::InlinedVector<CrossedBrick, 16> crossed;
   for (int64_t n = 0; n < slabs.slabs(); ++n) {
     const internal::SlabMarch::Slab slab = slabs.slab(n, limit());
     if (slab.near > limit()) return true;
-    met.clear();
+    crossed.clear();
     for_each_brick(level, slab.bricks, work, [&](const internal::Brick& brick) {
-      met.push_back({&brick, internal::CullRay(brick, ray, margin)});
+      crossed.push_back({&brick, internal::CullRay(brick, ray, ray_radius)});
       return true;
     });
-    for (Met& one : met) {
-      one.ray.end_at(limit());
+    for (CrossedBrick& entry : crossed) {
+      entry.ray.end_at(limit());
       const auto cull = [&](const GridRows& rows, uint32_t* slots) {
-        return kernels.cull_line(rows, one.ray.line(), slots);
+        return kernels.cull_line(rows, entry.ray.line(), slots);
       };
-      if (!internal::scan_recent(*one.brick, work, cull, visit)) return false;
+      if (!internal::scan_recent(*entry.brick, work, cull, visit)) return false;
     }
-    for (int number = 0; number < kLayers && !met.empty(); ++number) {
-      const internal::SlabMarch::Layer layer = slabs.layer(n, number, limit());
+    for (int layer_index = 0; layer_index < kLayers && !crossed.empty(); ++layer_index) {
+      const internal::SlabMarch::Layer layer = slabs.layer(n, layer_index, limit());
       if (layer.near > limit()) return true;
-      for (Met& one : met) {
-        const internal::KeyRange cells = internal::within_brick(layer.cells, one.brick->place.key);
+      for (CrossedBrick& entry : crossed) {
+        const internal::KeyRange cells = internal::within_brick(layer.cells, entry.brick->geometry.key);
         if (cells.empty()) continue;
-        one.ray.end_at(limit());
+        entry.ray.end_at(limit());
         const auto cull = [&](const GridRows& rows, uint32_t* slots) {
-          return kernels.cull_line(rows, one.ray.line(), slots);
+          return kernels.cull_line(rows, entry.ray.line(), slots);
         };
-        if (!internal::scan_cells(*one.brick, cells, work, cull, visit)) return false;
+        if (!internal::scan_cells(*entry.brick, cells, work, cull, visit)) return false;
       }
     }
   }
@@ -274,7 +289,7 @@ bool GridSnapshot::march(const internal::GridLevel& level, const internal::SlabM
 }
 
 template <class Limit, class Visit>
-bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double reach, double margin,
+bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double max_extent, double ray_radius,
                                      const SlabRay<double>& ray, const Limit& limit, Work& work,
                                      const Visit& visit) const {
   struct Candidate {
@@ -283,11 +298,11 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double re
   };
   const GridKernels& kernels = active_grid_kernels();
   absl::InlinedVector<Candidate, 32> candidates;
-  level.table->for_each([&](uint32_t number) {
+  level.table->for_each([&](uint32_t index) {
     ++work.cells;
-    const internal::Brick& brick = *bricks_[number];
-    const Vec3d half = Vec3d{1, 1, 1} * (brick.place.edge / 2 + reach);
-    const Interval<double> part = ray.interval({brick.place.center - half, brick.place.center + half});
+    const internal::Brick& brick = *bricks_[index];
+    const Vec3d half = Vec3d{1, 1, 1} * (brick.geometry.edge / 2 + max_extent);
+    const Interval<double> part = ray.interval({brick.geometry.center - half, brick.geometry.center + half});
     if (part.near <= part.far && part.far >= 0 && part.near <= limit()) candidates.push_back({part.near, &brick});
     return true;
   });
@@ -295,7 +310,7 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double re
             [](const Candidate& a, const Candidate& b) { return a.near < b.near; });
   for (const Candidate& candidate : candidates) {
     if (candidate.near > limit()) break;
-    internal::CullRay cull_ray(*candidate.brick, ray, margin);
+    internal::CullRay cull_ray(*candidate.brick, ray, ray_radius);
     cull_ray.end_at(limit());
     const auto cull = [&](const GridRows& rows, uint32_t* slots) {
       return kernels.cull_line(rows, cull_ray.line(), slots);
@@ -309,10 +324,10 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double re
 
 template <class Limit, class Visit>
 void GridSnapshot::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
-  constexpr size_t kFewBricks = 1024;  // so many are looked at shell by shell, even if they are all there are
+  constexpr size_t kFewBricks = 1024;  // a shell of at most so many bricks is always visited key by key
   internal::NearCandidates candidates;
   for (const internal::GridLevel& level : levels_) {
-    internal::NearestShells shells(point, level.extent, values_per_cell(level, point));
+    internal::NearestShells shells(point, level.geometry, values_per_cell(level, point));
     while (shells.next(limit())) {
       const internal::KeyRange cells = internal::cells_near(level, shells.region());
       const internal::KeyRange bricks = internal::bricks_of(cells);
@@ -321,8 +336,8 @@ void GridSnapshot::visit_nearest(const Vec3d& point, const Limit& limit, Work& w
         break;
       }
       for_each_brick(level, bricks, work, [&](const internal::Brick& brick) {
-        candidates.collect(brick, internal::within_brick(cells, brick.place.key), point, shells.above(), shells.upto(),
-                           work);
+        candidates.collect(brick, internal::within_brick(cells, brick.geometry.key), point, shells.above(),
+                           shells.up_to(), work);
         return true;
       });
       if (!candidates.visit(limit, work, visit)) return;
@@ -334,11 +349,11 @@ template <class Limit, class Visit>
 bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells,
                                         const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
   absl::InlinedVector<std::pair<double, const internal::Brick*>, 32> near;
-  level.table->for_each([&](uint32_t number) {
+  level.table->for_each([&](uint32_t index) {
     ++work.cells;
-    const internal::Brick& brick = *bricks_[number];
-    const double away = squared_distance(point, internal::box_of_values(brick, level.extent.reach));
-    if (away <= limit()) near.emplace_back(away, &brick);
+    const internal::Brick& brick = *bricks_[index];
+    const double distance = squared_distance(point, internal::box_of_values(brick, level.geometry.max_extent));
+    if (distance <= limit()) near.emplace_back(distance, &brick);
     return true;
   });
   const auto farther = [](const auto& a, const auto& b) { return a.first > b.first; };
@@ -348,7 +363,7 @@ bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const 
     const internal::Brick* brick = near.front().second;
     std::pop_heap(near.begin(), near.end(), farther);
     const internal::KeyRange cells =
-        internal::within_brick(internal::cells_near(level, shells.region_within(limit())), brick->place.key);
+        internal::within_brick(internal::cells_near(level, shells.region_within(limit())), brick->geometry.key);
     candidates.collect(*brick, cells, point, shells.above(), internal::key_limit(limit()), work);
     if (!candidates.visit(limit, work, visit)) return false;
   }
@@ -358,9 +373,9 @@ bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const 
 template <class Visit>
 bool GridSnapshot::for_each(const Visit& visit) const {
   for (const internal::GridLevel& level : levels_) {
-    const bool go_on =
-        level.table->for_each([&](uint32_t number) { return internal::for_each_value(*bricks_[number], visit); });
-    if (!go_on) return false;
+    const bool keep_going =
+        level.table->for_each([&](uint32_t index) { return internal::for_each_value(*bricks_[index], visit); });
+    if (!keep_going) return false;
   }
   return true;
 }
@@ -370,13 +385,14 @@ bool GridSnapshot::for_each_from(GridCursor& cursor, const Visit& visit) const {
   for (; cursor.brick < bricks_.size(); cursor = {cursor.brick + 1, 0}) {
     const internal::Brick* const brick = bricks_[cursor.brick].get();
     if (brick == nullptr) continue;
-    size_t number = 0;
-    const bool go_on = internal::for_each_value(*brick, [&](const GridRef& value) {
-      if (number++ < cursor.values) return true;
+    LOCUS_DCHECK_LE(cursor.values, size_t{brick->size()});
+    size_t index = 0;
+    const bool keep_going = internal::for_each_value(*brick, [&](const GridRef& value) {
+      if (index++ < cursor.values) return true;
       ++cursor.values;
       return visit(value);
     });
-    if (!go_on) return false;
+    if (!keep_going) return false;
   }
   return true;
 }

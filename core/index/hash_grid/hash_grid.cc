@@ -13,13 +13,13 @@
 namespace locus {
 namespace {
 
-constexpr size_t kChangesPerLook = 64;   // of each value, before the cell size is looked at again
-constexpr size_t kRefiledAtOnce = 8192;  // values that change cells of one size for those of another with a batch
+constexpr size_t kChangesPerCheck = 64;    // changes per value, on average, before the cell size is checked again
+constexpr size_t kRefiledPerBatch = 8192;  // min number of values that a batch moves to cells of the new size
 
 }  // namespace
 
 using internal::BrickChange;
-using internal::BrickPlace;
+using internal::BrickGeometry;
 using internal::GridKey;
 using internal::GridSlot;
 
@@ -31,23 +31,80 @@ HashGrid::HashGrid(const HashGridOptions& options)
 double HashGrid::cell_size() const { return std::ldexp(1.0, base_exponent_); }
 
 GridRef HashGrid::at(uint32_t handle) const {
+  LOCUS_DCHECK_LT(handle, slots_.size());
   const GridSlot& slot = slots_[handle];
   const internal::Brick& brick = *bricks_[slot.brick];
   const bool recent = (slot.slot & GridSlot::kRecent) != 0;
   return {recent ? *brick.recent : *brick.sorted, slot.slot & ~GridSlot::kRecent, slot.brick};
 }
 
-// Of the level for values of that reach.
-int HashGrid::exponent_for(float reach) const {
-  return internal::exponent_covering(2.0 * double{reach}, base_exponent_, internal::kMaxCellExponent);
+// Checks that the location of a handle is a slot with that handle in an existing brick. O(1).
+void HashGrid::check_in_use(uint32_t handle) const {
+  if constexpr (kDebugChecks) {
+    if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+    LOCUS_DCHECK_LT(handle, slots_.size());
+    LOCUS_DCHECK_LT(slots_[handle].brick, bricks_.size());
+    LOCUS_DCHECK(bricks_[slots_[handle].brick] != nullptr);
+    LOCUS_DCHECK_EQ(at(handle).handle(), handle);
+  }
 }
 
-HashGrid::Level& HashGrid::level_for(float reach) {
-  const int exponent = exponent_for(reach);
-  auto at = levels_.begin();
-  while (at != levels_.end() && (*at)->exponent > exponent) ++at;
-  if (at == levels_.end() || (*at)->exponent != exponent) at = levels_.insert(at, std::make_unique<Level>(exponent));
-  return **at;
+// Checks the invariants of the class for the bricks and values that the batch has changed. O(changes + levels).
+void HashGrid::check_invariants(const GridBatch& batch) const {
+  if constexpr (kDebugChecks) {
+    size_t values = 0, bricks = 0;
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1]->exponent, levels_[i]->exponent);
+      LOCUS_DCHECK_GT(levels_[i]->size, 0u);
+      LOCUS_DCHECK_GT(levels_[i]->table->size(), 0u);
+      values += levels_[i]->size;
+      bricks += levels_[i]->table->size();
+    }
+    LOCUS_DCHECK_EQ(values, size_);
+    LOCUS_DCHECK_EQ(bricks, brick_info_.size() - free_bricks_.size());
+    LOCUS_DCHECK_EQ(touched_indices_.size(), brick_info_.size());
+    for (const uint32_t brick : touched_) check_brick(brick);
+    check_locations(batch);
+  }
+}
+
+// Checks that a brick agrees with its entry in brick_info_ and with its level; a dropped brick passes. O(1).
+void HashGrid::check_brick(uint32_t brick) const {
+  if (bricks_[brick] == nullptr) return;
+  const internal::Brick& version = *bricks_[brick];
+  const BrickInfo& info = brick_info_[brick];
+  LOCUS_DCHECK_EQ(version.index, brick);
+  LOCUS_DCHECK(version.geometry.key == info.geometry.key);
+  LOCUS_DCHECK_EQ(version.geometry.exponent, info.level->exponent);
+  LOCUS_DCHECK_LE(double{version.max_extent}, info.level->max_extent);
+  LOCUS_DCHECK(contains(info.level->bounds, Aabbd{version.geometry.low, version.geometry.high}));
+  const auto has_key = [&](uint32_t candidate) { return brick_info_[candidate].geometry.key == info.geometry.key; };
+  LOCUS_DCHECK_EQ(info.level->table->find(info.geometry.key, has_key), brick);
+}
+
+// Checks the locations of the values that the batch has moved or inserted. O(changes).
+void HashGrid::check_locations(const GridBatch& batch) const {
+  if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+  const auto check = [this](uint32_t handle, Vec3d position) {
+    check_in_use(handle);
+    LOCUS_DCHECK(at(handle).entry().position == position);
+    LOCUS_DCHECK_EQ(bricks_by_handle_[handle], slots_[handle].brick);
+  };
+  for (const GridMove& move : batch.moves.moves) check(move.handle, move.position);
+  for (const GridItem& item : batch.inserted) check(item.handle, item.entry.position);
+}
+
+int HashGrid::exponent_for(float extent) const {
+  return internal::exponent_covering(2.0 * double{extent}, base_exponent_, internal::kMaxCellExponent);
+}
+
+HashGrid::Level& HashGrid::level_for(float extent) {
+  const int exponent = exponent_for(extent);
+  auto level = levels_.begin();
+  while (level != levels_.end() && (*level)->exponent > exponent) ++level;
+  if (level == levels_.end() || (*level)->exponent != exponent)
+    level = levels_.insert(level, std::make_unique<Level>(exponent));
+  return **level;
 }
 
 internal::BrickTable& HashGrid::writable_table(Level& level) {
@@ -56,33 +113,34 @@ internal::BrickTable& HashGrid::writable_table(Level& level) {
 }
 
 uint32_t HashGrid::brick_for(Level& level, const GridKey& key) {
-  const uint32_t found = level.table->find(key, [&](uint32_t number) { return known_[number].place.key == key; });
+  const uint32_t found = level.table->find(key, [&](uint32_t brick) { return brick_info_[brick].geometry.key == key; });
   if (found != internal::BrickTable::kNone) return found;
-  uint32_t number = static_cast<uint32_t>(known_.size());
+  uint32_t brick = static_cast<uint32_t>(brick_info_.size());
   if (free_bricks_.empty()) {
-    known_.emplace_back();
-    touch_numbers_.push_back(0);
+    brick_info_.emplace_back();
+    touched_indices_.push_back(0);
   } else {
-    number = free_bricks_.back();
+    brick = free_bricks_.back();
     free_bricks_.pop_back();
   }
-  known_[number] = {BrickPlace::of(key, level.exponent), &level};
-  bricks_.set(number, nullptr);
-  writable_table(level).insert(key, number);
-  const Vec3d half = Vec3d{1, 1, 1} * (known_[number].place.edge / 2);
-  const Vec3d center = known_[number].place.center;
+  brick_info_[brick] = {BrickGeometry::of(key, level.exponent), &level};
+  bricks_.set(brick, nullptr);
+  writable_table(level).insert(key, brick);
+  const Vec3d half = Vec3d{1, 1, 1} * (brick_info_[brick].geometry.edge / 2);
+  const Vec3d center = brick_info_[brick].geometry.center;
   level.bounds = merge(level.bounds, Aabbd{center - half, center + half});
-  return number;
+  return brick;
 }
 
-// A brick is among the touched if the list says so at the number it keeps: nothing needs to be cleared between batches.
+// A brick is touched if touched_ holds it at its index in touched_indices_. An index left by an earlier batch fails
+// this test, so touched_indices_ needs no clearing between batches.
 inline uint32_t HashGrid::touch(uint32_t brick) {
-  const uint32_t number = touch_numbers_[brick];
-  if (number < touched_.size() && touched_[number] == brick) return number;
-  touch_numbers_[brick] = static_cast<uint32_t>(touched_.size());
+  const uint32_t known_index = touched_indices_[brick];
+  if (known_index < touched_.size() && touched_[known_index] == brick) return known_index;
+  touched_indices_[brick] = static_cast<uint32_t>(touched_.size());
   touched_.push_back(brick);
   change_counts_.push_back(0);
-  return touch_numbers_[brick];
+  return touched_indices_[brick];
 }
 
 void HashGrid::change(uint32_t brick, const BrickChange& change) {
@@ -93,8 +151,9 @@ void HashGrid::change(uint32_t brick, const BrickChange& change) {
 
 void HashGrid::remove(uint32_t handle) {
   LOCUS_CHECK_LT(handle, slots_.size());
+  check_in_use(handle);
   const GridSlot slot = slots_[handle];
-  --known_[slot.brick].level->size;
+  --brick_info_[slot.brick].level->size;
   --size_;
   change(slot.brick, {slot.slot, BrickChange::kLeaves});
 }
@@ -104,7 +163,7 @@ void HashGrid::insert(const GridItem& item) {
   Level& level = level_for(item.reach);
   const uint32_t brick =
       brick_for(level, internal::brick_of(internal::cell_of(item.entry.position, level.cells_per_unit)));
-  level.reach = std::max(level.reach, double{item.reach});
+  level.max_extent = std::max(level.max_extent, double{item.reach});
   ++level.size;
   ++size_;
   if (item.handle >= slots_.size()) slots_.resize(item.handle + 1);
@@ -113,14 +172,14 @@ void HashGrid::insert(const GridItem& item) {
   arrivals_.push_back(item);
 }
 
-// To another brick.
-void HashGrid::move_away(const GridMove& move, const GridMoves& moves) {
+// Moves a value to another brick.
+void HashGrid::move_to_other_brick(const GridMove& move, const GridMoves& moves) {
   const GridItem item = at(move.handle).item();
   if (!planted(PlantedBug::kGhostAfterMove)) remove(move.handle);
   insert_moved(item, move, moves);
 }
 
-// `before`: what it was.
+// Inserts the value `before` with the pose of `move`.
 void HashGrid::insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves) {
   GridItem item = before;
   item.entry.position = move.position;
@@ -133,12 +192,13 @@ void HashGrid::move_all(const GridMoves& batch) {
   const size_t before = changes_.size();
   changes_.resize(before + moves.size());
   size_t changes = before;
-  away_.clear();
+  leaving_moves_.clear();
   for (size_t i = 0; i < moves.size(); ++i) {
     const GridMove& move = moves[i];
+    check_in_use(move.handle);
     const GridSlot slot = slots_[move.handle];
-    if (!known_[slot.brick].place.holds(move.position)) {
-      away_.push_back(static_cast<uint32_t>(i));
+    if (!brick_info_[slot.brick].geometry.holds(move.position)) {
+      leaving_moves_.push_back(static_cast<uint32_t>(i));
       continue;
     }
     const uint32_t touched = touch(slot.brick);
@@ -146,10 +206,11 @@ void HashGrid::move_all(const GridMoves& batch) {
     changes_[changes++] = {touched, {slot.slot, static_cast<uint32_t>(i)}};
   }
   changes_.resize(changes);
-  for (const uint32_t i : away_) move_away(moves[i], batch);
+  for (const uint32_t i : leaving_moves_) move_to_other_brick(moves[i], batch);
 }
 
 void HashGrid::group_changes() {
+  LOCUS_DCHECK_EQ(change_counts_.size(), touched_.size());
   uint32_t begin = 0;
   for (uint32_t& count : change_counts_) begin += std::exchange(count, begin);
   grouped_.resize(changes_.size());
@@ -157,8 +218,8 @@ void HashGrid::group_changes() {
 }
 
 void HashGrid::drop_brick(uint32_t brick) {
-  Level& level = *known_[brick].level;
-  writable_table(level).erase(known_[brick].place.key, brick);
+  Level& level = *brick_info_[brick].level;
+  writable_table(level).erase(brick_info_[brick].geometry.key, brick);
   bricks_.set(brick, nullptr);
   free_bricks_.push_back(brick);
 }
@@ -169,11 +230,11 @@ void HashGrid::rebuild_bricks(const GridMoves& moves) {
     prefetch_changes(i);
     const uint32_t brick = touched_[i];
     const internal::Brick* const old = bricks_[brick].get();
-    const BrickPlace& place = known_[brick].place;
-    if (i < remains_.size() && remains_[i].gathered) {
-      replace_brick(brick, builder_.build(old, place, brick, remains_[i].sources, changes_of(i)));
+    const BrickGeometry& geometry = brick_info_[brick].geometry;
+    if (i < gathered_.size() && gathered_[i].is_gathered) {
+      replace_brick(brick, builder_.build(old, geometry, brick, gathered_[i].sources, changes_of(i)));
     } else {
-      replace_brick(brick, builder_.apply(old, place, brick, changes_of(i)));
+      replace_brick(brick, builder_.apply(old, geometry, brick, changes_of(i)));
     }
   }
 }
@@ -188,17 +249,19 @@ void HashGrid::replace_brick(uint32_t brick, internal::BrickPtr next) {
   }
 }
 
-// Of the touched brick of that number.
+// Returns the changes of the brick touched_[touched].
 absl::Span<const BrickChange> HashGrid::changes_of(size_t touched) const {
+  LOCUS_DCHECK_LT(touched, touched_.size());
   const uint32_t begin = touched == 0 ? 0 : change_counts_[touched - 1];
   return absl::MakeConstSpan(grouped_).subspan(begin, change_counts_[touched] - begin);
 }
 
-// Scattered changes find nothing in the cache: what the next bricks need is asked for while others are at work.
+// Prefetches the memory of bricks that follow touched_[touched]. Scattered changes miss the caches, so the memory of
+// the next bricks is requested while earlier ones are processed.
 void HashGrid::prefetch_changes(size_t touched) const {
   constexpr size_t kBrickAhead = 12, kBlocksAhead = 8, kValuesAhead = 4;
-  const auto brick_at = [this](size_t number) {
-    return number < touched_.size() ? bricks_[touched_[number]].get() : nullptr;
+  const auto brick_at = [this](size_t index) {
+    return index < touched_.size() ? bricks_[touched_[index]].get() : nullptr;
   };
   if (const internal::Brick* brick = brick_at(touched + kBrickAhead); brick != nullptr) brick->prefetch();
   if (const internal::Brick* brick = brick_at(touched + kBlocksAhead); brick != nullptr) brick->prefetch_blocks();
@@ -210,15 +273,15 @@ void HashGrid::prefetch_changes(size_t touched) const {
     ((change.slot & GridSlot::kRecent) != 0 ? *brick->recent : *brick->sorted).prefetch_value(slot);
   }
   if (brick->recent != nullptr && brick->recent_count < brick->recent_room())
-    brick->recent->prefetch_place(brick->recent_count);
+    brick->recent->prefetch_target(brick->recent_count);
 }
 
 void HashGrid::apply_to_bricks(const GridBatch& batch) {
   touched_.clear();
   change_counts_.clear();
   for (const uint32_t handle : batch.removed) {
-    const auto is_it = [handle](const GridItem& item) { return item.handle == handle; };
-    if (planted(PlantedBug::kGhostAfterMove) && std::any_of(batch.inserted.begin(), batch.inserted.end(), is_it))
+    const auto has_handle = [handle](const GridItem& item) { return item.handle == handle; };
+    if (planted(PlantedBug::kGhostAfterMove) && std::any_of(batch.inserted.begin(), batch.inserted.end(), has_handle))
       continue;
     remove(handle);
   }
@@ -232,13 +295,14 @@ void HashGrid::apply_to_bricks(const GridBatch& batch) {
   rebuild_bricks(batch.moves);
   clear_batch();
   std::erase_if(levels_, [](const std::unique_ptr<Level>& level) { return level->size == 0; });
+  check_invariants(batch);
 }
 
 void HashGrid::clear_batch() {
   clear_scratch(changes_);
   clear_scratch(grouped_);
   clear_scratch(arrivals_);
-  clear_scratch(remains_);
+  clear_scratch(gathered_);
   clear_scratch(sources_);
   builder_.end();
 }
@@ -249,36 +313,37 @@ bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
          moves >= size_ / 2;
 }
 
-// Instead of move_all(): goes from brick to brick, and looks up the move of each value. Values lie together there, in
-// the order of cells that most of them stay in, so that nothing needs to be found or sorted by brick.
+// Replaces move_all() if nearly all values move: iterates over the bricks and looks up the move of each value. Values
+// of a brick are adjacent in memory and most stay in their cell, so moves need not be grouped by brick.
 void HashGrid::gather_all(const GridMoves& moves) {
   const internal::MoveFinder finder(moves);
-  const auto bricks = static_cast<uint32_t>(known_.size());  // others are new, and hold arrivals only
+  const auto bricks = static_cast<uint32_t>(brick_info_.size());  // later bricks are new and hold arrivals only
   sources_.resize(size_);
-  internal::BrickSource* to = sources_.data();
-  for (uint32_t number = 0; number < bricks; ++number) {
-    const internal::Brick* const brick = bricks_[number].get();
+  internal::BrickSource* next = sources_.data();
+  for (uint32_t index = 0; index < bricks; ++index) {
+    const internal::Brick* const brick = bricks_[index].get();
     if (brick == nullptr) continue;
-    Level& level = *known_[number].level;
+    Level& level = *brick_info_[index].level;
     const auto leave = [&](const internal::GridBlock& block, uint32_t slot, const GridMove& move) {
       --level.size;
       --size_;
       insert_moved(block.item(slot), move, moves);
     };
     size_t moved = 0;
-    internal::BrickSource* const end = internal::gather_brick(*brick, finder, to, moved, leave);
+    internal::BrickSource* const end = internal::gather_brick(*brick, finder, next, moved, leave);
+    LOCUS_DCHECK_LE(end, sources_.data() + sources_.size());
     if (moved == 0) continue;
-    const uint32_t touched = touch(number);
-    if (remains_.size() <= touched) remains_.resize(touched + 1);
-    remains_[touched] = {true, absl::MakeConstSpan(to, static_cast<size_t>(end - to))};
-    to = end;
+    const uint32_t touched = touch(index);
+    if (gathered_.size() <= touched) gathered_.resize(touched + 1);
+    gathered_[touched] = {true, absl::MakeConstSpan(next, static_cast<size_t>(end - next))};
+    next = end;
   }
-  remains_.resize(touched_.size());
+  gathered_.resize(touched_.size());
 }
 
 size_t HashGrid::apply(const GridBatch& batch) {
   replaced_bytes_ = 0;
-  if (size_ == 0 && batch.inserted.size() >= first_choice_) {  // files a bulk load once, at the right size
+  if (size_ == 0 && batch.inserted.size() >= first_choice_) {  // files a bulk load once, by the right cell size
     internal::EvenSample sample(batch.inserted.size());
     for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
     base_exponent_ = internal::choose_cell_exponent(sample.values(), batch.inserted.size());
@@ -288,8 +353,8 @@ size_t HashGrid::apply(const GridBatch& batch) {
   apply_to_bricks(batch);
   const size_t changes = batch.removed.size() + batch.moves.moves.size() + batch.inserted.size();
   changes_since_choice_ += changes;
-  if (stale_.empty() && choice_is_stale()) choose_cell_size();
-  if (!stale_.empty()) refile(std::max(changes, kRefiledAtOnce));
+  if (stale_bricks_.empty() && choice_is_stale()) choose_cell_size();
+  if (!stale_bricks_.empty()) refile(std::max(changes, kRefiledPerBatch));
   return replaced_bytes_;
 }
 
@@ -303,45 +368,47 @@ void HashGrid::fill(absl::Span<const GridItem> items, double cell_size) {
 
 bool HashGrid::choice_is_stale() const {
   return size_ >= first_choice_ && (size_ >= 2 * size_at_choice_ || size_ <= size_at_choice_ / 8 ||
-                                    changes_since_choice_ >= kChangesPerLook * size_);
+                                    changes_since_choice_ >= kChangesPerCheck * size_);
 }
 
 void HashGrid::choose_cell_size() {
-  const bool same_number = size_ < 2 * size_at_choice_ && size_ > size_at_choice_ / 8;
+  const bool similar_size = size_ < 2 * size_at_choice_ && size_ > size_at_choice_ / 8;
   internal::EvenSample sample(size_);
   for_each([&sample](const GridRef& value) {
     sample.offer(value.entry().position, 2.0 * double{value.reach()});
     return true;
   });
   changes_since_choice_ = 0;
-  if (same_number && internal::cell_exponent_serves(sample.values(), size_, base_exponent_)) return;
+  if (similar_size && internal::cell_exponent_fits(sample.values(), size_, base_exponent_)) return;
   size_at_choice_ = size_;
   const int exponent = internal::choose_cell_exponent(sample.values(), size_);
   if (exponent != base_exponent_) start_refiling(exponent);
 }
 
-// Bricks that lie together in order, from the last to the first: they go to the same new ones.
+// Lists all bricks as stale. Neighbours follow each other in stale_bricks_, since their values go to the same new
+// bricks; refile() takes bricks from the end.
 void HashGrid::start_refiling(int base_exponent) {
   base_exponent_ = base_exponent;
-  for (uint32_t brick = 0; brick < known_.size(); ++brick)
-    if (bricks_[brick] != nullptr) stale_.push_back(brick);
+  for (uint32_t brick = 0; brick < brick_info_.size(); ++brick)
+    if (bricks_[brick] != nullptr) stale_bricks_.push_back(brick);
   const auto order = [this](uint32_t brick) {
-    const GridKey& key = known_[brick].place.key;
-    constexpr int kTogether = 2;  // bits of each axis
-    return std::pair(GridKey{key.x >> kTogether, key.y >> kTogether, key.z >> kTogether}, key);
+    const GridKey& key = brick_info_[brick].geometry.key;
+    constexpr int kGroupBits = 2;  // groups of 4x4x4 bricks
+    return std::pair(GridKey{key.x >> kGroupBits, key.y >> kGroupBits, key.z >> kGroupBits}, key);
   };
-  std::sort(stale_.begin(), stale_.end(), [&](uint32_t a, uint32_t b) { return order(b) < order(a); });
+  std::sort(stale_bricks_.begin(), stale_bricks_.end(), [&](uint32_t a, uint32_t b) { return order(b) < order(a); });
 }
 
-void HashGrid::refile(size_t values) {
+// Moves about `max_values` values, in whole bricks, from stale bricks to the levels of the new base cell.
+void HashGrid::refile(size_t max_values) {
   std::vector<uint32_t> leaving;
   std::vector<GridItem> items;
-  while (!stale_.empty() && items.size() < values) {
-    const uint32_t number = stale_.back();
-    stale_.pop_back();
-    const internal::Brick* const brick = bricks_[number].get();
+  while (!stale_bricks_.empty() && items.size() < max_values) {
+    const uint32_t index = stale_bricks_.back();
+    stale_bricks_.pop_back();
+    const internal::Brick* const brick = bricks_[index].get();
     if (brick == nullptr) continue;
-    const int exponent = brick->place.exponent;
+    const int exponent = brick->geometry.exponent;
     internal::for_each_value(*brick, [&](const GridRef& value) {
       if (exponent_for(value.reach()) == exponent) return true;
       leaving.push_back(value.handle());
@@ -349,7 +416,7 @@ void HashGrid::refile(size_t values) {
       return true;
     });
   }
-  if (stale_.empty()) std::vector<uint32_t>().swap(stale_);
+  if (stale_bricks_.empty()) std::vector<uint32_t>().swap(stale_bricks_);
   if (!items.empty()) apply_to_bricks({leaving, {}, items});
 }
 
@@ -358,10 +425,12 @@ GridSnapshot HashGrid::snapshot() {
   levels.reserve(levels_.size());
   for (const std::unique_ptr<Level>& level : levels_) {
     level->table_is_shared = true;
-    const double growth = internal::kBoundsGrowth * (level->reach + magnitude(level->bounds));
-    const double reach = level->reach + growth;
-    levels.push_back(
-        {level->exponent, {grown(level->bounds, reach), reach, level->cells_per_unit}, level->size, level->table});
+    const double epsilon = internal::kBoundsGrowth * (level->max_extent + magnitude(level->bounds));
+    const double max_extent = level->max_extent + epsilon;
+    levels.push_back({level->exponent,
+                      {grown(level->bounds, max_extent), max_extent, level->cells_per_unit},
+                      level->size,
+                      level->table});
   }
   return {std::move(levels), bricks_.snapshot(), bricks_by_handle_.snapshot(), cell_size()};
 }

@@ -1,15 +1,18 @@
-// A hash grid: moving values of any size in an unbounded world, where only occupied bricks of cells exist. This is the
-// writer's side: it takes batches of changes and gives snapshots, which share with it and with each other whatever has
-// not changed between them.
+// Hash grid: an index of moving values of any size in an unbounded world. Only occupied bricks of cells are stored.
+// This class is the writer's side: it applies batches of changes and makes snapshots for readers. The grid and its
+// snapshots share all bricks and blocks that did not change in between. README.md shows the structure in a picture.
 //
-// One writer; snapshots belong to any thread and never change, whatever happens to the grid they were taken from.
-// Values are known by handles, small numbers that the caller gives out; a handle names one value at a time.
+// Threads: one writer. Snapshots are immutable, may be used by any thread and outlive the grid. Values are identified
+// by handles, small integers that the caller assigns; a handle identifies one value at a time.
 //
-// Answers never depend on cell sizes: they only cull. The base cell is chosen anew from a sample of the values when
-// their number has doubled since or fallen to an eighth, and looked at when all have moved some dozen times. Values are
-// filed anew a few thousand with each batch, so that none takes long: meanwhile there are levels of both.
-// Invariants: every value lies in the brick of its position on a level at least as wide as it; no brick is empty;
-// slots_ says where each value is. |position| <= limits::kMaxCoordinate on each axis.
+// The cell size affects only the cost of a query, never its result. The base cell is chosen again from a sample of the
+// values if their number has doubled since the last choice or has fallen to an eighth, and checked after each value has
+// changed 64 times on average. The values are then moved to the new cells a few thousand per batch, which bounds the
+// time of a batch; until all have moved, levels of the old and the new size exist side by side.
+//
+// Invariants: every value is stored in the brick that contains its position, on a level whose cells are at least as
+// wide as the value; no brick is empty; slots_ holds the location of each value. |position| <= limits::kMaxCoordinate
+// on each axis.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_HASH_GRID_H_
 
@@ -26,13 +29,13 @@ namespace locus {
 struct HashGridOptions {
   // Edge of the base cell until the first choice, rounded up to a power of two between 2^-20 and 2^31.
   double cell_size = 8;
-  // Number of values at which the cell size is chosen from them for the first time; the largest number = never. Up to
-  // about a thousand values the choice comes to one brick, which is a list in columns.
+  // Number of values at which the cell size is chosen for the first time; the maximum of size_t means never. With up to
+  // about a thousand values the choice results in one brick, which is a list in columns.
   size_t first_choice = 8;
 };
 
-// What one batch changes. Handles are distinct within `removed` and `moves` together, and within `inserted`; a value
-// may be removed and inserted again under its handle.
+// Changes of one batch. Handles are distinct within `removed` and `moves` together, and within `inserted`; a value may
+// be removed and inserted again under its handle.
 struct GridBatch {
   absl::Span<const uint32_t> removed;
   GridMoves moves;
@@ -45,56 +48,63 @@ class HashGrid {
   explicit HashGrid(const HashGridOptions& options);
 
   size_t size() const { return size_; }
-  // The value of `handle`, which is in the grid.
+  // Returns the value of `handle`. Precondition: the handle is in use.
   GridRef at(uint32_t handle) const;
-  // Asks for the memory of at(), some time before it is needed.
+  // Prefetches the memory that at() reads first.
   [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { __builtin_prefetch(&slots_[handle]); }
-  // Returns the bytes of what the snapshots so far hold and later ones will not. O(n) and the bricks that are touched.
+  // Applies a batch. Returns the bytes that existing snapshots hold and later ones will not. Cost: O(changes), and for
+  // each touched brick O(changes) or O(values of the brick).
   size_t apply(const GridBatch& batch);
 
-  // The first values of a grid, as another grid had them whose cell_size() is given: it fits, and is not chosen again
-  // until it would be anyway.
+  // Fills an empty grid with `items`, using the cell_size() of another grid that held the same values. The cell size is
+  // not chosen again until the rules above require it.
   void fill(absl::Span<const GridItem> items, double cell_size);
 
-  // visit(GridRef) for each value, until it returns false. O(size).
+  // Calls visit(GridRef) for each value, until it returns false. O(size).
   template <class Visit>
   void for_each(const Visit& visit) const {
     for (const std::unique_ptr<Level>& level : levels_) {
-      const bool go_on =
-          level->table->for_each([&](uint32_t number) { return internal::for_each_value(*bricks_[number], visit); });
-      if (!go_on) return;
+      const bool keep_going =
+          level->table->for_each([&](uint32_t brick) { return internal::for_each_value(*bricks_[brick], visit); });
+      if (!keep_going) return;
     }
   }
-  // O(levels), and the lists of bricks where they changed.
+  // Returns an immutable snapshot of the present state. O(levels). The first change of a level after a snapshot copies
+  // the brick table of that level.
   GridSnapshot snapshot();
 
+  // Returns the cell edge of the base level.
   double cell_size() const;
 
  private:
   struct Level {
-    explicit Level(int of_exponent) : exponent(of_exponent) {}
+    explicit Level(int level_exponent) : exponent(level_exponent) {}
 
-    int exponent;
+    int exponent;  // cell edge = 2^exponent
     double cells_per_unit = internal::cells_per_unit(exponent);
-    double reach = 0;  // of the values since the level was empty last
-    Aabbd bounds;      // of bricks, likewise
-    size_t size = 0;
+    double max_extent = 0;  // largest extent of all values since the level was created
+    Aabbd bounds;           // bounds of all bricks since the level was created
+    size_t size = 0;        // number of values
     std::shared_ptr<internal::BrickTable> table = std::make_shared<internal::BrickTable>();
-    bool table_is_shared = false;
+    bool table_is_shared = false;  // true after a snapshot: the next change copies the table
   };
-  // A brick as the writer knows it: places of bricks that are gone are used again.
-  struct Known {
-    internal::BrickPlace place;
+  // Writer's record of a brick. The index of a dropped brick is reused.
+  struct BrickInfo {
+    internal::BrickGeometry geometry;
     Level* level = nullptr;
   };
 
   void remove(uint32_t handle);
-  void move_away(const GridMove& move, const GridMoves& moves);
+  void move_to_other_brick(const GridMove& move, const GridMoves& moves);
   void insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves);
   void insert(const GridItem& item);
-  int exponent_for(float reach) const;
-  Level& level_for(float reach);
+  // Returns the exponent of the level for values of that extent.
+  int exponent_for(float extent) const;
+  // Returns the level for values of that extent; creates it if it does not exist.
+  Level& level_for(float extent);
+  // Returns the index of the brick of `key`; creates an entry without a version if there is none.
   uint32_t brick_for(Level& level, const internal::GridKey& key);
+  // Returns the index of `brick` in touched_; appends it if this batch has not touched it before.
   uint32_t touch(uint32_t brick);
   void change(uint32_t brick, const internal::BrickChange& change);
   void group_changes();
@@ -112,41 +122,45 @@ class HashGrid {
   bool choice_is_stale() const;
   void choose_cell_size();
   void start_refiling(int base_exponent);
-  void refile(size_t values);
+  void refile(size_t max_values);
+  void check_in_use(uint32_t handle) const;
+  void check_invariants(const GridBatch& batch) const;
+  void check_brick(uint32_t brick) const;
+  void check_locations(const GridBatch& batch) const;
 
   int base_exponent_;
   size_t first_choice_;
   size_t size_at_choice_ = 0;
   size_t changes_since_choice_ = 0;
   size_t size_ = 0;
-  size_t replaced_bytes_ = 0;                   // by the batch at work
+  size_t replaced_bytes_ = 0;                   // bytes that the current batch has replaced
   std::vector<std::unique_ptr<Level>> levels_;  // coarse to fine
-  std::vector<Known> known_;                    // by brick
+  std::vector<BrickInfo> brick_info_;           // indexed by brick
   std::vector<uint32_t> free_bricks_;
-  std::vector<uint32_t> stale_;          // bricks that may hold values of cells chosen before
-  std::vector<uint32_t> touch_numbers_;  // by brick: its number among the touched, if the list there says so
+  std::vector<uint32_t> stale_bricks_;     // bricks that may hold values filed by the previous base cell
+  std::vector<uint32_t> touched_indices_;  // indexed by brick: index in touched_, valid only if touched_ confirms it
   internal::BrickArray bricks_;
-  std::vector<internal::GridSlot> slots_;  // by handle
-  internal::BrickNumbers bricks_by_handle_;
+  std::vector<internal::GridSlot> slots_;  // indexed by handle
+  internal::BrickIndices bricks_by_handle_;
 
-  // The batch at work.
+  // State of the current batch.
   struct Change {
-    uint32_t touched;
+    uint32_t touched;  // index in touched_
     internal::BrickChange change;
   };
-  std::vector<uint32_t> touched_;
-  std::vector<uint32_t> change_counts_;  // by number among the touched, then where their changes begin
+  std::vector<uint32_t> touched_;        // bricks
+  std::vector<uint32_t> change_counts_;  // indexed as touched_; after group_changes() the ends of ranges in grouped_
   std::vector<Change> changes_;
-  std::vector<uint32_t> away_;  // moves to other bricks
-  std::vector<internal::BrickChange> grouped_;
+  std::vector<uint32_t> leaving_moves_;         // indices of moves to other bricks
+  std::vector<internal::BrickChange> grouped_;  // changes in the order of touched_
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
-  // Where it moves nearly all.
-  struct Remains {
-    bool gathered = false;  // else the brick's changes say all
+  // Values that stay in a brick, gathered by a batch that moves nearly all values.
+  struct GatheredBrick {
+    bool is_gathered = false;  // false: the next version of the brick follows from its changes alone
     absl::Span<const internal::BrickSource> sources;
   };
-  std::vector<Remains> remains_;  // by number among the touched
+  std::vector<GatheredBrick> gathered_;  // indexed as touched_
   std::vector<internal::BrickSource> sources_;
 };
 

@@ -2,30 +2,33 @@
 
 #include <cmath>
 
+#include "core/base/check.h"
+
 namespace locus::internal {
 namespace {
 
-constexpr double kFirstValues = 12;   // that the first shell is to hold, about
-constexpr uint32_t kEnoughToSay = 4;  // of values, how many there are around
-constexpr double kWider = 1.6;        // each next one
+constexpr double kFirstShellValues = 12;  // target number of values in the first shell
+constexpr uint32_t kMinForEstimate = 4;   // min number of values for an estimate of the density
+constexpr double kShellGrowth = 1.6;      // factor of the width from shell to shell
 
-GridNear near_of(const Brick& brick, const Vec3d& point, float above, float upto) {
-  const Vec3d to_point = point - brick.place.center;
+// Returns the query of the kernels for a shell, relative to the brick.
+GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_to) {
+  const Vec3d to_point = point - brick.geometry.center;
   GridNear near;
   for (int axis = 0; axis < 3; ++axis) near.point[axis] = static_cast<float>(to_point[axis]);
-  const double margin = cull_margin(brick) + double{kCullSlack} * max_component(abs(to_point));
-  near.margin = static_cast<float>(margin * (1 + double{kCullSlack}));
+  const double epsilon = cull_epsilon(brick) + double{kCullEpsilon} * max_component(abs(to_point));
+  near.epsilon = static_cast<float>(epsilon * (1 + double{kCullEpsilon}));
   near.above = above;
-  near.upto = upto;
+  near.up_to = up_to;
   return near;
 }
 
-// How far off the sides of a region may be that holds all keys of a shell: more than twice what near_of() adds, and the
-// rounding of the sides.
-double slack_of(const Vec3d& point, const LevelExtent& level) {
+// Returns the epsilon by which the region of a shell is widened, so that it contains all keys of the shell: more than
+// twice the epsilon of near_of() plus the rounding of the sides.
+double epsilon_of(const Vec3d& point, const LevelGeometry& level) {
   const double edge = (1 << kBrickBits) / level.cells_per_unit;
   const double size = max_component(abs(point)) + magnitude(level.bounds);
-  return 8 * (double{kCullSlack} * (edge + level.reach) + kBoundsGrowth * (size + edge + level.reach));
+  return 8 * (double{kCullEpsilon} * (edge + level.max_extent) + kBoundsGrowth * (size + edge + level.max_extent));
 }
 
 }  // namespace
@@ -33,15 +36,15 @@ double slack_of(const Vec3d& point, const LevelExtent& level) {
 float key_limit(double limit) {
   constexpr double kLargest = std::numeric_limits<float>::max();
   if (limit >= kLargest / 2) return std::numeric_limits<float>::infinity();
-  return static_cast<float>(limit * (1 + double{kCullSlack})) + 0x1p-120f;  // which covers keys that underflow
+  return static_cast<float>(limit * (1 + double{kCullEpsilon})) + 0x1p-120f;  // the sum covers keys that underflow
 }
 
 double values_per_cell(const Brick& brick, const Vec3d& point) {
-  // The cells around the corner that is nearest to the point, as far as they are in the brick.
+  // Counts the cells around the cell corner nearest to the point, if they are in the brick.
   constexpr int kLast = (1 << kBrickBits) - 1;
   int low[3], high[3];
   for (int axis = 0; axis < 3; ++axis) {
-    const double cells = (point[axis] - brick.place.low[axis]) * brick.place.cells_per_unit;
+    const double cells = (point[axis] - brick.geometry.low[axis]) * brick.geometry.cells_per_unit;
     low[axis] = std::clamp(static_cast<int>(cells - 0.5), 0, kLast);
     high[axis] = std::clamp(static_cast<int>(cells + 0.5), 0, kLast);
   }
@@ -53,63 +56,66 @@ double values_per_cell(const Brick& brick, const Vec3d& point) {
                 brick.sorted->offsets()[row + static_cast<size_t>(low[0])];
     }
   }
-  if (values < kEnoughToSay) return brick.size() < kEnoughToSay ? 0 : brick.size() / double{kBrickCells};
+  if (values < kMinForEstimate) return brick.size() < kMinForEstimate ? 0 : brick.size() / double{kBrickCells};
   return static_cast<double>(values) / ((high[0] - low[0] + 1) * (high[1] - low[1] + 1) * (high[2] - low[2] + 1));
 }
 
-double values_per_cell(const LevelExtent& level, size_t values) {
+double values_per_cell(const LevelGeometry& level, size_t values) {
   const Vec3d cells = (level.bounds.max - level.bounds.min) * level.cells_per_unit;
   return static_cast<double>(values) / ((cells.x + 1) * (cells.y + 1) * (cells.z + 1));
 }
 
-NearestShells::NearestShells(const Vec3d& point, const LevelExtent& level, double per_cell)
-    : point_(point), level_(level), slack_(slack_of(point, level)) {
-  constexpr float kBall = 4.18879f;  // the volume of one with the radius 1
-  const double cells = std::cbrt(static_cast<float>(kFirstValues) / (kBall * static_cast<float>(per_cell)));
-  away_ = std::sqrt(squared_distance(point, level.bounds));
-  width_ = cells / level.cells_per_unit;
+NearestShells::NearestShells(const Vec3d& point, const LevelGeometry& level, double per_cell)
+    : point_(point), level_(level), epsilon_(epsilon_of(point, level)) {
+  LOCUS_DCHECK_GT(per_cell, 0.0);
+  constexpr float kBall = 4.18879f;  // volume of a ball of radius 1
+  const double cells = std::cbrt(static_cast<float>(kFirstShellValues) / (kBall * static_cast<float>(per_cell)));
+  bounds_distance_ = std::sqrt(squared_distance(point, level.bounds));
+  shell_width_ = cells / level.cells_per_unit;
 }
 
 Aabbd NearestShells::region_within(double limit) const {
-  return grown(Aabbd{point_, point_}, std::sqrt(limit) * (1 + 16 * double{kCullSlack}) + slack_);
+  return grown(Aabbd{point_, point_}, std::sqrt(limit) * (1 + 16 * double{kCullEpsilon}) + epsilon_);
 }
 
 bool NearestShells::next(double limit) {
   const float last = key_limit(limit);
-  if (upto_ >= last) return false;
-  if (upto_ >= 0) width_ *= kWider;
-  above_ = upto_;
-  const double squared = (away_ + width_) * (away_ + width_);
+  if (up_to_ >= last) return false;
+  if (up_to_ >= 0) shell_width_ *= kShellGrowth;
+  above_ = up_to_;
+  const double squared = (bounds_distance_ + shell_width_) * (bounds_distance_ + shell_width_);
   region_ = region_within(squared);
   if (squared < limit && !contains(region_, level_.bounds)) {
-    upto_ = key_limit(squared);
+    up_to_ = key_limit(squared);
+    LOCUS_DCHECK_LE(above_, up_to_);
     return true;
   }
-  upto_ = last;
+  up_to_ = last;
+  LOCUS_DCHECK_LT(above_, up_to_);
   region_ = region_within(limit);
   return true;
 }
 
-void NearCandidates::collect(const Brick& brick, const KeyRange& cells, const Vec3d& point, float above, float upto,
+void NearCandidates::collect(const Brick& brick, const KeyRange& cells, const Vec3d& point, float above, float up_to,
                              Work& work) {
-  const GridNear near = near_of(brick, point, above, upto);
+  const GridNear near = near_of(brick, point, above, up_to);
   const GridRows rows = rows_of(brick, cells);
   work.cells += rows.count;
-  if (rows.count != 0) collect_rows(*brick.sorted, brick.number, rows, near);
+  if (rows.count != 0) collect_rows(*brick.sorted, brick.index, rows, near);
   if (brick.recent_count != 0) collect_recent(brick, near, work);
 }
 
 void NearCandidates::collect_recent(const Brick& brick, const GridNear& near, Work& work) {
   const GridKernels& kernels = active_grid_kernels();
   const auto source = static_cast<uint32_t>(sources_.size());
-  sources_.push_back({brick.recent.get(), brick.number});
+  sources_.push_back({brick.recent.get(), brick.index});
   float keys[GridRows::kMaxValues + GridBlock::kLanes];
   size_t next = 0;
   const auto cull = [&](const GridRows& rows, uint32_t* slots) {
     next = 0;
     return kernels.collect_near(rows, near, slots, keys);
   };
-  Work collected;  // its tests are counted when they are made
+  Work collected;  // tests are counted later, by visit()
   scan_recent(brick, collected, cull, [&](const GridRef& value) {
     candidates_.push_back({keys[next++], value.slot(), source});
     return true;
@@ -129,34 +135,38 @@ void NearCandidates::collect_rows(const GridBlock& block, uint32_t brick, const 
 }
 
 void NearCandidates::add(const uint32_t* slots, const float* keys, uint32_t count) {
+  LOCUS_DCHECK(!sources_.empty());
   const auto source = static_cast<uint32_t>(sources_.size() - 1);
   const size_t before = candidates_.size();
   candidates_.resize(before + count);
   for (uint32_t i = 0; i < count; ++i) {
+    LOCUS_DCHECK_GE(keys[i], 0.0f);
     candidates_[before + i] = {keys[i], slots[i], source};
     sources_[source].block->prefetch_entry(slots[i]);
   }
 }
 
 void NearCandidates::sort() {
+  const auto before = [](const Candidate& a, const Candidate& b) { return a.key < b.key; };
   const auto count = static_cast<uint32_t>(candidates_.size());
   if (count > kMaxSorted) {
-    std::sort(candidates_.begin(), candidates_.end(),
-              [](const Candidate& a, const Candidate& b) { return a.key < b.key; });
+    std::sort(candidates_.begin(), candidates_.end(), before);
     return;
   }
-  // By the bits of the keys, which are not negative; the lowest make room for the candidate's number.
-  int32_t numbers[kMaxSorted];
+  // Sorts integers: the bits of a key, which is not negative, are ordered like the key. Their lowest bits are replaced
+  // by the index of the candidate.
+  int32_t packed[kMaxSorted];
   Candidate given[kMaxSorted];
   for (uint32_t i = 0; i < count; ++i) {
     given[i] = candidates_[i];
-    numbers[i] = (std::bit_cast<int32_t>(given[i].key) & ~kNumberBits) | static_cast<int32_t>(i);
+    packed[i] = (std::bit_cast<int32_t>(given[i].key) & ~kIndexMask) | static_cast<int32_t>(i);
   }
-  active_grid_kernels().sort_few(numbers, count);
+  active_grid_kernels().sort_few(packed, count);
   for (uint32_t i = 0; i < count; ++i) {
-    candidates_[i] = given[numbers[i] & kNumberBits];
-    candidates_[i].key = std::bit_cast<float>(numbers[i] & ~kNumberBits);
+    candidates_[i] = given[packed[i] & kIndexMask];
+    candidates_[i].key = std::bit_cast<float>(packed[i] & ~kIndexMask);
   }
+  LOCUS_DCHECK(std::is_sorted(candidates_.begin(), candidates_.end(), before));
 }
 
 }  // namespace locus::internal

@@ -1,9 +1,11 @@
-// How the hash grid finds what is nearest to a point: shells around it, each a little wider than the one before, whose
-// values are collected by their distance in float and visited from near to far. So few are visited that are not among
-// the nearest, however many those are. For GridSnapshot; one object a query and thread.
+// Nearest-value search of the hash grid: visits shells around a point, each a little wider than the one before. The
+// values of a shell are collected by their distance in float and visited from near to far, so that few values are
+// visited that are not among the nearest, however many values lie around. For GridSnapshot; one object per query and
+// thread.
 //
-// A value's key is the squared distance of its bounds, in float and never more than in double; the same however often
-// it is asked. A shell is the keys above one number and up to another, so that each value lies in exactly one.
+// The key of a value is the squared distance of its bounds from the point, in float and never greater than the exact
+// one; it is the same for every shell. A shell is a range of keys (above, up_to], so each value lies in exactly one
+// shell.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 
@@ -16,49 +18,50 @@
 
 namespace locus::internal {
 
-// No key of bounds within the squared distance `limit` is greater.
+// Returns an upper bound of the keys of all values within the squared distance `limit`.
 float key_limit(double limit);
 
-// About how many values there are in a cell near `point`, which lies in the brick; 0 where there are too few to say.
+// Returns the estimated number of values per cell near `point`, which lies in the brick; 0 if the brick has too few
+// values for an estimate.
 double values_per_cell(const Brick& brick, const Vec3d& point);
-// The same of `values` anywhere on the level.
-double values_per_cell(const LevelExtent& level, size_t values);
+// Returns the mean number of values per cell of a level with `values` values.
+double values_per_cell(const LevelGeometry& level, size_t values);
 
-// The shells around a point on one level.
+// Sequence of shells around a point on one level.
 class NearestShells {
  public:
-  // `per_cell`: about how many values there are in a cell near the point; decides cost only. Borrows the level.
-  NearestShells(const Vec3d& point, const LevelExtent& level, double per_cell);
-  NearestShells(const Vec3d& point, const LevelExtent&& level, double per_cell) = delete;
+  // `per_cell` is the estimated number of values per cell near the point; it affects only cost. Borrows the level.
+  NearestShells(const Vec3d& point, const LevelGeometry& level, double per_cell);
+  NearestShells(const Vec3d& point, const LevelGeometry&& level, double per_cell) = delete;
 
-  // Goes on to the next shell; false where nothing remains within `limit`.
+  // Advances to the next shell. Returns false if no key within the squared distance `limit` remains.
   bool next(double limit);
   float above() const { return above_; }
-  float upto() const { return upto_; }
-  // Every value of this shell reaches into it.
+  float up_to() const { return up_to_; }
+  // Returns a box that overlaps the bounds of every value of this shell.
   const Aabbd& region() const { return region_; }
-  // Every value within the squared distance `limit` reaches into it.
+  // Returns a box that overlaps the bounds of every value within the squared distance `limit`.
   Aabbd region_within(double limit) const;
 
  private:
   const Vec3d point_;
-  const LevelExtent& level_;
-  const double slack_;  // of a region's sides
-  double away_;         // the point, from the bounds of all
-  double width_;        // of the ball around the point, beyond that
+  const LevelGeometry& level_;
+  const double epsilon_;    // rounding allowance of the sides of a region
+  double bounds_distance_;  // distance from the point to the bounds of the level
+  double shell_width_;      // radius of the present shell minus bounds_distance_
   float above_ = -1;
-  float upto_ = -1;
+  float up_to_ = -1;
   Aabbd region_;
 };
 
-// Values of some bricks, visited from near to far.
+// Candidates of one shell: values of some bricks, to be visited from near to far.
 class NearCandidates {
  public:
-  // Adds the values of `cells`, numbered within the brick, and those that came lately, whose key is in the shell.
-  void collect(const Brick& brick, const KeyRange& cells, const Vec3d& point, float above, float upto, Work& work);
+  // Adds the values of `cells`, which are relative to the brick, and of its log whose key is in (above, up_to].
+  void collect(const Brick& brick, const KeyRange& cells, const Vec3d& point, float above, float up_to, Work& work);
 
-  // visit(GridRef) of each, the nearest first, up to limit(), which may fall meanwhile; false once visit() was. None
-  // remains.
+  // Calls visit(GridRef) for each candidate within limit(), the nearest first, until it returns false; limit() may fall
+  // during the visit. Returns false if a call did. Removes all candidates.
   template <class Limit, class Visit>
   bool visit(const Limit& limit, Work& work, const Visit& visit);
 
@@ -72,7 +75,7 @@ class NearCandidates {
     const GridBlock* block;
     uint32_t brick;
   };
-  static constexpr int32_t kNumberBits = kMaxSorted - 1;
+  static constexpr int32_t kIndexMask = kMaxSorted - 1;
 
   GridRef value(const Candidate& candidate) const {
     const Source& source = sources_[candidate.source];
@@ -80,9 +83,9 @@ class NearCandidates {
   }
   void collect_rows(const GridBlock& block, uint32_t brick, const GridRows& rows, const GridNear& near);
   void collect_recent(const Brick& brick, const GridNear& near, Work& work);
-  // Candidates of the last source.
+  // Adds candidates of the last source.
   void add(const uint32_t* slots, const float* keys, uint32_t count);
-  // By their keys, which become a little smaller: none becomes greater than a later one's.
+  // Sorts the candidates by key. May lower the keys a little, which keeps their order.
   void sort();
 
   absl::InlinedVector<Candidate, kMaxSorted> candidates_;
@@ -92,16 +95,16 @@ class NearCandidates {
 template <class Limit, class Visit>
 bool NearCandidates::visit(const Limit& limit, Work& work, const Visit& visit) {
   sort();
-  bool go_on = true;
+  bool keep_going = true;
   for (const Candidate& candidate : candidates_) {
     if (candidate.key > key_limit(limit())) break;
     ++work.tests;
-    go_on = visit(value(candidate));
-    if (!go_on) break;
+    keep_going = visit(value(candidate));
+    if (!keep_going) break;
   }
   candidates_.clear();
   sources_.clear();
-  return go_on;
+  return keep_going;
 }
 
 }  // namespace locus::internal

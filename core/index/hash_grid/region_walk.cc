@@ -11,7 +11,7 @@ void prefetch(const void* from, size_t bytes) {
 }
 
 void prefetch_rows(const GridRows& rows) {
-  for (const float* column : {rows.x, rows.y, rows.z, rows.reach})
+  for (const float* column : {rows.x, rows.y, rows.z, rows.extent})
     for (uint32_t row = 0; row < rows.count; ++row)
       prefetch(column + rows.begin[row], (rows.end[row] - rows.begin[row]) * sizeof(float));
 }
@@ -19,42 +19,44 @@ void prefetch_rows(const GridRows& rows) {
 }  // namespace
 
 void RegionSteps::find_bricks(const GridRegion& region) {
+  LOCUS_DCHECK(region.grid != nullptr);
   region_ = region;
-  piece_count_ = slot_count_ = 0;
+  part_count_ = slot_count_ = 0;
   Work work;
   is_small_ =
       region.grid->for_few_bricks(region.bounds, kMaxBricks, work, [&](const Brick& brick, const KeyRange& cells) {
+        LOCUS_DCHECK_LT(part_count_, kMaxBricks);
         brick.prefetch_head();
-        pieces_[piece_count_].brick = &brick;
-        pieces_[piece_count_++].cells = cells;
+        parts_[part_count_].brick = &brick;
+        parts_[part_count_++].cells = cells;
       });
   cells_ = work.cells;
 }
 
 void RegionSteps::find_blocks() {
   if (!is_small_) return;
-  for (uint32_t i = 0; i < piece_count_; ++i) {
-    const Piece& piece = pieces_[i];
-    const GridBlock& sorted = *piece.brick->sorted;
+  for (uint32_t i = 0; i < part_count_; ++i) {
+    const BrickPart& part = parts_[i];
+    const GridBlock& sorted = *part.brick->sorted;
     __builtin_prefetch(&sorted);
-    for (int64_t z = piece.cells.lo.z; z <= piece.cells.hi.z; ++z) {
+    for (int64_t z = part.cells.lo.z; z <= part.cells.hi.z; ++z) {
       const auto layer = static_cast<size_t>(z) << (2 * kBrickBits);
       __builtin_prefetch(&sorted.offsets()[layer]);
       __builtin_prefetch(&sorted.offsets()[layer + (1 << (2 * kBrickBits))]);
     }
-    if (piece.brick->recent_count != 0) __builtin_prefetch(piece.brick->recent.get());
+    if (part.brick->recent_count != 0) __builtin_prefetch(part.brick->recent.get());
   }
 }
 
 void RegionSteps::find_rows() {
   if (!is_small_) return;
-  for (uint32_t i = 0; i < piece_count_; ++i) {
-    Piece& piece = pieces_[i];
-    piece.rows = rows_of(*piece.brick, piece.cells);
-    prefetch_rows(piece.rows);
-    if (piece.brick->recent_count == 0) continue;
-    for (int number = 0; number < 4; ++number)
-      prefetch(piece.brick->recent->column(number), piece.brick->recent_count * sizeof(float));
+  for (uint32_t i = 0; i < part_count_; ++i) {
+    BrickPart& part = parts_[i];
+    part.rows = rows_of(*part.brick, part.cells);
+    prefetch_rows(part.rows);
+    if (part.brick->recent_count == 0) continue;
+    for (int column = 0; column < 4; ++column)
+      prefetch(part.brick->recent->column(column), part.brick->recent_count * sizeof(float));
   }
 }
 
@@ -74,14 +76,14 @@ void RegionSteps::cull(const CullOf& cull_of) {
     slots_[slot_count_++] = value.slot();
     return true;
   };
-  for (uint32_t i = 0; is_small_ && i < piece_count_; ++i) {
-    Piece& piece = pieces_[i];
-    const Brick& brick = *piece.brick;
+  for (uint32_t i = 0; is_small_ && i < part_count_; ++i) {
+    BrickPart& part = parts_[i];
+    const Brick& brick = *part.brick;
     const auto cull = cull_of(brick);
-    is_small_ = scan_rows(*brick.sorted, brick.number, piece.rows, work, cull, keep);
-    piece.sorted_end = slot_count_;
+    is_small_ = scan_rows(*brick.sorted, brick.index, part.rows, work, cull, keep);
+    part.sorted_end = slot_count_;
     is_small_ = is_small_ && scan_recent(brick, work, cull, keep);
-    piece.recent_end = slot_count_;
+    part.recent_end = slot_count_;
   }
   cells_ += work.cells;
 }
@@ -90,6 +92,7 @@ void RegionSteps::cull(const CullOf& cull_of) {
 
 RegionWalk::RegionWalk(size_t begin, size_t end, std::function<GridRegion(size_t)> region_of)
     : region_of_(std::move(region_of)), next_(begin), end_(end) {
+  LOCUS_DCHECK_LE(begin, end);
   for (size_t ahead = 0; ahead < kAhead; ++ahead) {
     for (size_t step = 0; step <= ahead; ++step) take_step(begin + ahead - step, step);
   }

@@ -1,11 +1,11 @@
-// Visits the values near many regions, one region after the other, in steps: while one is visited, the memory that the
-// next few need is on its way. A grid of a million values lies outside the caches, and each step of a query waits for
-// memory that the step before it named; this way only the first query waits.
+// Region walk: visits the values near many regions, one region after the other, in steps, so that the memory of the
+// next few regions is prefetched while one is visited. A grid of a million values does not fit the caches, and each
+// step of a query waits for memory whose address the step before has read; in a walk only the first query waits.
 //
-// A walk belongs to one thread and borrows the grids. Every region's values are those that GridSnapshot's own visits
-// give. Regions of more than a few bricks, or values, are visited by those in the end: they wait little.
-// Source: Chen, Ailamaki, Gibbons, Mowry, Improving Hash Join Performance through Prefetching, 2004 (software
-// pipelining of dependent lookups).
+// A walk belongs to one thread and borrows the grids. It visits for each region the same values as the visits of
+// GridSnapshot. Regions of more than a few bricks or values are passed to GridSnapshot, since waiting is a small part
+// of their cost. Source: Chen, Ailamaki, Gibbons, Mowry, Improving Hash Join Performance through Prefetching, 2004
+// (software pipelining of dependent lookups).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_REGION_WALK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_REGION_WALK_H_
 
@@ -14,17 +14,19 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/index/hash_grid/grid_snapshot.h"
 
 namespace locus {
 
-// What a query asks of a grid: the values in a box or, where there is a ball, in that ball, which the box bounds.
+// Region of a grid query: the values in `ball` if it is given, with `bounds` as its bounds; else the values in
+// `bounds`.
 struct GridRegion {
   const GridSnapshot* grid = nullptr;
   Aabbd bounds;
   std::optional<Balld> ball;
 
-  // visit(GridRef) as the grid's own visits.
+  // Calls visit(GridRef) like GridSnapshot::visit_ball() or visit_region().
   template <class Visit>
   void visit(Work& work, const Visit& visit) const {
     if (ball) return grid->visit_ball(*ball, bounds, work, visit);
@@ -34,7 +36,7 @@ struct GridRegion {
 
 namespace internal {
 
-// One region on its way through the steps, which are called in this order, some time apart.
+// State of one region between its steps, which are called in this order, some time apart.
 class RegionSteps {
  public:
   void find_bricks(const GridRegion& region);
@@ -42,7 +44,7 @@ class RegionSteps {
   void find_rows();
   void find_values();
 
-  // visit(GridRef) for each value, until it returns false.
+  // Calls visit(GridRef) for each value until it returns false.
   template <class Visit>
   void visit(Work& work, const Visit& visit) const;
 
@@ -50,21 +52,21 @@ class RegionSteps {
   static constexpr size_t kMaxBricks = 8;
   static constexpr size_t kMaxValues = 256;
 
-  struct Piece {
+  struct BrickPart {
     const Brick* brick;
     KeyRange cells;
     GridRows rows;
-    uint32_t sorted_end, recent_end;  // of its slots: those in the sorted block, then those in the log
+    uint32_t sorted_end, recent_end;  // ends in slots_: of the sorted block's slots, then of the log's
   };
 
   template <class CullOf>
   void cull(const CullOf& cull_of);
 
   GridRegion region_;
-  bool is_small_ = false;  // all there is to find fits here
-  uint32_t piece_count_ = 0, slot_count_ = 0;
+  bool is_small_ = false;  // true if all bricks and values of the region fit the arrays below
+  uint32_t part_count_ = 0, slot_count_ = 0;
   uint64_t cells_ = 0;
-  std::array<Piece, kMaxBricks> pieces_;
+  std::array<BrickPart, kMaxBricks> parts_;
   std::array<uint32_t, kMaxValues> slots_;
 };
 
@@ -80,10 +82,12 @@ void RegionSteps::visit(Work& work, const Visit& visit) const {
     }
     return true;
   };
-  for (uint32_t i = 0; i < piece_count_; ++i) {
-    const Piece& piece = pieces_[i];
-    if (!visit_up_to(piece.sorted_end, *piece.brick->sorted, piece.brick->number)) return;
-    if (next != piece.recent_end && !visit_up_to(piece.recent_end, *piece.brick->recent, piece.brick->number)) return;
+  for (uint32_t i = 0; i < part_count_; ++i) {
+    const BrickPart& part = parts_[i];
+    LOCUS_DCHECK_LE(part.sorted_end, part.recent_end);
+    LOCUS_DCHECK_LE(part.recent_end, slot_count_);
+    if (!visit_up_to(part.sorted_end, *part.brick->sorted, part.brick->index)) return;
+    if (next != part.recent_end && !visit_up_to(part.recent_end, *part.brick->recent, part.brick->index)) return;
   }
 }
 
@@ -91,24 +95,27 @@ void RegionSteps::visit(Work& work, const Visit& visit) const {
 
 class RegionWalk {
  public:
-  // Whether a walk through such a grid is faster than one visit after the other: from about 30 MB on (measured: as fast
-  // at 100,000 values, 1.5 to 2 times at a million, but a third slower in the caches).
+  // Returns true if a walk through such a grid is faster than separate visits: from about 30 MB on. Measured: equal at
+  // 100,000 values, 1.5 to 2 times as fast at a million, a third slower if the grid fits the caches.
   static bool pays(const GridSnapshot& grid) { return grid.size() >= 250'000; }
 
-  // The regions region_of(begin) to region_of(end - 1), asked for in this order, some before their visits.
+  // Prepares a walk over region_of(begin) to region_of(end - 1). The function is called in this order, up to kAhead
+  // regions before the visit.
   RegionWalk(size_t begin, size_t end, std::function<GridRegion(size_t)> region_of);
 
-  // visit(GridRef) for the values of the next region, until it returns false. At most once a region.
+  // Calls visit(GridRef) for the values of the next region until it returns false. Precondition: not all regions have
+  // been visited.
   template <class Visit>
   void visit(Work& work, const Visit& visit) {
+    LOCUS_DCHECK_LT(next_, end_);
     take_steps();
     steps_[next_++ % steps_.size()].visit(work, visit);
   }
 
  private:
-  static constexpr size_t kAhead = 4;  // steps before the visit
+  static constexpr size_t kAhead = 4;  // number of steps before a visit
 
-  // The region kAhead from the next takes its first step, and those before it their next ones.
+  // Runs the first step of the region kAhead after the next one, and the following steps of those between.
   void take_steps();
   void take_step(size_t region, size_t step);
 

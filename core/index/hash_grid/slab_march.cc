@@ -4,10 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus::internal {
 namespace {
 
-// Covers the rounding of a dozen operations on numbers not much greater than the magnitude it is multiplied by.
+// Relative epsilon: covers the rounding of a dozen operations on numbers that are not much greater than the magnitude
+// it is multiplied by.
 constexpr double kRounding = 0x1p-44;
 
 int dominant_axis(Vec3d direction) {
@@ -18,35 +21,38 @@ int dominant_axis(Vec3d direction) {
 
 }  // namespace
 
-SlabMarch::SlabMarch(const SlabRay<double>& ray, const LevelExtent& level, double limit)
+SlabMarch::SlabMarch(const SlabRay<double>& ray, const LevelGeometry& level, double limit)
     : origin_(ray.origin()),
       direction_(ray.direction()),
       bounds_(level.bounds),
       per_unit_(level.cells_per_unit),
       slab_edge_((1 << kBrickBits) / level.cells_per_unit),
       axis_(dominant_axis(ray.direction())) {
+  LOCUS_DCHECK(!level.bounds.empty());
+  LOCUS_DCHECK_GE(level.max_extent, 0.0);
+  LOCUS_DCHECK_GT(level.cells_per_unit, 0.0);
   const Interval<double> part = ray.interval(bounds_);
   if (part.near > part.far || part.far < 0 || part.near > limit) return;
   part_ = {part.near, part.far};
   const double size = magnitude(bounds_);
-  margin_ =
-      level.reach + 2 * ray.margin(size) + kRounding * (max_component(abs(origin_)) + size + level.reach + slab_edge_);
+  tube_radius_ = level.max_extent + 2 * ray.margin(size) +
+                 kRounding * (max_component(abs(origin_)) + size + level.max_extent + slab_edge_);
   const Vec3d enter = point_at(std::max(part.near, 0.0));
   const Vec3d leave = point_at(std::min(part.far, std::max(limit, 0.0)));
   bricks_ = std::numeric_limits<double>::infinity();
-  if (!is_finite(enter) || !is_finite(leave) || !std::isfinite(margin_)) return;
+  if (!is_finite(enter) || !is_finite(leave) || !std::isfinite(tube_radius_)) return;
   step_ = direction_[axis_] < 0 ? -1 : 1;
   const auto index_at = [this](double x) {
     return brick_index(std::clamp(x, bounds_.min[axis_], bounds_.max[axis_]), per_unit_);
   };
-  first_ = index_at(enter[axis_] - margin_ * static_cast<double>(step_));
-  slabs_ = (index_at(leave[axis_] + margin_ * static_cast<double>(step_)) - first_) * step_ + 1;
-  const Vec3d way = abs(leave - enter);
-  bricks_ = static_cast<double>(slabs_) + (way.x + way.y + way.z - way[axis_]) / slab_edge_;
+  first_ = index_at(enter[axis_] - tube_radius_ * static_cast<double>(step_));
+  slabs_ = (index_at(leave[axis_] + tube_radius_ * static_cast<double>(step_)) - first_) * step_ + 1;
+  const Vec3d path = abs(leave - enter);
+  bricks_ = static_cast<double>(slabs_) + (path.x + path.y + path.z - path[axis_]) / slab_edge_;
 }
 
 SlabMarch::Crossing SlabMarch::cross(double index, double edge, double limit) const {
-  const double low = index * edge - margin_, high = (index + 1) * edge + margin_;
+  const double low = index * edge - tube_radius_, high = (index + 1) * edge + tube_radius_;
   const double o = origin_[axis_], d = direction_[axis_];
   const double enter = ((step_ > 0 ? low : high) - o) / d, leave = ((step_ > 0 ? high : low) - o) / d;
   Crossing crossing{std::max(enter, part_.near), Aabbd()};
@@ -54,12 +60,13 @@ SlabMarch::Crossing SlabMarch::cross(double index, double edge, double limit) co
   const double t1 = std::min({leave, part_.far, std::max(limit, 0.0)});
   if (t0 > t1) return crossing;
   const Vec3d a = point_at(t0), b = point_at(t1);
-  const Aabbd near = grown(Aabbd{min(a, b), max(a, b)}, margin_);
+  const Aabbd near = grown(Aabbd{min(a, b), max(a, b)}, tube_radius_);
   crossing.positions = {max(near.min, bounds_.min), min(near.max, bounds_.max)};
   return crossing;
 }
 
 SlabMarch::Slab SlabMarch::slab(int64_t n, double limit) const {
+  LOCUS_DCHECK(0 <= n && n < slabs_);
   const int64_t index = first_ + n * step_;
   const Crossing crossing = cross(static_cast<double>(index), slab_edge_, limit);
   Slab slab{crossing.near, {{0, 0, 0}, {-1, -1, -1}}};
@@ -69,8 +76,10 @@ SlabMarch::Slab SlabMarch::slab(int64_t n, double limit) const {
   return slab;
 }
 
-SlabMarch::Layer SlabMarch::layer(int64_t n, int number, double limit) const {
-  const int64_t within = step_ > 0 ? number : (1 << kBrickBits) - 1 - number;
+SlabMarch::Layer SlabMarch::layer(int64_t n, int layer_index, double limit) const {
+  LOCUS_DCHECK(0 <= n && n < slabs_);
+  LOCUS_DCHECK(0 <= layer_index && layer_index < 1 << kBrickBits);
+  const int64_t within = step_ > 0 ? layer_index : (1 << kBrickBits) - 1 - layer_index;
   const int64_t index = ((first_ + n * step_) << kBrickBits) + within;
   const Crossing crossing = cross(static_cast<double>(index), slab_edge_ / (1 << kBrickBits), limit);
   Layer layer{crossing.near, {{0, 0, 0}, {-1, -1, -1}}};

@@ -1,11 +1,11 @@
-// Where a ray goes through one level of the hash grid: slabs of bricks across the ray's dominant axis, from near to
-// far, each with the rectangle of bricks whose values the ray can meet in it. Immutable; any thread.
+// March of a ray through one level of the hash grid: slabs of bricks perpendicular to the ray's dominant axis, from
+// near to far, each with the rectangle of bricks whose values the ray can meet in it. Immutable; any thread.
 //
-// Every figure is computed from the slab's integer index, never accumulated along the ray, and widened by how far
-// values reach out of their bricks, by the pad of the slab test and by the rounding of the figures themselves. So a
-// value that passes the slab test is always filed in a brick named here, and each brick is named at most once. Compare
-// Amanatides and Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987, whose accumulated steps lose cells on
-// long rays.
+// Every bound is computed from the integer index of the slab, never accumulated along the ray, and widened by the
+// largest extent of the level, the padding of the slab test and the rounding of the bounds themselves. Therefore a
+// value that passes the slab test is always stored in a brick that the march names, and each brick is named at most
+// once. Compare Amanatides and Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987, whose accumulated steps
+// miss cells on long rays.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_SLAB_MARCH_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_SLAB_MARCH_H_
 
@@ -14,40 +14,42 @@
 
 namespace locus::internal {
 
-// What a march needs to know of a level.
-struct LevelExtent {
-  Aabbd bounds;      // around all its values; not empty
-  double reach = 0;  // how far the bounds of any value extend from its position
+// Geometry of a level, as queries need it.
+struct LevelGeometry {
+  Aabbd bounds;           // bounds of all its values; not empty
+  double max_extent = 0;  // upper bound of the distance from a value's position to its bounds along any axis
   double cells_per_unit = 1;
 };
 
 class SlabMarch {
  public:
   struct Slab {
-    double near;      // no value of this slab or a later one has a smaller near value
+    double near;      // lower bound of the near values of this slab and all later ones
     KeyRange bricks;  // may be empty
   };
 
-  // For the part of the ray up to `limit`, in the unit of the slab test.
-  SlabMarch(const SlabRay<double>& ray, const LevelExtent& level, double limit);
+  // Prepares a march along the part of the ray up to `limit`, in the unit of the slab test.
+  SlabMarch(const SlabRay<double>& ray, const LevelGeometry& level, double limit);
 
-  // How many slabs there are; 0 when the ray misses the level.
+  // Returns the number of slabs; 0 if the ray misses the level.
   int64_t slabs() const { return slabs_; }
-  // About how many bricks they name, before `limit` falls. Infinite where the figures overflow: do not march then.
+  // Returns the approximate number of bricks that all slabs name for the limit of the constructor. Infinite if a bound
+  // overflows: slab() and layer() must then not be called.
   double bricks() const { return bricks_; }
-  // Slab number `n` from the near end; `limit` as above, possibly smaller by now.
+  // Returns slab `n`, counted from the near end. `limit` is at most the limit of the constructor.
+  // Precondition: 0 <= n < slabs().
   Slab slab(int64_t n, double limit) const;
 
-  // One layer of cells within a slab, likewise: number 0 to 3 from the near end.
+  // Layer of cells within a slab; the four layers are counted from the near end.
   struct Layer {
     double near;
     KeyRange cells;  // may be empty
   };
-  Layer layer(int64_t n, int number, double limit) const;
+  Layer layer(int64_t n, int layer_index, double limit) const;
 
  private:
-  // The positions of values between two planes across the ray, which `index` times `edge` and one edge more name, that
-  // the ray can meet up to `limit`; near as in Slab.
+  // Part of the ray up to `limit` between the planes at `index` * `edge` and (`index` + 1) * `edge` on the dominant
+  // axis: its near value, as in Slab, and the bounds of the positions of values that the ray can meet there.
   struct Crossing {
     double near;
     Aabbd positions;  // may be empty
@@ -59,7 +61,7 @@ class SlabMarch {
   Aabbd bounds_;
   double per_unit_;
   double slab_edge_;
-  double margin_ = 0;  // around the ray, for positions
+  double tube_radius_ = 0;  // upper bound of the distance from the ray to the position of a value it can meet
   Interval<double> part_{0, 0};
   int axis_ = 0;
   int64_t first_ = 0;

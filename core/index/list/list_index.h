@@ -1,8 +1,8 @@
-// The list: an array that culls nothing and hands every value to the visitor. It is the oracle that every other
-// structure is compared with, and the fastest structure for a handful of values.
+// List: an array that culls no value and passes every value to the visitor. It is the test oracle of every other
+// structure, and the fastest structure for a handful of values.
 //
 // Threads: const members may run concurrently; insert and remove need exclusive use.
-// Invariant: slots_ maps each id in the list to the position of its value, and nothing else.
+// Invariant: slots_ maps the id of each value in the list to its slot in values_, and has no other entries.
 // Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (List).
 #ifndef LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
 #define LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
@@ -26,15 +26,16 @@ class ListIndex {
  public:
   using Value = V;
 
-  // Amortised O(1). The id must not be in the list.
+  // Appends a value. Precondition: its id is not in the list. Amortised O(1).
   void insert(const V& value) {
     const bool added = slots_.try_emplace(Traits::id(value), values_.size()).second;
     LOCUS_CHECK(added);
     values_.push_back(value);
+    check_invariants(values_.size() - 1);
   }
 
-  // False, and no change, when no value has the id of `value`. O(1): the last value takes the free place, so order is
-  // not kept.
+  // Removes the value with the id of `value`. Returns false and changes nothing if there is none. O(1): the last value
+  // takes the free slot, so the order is not kept.
   bool remove(const V& value) {
     const auto found = slots_.find(Traits::id(value));
     if (found == slots_.end()) return false;
@@ -45,6 +46,7 @@ class ListIndex {
       slots_[Traits::id(values_[slot])] = slot;
     }
     values_.pop_back();
+    check_invariants(slot);
     return true;
   }
 
@@ -68,6 +70,17 @@ class ListIndex {
   }
 
  private:
+  // Checks the sizes and, if it exists, the entry of `slot`, which has changed. O(1).
+  void check_invariants(size_t slot) const {
+    if constexpr (kDebugChecks) {
+      LOCUS_DCHECK_EQ(values_.size(), slots_.size());
+      if (slot >= values_.size()) return;
+      const auto found = slots_.find(Traits::id(values_[slot]));
+      LOCUS_DCHECK(found != slots_.end());
+      LOCUS_DCHECK_EQ(found->second, slot);
+    }
+  }
+
   template <class Visitor>
   void visit_all(Visitor& visitor, Work& work) const {
     for (const V& value : values_) {

@@ -16,7 +16,7 @@ using ::testing::UnorderedElementsAre;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// A ball around (x, 0, 0): rays along the x axis from the origin hit it at x - radius.
+// Returns a ball around (x, 0, 0): rays along the x axis from the origin hit it at x - radius.
 Object ball_at(Id id, double x, float radius = 1) {
   Object object;
   object.id = id;
@@ -28,7 +28,7 @@ Object ball_at(Id id, double x, float radius = 1) {
 
 ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
 
-// Every query must do the same for every structure.
+// Fixture that runs each test for every structure.
 template <class Index>
 class IndexQueriesTest : public ::testing::Test {
  protected:
@@ -58,7 +58,7 @@ std::vector<Id> ids_of(const std::vector<RayHit<Object>>& hits) {
   return ids;
 }
 
-TYPED_TEST(IndexQueriesTest, FirstRayWithoutAHitTouchesNeitherValueNorDistance) {
+TYPED_TEST(IndexQueriesTest, FirstRayWithoutAHitChangesNeitherValueNorDistance) {
   const auto index = this->make({ball_at(1, -10)});
   Object value = ball_at(77, 0);
   double distance = 100;
@@ -76,7 +76,7 @@ TYPED_TEST(IndexQueriesTest, FirstRayWithANearerHitSetsValueAndDistance) {
   EXPECT_EQ(distance, 9);
 }
 
-TYPED_TEST(IndexQueriesTest, FirstRayWithAHitAtOrBeyondTheDistanceTouchesNeither) {
+TYPED_TEST(IndexQueriesTest, FirstRayWithAHitAtOrBeyondTheDistanceChangesNeitherValueNorDistance) {
   const auto index = this->make({ball_at(1, 10)});
   for (const double limit : {9.0, 8.0, 0.0}) {
     Object value = ball_at(77, 0);
@@ -120,7 +120,7 @@ TYPED_TEST(IndexQueriesTest, AllRaysSortByDistanceThenId) {
   EXPECT_EQ(hits[2].distance, 19);
 }
 
-TYPED_TEST(IndexQueriesTest, AllRaysKeepTheNearest) {
+TYPED_TEST(IndexQueriesTest, AllRaysReturnTheNearestHits) {
   const auto index = this->make({ball_at(9, 30), ball_at(2, 10), ball_at(5, 20), ball_at(1, 30), ball_at(8, 10)});
   for (size_t max_hits = 0; max_hits <= 5; ++max_hits) {
     std::vector<RayHit<Object>> hits;
@@ -139,7 +139,7 @@ TYPED_TEST(IndexQueriesTest, AllRaysAreStrictAtTheDistance) {
 
 TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
   const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
-  // Later than every hit of this ray, so that a sort over the whole vector would move it.
+  // Farther than every hit of this ray, so that a sort of the whole vector would move it.
   std::vector<RayHit<Object>> hits = {{1e9, ball_at(77, 0)}};
   all_rays(index, along_x(), kInfinity, 1, hits);
   EXPECT_THAT(ids_of(hits), ElementsAre(77, 1));
@@ -167,8 +167,8 @@ TYPED_TEST(IndexQueriesTest, TouchingCountsAsOverlap) {
   EXPECT_THAT(ids_of(values), ElementsAre());
 }
 
-TYPED_TEST(IndexQueriesTest, ConservativeAnswersGoByBounds) {
-  // All three queries meet the ball's box at its corner, where the ball is not.
+TYPED_TEST(IndexQueriesTest, ConservativeQueriesDecideByBounds) {
+  // All three queries meet the ball's bounds at a corner, outside the ball.
   const auto index = this->make({ball_at(1, 0, 10)});
   const Balld ball{{10, 10, 10}, 1};
   const Obbd box{{10, 10, 10}, {1, 1, 1}, {}};
@@ -199,16 +199,17 @@ TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
   EXPECT_EQ(work.tests, 104u);
 }
 
-// first_ray(statics) || first_ray(dynamics) stops at the static hit. The nearer one may be dynamic.
+// The expression first_ray(statics) || first_ray(dynamics) stops at the static hit, although the nearer hit may be
+// dynamic.
 TYPED_TEST(IndexQueriesTest, TheNearerHitOfASecondIndexIsNotSkippedAfterAHitInTheFirst) {
   const auto statics = this->make({ball_at(1, 50)});
   const auto dynamics = this->make({ball_at(2, 10)});
-  Object trapped;
-  double trapped_distance = kInfinity;
-  const bool hit = first_ray(statics, along_x(), trapped, trapped_distance) ||
-                   first_ray(dynamics, along_x(), trapped, trapped_distance);
+  Object joined;
+  double joined_distance = kInfinity;
+  const bool hit =
+      first_ray(statics, along_x(), joined, joined_distance) || first_ray(dynamics, along_x(), joined, joined_distance);
   ASSERT_TRUE(hit);
-  ASSERT_EQ(trapped.id, 1u) << "the trap this test is about";
+  ASSERT_EQ(joined.id, 1u) << "joined calls no longer skip the second index";
 
   Object value;
   double distance = kInfinity;
@@ -234,7 +235,7 @@ TYPED_TEST(IndexQueriesTest, FirstRayOfSeveralIndicesDoesNotDependOnTheirOrder) 
   check(tied, none, far, near);
 }
 
-TEST(IndexQueriesOfTwoStructuresTest, AListAndATreeAnswerTogether) {
+TEST(IndexQueriesOfTwoStructuresTest, FirstRayOfAListAndATreeReturnsTheNearerHitOrTheLowerId) {
   ListIndex<Object> list;
   list.insert(ball_at(5, 10));
   const Bvh<Object> tree = *Bvh<Object>::build({ball_at(4, 10), ball_at(6, 9)});

@@ -24,7 +24,7 @@ Object ball_at(Id id, double x, float radius = 1) {
   return object;
 }
 
-// Every query must do the same for every structure.
+// Fixture that runs each test for every structure.
 template <class Index>
 class NearestValuesTest : public ::testing::Test {
  protected:
@@ -50,7 +50,7 @@ class NearestValuesTest : public ::testing::Test {
 using Structures = ::testing::Types<ListIndex<Object>, Bvh<Object>, ObjectGrid>;
 TYPED_TEST_SUITE(NearestValuesTest, Structures);
 
-TYPED_TEST(NearestValuesTest, AscendByDistanceThenId) {
+TYPED_TEST(NearestValuesTest, ResultsAscendByDistanceThenId) {
   const auto index = this->make({ball_at(9, 30), ball_at(2, -10), ball_at(5, 20), ball_at(1, -30), ball_at(8, 10)});
   EXPECT_THAT(this->nearest(index, kInfinity, 100), ElementsAre(2, 8, 5, 1, 9));
   EXPECT_THAT(this->nearest(index, kInfinity, 2), ElementsAre(2, 8));
@@ -65,7 +65,7 @@ TYPED_TEST(NearestValuesTest, TheMaximumDistanceIsIncluded) {
   EXPECT_THAT(this->nearest(index, 0, 9), IsEmpty());
 }
 
-TYPED_TEST(NearestValuesTest, SolidsAroundThePointAreAtZero) {
+TYPED_TEST(NearestValuesTest, SolidsThatContainThePointHaveDistanceZero) {
   const auto index = this->make({ball_at(3, 10, 30), ball_at(2, 10, 10), ball_at(5, 20)});
   std::vector<ValueAt<Object>> found;
   nearest_values(index, Vec3d{}, 0, 9, found);
@@ -76,7 +76,7 @@ TYPED_TEST(NearestValuesTest, SolidsAroundThePointAreAtZero) {
   EXPECT_EQ(found[1].distance, 0);
 }
 
-TYPED_TEST(NearestValuesTest, AnEmptyIndexHasNothingNear) {
+TYPED_TEST(NearestValuesTest, AnEmptyIndexGivesNoResults) {
   EXPECT_THAT(this->nearest(this->make({}), kInfinity, 3), IsEmpty());
 }
 
@@ -93,7 +93,7 @@ TYPED_TEST(NearestValuesTest, ResultsAreAppendedAndWorkIsAdded) {
   EXPECT_EQ(work.tests, 101u);
 }
 
-TEST(NearestWorkTest, TreesLookAtLittleMoreThanWhatIsNear) {
+TEST(NearestWorkTest, ATreeTestsFewValuesBesidesTheNearest) {
   std::vector<Object> objects;
   for (Id id = 1; id <= 4096; ++id) objects.push_back(ball_at(id, 4.0 * static_cast<double>(id)));
   const Bvh<Object> tree = *Bvh<Object>::build(objects);

@@ -18,7 +18,7 @@ Aabb<S> random_box(Random& random, double size) {
   return {rounded<S>(low), rounded<S>(low + random.positive_vector(random.magnitude(-8, 0) * size))};
 }
 
-// A box that contains `box`, often just so.
+// Returns a box that contains `box`, often with only one float of difference.
 template <class S>
 Aabb<S> superset(const Aabb<S>& box, Random& random) {
   constexpr S kInfinity = std::numeric_limits<S>::infinity();
@@ -34,7 +34,8 @@ Aabb<S> superset(const Aabb<S>& box, Random& random) {
 template <class S>
 class RegionsTest : public ::testing::Test {
  protected:
-  // What it reaches overlaps its bounds, and it reaches every superset of that.
+  // Checks with random boxes that a box that overlaps the region overlaps its bounds, and that every superset of it
+  // overlaps the region. Returns the number of boxes that overlap.
   template <class Region>
   static int expect_monotone_and_bounded(const Region& region, Random& random, double size) {
     int reached = 0;
@@ -85,7 +86,7 @@ TYPED_TEST(RegionsTest, ABallTouchesABoxAtItsRadius) {
   EXPECT_FALSE(region.overlaps({{3, 4, TypeParam{1} / 1024}, {9, 9, 9}}));
 }
 
-TYPED_TEST(RegionsTest, ABoxWhoseGapVanishesWhenSquaredIsWithinTheBoundsToo) {
+TYPED_TEST(RegionsTest, ABoxWhoseSquaredGapUnderflowsOverlapsTheBoundsToo) {
   const BallRegion<TypeParam> region({{0, 0, 0}, 0});
   const TypeParam tiny = -std::numeric_limits<TypeParam>::denorm_min();
   const Aabb<TypeParam> box{{-1, 0, 0}, {tiny, 0, 0}};

@@ -1,4 +1,4 @@
-// Which of the grid's kernels serve: those of the instruction set in use.
+// Selection of the hash grid's kernels by instruction set.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_DISPATCH_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_DISPATCH_H_
 
@@ -6,7 +6,7 @@
 
 namespace locus {
 
-// Thread-safe.
+// Returns the kernels of the active instruction set. Thread-safe.
 const GridKernels& active_grid_kernels();
 
 }  // namespace locus

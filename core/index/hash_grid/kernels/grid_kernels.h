@@ -1,10 +1,10 @@
-// What culls the values of the hash grid in float, eight at a time. Plain data and a table of functions, compiled once
-// for each instruction set; everything that decides is done elsewhere, in double. Threads: any.
+// Kernels that cull the values of the hash grid in float, eight at a time: plain data and a table of functions,
+// compiled once per instruction set. They only cull; exact decisions are made elsewhere, in double. Threads: any.
 //
-// The functions keep every value that the caller's numbers allow, whatever the rounding of their own few operations:
-// callers widen their numbers by kCullSlack of the magnitudes they give. That covers, with room to spare, the rounding
-// of the columns to float (2^-24 of a coordinate), of the query's numbers (2^-24), and of the sums, products and fused
-// products below (each 2^-24 of its result).
+// A kernel keeps every value that the caller's query allows, in spite of rounding in its own few operations, because
+// callers widen the query by kCullEpsilon times the magnitudes involved. This covers, with room to spare, the rounding
+// of the columns to float (2^-24 of a coordinate), of the query (2^-24), and of the sums, products and fused products
+// below (each 2^-24 of its result).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 
@@ -12,20 +12,21 @@
 
 namespace locus {
 
-inline constexpr float kCullSlack = 0x1p-20f;
-inline constexpr float kDiagonal = 1.73206f;  // the corners of a value's bounds, in reaches: the root of 3, and more
+inline constexpr float kCullEpsilon = 0x1p-20f;
+inline constexpr float kDiagonal =
+    1.73206f;  // upper bound of sqrt(3): distance to a corner of a value's bounds, in extents
 inline constexpr uint32_t kMaxSorted = 64;
 
-// Some rows of consecutive values of one block.
+// Rows of consecutive values of one block.
 struct GridRows {
-  static constexpr uint32_t kMax = 16;         // rows
-  static constexpr uint32_t kMaxValues = 512;  // of all rows of one call
+  static constexpr uint32_t kMax = 16;         // max rows
+  static constexpr uint32_t kMaxValues = 512;  // max values in all rows of one call
 
   const float* x;
   const float* y;
   const float* z;
-  const float* reach;
-  const uint64_t* gone;  // one bit a value, and 64 more; null where none is gone
+  const float* extent;
+  const uint64_t* dead;  // one bit per value, and 64 more; null if no value is dead
   uint32_t count;
   uint32_t begin[kMax];
   uint32_t end[kMax];
@@ -37,8 +38,8 @@ struct GridBox {
 
 struct GridLine {
   float point[3], direction[3];  // the direction has length 1
-  float margin;                  // added to every reach times kDiagonal
-  float from, to;                // the part that is asked for, by its distance from `point`
+  float radius;                  // added to kDiagonal times the extent of a value
+  float from, to;                // part of the line, as signed distances from `point`
 };
 
 struct GridBall {
@@ -46,24 +47,24 @@ struct GridBall {
   float radius;
 };
 
-// The values around a point whose key, the squared distance of their bounds, is above one number and up to another.
+// Shell around a point: values whose key, the squared distance of their bounds, lies in (above, up_to].
 struct GridNear {
   float point[3];
-  float margin;  // added to every reach
-  float above, upto;
+  float epsilon;  // added to the extent of a value
+  float above, up_to;
 };
 
 struct GridKernels {
   const char* name;
-  // Each writes the slots, in order, of values that reach the box, the line or the ball, and returns how many. There is
-  // room for kMaxValues and a vector.
+  // Each writes the slots of the values that meet the box, line or ball to `slots`, in order, and returns their number.
+  // `slots` has room for kMaxValues and one vector more.
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
-  // Likewise, and each one's key, which is none too large.
+  // Writes the slots of the values in the shell, in order, and their keys, which never exceed the exact ones.
   uint32_t (*collect_near)(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys);
-  // Sorts at most kMaxSorted numbers, of which no two are equal.
-  void (*sort_few)(int32_t* numbers, uint32_t count);
+  // Sorts at most kMaxSorted distinct integers.
+  void (*sort_few)(int32_t* values, uint32_t count);
 };
 
 const GridKernels& grid_kernels_portable();

@@ -1,4 +1,4 @@
-// Compiled for AVX2.
+// AVX2 version of the kernels.
 #include "core/index/hash_grid/kernels/grid_kernels_impl.h"
 
 namespace locus {

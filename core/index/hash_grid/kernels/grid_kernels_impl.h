@@ -1,4 +1,4 @@
-// The culling loops of the hash grid, written once by vectors of eight floats. To be included by one source for each
+// Implementation of the hash grid's kernels, written once with vectors of eight floats. Included by one source per
 // instruction set; everything has internal linkage.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_IMPL_H_
@@ -25,9 +25,9 @@ inline Floats load(const float* from) {
   return values;
 }
 
-inline Floats all(float value) { return Floats{} + value; }
+inline Floats splat(float value) { return Floats{} + value; }
 
-// One bit a lane.
+// Returns a mask with one bit per lane.
 inline uint32_t bits_of(Lanes lanes) {
 #if defined(__AVX2__)
   return static_cast<uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(lanes)));
@@ -42,47 +42,48 @@ inline uint32_t bits_of(Lanes lanes) {
 #endif
 }
 
-// The bits of values `slot` to slot + 7 that are gone.
-inline uint32_t gone_bits(const uint64_t* gone, uint32_t slot) {
+// Returns a mask of the dead values among `slot` to slot + 7.
+inline uint32_t dead_bits(const uint64_t* dead, uint32_t slot) {
   uint16_t bits;
-  std::memcpy(&bits, reinterpret_cast<const char*>(gone) + slot / 8, sizeof(bits));
+  std::memcpy(&bits, reinterpret_cast<const char*>(dead) + slot / 8, sizeof(bits));
   return (uint32_t{bits} >> (slot % 8)) & 0xFF;
 }
 
 #ifdef __AVX2__
-// For each set of lanes, their numbers in order, a byte each.
-struct LanesOfSets {
-  constexpr LanesOfSets() {
-    for (uint32_t set = 0; set < 256; ++set) {
+// Table from a mask of lanes to the indices of its lanes in order, one byte each.
+struct LanesOfMasks {
+  constexpr LanesOfMasks() {
+    for (uint32_t mask = 0; mask < 256; ++mask) {
       uint32_t next = 0;
       for (uint64_t lane = 0; lane < kLanes; ++lane)
-        if ((set >> lane & 1) != 0) lanes[set] |= lane << (8 * next++);
+        if ((mask >> lane & 1) != 0) lanes[mask] |= lane << (8 * next++);
     }
   }
   uint64_t lanes[256] = {};
 };
-constexpr LanesOfSets kLanesOfSets;
+constexpr LanesOfMasks kLanesOfMasks;
 #endif
 
-// Writes the slots of the lanes of `kept`, one after the other, and whatever behind them.
+// Writes the slots of the lanes in the mask `kept`, one after the other; may write up to a vector of garbage behind
+// them.
 inline void write_slots(uint32_t kept, uint32_t slot, uint32_t* slots) {
 #ifdef __AVX2__
-  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfSets.lanes[kept])));
-  const __m256i places = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
-  std::memcpy(slots, &places, sizeof(places));
+  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfMasks.lanes[kept])));
+  const __m256i found = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
+  std::memcpy(slots, &found, sizeof(found));
 #else
   for (; kept != 0; kept &= kept - 1) *slots++ = slot + static_cast<uint32_t>(__builtin_ctz(kept));
 #endif
 }
 
-// The same, and their keys.
+// Writes the slots and keys of the lanes in the mask `kept`, like write_slots().
 inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slots, float* keys) {
 #ifdef __AVX2__
-  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfSets.lanes[kept])));
+  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfMasks.lanes[kept])));
   const __m256 first = _mm256_permutevar8x32_ps(reinterpret_cast<__m256>(key), lanes);
   std::memcpy(keys, &first, sizeof(first));
-  const __m256i places = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
-  std::memcpy(slots, &places, sizeof(places));
+  const __m256i found = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
+  std::memcpy(slots, &found, sizeof(found));
 #else
   float all_keys[kLanes];
   std::memcpy(all_keys, &key, sizeof(all_keys));
@@ -94,9 +95,9 @@ inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slot
 #endif
 }
 
-// The vectors of all rows, one after the other: few loops of unknown length are more than one.
+// List of the vectors of all rows: one loop over the list is faster than a loop of unknown length for each row.
 struct RowVectors {
-  static constexpr uint32_t kUsual = 4;  // of a row
+  static constexpr uint32_t kUsual = 4;  // vectors of a row that are written without a loop of unknown length
   static constexpr uint32_t kMax = GridRows::kMaxValues / kLanes + GridRows::kMax + kUsual;
 
   explicit RowVectors(const GridRows& rows) {
@@ -117,7 +118,7 @@ struct RowVectors {
   uint32_t lanes[kMax];
 };
 
-// Writes the slots of all values of the rows that keep(slot) has a bit for.
+// Writes the slots of all live values of the rows for which the mask keep(slot) has a bit. Returns their number.
 template <class Keep>
 inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep) {
   uint32_t count = 0;
@@ -126,7 +127,7 @@ inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep)
     for (uint32_t slot = rows.begin[row]; slot < end; slot += kLanes) {
       uint32_t kept = keep(slot);
       if (end - slot < kLanes) kept &= (1u << (end - slot)) - 1;
-      if (rows.gone != nullptr) kept &= ~gone_bits(rows.gone, slot);
+      if (rows.dead != nullptr) kept &= ~dead_bits(rows.dead, slot);
       write_slots(kept, slot, slots + count);
       count += static_cast<uint32_t>(__builtin_popcount(kept));
     }
@@ -135,85 +136,86 @@ inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep)
 }
 
 uint32_t cull_box(const GridRows& rows, const GridBox& box, uint32_t* slots) {
-  const Floats low_x = all(box.low[0]), low_y = all(box.low[1]), low_z = all(box.low[2]);
-  const Floats high_x = all(box.high[0]), high_y = all(box.high[1]), high_z = all(box.high[2]);
+  const Floats low_x = splat(box.low[0]), low_y = splat(box.low[1]), low_z = splat(box.low[2]);
+  const Floats high_x = splat(box.high[0]), high_y = splat(box.high[1]), high_z = splat(box.high[2]);
   return collect(rows, slots, [&](uint32_t slot) {
     const Floats x = load(rows.x + slot), y = load(rows.y + slot), z = load(rows.z + slot);
-    const Floats reach = load(rows.reach + slot);
-    const Lanes in_x = (x + reach >= low_x) & (x - reach <= high_x);
-    const Lanes in_y = (y + reach >= low_y) & (y - reach <= high_y);
-    const Lanes in_z = (z + reach >= low_z) & (z - reach <= high_z);
+    const Floats extent = load(rows.extent + slot);
+    const Lanes in_x = (x + extent >= low_x) & (x - extent <= high_x);
+    const Lanes in_y = (y + extent >= low_y) & (y - extent <= high_y);
+    const Lanes in_z = (z + extent >= low_z) & (z - extent <= high_z);
     return bits_of(in_x & in_y & in_z);
   });
 }
 
 uint32_t cull_ball(const GridRows& rows, const GridBall& ball, uint32_t* slots) {
-  const Floats center_x = all(ball.center[0]), center_y = all(ball.center[1]), center_z = all(ball.center[2]);
-  const Floats radius = all(ball.radius);
+  const Floats center_x = splat(ball.center[0]), center_y = splat(ball.center[1]), center_z = splat(ball.center[2]);
+  const Floats radius = splat(ball.radius);
   return collect(rows, slots, [&](uint32_t slot) {
     const Floats x = load(rows.x + slot) - center_x, y = load(rows.y + slot) - center_y;
     const Floats z = load(rows.z + slot) - center_z;
-    const Floats reach = load(rows.reach + slot) + radius;
-    return bits_of(x * x + y * y + z * z <= reach * reach);
+    const Floats extent = load(rows.extent + slot) + radius;
+    return bits_of(x * x + y * y + z * z <= extent * extent);
   });
 }
 
 uint32_t cull_line(const GridRows& rows, const GridLine& line, uint32_t* slots) {
-  const Floats point_x = all(line.point[0]), point_y = all(line.point[1]), point_z = all(line.point[2]);
-  const Floats toward_x = all(line.direction[0]), toward_y = all(line.direction[1]), toward_z = all(line.direction[2]);
-  const Floats margin = all(line.margin), from = all(line.from), to = all(line.to);
+  const Floats point_x = splat(line.point[0]), point_y = splat(line.point[1]), point_z = splat(line.point[2]);
+  const Floats toward_x = splat(line.direction[0]), toward_y = splat(line.direction[1]),
+               toward_z = splat(line.direction[2]);
+  const Floats radius = splat(line.radius), from = splat(line.from), to = splat(line.to);
   return collect(rows, slots, [&](uint32_t slot) {
     const Floats x = load(rows.x + slot) - point_x, y = load(rows.y + slot) - point_y;
     const Floats z = load(rows.z + slot) - point_z;
     const Floats along = x * toward_x + y * toward_y + z * toward_z;
     const Floats off_x = x - along * toward_x, off_y = y - along * toward_y, off_z = z - along * toward_z;
-    const Floats reach = load(rows.reach + slot) * kDiagonal + margin;
-    const Lanes near = off_x * off_x + off_y * off_y + off_z * off_z <= reach * reach;
-    return bits_of(near & (along + reach >= from) & (along - reach <= to));
+    const Floats extent = load(rows.extent + slot) * kDiagonal + radius;
+    const Lanes near = off_x * off_x + off_y * off_y + off_z * off_z <= extent * extent;
+    return bits_of(near & (along + extent >= from) & (along - extent <= to));
   });
 }
 
-// How far beyond `reach` from zero.
-inline Floats gap_of(Floats along, Floats reach) {
+// Returns the distance of `along` from the interval [-extent, extent].
+inline Floats gap_of(Floats along, Floats extent) {
   const Floats away = along < 0 ? -along : along;
-  const Floats gap = away - reach;
+  const Floats gap = away - extent;
   return gap > 0 ? gap : Floats{};
 }
 
 uint32_t collect_near(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys) {
-  const Floats point_x = all(near.point[0]), point_y = all(near.point[1]), point_z = all(near.point[2]);
-  const Floats margin = all(near.margin), above = all(near.above), upto = all(near.upto);
+  const Floats point_x = splat(near.point[0]), point_y = splat(near.point[1]), point_z = splat(near.point[2]);
+  const Floats epsilon = splat(near.epsilon), above = splat(near.above), up_to = splat(near.up_to);
   const RowVectors vectors(rows);
   uint32_t count = 0;
   for (uint32_t i = 0; i < vectors.count; ++i) {
     const uint32_t slot = vectors.slot[i];
-    const Floats reach = load(rows.reach + slot) + margin;
-    const Floats x = gap_of(load(rows.x + slot) - point_x, reach);
-    const Floats y = gap_of(load(rows.y + slot) - point_y, reach);
-    const Floats z = gap_of(load(rows.z + slot) - point_z, reach);
+    const Floats extent = load(rows.extent + slot) + epsilon;
+    const Floats x = gap_of(load(rows.x + slot) - point_x, extent);
+    const Floats y = gap_of(load(rows.y + slot) - point_y, extent);
+    const Floats z = gap_of(load(rows.z + slot) - point_z, extent);
     const Floats key = x * x + y * y + z * z;
-    uint32_t kept = bits_of((key > above) & (key <= upto)) & vectors.lanes[i];
-    if (rows.gone != nullptr) kept &= ~gone_bits(rows.gone, slot);
+    uint32_t kept = bits_of((key > above) & (key <= up_to)) & vectors.lanes[i];
+    if (rows.dead != nullptr) kept &= ~dead_bits(rows.dead, slot);
     write_lanes(kept, slot, key, slots + count, keys + count);
     count += static_cast<uint32_t>(__builtin_popcount(kept));
   }
   return count;
 }
 
-void sort_few(int32_t* numbers, uint32_t count) {
+void sort_few(int32_t* values, uint32_t count) {
   if (count == 0) return;
   int32_t given[kMaxSorted + kLanes];
-  std::memcpy(given, numbers, count * sizeof(int32_t));
+  std::memcpy(given, values, count * sizeof(int32_t));
   for (uint32_t i = 0; i < kLanes; ++i) given[count + i] = INT32_MAX;
   for (uint32_t i = 0; i < count; ++i) {
-    const Lanes number = Lanes{} + given[i];
-    uint32_t place = 0;  // how many are below
+    const Lanes value = Lanes{} + given[i];
+    uint32_t rank = 0;  // number of smaller values
     for (uint32_t j = 0; j < count; j += kLanes) {
       Lanes others;
       std::memcpy(&others, given + j, sizeof(others));
-      place += static_cast<uint32_t>(__builtin_popcount(bits_of(others < number)));
+      rank += static_cast<uint32_t>(__builtin_popcount(bits_of(others < value)));
     }
-    numbers[place] = given[i];
+    values[rank] = given[i];
   }
 }
 

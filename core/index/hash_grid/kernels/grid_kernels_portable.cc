@@ -1,4 +1,4 @@
-// Compiled for any processor: two halves of a vector, or one number after the other.
+// Portable version of the kernels: the compiler splits each vector into two halves, or into single floats.
 #include "core/index/hash_grid/kernels/grid_kernels_impl.h"
 
 namespace locus {

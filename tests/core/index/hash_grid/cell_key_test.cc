@@ -36,21 +36,21 @@ TEST(CellKeyTest, IndicesOfInfiniteCoordinatesAreDefined) {
   EXPECT_LT(cell_index(-kInfinity, 1), -(int64_t{1} << 61));
 }
 
-TEST(CellKeyTest, EveryCellOfABrickHasItsOwnNumber) {
+TEST(CellKeyTest, EveryCellOfABrickHasItsOwnIndex) {
   for (const int64_t corner : {int64_t{0}, int64_t{-4}, int64_t{1} << 50}) {
-    std::set<int> numbers;
+    std::set<int> indices;
     for (int64_t i = 0; i < 64; ++i) {
       const GridKey cell{corner + (i & 3), corner + (i >> 2 & 3), corner + (i >> 4)};
       EXPECT_EQ(brick_of(cell), (GridKey{corner / 4, corner / 4, corner / 4}));
-      numbers.insert(number_in_brick(cell));
+      indices.insert(index_in_brick(cell));
     }
-    EXPECT_EQ(numbers.size(), 64u);
-    EXPECT_EQ(*numbers.begin(), 0);
-    EXPECT_EQ(*numbers.rbegin(), 63);
+    EXPECT_EQ(indices.size(), 64u);
+    EXPECT_EQ(*indices.begin(), 0);
+    EXPECT_EQ(*indices.rbegin(), 63);
   }
 }
 
-TEST(CellKeyTest, TheCoveringExponentIsTheSmallestThatCovers) {
+TEST(CellKeyTest, ExponentCoveringIsTheSmallestThatCovers) {
   EXPECT_EQ(exponent_covering(0, -20, 31), -20);
   EXPECT_EQ(exponent_covering(1e300, -20, 31), 31);
   test::Random random(1);
@@ -62,7 +62,7 @@ TEST(CellKeyTest, TheCoveringExponentIsTheSmallestThatCovers) {
   }
 }
 
-TEST(CellKeyTest, NeighbouringKeysHashApart) {
+TEST(CellKeyTest, NeighbouringKeysHaveDifferentHashes) {
   std::set<size_t> low_bits;
   for (int64_t i = 0; i < 4096; ++i) {
     low_bits.insert(GridKeyHash()({(i & 15) - 8, (i >> 4 & 15) - 8, (i >> 8) - 8}) & 0xFFFFFF);

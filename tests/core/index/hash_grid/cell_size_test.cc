@@ -17,7 +17,7 @@ std::vector<SampledValue> spread(size_t count, double half, double diameter) {
   return values;
 }
 
-TEST(CellSizeTest, CoincidentValuesOfAnySizeEndAtASaneChoice) {
+TEST(CellSizeTest, CoincidentValuesOfAnySizeGetAFiniteCellSize) {
   for (const double diameter : {0.0, 1e-9, 1.0, 1e9, 1e12}) {
     const std::vector<SampledValue> values(4096, {{5, 5, 5}, diameter});
     const int exponent = choose_cell_exponent(values, 1'000'000);
@@ -31,12 +31,12 @@ TEST(CellSizeTest, OneValueIsEnough) {
   EXPECT_EQ(choose_cell_exponent(values, 1), -1);
 }
 
-TEST(CellSizeTest, CellsOfAFewValuesAreNotMuchWiderThanAllOfThem) {
+TEST(CellSizeTest, CellsOfAFewValuesAreNotMuchWiderThanTheirBounds) {
   EXPECT_EQ(choose_cell_exponent(spread(20, 0.9, 0.01), 20), 3);
   EXPECT_LE(choose_cell_exponent(spread(2000, 1, 0.25), 2000), 3);
 }
 
-TEST(CellSizeTest, EvenlySpreadValuesGetUpToAboutTwentyFourCompanions) {
+TEST(CellSizeTest, EvenlySpreadValuesShareACellWithAboutTwentyFourOthersAtMost) {
   for (const size_t population : {4'096u, 100'000u, 1'000'000u}) {
     const double half = 500;
     const int exponent = choose_cell_exponent(spread(4096, half, 0.1), population);
@@ -51,7 +51,7 @@ TEST(CellSizeTest, TheCellIsNeverSmallerThanTheMedianDiameter) {
   EXPECT_GE(choose_cell_exponent(spread(4096, 10, 3), 4096), 2);
 }
 
-TEST(CellSizeTest, AHeapInOnePointDoesNotShrinkTheCellsOfTheOthers) {
+TEST(CellSizeTest, CoincidentValuesDoNotShrinkTheCellsOfTheOthers) {
   std::vector<SampledValue> values = spread(2000, 1000, 0);
   values.insert(values.end(), 2096, {{3, 3, 3}, 0});
   const int exponent = choose_cell_exponent(values, values.size());
@@ -59,12 +59,12 @@ TEST(CellSizeTest, AHeapInOnePointDoesNotShrinkTheCellsOfTheOthers) {
   EXPECT_LE(exponent, 9);
 }
 
-TEST(CellSizeTest, AChoiceServesWhileNeitherTooFewNorTooManyShareACell) {
+TEST(CellSizeTest, ACellSizeFitsWhileNeitherTooFewNorTooManyValuesShareACell) {
   const std::vector<SampledValue> values = spread(4096, 100, 0.5);
   const int chosen = choose_cell_exponent(values, 100'000);
-  EXPECT_TRUE(cell_exponent_serves(values, 100'000, chosen));
-  EXPECT_FALSE(cell_exponent_serves(values, 100'000, chosen - 3));
-  EXPECT_FALSE(cell_exponent_serves(values, 100'000, chosen + 2));
+  EXPECT_TRUE(cell_exponent_fits(values, 100'000, chosen));
+  EXPECT_FALSE(cell_exponent_fits(values, 100'000, chosen - 3));
+  EXPECT_FALSE(cell_exponent_fits(values, 100'000, chosen + 2));
 }
 
 }  // namespace

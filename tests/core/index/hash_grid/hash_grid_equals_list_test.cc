@@ -1,5 +1,5 @@
-// Grids answer as the list does, bit for bit, whatever their cell size, the order and batches in which values came, and
-// what was there before.
+// Grids and the list give bitwise equal results for every cell size, every order and batching of updates, and every
+// previous content of the grid.
 #include <gtest/gtest.h>
 
 #include "tests/support/grid_comparison.h"
@@ -17,11 +17,11 @@ TEST(HashGridEqualsListTest, OnAdversarialScenes) {
   EXPECT_EQ(search_grid_scenes(scaled_count(2'400), adversarial_scene, grid_difference), "");
 }
 
-TEST(HashGridEqualsListTest, OnScenesMadeToBreakGrids) {
+TEST(HashGridEqualsListTest, OnAdversarialGridScenes) {
   EXPECT_EQ(search_grid_scenes(scaled_count(2'000), grid_scene, grid_difference), "");
 }
 
-TEST(HashGridEqualsListTest, OnBallsThatAreNotAskedByTheirBounds) {
+TEST(HashGridEqualsListTest, OnBallsVisitedByBallInsteadOfByBounds) {
   EXPECT_EQ(search_grid_scenes(scaled_count(1'000), any_adversarial_scene, grid_ball_difference), "");
 }
 
@@ -29,7 +29,8 @@ TEST(HashGridEqualsListTest, ThroughRandomInsertsMovesAndRemoves) {
   EXPECT_EQ(search_grid_scenes(scaled_count(300), any_adversarial_scene, moving_grid_difference), "");
 }
 
-// Large enough for marches through many bricks, for several levels of many bricks each and for choices of cell size.
+// The scenes are large enough for marches through many bricks, for several levels with many bricks each and for choices
+// of the cell size.
 TEST(HashGridEqualsListTest, OnTensOfThousandsOfObjects) {
   for (uint64_t seed = 0; seed < scaled_count(20); ++seed) {
     Random random(seed);

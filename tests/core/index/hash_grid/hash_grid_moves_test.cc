@@ -1,5 +1,5 @@
-// Moves alone: a few, half or all of the values at once, with the numbers of moves by handle and without, and snapshots
-// that share what later moves add to.
+// Batches of moves only: a few, half or all of the values at once, with and without move indices by handle, and
+// snapshots that share the log to which later moves append.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -26,11 +26,11 @@ std::vector<Object> crowd(size_t count, double half, Random& random, bool with_f
   return objects;
 }
 
-// The store, and what must be in it.
+// Store with a model of its contents.
 class Crowd {
  public:
   Crowd(size_t count, bool with_forms, uint64_t seed)
-      : random_(seed), objects_(crowd(count, kHalf, random_, with_forms)), turns_(with_forms) {
+      : random_(seed), objects_(crowd(count, kHalf, random_, with_forms)), rotates_(with_forms) {
     store_.apply({}, objects_);
   }
 
@@ -38,26 +38,26 @@ class Crowd {
   const std::vector<Object>& objects() const { return objects_; }
   ObjectSet snapshot() { return store_.snapshot(); }
 
-  // Of about that share of the objects, each at most once.
-  void move(double share, bool with_numbers) {
+  // Moves about that share of the objects, each at most once. `with_indices`: passes the move indices by handle.
+  void move(double share, bool with_indices) {
     std::vector<GridMove> moves;
     std::vector<Quaternion> rotations;
-    std::vector<uint32_t> by_handle(with_numbers ? store_.handle_count() : 0, 12345);
+    std::vector<uint32_t> by_handle(with_indices ? store_.handle_count() : 0, 12345);
     for (Object& object : objects_) {
       if (!random_.chance(share)) continue;
       Shape& shape = object.shape;
       shape.position = random_.chance(0.1) ? random_.vector(kHalf) : shape.position + random_.vector(1);
       const uint32_t handle = store_.handle(object.id);
-      if (with_numbers) by_handle[handle] = static_cast<uint32_t>(moves.size());
+      if (with_indices) by_handle[handle] = static_cast<uint32_t>(moves.size());
       moves.push_back({shape.position, handle});
-      if (!turns_ || random_.chance(0.7)) continue;
+      if (!rotates_ || random_.chance(0.7)) continue;
       shape.rotation = random_.rotation();
       moves.back().rotation = static_cast<uint32_t>(rotations.size());
       rotations.push_back(shape.rotation);
     }
     store_.move({moves, rotations, by_handle});
   }
-  // One goes, and comes back elsewhere.
+  // Removes a random object and inserts it again elsewhere under its id.
   void replace_one() {
     Object& object = objects_[random_.below(objects_.size())];
     const Object before = object;
@@ -70,7 +70,7 @@ class Crowd {
 
   Random random_;
   std::vector<Object> objects_;
-  bool turns_;
+  bool rotates_;
   ObjectStore store_;
 };
 
@@ -106,7 +106,7 @@ void expect_finds(const ObjectSet& set, const std::vector<Object>& objects, Rand
 
 class HashGridMovesTest : public ::testing::TestWithParam<bool> {};
 
-TEST_P(HashGridMovesTest, OfAnyShareOfTheValuesAnswerAsTheModelAndSnapshotsStay) {
+TEST_P(HashGridMovesTest, QueriesEqualTheModelAfterMovesOfAnyShareAndSnapshotsStayUnchanged) {
   Crowd crowd(4'000, GetParam(), 3);
   std::vector<std::pair<ObjectSet, std::vector<Object>>> kept;
   for (uint64_t batch = 0; batch < scaled_count(150); ++batch) {
@@ -127,9 +127,8 @@ TEST_P(HashGridMovesTest, OfAnyShareOfTheValuesAnswerAsTheModelAndSnapshotsStay)
 INSTANTIATE_TEST_SUITE_P(Forms, HashGridMovesTest, ::testing::Bool(),
                          [](const auto& test) { return test.param ? "Any" : "BallsOnly"; });
 
-// Few moves at a time go into a block that versions share: the writer adds to it while readers of earlier versions
-// read.
-TEST(HashGridMovesThreadsTest, ReadersSeeTheirVersionWhileTheWriterAddsToWhatTheyShare) {
+// A batch of few moves appends to a log that versions share: the writer appends while readers of earlier versions read.
+TEST(HashGridMovesThreadsTest, ReadersSeeTheirVersionWhileTheWriterAppendsToTheSharedLog) {
   struct Version {
     ObjectSet set;
     std::vector<Object> objects;

@@ -41,14 +41,14 @@ std::vector<Object> crowd(size_t count, double half, float radius, uint64_t seed
   return objects;
 }
 
-// Grids that stay with the cell size of 8.
+// Returns options of a grid that keeps the cell size 8.
 HashGridOptions fixed_cells() {
   HashGridOptions options;
   options.first_choice = std::numeric_limits<size_t>::max();
   return options;
 }
 
-TEST(HashGridTest, AnEmptyGridAnswersNothing) {
+TEST(HashGridTest, AnEmptyGridGivesNoResults) {
   ObjectGrid grid;
   EXPECT_EQ(grid.size(), 0u);
   EXPECT_FALSE(grid.contains(ball(1, {}, 1)));
@@ -82,7 +82,7 @@ TEST(HashGridTest, AMoveThatChangesSizeChangesLevel) {
   EXPECT_EQ(ids_near(grid, {400, 0, 0}, 1), std::set<Id>{1});
 }
 
-TEST(HashGridTest, RemoveTakesOutTheGivenIdOnly) {
+TEST(HashGridTest, RemoveRemovesOnlyTheGivenId) {
   ObjectGrid grid;
   const Object first = ball(1, {1, 1, 1}, 1), second = ball(2, {1, 1, 1}, 1);
   grid.insert(first);
@@ -94,7 +94,7 @@ TEST(HashGridTest, RemoveTakesOutTheGivenIdOnly) {
   EXPECT_EQ(ids_near(grid, {1, 1, 1}, 0), std::set<Id>{2});
 }
 
-TEST(HashGridTest, EmptyBricksAndLevelsAreGivenBack) {
+TEST(HashGridTest, EmptyBricksAndLevelsAreFreed) {
   ObjectGrid grid(fixed_cells());
   std::vector<Object> objects = crowd(500, 1000, 0.5f, 1);
   for (size_t i = 0; i < objects.size(); i += 5) objects[i].shape.radius = 100;
@@ -110,7 +110,7 @@ TEST(HashGridTest, EmptyBricksAndLevelsAreGivenBack) {
   EXPECT_EQ(empty.bytes, 0u);
 }
 
-TEST(HashGridTest, MoreThanSixteenBitsOfValuesInOneCell) {
+TEST(HashGridTest, OneCellHoldsMoreThan65535Values) {
   ObjectGrid grid;
   const std::vector<Object> objects(crowd(70'000, 0.001, 0, 2));
   grid.apply({}, objects);
@@ -120,7 +120,7 @@ TEST(HashGridTest, MoreThanSixteenBitsOfValuesInOneCell) {
   EXPECT_EQ(ids_near(grid, {}, 1), std::set<Id>{70'000});
 }
 
-TEST(HashGridTest, ManyObjectsInOneCellAnswerAsTheList) {
+TEST(HashGridTest, ManyObjectsInOneCellGiveTheResultsOfTheList) {
   TestScene<Object> scene;
   scene.name = "one cell";
   Random random(3);
@@ -140,7 +140,7 @@ TEST(HashGridTest, ManyObjectsInOneCellAnswerAsTheList) {
   }
 }
 
-TEST(HashGridTest, ASnapshotKeepsItsValuesWhileTheGridGoesOn) {
+TEST(HashGridTest, ASnapshotKeepsItsValuesWhileTheGridChanges) {
   const std::vector<Object> objects = crowd(2'000, 50, 0.5f, 4);
   ObjectGrid grid;
   grid.apply({}, objects);
@@ -169,7 +169,7 @@ TEST(HashGridTest, ForEachVisitsEveryValueOnceInTheSameOrderEveryTime) {
   EXPECT_EQ(ids.size(), objects.size());
 }
 
-TEST(HashGridTest, CellSizeFollowsTheValuesAndChangesNoAnswer) {
+TEST(HashGridTest, TheCellSizeFollowsTheValuesAndChangesNoResult) {
   Random random(6);
   SceneSketch sketch = random_scene(random);
   TestScene<Object> scene = make_scene<Object>(sketch, random);
@@ -195,40 +195,40 @@ TEST(HashGridTest, CellSizeFollowsTheValuesAndChangesNoAnswer) {
   EXPECT_EQ(first_difference(grid, scene), "");
 }
 
-// So that no batch takes long: what is replaced with each is a part of the whole.
-TEST(HashGridTest, ValuesAreFiledAnewAFewWithEachBatchAndEveryAnswerStays) {
+// Limits the time of a batch: each replaces only a part of the grid.
+TEST(HashGridTest, AfterANewCellSizeEachBatchRefilesAFewValuesAndResultsStayCorrect) {
   Random random(9);
   std::vector<Object> objects = crowd(40'000, 1000, 0.01f, 9);
   ObjectGrid grid;
   grid.apply({}, objects);
   const double first_size = grid.statistics().cell_size;
-  const auto crowd_the_middle = [&] {
+  const auto insert_in_the_middle = [&] {
     const size_t before = objects.size();
     for (int i = 0; i < 500; ++i) objects.push_back(ball(objects.size() + 1, random.vector(5), 0.01f));
     return grid.apply({}, absl::MakeConstSpan(objects).subspan(before));
   };
   while (grid.statistics().cell_size == first_size) {
-    crowd_the_middle();
-    ASSERT_LT(objects.size(), 100'000u) << "no other cells were chosen";
+    insert_in_the_middle();
+    ASSERT_LT(objects.size(), 100'000u) << "no other cell size was chosen";
   }
   int batches = 1;
   for (; grid.statistics().levels > 1; ++batches) {
     const double radius = random.chance(0.5) ? 1 : 200;
-    const Balld asked{random.vector(3), radius};
+    const Balld ball_query{random.vector(3), radius};
     size_t expected = 0;
-    for (const Object& object : objects) expected += ball_overlaps(asked, object.shape) ? 1 : 0;
-    EXPECT_EQ(ids_near(grid, asked.center, radius).size(), expected);
-    EXPECT_LT(crowd_the_middle(), grid.statistics().bytes / 2);
-    ASSERT_LT(batches, 100) << "it does not end";
+    for (const Object& object : objects) expected += ball_overlaps(ball_query, object.shape) ? 1 : 0;
+    EXPECT_EQ(ids_near(grid, ball_query.center, radius).size(), expected);
+    EXPECT_LT(insert_in_the_middle(), grid.statistics().bytes / 2);
+    ASSERT_LT(batches, 100) << "refiling does not end";
   }
   EXPECT_GT(batches, 3);
   EXPECT_EQ(ids_near(grid, {}, 1e6).size(), objects.size());
 }
 
 TEST(HashGridTest, OptionsRoundTheCellSizeUpToAPowerOfTwoWithinBounds) {
-  const auto cell_size = [](double asked) {
+  const auto cell_size = [](double requested) {
     HashGridOptions options;
-    options.cell_size = asked;
+    options.cell_size = requested;
     return ObjectGrid(options).statistics().cell_size;
   };
   EXPECT_EQ(cell_size(8), 8);
@@ -249,7 +249,7 @@ TEST(HashGridTest, AGiantDoesNotWidenLookupsForSmallObjects) {
   EXPECT_EQ(with.tests, without.tests + 1);
 }
 
-TEST(HashGridTest, AnInfiniteRayInASparseWorldLooksIntoFewCells) {
+TEST(HashGridTest, AnInfiniteRayInASparseWorldVisitsFewCells) {
   ObjectGrid grid(fixed_cells());
   std::vector<Object> objects;
   for (Id id = 1; id <= 200; ++id) {
@@ -268,7 +268,7 @@ TEST(HashGridTest, AnInfiniteRayInASparseWorldLooksIntoFewCells) {
   EXPECT_EQ(hits.size(), 100u);
 }
 
-TEST(HashGridTest, AWorldWideRegionLooksIntoEachBrickOnce) {
+TEST(HashGridTest, AWorldWideRegionVisitsEachBrickOnce) {
   ObjectGrid grid(fixed_cells());
   grid.apply({}, crowd(100, kWorld, 1, 8));
   Work work;
@@ -276,7 +276,7 @@ TEST(HashGridTest, AWorldWideRegionLooksIntoEachBrickOnce) {
   EXPECT_LE(work.cells, 200u);
 }
 
-TEST(HashGridTest, AShortRayInACrowdLooksIntoFewCells) {
+TEST(HashGridTest, AShortRayInACrowdVisitsFewCells) {
   ObjectGrid grid;
   grid.apply({}, crowd(100'000, 1000, 0.5f, 9));
   Work work;
@@ -285,7 +285,7 @@ TEST(HashGridTest, AShortRayInACrowdLooksIntoFewCells) {
   EXPECT_LE(work.tests, 200u);
 }
 
-TEST(HashGridTest, AHitEndsTheMarchThroughWhatLiesBehindIt) {
+TEST(HashGridTest, AHitEndsTheMarchOfTheRay) {
   ObjectGrid grid(fixed_cells());
   std::vector<Object> objects = crowd(50'000, 1000, 0.5f, 10);
   objects.push_back(ball(60'000, {5, 2, 3}, 2));
@@ -301,7 +301,7 @@ TEST(HashGridTest, AHitEndsTheMarchThroughWhatLiesBehindIt) {
   EXPECT_LT(to_the_hit.cells * 4, all_the_way.cells);
 }
 
-TEST(HashGridTest, AWalkGoesOnWhereItStoppedHoweverManyValuesABrickHas) {
+TEST(HashGridTest, ACursorResumesBehindTheLastVisitedValueEvenWithinABrick) {
   ObjectGrid grid;
   grid.apply({}, crowd(3000, 50, 1, 1));
   const ObjectSet set = grid.snapshot();
@@ -309,10 +309,10 @@ TEST(HashGridTest, AWalkGoesOnWhereItStoppedHoweverManyValuesABrickHas) {
   GridCursor cursor;
   std::vector<Id> ids;
   for (bool all = false; !all;) {
-    uint64_t most = 1 + random.below(700);
+    uint64_t steps = 1 + random.below(700);
     all = set.grid().for_each_from(cursor, [&](const GridRef& value) {
       ids.push_back(value.entry().id);
-      return --most > 0;
+      return --steps > 0;
     });
   }
   std::vector<Id> at_once;
@@ -322,7 +322,7 @@ TEST(HashGridTest, AWalkGoesOnWhereItStoppedHoweverManyValuesABrickHas) {
   EXPECT_EQ(ids, at_once);
 }
 
-TEST(HashGridTest, AGridThatIsFilledAsAnotherWasHasItsCells) {
+TEST(HashGridTest, AGridFilledWithTheCellSizeOfAnotherHasTheSameBricks) {
   HashGrid chosen, filled;
   std::vector<GridItem> items;
   for (const Object& object : crowd(5000, 500, 1, 1)) items.push_back(grid_item_of(object, uint32_t(items.size())));
@@ -339,7 +339,7 @@ TEST(HashGridTest, AGridThatIsFilledAsAnotherWasHasItsCells) {
   EXPECT_EQ(filled.snapshot().cell_size(), chosen.cell_size());
 }
 
-TEST(HashGridDeathTest, RemovingWhatIsNotThereIsAProgrammersError) {
+TEST(HashGridDeathTest, RemovingAnAbsentObjectIsAProgrammerError) {
   ObjectGrid grid;
   grid.insert(ball(1, {1, 1, 1}, 1));
   const Object other = ball(2, {1, 1, 1}, 1);

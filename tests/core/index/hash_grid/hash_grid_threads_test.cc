@@ -1,4 +1,4 @@
-// One writer at full speed, two readers that never wait for it: each snapshot shows one revision, whole.
+// One writer at full speed and two readers that never wait for it: each snapshot shows exactly one revision.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -35,7 +35,7 @@ class Published {
 
 constexpr size_t kObjects = 1'000;
 
-// All objects of one revision carry its number as their tag.
+// Expects a consistent snapshot: all objects carry the number of the same revision as their tag.
 void expect_one_revision(const ObjectSet& grid) {
   std::vector<Object> found;
   ball_overlap(grid, {{}, 1e6}, found);
@@ -54,7 +54,7 @@ void expect_one_revision(const ObjectSet& grid) {
   for (const RayHit<Object>& hit : hits) EXPECT_EQ(hit.value.tag, found[0].tag);
 }
 
-TEST(HashGridThreadsTest, ReadersOfSnapshotsSeeWholeRevisionsWhileTheWriterGoesOn) {
+TEST(HashGridThreadsTest, EachSnapshotShowsOneRevisionWhileTheWriterContinues) {
   Random random(1);
   std::vector<Object> objects(kObjects);
   for (size_t i = 0; i < kObjects; ++i) {

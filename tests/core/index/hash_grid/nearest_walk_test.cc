@@ -1,5 +1,5 @@
-// Shells around a point miss nothing and end; what they hold is visited from near to far; and points in empty space do
-// not walk through it.
+// Shells around a point miss no value and end; the values of a shell are visited from near to far; and a search from
+// empty space does not visit the empty cells on the way.
 #include "core/index/hash_grid/nearest_walk.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using test::Random;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-LevelExtent world_of(double half) { return {{{-half, -half, -half}, {half, half, half}}, 0.5, 1.0 / 8}; }
+LevelGeometry world_of(double half) { return {{{-half, -half, -half}, {half, half, half}}, 0.5, 1.0 / 8}; }
 
 Object ball(Id id, Vec3d center, float radius = 0.5f) {
   Object object;
@@ -34,7 +34,7 @@ std::vector<Object> crowd(size_t count, double half, uint64_t seed) {
   return objects;
 }
 
-// The grid's cells and bricks that finding the nearest `count` looks at.
+// Returns the number of cells and bricks visited to find the nearest `count` objects.
 uint64_t cells_of(const ObjectGrid& grid, Vec3d point, size_t count) {
   std::vector<ValueAt<Object>> found;
   Work work;
@@ -43,17 +43,17 @@ uint64_t cells_of(const ObjectGrid& grid, Vec3d point, size_t count) {
   return work.cells;
 }
 
-TEST(NearestWalkTest, ShellsFollowEachOtherUntilAllIsInTheLast) {
-  const LevelExtent world = world_of(1000);
+TEST(NearestWalkTest, ShellsAreAdjacentAndTheLastContainsTheWorld) {
+  const LevelGeometry world = world_of(1000);
   NearestShells shells({10, 20, 30}, world, 12);
   float last = -1;
   Aabbd region;
   int count = 0;
   for (; shells.next(kInfinity); ++count) {
     EXPECT_EQ(shells.above(), last);
-    EXPECT_GT(shells.upto(), last);
+    EXPECT_GT(shells.up_to(), last);
     EXPECT_TRUE(count == 0 || contains(shells.region(), region));
-    last = shells.upto();
+    last = shells.up_to();
     region = shells.region();
   }
   EXPECT_TRUE(contains(region, world.bounds));
@@ -62,43 +62,43 @@ TEST(NearestWalkTest, ShellsFollowEachOtherUntilAllIsInTheLast) {
 }
 
 TEST(NearestWalkTest, ShellsEndAtTheLimit) {
-  const LevelExtent world = world_of(1000);
+  const LevelGeometry world = world_of(1000);
   NearestShells shells({}, world, 12);
   EXPECT_TRUE(shells.next(4));
-  EXPECT_EQ(shells.upto(), key_limit(4));
+  EXPECT_EQ(shells.up_to(), key_limit(4));
   EXPECT_FALSE(shells.next(4));
   EXPECT_FALSE(shells.next(1));
 }
 
-TEST(NearestWalkTest, TheFirstShellIsNarrowerWhereThereIsMore) {
-  const LevelExtent world = world_of(1000);
+TEST(NearestWalkTest, TheFirstShellIsNarrowerAtHigherDensity) {
+  const LevelGeometry world = world_of(1000);
   NearestShells few({}, world, 1), many({}, world, 1000);
   ASSERT_TRUE(few.next(kInfinity) && many.next(kInfinity));
-  EXPECT_LT(many.upto(), few.upto() / 10);
+  EXPECT_LT(many.up_to(), few.up_to() / 10);
 }
 
-TEST(NearestWalkTest, TheFirstShellOfAPointOutsideReachesTheWorld) {
-  const LevelExtent world = world_of(100);
+TEST(NearestWalkTest, TheFirstShellOfAPointOutsideOverlapsTheWorld) {
+  const LevelGeometry world = world_of(100);
   NearestShells shells({1e6, 0, 0}, world, 12);
   ASSERT_TRUE(shells.next(kInfinity));
   EXPECT_TRUE(overlaps(shells.region(), world.bounds));
   EXPECT_FALSE(contains(shells.region(), world.bounds));
 }
 
-TEST(NearestWalkTest, NoLimitHasAKeyBelowItself) {
+TEST(NearestWalkTest, TheKeyOfALimitIsNotBelowTheLimit) {
   for (const double limit : {0.0, 1e-300, 1e-60, 1e-44, 1.0, 1e30, 3e38, 1e60, kInfinity})
     EXPECT_GE(double{key_limit(limit)}, limit > 1e38 ? 1e38 : limit) << limit;
   EXPECT_EQ(key_limit(1e60), std::numeric_limits<float>::infinity());
 }
 
-// Few of them are sorted by vectors, many are not.
-TEST(NearestWalkTest, FewAndManyAreVisitedFromNearToFarAndOnce) {
+// Up to kMaxSorted candidates are sorted by a kernel, more by std::sort().
+TEST(NearestWalkTest, AnyNumberOfValuesIsVisitedOnceAndFromNearToFar) {
   const Vec3d center = {1000, 1000, 1000};
   for (const size_t count : {1, 7, 8, 9, 63, 64, 65, 2000}) {
     std::vector<Object> objects = crowd(count, 20, count);
     for (Object& object : objects) object.shape.position = object.shape.position + center;
     HashGridOptions options;
-    options.first_choice = std::numeric_limits<size_t>::max();  // a few objects would get cells as wide as the world
+    options.first_choice = std::numeric_limits<size_t>::max();  // else a few objects get cells as wide as the world
     ObjectGrid grid(options);
     grid.apply({}, objects);
     const ObjectSet set = grid.snapshot();
@@ -116,7 +116,7 @@ TEST(NearestWalkTest, FewAndManyAreVisitedFromNearToFarAndOnce) {
   }
 }
 
-TEST(NearestWalkTest, HardlyMoreThanWhatIsNearestIsVisitedInACrowd) {
+TEST(NearestWalkTest, FewValuesBesidesTheNearestAreVisitedInACrowd) {
   ObjectGrid grid;
   grid.apply({}, crowd(50'000, 500, 1));
   Random random(2);
@@ -128,14 +128,14 @@ TEST(NearestWalkTest, HardlyMoreThanWhatIsNearestIsVisitedInACrowd) {
   EXPECT_LT(work.tests, 100 * 12);
 }
 
-TEST(NearestWalkTest, APointFarFromACrowdDoesNotWalkThere) {
+TEST(NearestWalkTest, APointFarFromACrowdVisitsFewCells) {
   ObjectGrid grid;
   grid.apply({}, crowd(50'000, 500, 1));
   const uint64_t all = grid.statistics().bricks * 16 + grid.statistics().cells;
   for (const double away : {600.0, 1e4, 1e6, 1e9}) EXPECT_LT(cells_of(grid, {away, 0, 0}, 8), all) << away;
 }
 
-TEST(NearestWalkTest, AFewObjectsFarFromEachOtherCostAFewBricks) {
+TEST(NearestWalkTest, AFewDistantObjectsCostVisitsOfAFewBricks) {
   ObjectGrid grid;
   grid.apply({}, crowd(20, 1e8, 1));
   const size_t bricks = grid.statistics().bricks;

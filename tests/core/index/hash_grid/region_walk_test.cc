@@ -1,5 +1,5 @@
-// A walk visits for each of its regions what the grid's own visit of that region visits, in the same order, at the same
-// cost: whatever was moved lately, and however many values or bricks a region holds.
+// A walk visits for each of its regions the same values as the grid's own visit of that region, in the same order and
+// at the same cost, whatever was moved before and however many values or bricks a region holds.
 #include "core/index/hash_grid/region_walk.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ struct Visited {
   Work work;
 };
 
-// Balls of two sizes, of which some were moved, so that bricks have values in their logs and gaps where they were.
+// Returns a grid of balls of two sizes. Some have moved, so that bricks have logs and dead slots.
 GridSnapshot crowd(Random& random) {
   HashGrid grid;
   std::vector<GridItem> items(kCount);
@@ -58,11 +58,11 @@ std::vector<GridRegion> regions_in(const GridSnapshot& grid, Random& random, siz
 }
 
 template <class Visit>
-Visited visited_by(const Visit& visit, size_t most = kCount) {
+Visited visited_by(const Visit& visit, size_t max_values = kCount) {
   Visited result;
   visit(result.work, [&](const GridRef& value) {
     result.ids.push_back(value.entry().id);
-    return result.ids.size() < most;
+    return result.ids.size() < max_values;
   });
   return result;
 }
@@ -73,7 +73,7 @@ void expect_same(const Visited& a, const Visited& b, size_t i) {
   EXPECT_EQ(a.work.tests, b.work.tests) << "region " << i;
 }
 
-TEST(RegionWalkTest, EveryRegionIsVisitedAsByItself) {
+TEST(RegionWalkTest, EveryRegionIsVisitedLikeASeparateVisit) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     Random random(seed);
     const GridSnapshot grid = crowd(random);
@@ -89,14 +89,14 @@ TEST(RegionWalkTest, EveryRegionIsVisitedAsByItself) {
   }
 }
 
-TEST(RegionWalkTest, AWalkFromTheMiddleEndsWhereItIsTold) {
+TEST(RegionWalkTest, AWalkFromTheMiddleVisitsUpToItsEnd) {
   Random random(6);
   const GridSnapshot grid = crowd(random);
   const std::vector<GridRegion> regions = regions_in(grid, random, 20);
   for (size_t begin = 0; begin < regions.size(); ++begin) {
-    std::vector<size_t> asked;
+    std::vector<size_t> requested;
     const auto region_of = [&](size_t i) {
-      asked.push_back(i);
+      requested.push_back(i);
       return regions.at(i);
     };
     RegionWalk walk(begin, regions.size(), region_of);
@@ -106,11 +106,11 @@ TEST(RegionWalkTest, AWalkFromTheMiddleEndsWhereItIsTold) {
       expect_same(visited_by([&](Work& work, const auto& visit) { walk.visit(work, visit); }),
                   visited_by([&](Work& work, const auto& visit) { regions[i].visit(work, visit); }), i);
     }
-    EXPECT_EQ(asked, expected);
+    EXPECT_EQ(requested, expected);
   }
 }
 
-TEST(RegionWalkTest, AVisitEndsWhenItsVisitorSaysSo) {
+TEST(RegionWalkTest, AVisitEndsWhenTheVisitorReturnsFalse) {
   Random random(7);
   const GridSnapshot grid = crowd(random);
   const Balld everything = {{}, 4 * kHalf}, some = {{}, 30};
@@ -120,9 +120,9 @@ TEST(RegionWalkTest, AVisitEndsWhenItsVisitorSaysSo) {
     EXPECT_EQ(visited_by([&](Work& work, const auto& visit) { walk.visit(work, visit); }, 2).ids.size(), 2u);
 }
 
-TEST(RegionWalkTest, NoRegionsAreNotAskedFor) {
+TEST(RegionWalkTest, AnEmptyWalkRequestsNoRegion) {
   RegionWalk walk(3, 3, [](size_t) -> GridRegion {
-    ADD_FAILURE() << "there is none";
+    ADD_FAILURE() << "an empty walk has requested a region";
     return {};
   });
 }

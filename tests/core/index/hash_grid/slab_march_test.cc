@@ -1,4 +1,4 @@
-// The march names, exactly once, the brick of every value that the slab test lets through, and never too late.
+// The march names, exactly once, the brick of every value that passes the slab test, in a slab that is not too late.
 #include "core/index/hash_grid/slab_march.h"
 
 #include <gtest/gtest.h>
@@ -20,30 +20,31 @@ struct Filed {
 };
 
 struct FiledLevel {
-  LevelExtent extent;
+  LevelGeometry geometry;
   std::vector<Filed> values;
 };
 
-// Values that reach out of their cells by up to half a cell, many of them thin and exactly on a border.
+// Returns a level of values that extend up to half a cell beyond their cells; many are thin and exactly on a border.
 FiledLevel random_level(Random& random, Vec3d center) {
   FiledLevel level;
   const int exponent = random.whole(-6, 8);
   const double edge = std::exp2(exponent);
-  level.extent.cells_per_unit = cells_per_unit(exponent);
+  level.geometry.cells_per_unit = cells_per_unit(exponent);
   for (int i = 0; i < 60; ++i) {
     const bool on_border = random.chance(0.5);
     const Vec3d position = center + (on_border ? random.whole_vector(24) * edge : random.vector(24 * edge));
     Vec3d half = random.positive_vector(edge / 2);
     if (random.chance(0.7)) half[static_cast<int>(random.below(3))] = 0;
     const Aabbd bounds{position - half, position + half};
-    level.extent.bounds = merge(level.extent.bounds, bounds);
-    level.extent.reach = std::max(level.extent.reach, reach_of(bounds, position));
-    level.values.push_back({bounds, brick_of(cell_of(position, level.extent.cells_per_unit))});
+    level.geometry.bounds = merge(level.geometry.bounds, bounds);
+    level.geometry.max_extent = std::max(level.geometry.max_extent, extent_of(bounds, position));
+    level.values.push_back({bounds, brick_of(cell_of(position, level.geometry.cells_per_unit))});
   }
   return level;
 }
 
-// At a corner or on a face of one of the values, or so little outside that only the pad of the slab test lets it pass.
+// Returns a ray through a corner or a face of one of the values, or so little outside that the value passes the slab
+// test only by its padding.
 Rayd grazing_ray(Random& random, const FiledLevel& level, double pad) {
   const Aabbd& box = random.pick(level.values).bounds;
   Vec3d through = random.chance(0.5) ? box.min : box.max;
@@ -52,7 +53,7 @@ Rayd grazing_ray(Random& random, const FiledLevel& level, double pad) {
   Vec3d direction = random.chance(0.7) ? test::lattice_direction(random) : random.unit_vector();
   if (random.chance(0.2)) direction[static_cast<int>(random.below(3))] *= 1e-12;
   if (direction == Vec3d{}) direction = {0, 0, 1};
-  const double back = random.chance(0.3) ? 0 : random.between(0, 100 / level.extent.cells_per_unit);
+  const double back = random.chance(0.3) ? 0 : random.between(0, 100 / level.geometry.cells_per_unit);
   return {through - direction * back, direction * random.magnitude(-20, 20)};
 }
 
@@ -63,9 +64,9 @@ bool names(const KeyRange& range, const GridKey& brick) {
   return true;
 }
 
-// How many values the slab test lets through; each must be named once.
+// Expects that each value that passes the slab test is named once. Returns the number of these values.
 int check_march(const FiledLevel& level, const SlabRay<double>& ray, double limit) {
-  const SlabMarch march(ray, level.extent, limit);
+  const SlabMarch march(ray, level.geometry, limit);
   EXPECT_TRUE(std::isfinite(march.bricks()));
   int met = 0;
   for (const Filed& value : level.values) {
@@ -84,7 +85,7 @@ int check_march(const FiledLevel& level, const SlabRay<double>& ray, double limi
   return met;
 }
 
-TEST(SlabMarchTest, NamesTheBrickOfEveryValueMetExactlyOnceAndInTime) {
+TEST(SlabMarchTest, NamesTheBrickOfEveryMetValueExactlyOnceAndNotTooLate) {
   uint64_t met = 0;
   for (uint64_t seed = 0; seed < test::scaled_count(2'000) && !HasFailure(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -94,15 +95,15 @@ TEST(SlabMarchTest, NamesTheBrickOfEveryValueMetExactlyOnceAndInTime) {
     for (int i = 0; i < 30; ++i) {
       const double pad = random.chance(0.5) ? kObjectPad : kInstancePad;
       const SlabRay<double> ray(grazing_ray(random, level, pad), pad);
-      const double end = random.between(0, 100) / (level.extent.cells_per_unit * max_component(abs(ray.direction())));
+      const double end = random.between(0, 100) / (level.geometry.cells_per_unit * max_component(abs(ray.direction())));
       met += check_march(level, ray, random.chance(0.5) ? std::numeric_limits<double>::infinity() : end);
     }
   }
   EXPECT_GT(met, test::scaled_count(2'000) * 30);
 }
 
-TEST(SlabMarchTest, ARayBesideTheLevelOrBeforeItsLimitHasNoSlabs) {
-  const LevelExtent level{{{0, 0, 0}, {10, 10, 10}}, 1, 1};
+TEST(SlabMarchTest, ARayThatMissesTheLevelOrEndsBeforeItHasNoSlabs) {
+  const LevelGeometry level{{{0, 0, 0}, {10, 10, 10}}, 1, 1};
   const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_EQ(SlabMarch(SlabRay<double>({{-5, 20, 5}, {1, 0, 0}}, kObjectPad), level, infinity).slabs(), 0);
   EXPECT_EQ(SlabMarch(SlabRay<double>({{-5, 5, 5}, {-1, 0, 0}}, kObjectPad), level, infinity).slabs(), 0);
@@ -111,7 +112,7 @@ TEST(SlabMarchTest, ARayBesideTheLevelOrBeforeItsLimitHasNoSlabs) {
 }
 
 TEST(SlabMarchTest, SlabsComeFromNearToFarInEitherDirection) {
-  const LevelExtent level{{{-100, -100, -100}, {100, 100, 100}}, 0.5, 1};
+  const LevelGeometry level{{{-100, -100, -100}, {100, 100, 100}}, 0.5, 1};
   for (const double sign : {-1.0, 1.0}) {
     const SlabRay<double> ray({{sign * -150, 3, 5}, {sign, 0.3, -0.1}}, kObjectPad);
     const SlabMarch march(ray, level, std::numeric_limits<double>::infinity());
@@ -126,8 +127,8 @@ TEST(SlabMarchTest, SlabsComeFromNearToFarInEitherDirection) {
   }
 }
 
-TEST(SlabMarchTest, ARayTooFlatForItsFiguresSaysSo) {
-  const LevelExtent level{{{-100, -100, -100}, {100, 100, 100}}, 0.5, 1};
+TEST(SlabMarchTest, ARayWhoseBoundsOverflowReportsInfiniteBricks) {
+  const LevelGeometry level{{{-100, -100, -100}, {100, 100, 100}}, 0.5, 1};
   const SlabRay<double> ray({{0, 0, 0}, {1e-320, 0, 0}}, kObjectPad);
   EXPECT_EQ(SlabMarch(ray, level, std::numeric_limits<double>::infinity()).bricks(),
             std::numeric_limits<double>::infinity());

@@ -28,9 +28,9 @@ std::vector<Id> ids_of(const ListIndex<Object>& list) {
   return ids;
 }
 
-// Keeps ids until it has as many as it wants.
-struct Taker {
-  size_t wanted;
+// Visitor that records ids and ends the visit after `max_ids`.
+struct IdRecorder {
+  size_t max_ids;
   std::vector<Id> ids;
 
   double limit() const { return 0; }
@@ -38,7 +38,7 @@ struct Taker {
   bool overlaps(const Aabbd&) const { return false; }
   bool visit(const Object& object) {
     ids.push_back(object.id);
-    return ids.size() < wanted;
+    return ids.size() < max_ids;
   }
 };
 
@@ -58,7 +58,7 @@ TEST(ListIndexTest, RemoveFillsTheHoleWithTheLastValue) {
   EXPECT_THAT(ids_of(list), ElementsAre(1, 3));
 }
 
-TEST(ListIndexTest, RemoveOfTheLastValueMovesNone) {
+TEST(ListIndexTest, RemoveOfTheLastValueMovesNoOther) {
   ListIndex<Object> list;
   for (Id id = 1; id <= 3; ++id) list.insert(point(id));
   EXPECT_TRUE(list.remove(point(3)));
@@ -82,7 +82,7 @@ TEST(ListIndexTest, RemoveAndContainsCompareOnlyIds) {
   EXPECT_EQ(list.size(), 0u);
 }
 
-TEST(ListIndexTest, AnIdMayComeBackWithAnotherValue) {
+TEST(ListIndexTest, ARemovedIdCanBeInsertedAgainWithAnotherValue) {
   ListIndex<Object> list;
   list.insert(point(7, 1.0));
   EXPECT_TRUE(list.remove(point(7)));
@@ -96,7 +96,7 @@ TEST(ListIndexDeathTest, InsertOfAPresentIdIsAProgrammerError) {
   EXPECT_DEATH(list.insert(point(7)), "check failed");
 }
 
-TEST(ListIndexTest, StaysTrueToASetThroughRandomUpdates) {
+TEST(ListIndexTest, EqualsASetThroughRandomUpdates) {
   constexpr uint64_t kSeed = 11;
   Random random(kSeed);
   ListIndex<Object> list;
@@ -117,11 +117,11 @@ TEST(ListIndexTest, StaysTrueToASetThroughRandomUpdates) {
   }
 }
 
-TEST(ListIndexTest, VisitsHandOverEverythingAndCountIt) {
+TEST(ListIndexTest, VisitsPassEveryValueAndCountIt) {
   ListIndex<Object> list;
   for (Id id = 1; id <= 3; ++id) list.insert(point(id, 1e6 * static_cast<double>(id)));
   Work work;
-  Taker on_ray{99, {}}, in_region{99, {}};
+  IdRecorder on_ray{99, {}}, in_region{99, {}};
   list.visit_ray(SlabRay<double>({{}, {0, 1, 0}}, kObjectPad), on_ray, work);
   list.visit_region(in_region, work);
   EXPECT_THAT(on_ray.ids, ElementsAre(1, 2, 3));
@@ -130,13 +130,13 @@ TEST(ListIndexTest, VisitsHandOverEverythingAndCountIt) {
   EXPECT_EQ(work.nodes, 0u);
 }
 
-TEST(ListIndexTest, AVisitEndsWhenTheVisitorHasEnough) {
+TEST(ListIndexTest, AVisitEndsWhenTheVisitorReturnsFalse) {
   ListIndex<Object> list;
   for (Id id = 1; id <= 5; ++id) list.insert(point(id));
   Work work;
-  Taker two{2, {}};
-  list.visit_region(two, work);
-  EXPECT_THAT(two.ids, ElementsAre(1, 2));
+  IdRecorder first_two{2, {}};
+  list.visit_region(first_two, work);
+  EXPECT_THAT(first_two.ids, ElementsAre(1, 2));
   EXPECT_EQ(work.tests, 2u);
 }
 

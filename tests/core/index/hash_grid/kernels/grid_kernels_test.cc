@@ -1,4 +1,4 @@
-// What float culls, by every instruction set: never a value that double keeps, and little more than it must.
+// Kernels of every instruction set keep each value that the exact test in double keeps, and few others.
 #include "core/index/hash_grid/kernels/grid_kernels.h"
 
 #include <gtest/gtest.h>
@@ -15,17 +15,17 @@
 namespace locus::test {
 namespace {
 
-// Columns of one block with room for a vector behind them.
+// Columns of one block, padded by one vector.
 struct Columns4 {
   explicit Columns4(size_t values) : count(static_cast<uint32_t>(values)) {
-    for (std::vector<float>* column : {&x, &y, &z, &reach}) column->resize(values + 8);
-    gone.resize(values / 64 + 2);
+    for (std::vector<float>* column : {&x, &y, &z, &extent}) column->resize(values + 8);
+    dead.resize(values / 64 + 2);
   }
-  GridRows rows() const { return {x.data(), y.data(), z.data(), reach.data(), nullptr, 0, {}, {}}; }
+  GridRows rows() const { return {x.data(), y.data(), z.data(), extent.data(), nullptr, 0, {}, {}}; }
 
   uint32_t count;
-  std::vector<float> x, y, z, reach;
-  std::vector<uint64_t> gone;
+  std::vector<float> x, y, z, extent;
+  std::vector<uint64_t> dead;
 };
 
 Columns4 random_columns(size_t values, Random& random) {
@@ -34,7 +34,7 @@ Columns4 random_columns(size_t values, Random& random) {
     columns.x[i] = random.float_between(-10, 10);
     columns.y[i] = random.float_between(-10, 10);
     columns.z[i] = random.float_between(-10, 10);
-    columns.reach[i] = random.float_between(0, 2);
+    columns.extent[i] = random.float_between(0, 2);
   }
   return columns;
 }
@@ -44,15 +44,16 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
   void SetUp() override { ASSERT_TRUE(use_instruction_set(GetParam()).ok()); }
   void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
 
-  // Asks about rows drawn at random and compares what is kept with keep(slot), 1 must be, 0 may be, -1 must not.
-  template <class Ask, class Keep>
-  static void expect_kept(Columns4& columns, Random& random, const Ask& ask, const Keep& keep) {
+  // Runs the kernel run(rows, slots) on random rows and compares the kept slots with keep(slot): 1 = must be kept, 0 =
+  // may be kept, -1 = must not be kept.
+  template <class Run, class Keep>
+  static void expect_kept(Columns4& columns, Random& random, const Run& run, const Keep& keep) {
     for (int round = 0; round < 200; ++round) {
       GridRows rows = columns.rows();
-      std::set<uint32_t> asked;
-      const bool some_gone = random.chance(0.5);
-      for (uint64_t& word : columns.gone) word = some_gone ? random.next() & random.next() : 0;
-      if (some_gone) rows.gone = columns.gone.data();
+      std::set<uint32_t> live;
+      const bool some_dead = random.chance(0.5);
+      for (uint64_t& word : columns.dead) word = some_dead ? random.next() & random.next() : 0;
+      if (some_dead) rows.dead = columns.dead.data();
       uint32_t at = 0;
       while (rows.count < GridRows::kMax && at < columns.count) {
         const auto begin = static_cast<uint32_t>(at + random.below(12));
@@ -61,27 +62,27 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
         rows.begin[rows.count] = begin;
         rows.end[rows.count++] = end;
         for (uint32_t slot = begin; slot < end; ++slot)
-          if ((columns.gone[slot / 64] >> (slot % 64) & 1) == 0) asked.insert(slot);
+          if ((columns.dead[slot / 64] >> (slot % 64) & 1) == 0) live.insert(slot);
         at = end;
       }
       uint32_t slots[GridRows::kMaxValues + 8];
-      const uint32_t count = ask(rows, slots);
+      const uint32_t count = run(rows, slots);
       ASSERT_TRUE(std::is_sorted(slots, slots + count));
       const std::set<uint32_t> kept(slots, slots + count);
       ASSERT_EQ(kept.size(), count);
-      for (const uint32_t slot : kept) ASSERT_TRUE(asked.contains(slot) && keep(slot) >= 0) << slot;
-      for (const uint32_t slot : asked) ASSERT_TRUE(keep(slot) <= 0 || kept.contains(slot)) << slot;
+      for (const uint32_t slot : kept) ASSERT_TRUE(live.contains(slot) && keep(slot) >= 0) << slot;
+      for (const uint32_t slot : live) ASSERT_TRUE(keep(slot) <= 0 || kept.contains(slot)) << slot;
     }
   }
 };
 
-// 1 where `distance` is within `reach` and a little less, -1 where it is beyond and a little more.
-int verdict(double distance, double reach) {
-  constexpr double kSlack = 1e-4;
-  return distance <= reach - kSlack ? 1 : distance > reach + kSlack ? -1 : 0;
+// Returns 1 if `distance` is less than `extent` by more than an epsilon, -1 if it is greater by more than that, else 0.
+int verdict(double distance, double extent) {
+  constexpr double kEpsilon = 1e-4;
+  return distance <= extent - kEpsilon ? 1 : distance > extent + kEpsilon ? -1 : 0;
 }
 
-TEST_P(GridKernelsTest, KeepValuesThatReachABox) {
+TEST_P(GridKernelsTest, CullBoxKeepsTheValuesThatMeetTheBox) {
   Random random(1);
   Columns4 columns = random_columns(300, random);
   const GridBox box{{-3, -2, 0}, {4, 5, 1}};
@@ -90,37 +91,37 @@ TEST_P(GridKernelsTest, KeepValuesThatReachABox) {
     const double at[] = {columns.x[slot], columns.y[slot], columns.z[slot]};
     for (int axis = 0; axis < 3; ++axis)
       worst = std::max({worst, double{box.low[axis]} - at[axis], at[axis] - double{box.high[axis]}});
-    return verdict(worst, columns.reach[slot]);
+    return verdict(worst, columns.extent[slot]);
   };
   expect_kept(
       columns, random,
       [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_box(rows, box, slots); }, keep);
 }
 
-TEST_P(GridKernelsTest, KeepValuesThatReachABall) {
+TEST_P(GridKernelsTest, CullBallKeepsTheValuesThatMeetTheBall) {
   Random random(2);
   Columns4 columns = random_columns(300, random);
   const GridBall ball{{1, -2, 3}, 4};
   const auto keep = [&](uint32_t slot) {
     const double x = columns.x[slot] - 1.0, y = columns.y[slot] + 2.0, z = columns.z[slot] - 3.0;
-    return verdict(std::sqrt(x * x + y * y + z * z), 4.0 + columns.reach[slot]);
+    return verdict(std::sqrt(x * x + y * y + z * z), 4.0 + columns.extent[slot]);
   };
   expect_kept(
       columns, random,
       [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_ball(rows, ball, slots); }, keep);
 }
 
-TEST_P(GridKernelsTest, KeepValuesThatReachAPartOfALine) {
+TEST_P(GridKernelsTest, CullLineKeepsTheValuesThatMeetThePartOfTheLine) {
   Random random(3);
   Columns4 columns = random_columns(300, random);
   for (const auto& [from, to] : {std::pair(-1e30f, 1e30f), std::pair(-2.0f, 1e30f), std::pair(-2.0f, 1.5f)}) {
     const GridLine line{{1, 2, 0}, {0.6f, 0, 0.8f}, 0.5f, from, to};
     const auto keep = [&](uint32_t slot) {
       const double x = columns.x[slot] - 1.0, y = columns.y[slot] - 2.0, z = columns.z[slot];
-      const double along = x * 0.6 + z * 0.8, reach = 0.5 + double{kDiagonal} * columns.reach[slot];
+      const double along = x * 0.6 + z * 0.8, extent = 0.5 + double{kDiagonal} * columns.extent[slot];
       const double off_x = x - along * 0.6, off_z = z - along * 0.8;
-      return std::min({verdict(std::sqrt(off_x * off_x + y * y + off_z * off_z), reach),
-                       verdict(line.from, along + reach), verdict(along - reach, line.to)});
+      return std::min({verdict(std::sqrt(off_x * off_x + y * y + off_z * off_z), extent),
+                       verdict(line.from, along + extent), verdict(along - extent, line.to)});
     };
     expect_kept(
         columns, random,
@@ -129,7 +130,7 @@ TEST_P(GridKernelsTest, KeepValuesThatReachAPartOfALine) {
   }
 }
 
-TEST_P(GridKernelsTest, CollectValuesByTheSquaredDistanceOfTheirBoundsAndSayIt) {
+TEST_P(GridKernelsTest, CollectNearReturnsTheValuesOfTheShellAndTheirKeys) {
   Random random(4);
   Columns4 columns = random_columns(300, random);
   const GridNear near{{1, -2, 3}, 0.01f, 4, 50};
@@ -138,22 +139,22 @@ TEST_P(GridKernelsTest, CollectValuesByTheSquaredDistanceOfTheirBoundsAndSayIt) 
                            std::fabs(columns.z[slot] - 3.0)};
     double key = 0;
     for (const double gap : gaps) {
-      const double beyond = std::max(0.0, gap - columns.reach[slot] - 0.01);
+      const double beyond = std::max(0.0, gap - columns.extent[slot] - 0.01);
       key += beyond * beyond;
     }
     return key;
   };
   const auto keep = [&](uint32_t slot) { return std::min(verdict(4, key_of(slot)), verdict(key_of(slot), 50)); };
-  const auto ask = [&](const GridRows& rows, uint32_t* slots) {
+  const auto run = [&](const GridRows& rows, uint32_t* slots) {
     float keys[GridRows::kMaxValues + 8];
     const uint32_t count = active_grid_kernels().collect_near(rows, near, slots, keys);
     for (uint32_t i = 0; i < count; ++i) EXPECT_NEAR(double{keys[i]}, key_of(slots[i]), 1e-4);
     return count;
   };
-  expect_kept(columns, random, ask, keep);
+  expect_kept(columns, random, run, keep);
 }
 
-TEST_P(GridKernelsTest, CollectFromLongRowsAndEmptyOnes) {
+TEST_P(GridKernelsTest, CollectNearAcceptsLongAndEmptyRows) {
   Random random(5);
   Columns4 columns = random_columns(500, random);
   GridRows rows = columns.rows();
@@ -168,7 +169,7 @@ TEST_P(GridKernelsTest, CollectFromLongRowsAndEmptyOnes) {
   for (uint32_t i = 0; i < 496; ++i) EXPECT_EQ(slots[i], i + 3);
 }
 
-TEST_P(GridKernelsTest, SortAnyNumberOfDifferentNumbers) {
+TEST_P(GridKernelsTest, SortFewSortsAnyCountOfDistinctValues) {
   Random random(6);
   for (uint32_t count = 0; count <= kMaxSorted; ++count) {
     std::vector<int32_t> numbers;
