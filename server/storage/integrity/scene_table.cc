@@ -62,13 +62,13 @@ absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneLogState& scene,
                                ": load it anew before writing to it"),
                   refusal);
   }
-  scene.begun_at = database_sequence;
+  scene.append_began_at = database_sequence;
   return Start{scene.written, scene.possibly_written_end};
 }
 
 void SceneTable::end_append(SceneLogState& scene, Position written, bool synced) {
   MutexLock lock(mutex_);
-  scene.begun_at.reset();
+  scene.append_began_at.reset();
   scene.written = written;
   scene.possibly_written_end = 0;
   if (synced) scene.synced = written;
@@ -76,7 +76,7 @@ void SceneTable::end_append(SceneLogState& scene, Position written, bool synced)
 
 void SceneTable::fail_append(SceneLogState& scene, uint64_t last) {
   MutexLock lock(mutex_);
-  scene.begun_at.reset();
+  scene.append_began_at.reset();
   scene.possibly_written_end = std::max(scene.possibly_written_end, last);
 }
 
@@ -88,7 +88,7 @@ std::vector<std::pair<SceneLogStatePtr, Position>> SceneTable::written() const {
   return positions;
 }
 
-void SceneTable::on_disk(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) {
+void SceneTable::mark_synced(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) {
   MutexLock lock(mutex_);
   for (const auto& [scene, position] : positions) {
     if (scene->synced.sequence < position.sequence) scene->synced = position;
@@ -105,7 +105,7 @@ void SceneTable::set_row(SceneLogState& scene, const SceneRow& row, uint64_t row
   if (scene.epoch != row.epoch) scene.copied = false;
   scene.epoch = row.epoch;
   scene.row_checksum = row_checksum;
-  // The snapshot holds these records, and is on the disk.
+  // The snapshot contains these records and is synced.
   if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.running_checksum};
   totals_ = totals;
 }
@@ -120,7 +120,7 @@ void SceneTable::remove(SceneKey scene, const CatalogueRow& totals) {
   totals_ = totals;
 }
 
-void SceneTable::describe(uint64_t database_sequence, DurableMarker& durable_marker) const {
+void SceneTable::fill_marker(uint64_t database_sequence, DurableMarker& durable_marker) const {
   MutexLock lock(mutex_);
   durable_marker.catalogue = totals_.generation;
   durable_marker.next_scene = totals_.next_scene;
@@ -128,8 +128,8 @@ void SceneTable::describe(uint64_t database_sequence, DurableMarker& durable_mar
   durable_marker.scene_markers.clear();
   bool all_synced = true;
   for (const auto& [key, scene] : scenes_) {
-    // An append that is at work has a number above the one it began at, and is not in the marks.
-    if (scene->begun_at) database_sequence = std::min(database_sequence, *scene->begun_at);
+    // The writes of an append in progress come after append_began_at and are not in the marker yet.
+    if (scene->append_began_at) database_sequence = std::min(database_sequence, *scene->append_began_at);
     all_synced = all_synced && scene->synced.sequence == scene->written.sequence;
     SceneMarker& scene_marker = durable_marker.scene_markers.emplace_back();
     scene_marker.scene = key;

@@ -11,7 +11,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-TEST(AdmissionLimiterTest, NoMorePassesThanMayBeInside) {
+TEST(AdmissionLimiterTest, NeverMorePermitsThanTheMaximum) {
   AdmissionLimiter gate(2);
   const AdmissionLimiter::Permit first = gate.enter();
   {
@@ -24,7 +24,7 @@ TEST(AdmissionLimiterTest, NoMorePassesThanMayBeInside) {
   EXPECT_TRUE(gate.enter());
 }
 
-TEST(AdmissionLimiterTest, WaitingEndsWhenTheLastLeaves) {
+TEST(AdmissionLimiterTest, WaitUntilEmptyReturnsWhenTheLastPermitIsReleased) {
   AdmissionLimiter gate(4);
   AdmissionLimiter::Permit pass = gate.enter();
   EXPECT_FALSE(gate.wait_until_empty(Clock::now()));

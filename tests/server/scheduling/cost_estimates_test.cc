@@ -35,7 +35,7 @@ class CostEstimatesTest : public testing::Test {
   const std::unique_ptr<CostEstimates> costs_ = std::make_unique<CostEstimates>();
 };
 
-TEST_F(CostEstimatesTest, BeforeAnythingIsKnownEveryKindHasAGuess) {
+TEST_F(CostEstimatesTest, EveryKindHasAFirstGuess) {
   for (const QueryBlock& block : {rays(1), rays(1, RayMode::kAll), balls(1), block_of(NearestColumns()),
                                   block_of(BoxColumns()), block_of(LookupColumns())}) {
     EXPECT_GE(costs_->nanoseconds_a_query(1, block), 1);
@@ -57,7 +57,7 @@ TEST_F(CostEstimatesTest, ScenesKindsAndSourcesAreKeptApart) {
   EXPECT_NE(costs_->nanoseconds_a_query(1, balls(1)), costs_->nanoseconds_a_query(1, rays(1)));
 }
 
-TEST_F(CostEstimatesTest, AnEstimateFollowsWhatIsSeen) {
+TEST_F(CostEstimatesTest, AnEstimateFollowsTheMeasuredCost) {
   costs_->learn(1, rays(1000), 100'000);
   for (int i = 0; i < 20; ++i) costs_->learn(1, rays(1000), 1'000'000);
   EXPECT_NEAR(costs_->nanoseconds_a_query(1, rays(1)), 1000, 10);
@@ -72,7 +72,7 @@ TEST_F(CostEstimatesTest, FewQueriesCountLessThanMany) {
   EXPECT_GT(costs_->nanoseconds_a_query(2, rays(1)), 100'000);
 }
 
-TEST_F(CostEstimatesTest, ABatchTakesWhatItsBlocksTakeTogether) {
+TEST_F(CostEstimatesTest, TheEstimateOfABatchIsTheSumOfItsBlocks) {
   costs_->learn(1, rays(1000), 100'000);
   costs_->learn(1, balls(1000), 900'000);
   QueryBatch batch;
@@ -80,19 +80,19 @@ TEST_F(CostEstimatesTest, ABatchTakesWhatItsBlocksTakeTogether) {
   EXPECT_NEAR(static_cast<double>(costs_->nanoseconds(1, batch)), 100 * 100 + 10 * 900, 2000);
 }
 
-TEST_F(CostEstimatesTest, ABlockWithoutQueriesTeachesNothing) {
+TEST_F(CostEstimatesTest, ABlockWithoutQueriesChangesNoEstimate) {
   const double before = costs_->nanoseconds_a_query(1, rays(1));
   costs_->learn(1, rays(0), 1'000'000);
   EXPECT_EQ(costs_->nanoseconds_a_query(1, rays(1)), before);
 }
 
-TEST_F(CostEstimatesTest, MoreScenesThanThereIsRoomForAreNoHarm) {
+TEST_F(CostEstimatesTest, MoreScenesThanEntriesGiveUsableEstimates) {
   for (uint64_t scene = 0; scene < 3 * CostEstimates::kEntries; ++scene) costs_->learn(scene, rays(1000), 50'000);
   const uint64_t last = 3 * CostEstimates::kEntries - 1;
   EXPECT_NEAR(costs_->nanoseconds_a_query(last, rays(1)), 50, 0.1) << "the latest is known";
 }
 
-TEST_F(CostEstimatesTest, ThreadsThatLearnAtOnceLeaveAValueThatOneOfThemSaw) {
+TEST_F(CostEstimatesTest, ConcurrentLearningLeavesAValueOfOneThread) {
   std::vector<std::thread> threads;
   for (uint64_t thread = 1; thread <= 4; ++thread)
     threads.emplace_back([this, thread] {

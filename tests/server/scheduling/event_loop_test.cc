@@ -95,7 +95,7 @@ class Served {
   std::vector<std::thread> threads_;
 };
 
-TEST(EventLoopTest, WhatIsPostedArrivesInItsOrderThoughTheLeaderSleeps) {
+TEST(EventLoopTest, PostedTagsArriveInOrderWhileTheLeaderSleeps) {
   std::vector<int> order;
   std::latch all(3);
   Served served(2);
@@ -107,7 +107,7 @@ TEST(EventLoopTest, WhatIsPostedArrivesInItsOrderThoughTheLeaderSleeps) {
   EXPECT_EQ(order, (std::vector<int>{1, 2, 3}));
 }
 
-TEST(EventLoopTest, LongWorkSetAsideLeavesTheLeadToAnother) {
+TEST(EventLoopTest, ALongDeferredTaskHandsTheLeadToAnotherThread) {
   std::latch meet(2), all(2);
   // Each waits for the other: on one thread neither would end.
   const auto run = [&meet] { meet.arrive_and_wait(); };
@@ -120,7 +120,7 @@ TEST(EventLoopTest, LongWorkSetAsideLeavesTheLeadToAnother) {
   all.wait();
 }
 
-TEST(EventLoopTest, WithAsManyLongWorksAsThreadsEventsWaitForTheFirstToEnd) {
+TEST(EventLoopTest, EventsWaitWhileEveryThreadRunsALongTask) {
   std::latch begun(2), go(1), all(3);
   const auto run = [&] {
     begun.count_down();
@@ -142,7 +142,7 @@ TEST(EventLoopTest, WithAsManyLongWorksAsThreadsEventsWaitForTheFirstToEnd) {
   all.wait();
 }
 
-TEST(EventLoopTest, ShortWorkSetAsideKeepsTheLead) {
+TEST(EventLoopTest, AShortDeferredTaskKeepsTheLead) {
   std::latch begun(1), go(1), all(2);
   Work work(
       [&] {
@@ -163,7 +163,7 @@ TEST(EventLoopTest, ShortWorkSetAsideKeepsTheLead) {
   all.wait();
 }
 
-TEST(EventLoopTest, ATimerThatIsSetByWhoDoesNotLeadWakesTheLeader) {
+TEST(EventLoopTest, ATimerSetByAnotherThreadWakesTheLeader) {
   std::latch rung(1);
   Served served(2);
   Work work([] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); },
@@ -187,13 +187,13 @@ TEST(EventLoopTest, ACancelledTimerIsNotCalled) {
   EXPECT_FALSE(called);
 }
 
-TEST(EventLoopTest, TheEndIsToldToEveryThread) {
+TEST(EventLoopTest, TheEndOfTheSourceStopsEveryThread) {
   Served served(4);
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
 // What handlers share needs no lock: ThreadSanitizer judges that. Every event is handled once and every work done once.
-TEST(EventLoopTest, HandlersNeverRunAtOnceAndNothingIsLost) {
+TEST(EventLoopTest, HandlersNeverRunConcurrentlyAndNoEventIsLost) {
   constexpr uint64_t kChains = 24, kSteps = 400;
   uint64_t shared = 0;  // of handlers
   std::atomic<uint64_t> worked{0};

@@ -39,7 +39,7 @@ TEST(FairQueueTest, EntriesOfAClientKeepTheirOrder) {
   EXPECT_EQ(queue.turn(kTurn), 1001);
 }
 
-TEST(FairQueueTest, WhoHadMoreThanWasBookedWaitsLonger) {
+TEST(FairQueueTest, AClientThatUsedMoreThanChargedWaitsLonger) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   queue.push_back(2, 2000);
@@ -48,7 +48,7 @@ TEST(FairQueueTest, WhoHadMoreThanWasBookedWaitsLonger) {
   EXPECT_THAT(clients_in_turn(queue, 5), ElementsAre(2, 2, 2, 1, 2));
 }
 
-TEST(FairQueueTest, WhoHadLessThanWasBookedGoesAgainSooner) {
+TEST(FairQueueTest, AClientThatUsedLessThanChargedIsServedSooner) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   queue.push_back(2, 2000);
@@ -57,7 +57,7 @@ TEST(FairQueueTest, WhoHadLessThanWasBookedGoesAgainSooner) {
   EXPECT_EQ(queue.turn(kTurn), 1000);
 }
 
-TEST(FairQueueTest, NobodySavesUpAClaimByBeingAway) {
+TEST(FairQueueTest, AnAbsentClientSavesUpNoShare) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   clients_in_turn(queue, 1000);
@@ -66,7 +66,7 @@ TEST(FairQueueTest, NobodySavesUpAClaimByBeingAway) {
   EXPECT_LE(std::count(turns.begin(), turns.end(), 2), 6);
 }
 
-TEST(FairQueueTest, WhoLeavesInDebtFindsItsDebtAgain) {
+TEST(FairQueueTest, AClientThatLeavesOverdrawnReturnsOverdrawn) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   queue.push_back(2, 2000);
@@ -78,7 +78,7 @@ TEST(FairQueueTest, WhoLeavesInDebtFindsItsDebtAgain) {
   EXPECT_EQ(queue.turn(kTurn), 1000);
 }
 
-TEST(FairQueueTest, WhatIsTakenOutIsGone) {
+TEST(FairQueueTest, RemovedEntriesAreNotServed) {
   FairQueue<int> queue;
   for (int i = 0; i < 10; ++i) queue.push_back(static_cast<uint64_t>(i % 3), i);
   EXPECT_THAT(queue.take_if([](int entry) { return entry % 2 == 0; }), testing::UnorderedElementsAre(0, 2, 4, 6, 8));
@@ -88,7 +88,7 @@ TEST(FairQueueTest, WhatIsTakenOutIsGone) {
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(FairQueueTest, ClientsThatComeAndGoAreForgottenInTheEnd) {
+TEST(FairQueueTest, IdleClientsAreForgotten) {
   FairQueue<int> queue;
   for (uint64_t client = 0; client < 3 * FairQueue<int>::kMaxDebtors; ++client) {
     queue.push_back(client, 1);

@@ -143,7 +143,7 @@ TEST(QuerySchedulerTest, AJobEstimatedUnderTheBudgetIsRunByItsCallerAndNeverQueu
   EXPECT_EQ(scheduler.stats().worked_nanoseconds, 0u);
 }
 
-TEST(QuerySchedulerTest, WhatAnInlineRunDoesNotFinishCanBeQueued) {
+TEST(QuerySchedulerTest, TheRestOfAnInlineRunCanBeQueued) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(5);
   EXPECT_EQ(scheduler.run_inline(job), Progress::kMore);
@@ -269,7 +269,7 @@ TEST(QuerySchedulerTest, AWaitingJobIsWithdrawnAtOnceAndNeverTouchedAgain) {
   EXPECT_FALSE(scheduler.withdraw(**ticket)) << "once";
 }
 
-TEST(QuerySchedulerTest, AJobInWorkIsNotWithdrawnButDone) {
+TEST(QuerySchedulerTest, ARunningJobIsNotWithdrawnButDone) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(1);
   std::atomic<bool> held{true};
@@ -282,7 +282,7 @@ TEST(QuerySchedulerTest, AJobInWorkIsNotWithdrawnButDone) {
   EXPECT_FALSE(scheduler.withdraw(**ticket)) << "done by now";
 }
 
-TEST(QuerySchedulerTest, WithdrawnJobsTakeNoPlaceHoweverManyTheyAre) {
+TEST(QuerySchedulerTest, WithdrawnJobsFreeTheirPlaceInTheQueue) {
   SchedulerOptions options = options_of(1);
   options.limits[1].jobs = 2;
   QueryScheduler scheduler(options);
@@ -356,7 +356,7 @@ TEST(QuerySchedulerTest, TooMuchEstimatedWorkIsRefusedWithARetryAfterHalfOfItIsD
   first.wait();
 }
 
-TEST(QuerySchedulerTest, OneJobIsLetInHoweverLargeItIs) {
+TEST(QuerySchedulerTest, OneJobIsAdmittedHoweverLargeItIs) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(3);
   ASSERT_TRUE(scheduler.submit(job, 1, 1'000'000'000'000).ok());

@@ -69,7 +69,7 @@ class SnapshotterTest : public testing::Test {
   std::unique_ptr<test::MemoryLog> crashed_;
 };
 
-TEST_F(SnapshotterTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn) {
+TEST_F(SnapshotterTest, ASnapshotReplacesManyRecordsWhileTheSceneChanges) {
   const Snapshotter keeper(registry_, &log_, eager());
   apply(200);
   wait_for_snapshots(keeper, 1);
@@ -83,7 +83,7 @@ TEST_F(SnapshotterTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn) {
   EXPECT_EQ(again->latest()->objects.size(), 250u);
 }
 
-TEST_F(SnapshotterTest, FewRecordsAreLeftAlone) {
+TEST_F(SnapshotterTest, FewRecordsCauseNoSnapshot) {
   apply(3);
   std::atomic<bool> told{false};
   SnapshotterOptions options = eager();
@@ -100,7 +100,7 @@ TEST_F(SnapshotterTest, FewRecordsAreLeftAlone) {
   EXPECT_TRUE(told);
 }
 
-TEST_F(SnapshotterTest, AFullDiskIsToldOfAndTriedAgain) {
+TEST_F(SnapshotterTest, AFailedSnapshotIsReportedAndRetried) {
   apply(200);
   log_.fail_with(absl::ResourceExhaustedError("full"));
   const Snapshotter keeper(registry_, &log_, eager());

@@ -124,7 +124,7 @@ class LatestWinsTest : public UpdateQueueTest {
   LatestWinsTest() : UpdateQueueTest(OverloadPolicy::kLatestWins) {}
 };
 
-TEST_F(UpdateQueueTest, ASmallBatchForAnIdleSceneIsAppliedByWhoBringsIt) {
+TEST_F(UpdateQueueTest, ASmallBatchForAnIdleSceneIsAppliedByItsCaller) {
   UpdateQueue pump({});
   const auto update = move({1}, 5);
   EXPECT_EQ(*pump.post(scene_, *update, WhenFull::kRefuse), Posted::kTaken);
@@ -134,7 +134,7 @@ TEST_F(UpdateQueueTest, ASmallBatchForAnIdleSceneIsAppliedByWhoBringsIt) {
   EXPECT_EQ(pump.stats().applied_inline, 1u);
 }
 
-TEST_F(UpdateQueueTest, ABatchThatLooksAtEveryObjectIsNotAppliedByWhoBringsIt) {
+TEST_F(UpdateQueueTest, ABatchThatScansEveryObjectIsNotAppliedByItsCaller) {
   UpdateQueue pump({});
   const auto update = insert({7});
   update->change().clear = true;
@@ -144,7 +144,7 @@ TEST_F(UpdateQueueTest, ABatchThatLooksAtEveryObjectIsNotAppliedByWhoBringsIt) {
   EXPECT_EQ(pump.stats().applied, 1u);
 }
 
-TEST_F(UpdateQueueTest, WhoBringsABatchNeverWaitsForTheOneBefore) {
+TEST_F(UpdateQueueTest, ACallerNeverWaitsForThePreviousBatch) {
   UpdateQueue pump({});
   const auto held = move({1}, 1);
   held->hold();
@@ -183,7 +183,7 @@ TEST_F(UpdateQueueTest, ScenesDoNotWaitForEachOther) {
   EXPECT_TRUE(held->wait().ok());
 }
 
-TEST_F(UpdateQueueTest, AFullMailboxRefusesAtOnceNamingTheLimitAndHoldsStreams) {
+TEST_F(UpdateQueueTest, AFullSceneQueueRefusesAtOnceAndHoldsStreams) {
   UpdateQueueOptions options = by_threads();
   options.max_updates = 2;
   UpdateQueue pump(options);
@@ -206,7 +206,7 @@ TEST_F(UpdateQueueTest, AFullMailboxRefusesAtOnceNamingTheLimitAndHoldsStreams) 
   EXPECT_EQ(x_of(1), 4);
 }
 
-TEST_F(UpdateQueueTest, TheItemsOfAMailboxAreLimitedTooButOneBatchIsAlwaysTaken) {
+TEST_F(UpdateQueueTest, TheItemsOfASceneQueueAreLimitedButOneBatchIsAlwaysAccepted) {
   UpdateQueueOptions options = by_threads();
   options.max_items = 3;
   UpdateQueue pump(options);
@@ -220,7 +220,7 @@ TEST_F(UpdateQueueTest, TheItemsOfAMailboxAreLimitedTooButOneBatchIsAlwaysTaken)
   EXPECT_TRUE(large->wait().ok());
 }
 
-TEST_F(UpdateQueueTest, WhatNobodyWantsAnyMoreIsNotApplied) {
+TEST_F(UpdateQueueTest, ACancelledBatchIsNotApplied) {
   UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   const auto cancelled = move({1}, 1), wanted = move({2}, 1);
@@ -233,7 +233,7 @@ TEST_F(UpdateQueueTest, WhatNobodyWantsAnyMoreIsNotApplied) {
   EXPECT_EQ(x_of(1), -1);
 }
 
-TEST_F(UpdateQueueTest, ARefusedBatchDoesNotHoldUpTheNext) {
+TEST_F(UpdateQueueTest, ARefusedBatchDoesNotDelayTheNext) {
   UpdateQueue pump(by_threads());
   const auto wrong = move({1}, 1), right = move({1}, 2);
   wrong->change().moves[0].positions = {};
@@ -270,7 +270,7 @@ TEST_F(UpdateQueueTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
   EXPECT_TRUE(stalled->wait().ok());
 }
 
-TEST_F(UpdateQueueTest, EveryBatchIsDoneBeforeThePumpIsGone) {
+TEST_F(UpdateQueueTest, TheDestructorFinishesEveryBatch) {
   std::vector<std::unique_ptr<Points>> updates;
   {
     UpdateQueue pump(by_threads(2));
@@ -286,7 +286,7 @@ TEST_F(UpdateQueueTest, EveryBatchIsDoneBeforeThePumpIsGone) {
   for (const auto& update : updates) EXPECT_TRUE(update->is_done());
 }
 
-TEST_F(UpdateQueueTest, ManyBringBatchesAtOnceAndNoneIsLost) {
+TEST_F(UpdateQueueTest, NoBatchOfConcurrentCallersIsLost) {
   UpdateQueue pump({2});
   constexpr int kEach = 300;
   std::vector<std::thread> senders;
@@ -307,7 +307,7 @@ TEST_F(UpdateQueueTest, ManyBringBatchesAtOnceAndNoneIsLost) {
   EXPECT_EQ(pump.stats().applied, 3u * kEach);
 }
 
-TEST_F(LatestWinsTest, MovesThatWaitTogetherBecomeOneRevision) {
+TEST_F(LatestWinsTest, WaitingMovesBecomeOneRevision) {
   UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   std::vector<std::unique_ptr<Points>> moves;
@@ -326,7 +326,7 @@ TEST_F(LatestWinsTest, MovesThatWaitTogetherBecomeOneRevision) {
   EXPECT_EQ(scene_->status().joined_updates, 9u);
 }
 
-TEST_F(LatestWinsTest, NothingOvertakesABatchThatIsMoreThanMoves) {
+TEST_F(LatestWinsTest, NoBatchOvertakesOneThatIsMoreThanMoves) {
   UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   const auto before = move({1}, 1), middle = insert({4}), after = move({1, 4}, 2), last = move({1, 4}, 3);
@@ -354,7 +354,7 @@ TEST_F(LatestWinsTest, MovesOfAnotherTickAreAnotherRevision) {
   EXPECT_EQ(tick_two->wait()->revision, tick_one->wait()->revision + 1);
 }
 
-TEST_F(LatestWinsTest, OneThatWasCancelledMeanwhileIsLeftOut) {
+TEST_F(LatestWinsTest, ACancelledBatchIsLeftOutOfTheGroup) {
   UpdateQueue pump(by_threads());
   const auto held = occupy(pump);
   const auto first = move({1}, 1), cancelled = move({1, 2}, 2);
@@ -368,9 +368,9 @@ TEST_F(LatestWinsTest, OneThatWasCancelledMeanwhileIsLeftOut) {
 }
 
 // A scene whose acks wait for the log.
-class LoggedPumpTest : public testing::Test {
+class LoggedUpdateQueueTest : public testing::Test {
  protected:
-  LoggedPumpTest() {
+  LoggedUpdateQueueTest() {
     const absl::StatusOr<Registry::CreatedScene> created = registry_.create_scene("arena", {}, 5, "", false);
     EXPECT_TRUE(created.ok()) << created.status();
     scene_ = created->scene;
@@ -381,7 +381,7 @@ class LoggedPumpTest : public testing::Test {
   ScenePtr scene_;
 };
 
-TEST_F(LoggedPumpTest, OneSyncServesAllThatWaitAndEachIsARevisionOfItsOwn) {
+TEST_F(LoggedUpdateQueueTest, OneSyncServesAllWaitingBatchesAndEachIsARevision) {
   constexpr uint64_t kBatches = 200;
   std::vector<std::unique_ptr<Points>> batches;
   for (uint64_t i = 1; i <= kBatches; ++i) batches.push_back(insert({i}));
@@ -404,7 +404,7 @@ TEST_F(LoggedPumpTest, OneSyncServesAllThatWaitAndEachIsARevisionOfItsOwn) {
   EXPECT_EQ(stats.coalesced, 0u);
 }
 
-TEST_F(LoggedPumpTest, AFullDiskRefusesUpdatesUntilThereIsRoom) {
+TEST_F(LoggedUpdateQueueTest, AFullDiskRefusesUpdatesUntilSpaceIsFree) {
   UpdateQueue pump(UpdateQueueOptions{});
   log_.fail_with(absl::ResourceExhaustedError("full"));
   const auto refused = insert({1});
