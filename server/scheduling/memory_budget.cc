@@ -15,7 +15,7 @@ void MemoryBudget::measure() {
   ended_since_ = 0;
 }
 
-// Work under way counts twice as far as it holds already what it claimed: too much rather than too little.
+// Overestimates: memory that work in progress has already allocated counts both as measured and as claimed.
 bool MemoryBudget::fits(uint64_t bytes) const {
   const uint64_t taken = measured_ + ended_since_ + claimed_;
   return taken <= limit_ && bytes <= limit_ - taken;
@@ -24,7 +24,7 @@ bool MemoryBudget::fits(uint64_t bytes) const {
 bool MemoryBudget::make_room(uint64_t bytes) {
   if (!fits(bytes) || ended_since_ > limit_ / kStepShare) measure();
   if (fits(bytes)) return true;
-  // What can never fit is not worth the trouble.
+  // Releasing memory cannot help.
   if (bytes > limit_) return false;
   meter_.give_back();
   measure();
@@ -53,7 +53,7 @@ absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field,
 
 MemoryBudget::Claim MemoryBudget::claim_anyway(uint64_t bytes) {
   MutexLock lock(mutex_);
-  // Nobody can be refused, so looking now and then is enough.
+  // The work is never refused, so an occasional measurement is enough.
   if (ended_since_ > limit_ / kStepShare) make_room(bytes);
   claimed_ += bytes;
   return Claim(this, bytes);

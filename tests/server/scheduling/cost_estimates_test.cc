@@ -9,7 +9,7 @@
 namespace locus::server {
 namespace {
 
-// Of so many queries; the columns' numbers are never looked at.
+// Makes a block of the given kind. Its number of queries comes from the columns; their values are never read.
 QueryBlock block_of(decltype(QueryBlock::kind) kind, Source source = Source::kBoth) {
   QueryBlock block;
   block.kind = kind;
@@ -21,17 +21,17 @@ class CostEstimatesTest : public testing::Test {
  protected:
   QueryBlock rays(size_t count, RayMode mode = RayMode::kFirst, Source source = Source::kBoth) const {
     RayColumns columns;
-    columns.origins = absl::MakeConstSpan(numbers_).subspan(0, 3 * count);
+    columns.origins = absl::MakeConstSpan(values_).subspan(0, 3 * count);
     columns.mode = mode;
     return block_of(columns, source);
   }
   QueryBlock balls(size_t count) const {
     BallColumns columns;
-    columns.centers = absl::MakeConstSpan(numbers_).subspan(0, 3 * count);
+    columns.centers = absl::MakeConstSpan(values_).subspan(0, 3 * count);
     return block_of(columns);
   }
 
-  const std::vector<float> numbers_ = std::vector<float>(30'000);
+  const std::vector<float> values_ = std::vector<float>(30'000);
   const std::unique_ptr<CostEstimates> costs_ = std::make_unique<CostEstimates>();
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// A queue that any thread may put tags into. Complains where two threads wait at once.
+// Event source: a queue of tags. Fails the test if two threads wait in next() at once.
 class QueueSource final : public EventSource {
  public:
   void put(EventTag& tag) {
@@ -73,7 +73,7 @@ class Work final : public DeferredTask {
   std::function<void()> run_, done_;
 };
 
-// A loop served by so many threads until it is dropped.
+// Event loop that `threads` threads run until it is destroyed.
 class Served {
  public:
   explicit Served(size_t threads) {
@@ -109,7 +109,7 @@ TEST(EventLoopTest, PostedTagsArriveInOrderWhileTheLeaderSleeps) {
 
 TEST(EventLoopTest, ALongDeferredTaskHandsTheLeadToAnotherThread) {
   std::latch meet(2), all(2);
-  // Each waits for the other: on one thread neither would end.
+  // Each task waits for the other, so on one thread neither would end.
   const auto run = [&meet] { meet.arrive_and_wait(); };
   Work one(run, [&all] { all.count_down(); }), other(run, [&all] { all.count_down(); });
   Served served(2);
@@ -158,7 +158,7 @@ TEST(EventLoopTest, AShortDeferredTaskKeepsTheLead) {
   begun.wait();
   served.source.put(second);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  EXPECT_FALSE(arrived) << "nobody leads meanwhile";
+  EXPECT_FALSE(arrived) << "no thread leads meanwhile";
   go.count_down();
   all.wait();
 }
@@ -192,15 +192,15 @@ TEST(EventLoopTest, TheEndOfTheSourceStopsEveryThread) {
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
-// What handlers share needs no lock: ThreadSanitizer judges that. Every event is handled once and every work done once.
+// Handlers share data without a lock, which ThreadSanitizer verifies. Every event and every task is handled once.
 TEST(EventLoopTest, HandlersNeverRunConcurrentlyAndNoEventIsLost) {
   constexpr uint64_t kChains = 24, kSteps = 400;
-  uint64_t shared = 0;  // of handlers
+  uint64_t shared = 0;  // data shared by handlers
   std::atomic<uint64_t> worked{0};
   std::latch all(kChains);
   Served served(3);
 
-  // From an event to work set aside, to a post by another thread, to a timer, and round again.
+  // Cycle: an event, a deferred task, a post by another thread, a timer, and again an event.
   struct Chain {
     Chain(uint64_t number, Served& with, uint64_t& count, std::atomic<uint64_t>& works, std::latch& end)
         : served(with),

@@ -14,7 +14,7 @@ namespace {
 
 int nice_of_this_thread() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
 
-// Linux's sched_attr up to what it says of slices; 0 where it is too old to tell.
+// Returns the time slice of this thread in nanoseconds; 0 if Linux is too old to report it.
 uint64_t slice_of_this_thread() {
   struct {
     uint32_t size, policy;
