@@ -26,7 +26,7 @@ bool MemoryBudget::make_room(uint64_t bytes) {
   if (fits(bytes)) return true;
   // Releasing memory cannot help.
   if (bytes > limit_) return false;
-  meter_.give_back();
+  meter_.release_memory();
   measure();
   return fits(bytes);
 }

@@ -21,8 +21,8 @@ namespace locus::server {
 class MemoryBudget {
  public:
   struct Meter {
-    std::function<uint64_t()> used;   // returns the bytes that the process holds
-    std::function<void()> give_back;  // frees what it can and returns free memory to the kernel; slow
+    std::function<uint64_t()> used;        // returns the bytes that the process holds
+    std::function<void()> release_memory;  // frees what it can and returns free memory to the kernel; slow
   };
 
   // Claim of work in progress; released when destroyed. Must not outlive the budget.
@@ -43,10 +43,10 @@ class MemoryBudget {
   MemoryBudget(uint64_t limit, Meter meter);
 
   // Claims `bytes`, the peak that the work may add. RESOURCE_EXHAUSTED naming `field` and the limit memory_bytes if
-  // that would pass the limit even after give_back().
+  // that would pass the limit even after release_memory().
   absl::StatusOr<Claim> claim(absl::string_view field, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
-  // Claims `bytes` for work that is never refused because it only changes existing objects. Calls give_back() if it
-  // would pass the limit.
+  // Claims `bytes` for work that is never refused because it only changes existing objects. Calls release_memory() if
+  // it would pass the limit.
   Claim claim_anyway(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
 
   uint64_t limit() const { return limit_; }

@@ -35,7 +35,7 @@ Snapshotter::~Snapshotter() {
   thread_.join();
 }
 
-SnapshotKeeperStats Snapshotter::stats() const {
+SnapshotterStats Snapshotter::stats() const {
   const MutexLock lock(mutex_);
   return stats_;
 }
@@ -69,7 +69,7 @@ bool Snapshotter::snapshot_due_scenes() {
       const absl::StatusOr<uint64_t> bytes = write(*scene);
       // A scene that was deleted meanwhile needs no snapshot.
       if (ended() || absl::IsNotFound(bytes.status())) return true;
-      if (options_.tell) options_.tell(*scene, bytes);
+      if (options_.on_snapshot) options_.on_snapshot(*scene, bytes);
       const MutexLock lock(mutex_);
       stats_.written += bytes.ok() ? 1 : 0;
       stats_.bytes += bytes.value_or(0);

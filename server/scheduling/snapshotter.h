@@ -28,10 +28,10 @@ struct SnapshotterOptions {
   // Time until the next check after a failure, such as a full disk.
   std::chrono::milliseconds retry_after{5000};
   // Called after each snapshot, on the snapshotter's thread, with the size in bytes or the error.
-  std::function<void(const Scene& scene, const absl::StatusOr<uint64_t>& bytes)> tell;
+  std::function<void(const Scene& scene, const absl::StatusOr<uint64_t>& bytes)> on_snapshot;
 };
 
-struct SnapshotKeeperStats {
+struct SnapshotterStats {
   uint64_t written = 0;
   uint64_t bytes = 0;  // total size of the snapshots written
   uint64_t failed = 0;
@@ -46,7 +46,7 @@ class Snapshotter {
   Snapshotter(const Snapshotter&) = delete;
   Snapshotter& operator=(const Snapshotter&) = delete;
 
-  SnapshotKeeperStats stats() const LOCUS_EXCLUDES(mutex_);
+  SnapshotterStats stats() const LOCUS_EXCLUDES(mutex_);
 
  private:
   void run() LOCUS_EXCLUDES(mutex_);
@@ -64,7 +64,7 @@ class Snapshotter {
   mutable Mutex mutex_;
   ConditionVariable end_;
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
-  SnapshotKeeperStats stats_ LOCUS_GUARDED_BY(mutex_);
+  SnapshotterStats stats_ LOCUS_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

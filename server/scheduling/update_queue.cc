@@ -300,7 +300,7 @@ void UpdateQueue::learn(uint64_t items, SteadyTime start) {
   nanoseconds_per_item_.store(known + (per_item - known) * weight, std::memory_order_relaxed);
 }
 
-UpdatePumpStats UpdateQueue::stats() const {
+UpdateQueueStats UpdateQueue::stats() const {
   const MutexLock lock(mutex_);
   return stats_;
 }

@@ -60,7 +60,7 @@ struct UpdateQueueOptions {
 };
 
 // Counters; all but the first two only grow.
-struct UpdatePumpStats {
+struct UpdateQueueStats {
   uint64_t updates = 0;         // batches waiting for all scenes
   uint64_t items = 0;           // their items
   uint64_t applied = 0;         // batches applied
@@ -83,7 +83,7 @@ class UpdateQueue {
   // called.
   absl::StatusOr<Posted> post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) LOCUS_EXCLUDES(mutex_);
 
-  UpdatePumpStats stats() const LOCUS_EXCLUDES(mutex_);
+  UpdateQueueStats stats() const LOCUS_EXCLUDES(mutex_);
   const UpdateQueueOptions& options() const { return options_; }
 
  private:
@@ -128,7 +128,7 @@ class UpdateQueue {
   absl::flat_hash_map<const Scene*, std::unique_ptr<SceneQueue>> scene_queues_ LOCUS_GUARDED_BY(mutex_);
   std::deque<SceneQueue*> ready_ LOCUS_GUARDED_BY(mutex_);     // have waiting batches, not busy, each once
   std::vector<SceneQueue*> stalled_ LOCUS_GUARDED_BY(mutex_);  // as ready_, but wait for retry_at
-  UpdatePumpStats stats_ LOCUS_GUARDED_BY(mutex_);
+  UpdateQueueStats stats_ LOCUS_GUARDED_BY(mutex_);
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::atomic<double> nanoseconds_per_item_;
   std::vector<std::thread> threads_;

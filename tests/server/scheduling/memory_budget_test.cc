@@ -29,7 +29,7 @@ class MemoryBudgetTest : public testing::Test {
   }
 
   uint64_t used_ = 0;
-  uint64_t spare_ = 0;  // part of used_ that give_back() frees
+  uint64_t spare_ = 0;  // part of used_ that release_memory() frees
   int measurements_ = 0;
   int given_back_ = 0;
 };

@@ -29,7 +29,7 @@ class SnapshotterTest : public testing::Test {
     options.log_bytes = 2'000;
     options.poll_interval = milliseconds(1);
     options.retry_after = milliseconds(1);
-    options.tell = [this](const Scene&, const absl::StatusOr<uint64_t>& bytes) {
+    options.on_snapshot = [this](const Scene&, const absl::StatusOr<uint64_t>& bytes) {
       if (!bytes.ok()) ++reported_failures_;
     };
     return options;
@@ -88,7 +88,7 @@ TEST_F(SnapshotterTest, FewRecordsCauseNoSnapshot) {
   std::atomic<bool> reported{false};
   SnapshotterOptions options = eager();
   options.log_bytes = scene_->log_position().bytes;
-  options.tell = [&reported](const Scene&, const absl::StatusOr<uint64_t>&) { reported = true; };
+  options.on_snapshot = [&reported](const Scene&, const absl::StatusOr<uint64_t>&) { reported = true; };
   {
     const Snapshotter snapshotter(registry_, &log_, options);
     std::this_thread::sleep_for(milliseconds(20));

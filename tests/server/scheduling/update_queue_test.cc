@@ -401,7 +401,7 @@ TEST_F(LoggedUpdateQueueTest, OneSyncServesAllWaitingBatchesAndEachIsARevision) 
   }
   EXPECT_LE(log_.appends() - before, 2u) << "one for the first batch, one for all that waited during it";
   EXPECT_EQ(scene_->log_position().sequence, kBatches);
-  const UpdatePumpStats stats = queue.stats();
+  const UpdateQueueStats stats = queue.stats();
   EXPECT_EQ(stats.applied_inline, 0u) << "callers must not wait for the disk";
   EXPECT_EQ(stats.coalesced, 0u);
 }
