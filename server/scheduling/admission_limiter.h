@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/mutex.h"
 
 namespace locus::server {
@@ -41,6 +42,7 @@ class AdmissionLimiter {
     MutexLock lock(mutex_);
     if (used_ >= max_) return Permit();
     ++used_;
+    check_invariants();
     return Permit(this);
   }
 
@@ -61,8 +63,11 @@ class AdmissionLimiter {
  private:
   void release() LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
+    LOCUS_DCHECK_LT(0u, used_);
     if (--used_ == 0) emptied_.notify_all();
+    check_invariants();
   }
+  void check_invariants() const LOCUS_REQUIRES(mutex_) { LOCUS_DCHECK_LE(used_, max_); }
 
   const uint32_t max_;
   mutable Mutex mutex_;

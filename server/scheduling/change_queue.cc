@@ -37,7 +37,9 @@ absl::StatusOr<uint64_t> ChangeQueue::submit(uint64_t key, Job job) {
     work_.notify_one();
   }
   queue.waiting.push_back(std::move(job));
-  return ++queue.last_number;
+  ++queue.last_number;
+  check_invariants(key);
+  return queue.last_number;
 }
 
 uint32_t ChangeQueue::pending(uint64_t key) const {
@@ -67,10 +69,12 @@ void ChangeQueue::run() {
       key = ready_.front();
       ready_.pop_front();
       KeyQueue& queue = queues_[key];
+      LOCUS_DCHECK(!queue.running && !queue.waiting.empty());
       number = queue.last_number - queue.waiting.size() + 1;
       job = std::move(queue.waiting.front());
       queue.waiting.pop_front();
       queue.running = true;
+      check_invariants(key);
     }
     job(number);
     job = nullptr;
@@ -81,12 +85,25 @@ void ChangeQueue::run() {
 void ChangeQueue::finish(uint64_t key) {
   MutexLock lock(mutex_);
   const auto queue = queues_.find(key);
+  LOCUS_DCHECK(queue != queues_.end() && queue->second.running);
   queue->second.running = false;
   if (!queue->second.waiting.empty()) {
     ready_.push_back(key);
     work_.notify_one();
   } else if (queue->second.forgotten) {
     queues_.erase(queue);
+  }
+  check_invariants(key);
+}
+
+void ChangeQueue::check_invariants(uint64_t key) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(ready_.size(), queues_.size());
+    const auto found = queues_.find(key);
+    if (found == queues_.end()) return;
+    const KeyQueue& queue = found->second;
+    LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), max_waiting_);
+    LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), queue.last_number);
   }
 }
 

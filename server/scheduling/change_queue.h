@@ -49,6 +49,7 @@ class ChangeQueue {
 
   void run() LOCUS_EXCLUDES(mutex_);
   void finish(uint64_t key) LOCUS_EXCLUDES(mutex_);
+  void check_invariants(uint64_t key) const LOCUS_REQUIRES(mutex_);
 
   const uint32_t max_waiting_;
   mutable Mutex mutex_;

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "core/base/check.h"
+
 namespace locus::server {
 namespace {
 
@@ -54,6 +56,8 @@ CostEstimates::Slot CostEstimates::slot_of(uint64_t scene, const QueryBlock& blo
 }
 
 size_t CostEstimates::find(const Slot& slot) const {
+  LOCUS_DCHECK_LT(slot.first, kEntries);
+  LOCUS_DCHECK_NE(slot.tag, 0u);
   size_t empty = slot.first;
   for (size_t i = kProbes; i-- > 0;) {
     const size_t index = (slot.first + i) % kEntries;
@@ -87,6 +91,7 @@ void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nano
   const double weight = std::clamp(queries / kForgetQueries, kMinWeight, kMaxWeight);
   const double known = nanoseconds_of(before);
   const double now = tag_of(before) == slot.tag ? known + (seen - known) * weight : seen;
+  LOCUS_DCHECK(kMin / 2 <= now && now <= 2 * kMax);
   at.compare_exchange_strong(before, packed(slot.tag, now), std::memory_order_relaxed);
 }
 

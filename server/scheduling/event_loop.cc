@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace locus::server {
 namespace {
 
@@ -35,6 +37,8 @@ bool EventLoop::turn() {
   bool ok = false;
   const EventSource::Next result = next(*wait, &tag, &ok);
   const MutexLock lock(mutex_);
+  LOCUS_DCHECK(led_ && !ended_);
+  LOCUS_DCHECK(result != EventSource::Next::kEvent || tag != nullptr);
   if (result == EventSource::Next::kEnd) {
     end();
     return false;
@@ -55,6 +59,7 @@ std::optional<steady_clock::duration> EventLoop::acquire_lead() {
     mutex_.lock();
   }
   if (ended_) return std::nullopt;
+  LOCUS_DCHECK(!led_);
   led_ = true;
   asleep_.store(true);  // set before the lock is released: at() interrupts from now on
   if (timers_.empty()) return kLongest;
@@ -62,6 +67,7 @@ std::optional<steady_clock::duration> EventLoop::acquire_lead() {
 }
 
 void EventLoop::release_lead() {
+  LOCUS_DCHECK(led_);
   led_ = false;
   if (followers_ == 0) return;
   --followers_;
@@ -119,6 +125,7 @@ void EventLoop::run_deferred() {
     mutex_.lock();
     next.work->on_deferred_done();
   }
+  LOCUS_DCHECK(!leads || led_);
   if (leads) led_ = false;
 }
 

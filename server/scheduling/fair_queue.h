@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 
@@ -32,13 +33,20 @@ class FairQueue {
   // Returns the number of waiting and remembered clients.
   size_t clients() const { return queues_.size(); }
 
-  void push_back(uint64_t client, Entry entry) { activate(client).entries.push_back(std::move(entry)); }
+  void push_back(uint64_t client, Entry entry) {
+    activate(client).entries.push_back(std::move(entry));
+    check_invariants(client);
+  }
   // Adds an entry ahead of the client's others.
-  void push_front(uint64_t client, Entry entry) { activate(client).entries.push_front(std::move(entry)); }
+  void push_front(uint64_t client, Entry entry) {
+    activate(client).entries.push_front(std::move(entry));
+    check_invariants(client);
+  }
 
   // Returns the next entry to serve, without removing it, and charges `cost` to its client, so that the following call
   // may return another client's entry. Correct the estimate later by charge(). Precondition: the queue is not empty.
   Entry next(uint64_t cost) {
+    LOCUS_DCHECK(!waiting_.empty());
     const auto [spent, client] = *waiting_.begin();
     virtual_time_ = std::max(virtual_time_, spent);
     forget_settled();
@@ -56,6 +64,7 @@ class FairQueue {
     ranks.erase({queue.spent, client});
     queue.spent += static_cast<uint64_t>(cost);  // a negative cost wraps around to a subtraction
     ranks.insert({queue.spent, client});
+    check_invariants(client);
   }
 
   // Removes an entry; returns false if the client has no such entry.
@@ -67,6 +76,7 @@ class FairQueue {
     if (position == queue.entries.end()) return false;
     queue.entries.erase(position);
     if (queue.entries.empty()) deactivate(client, queue);
+    check_invariants(client);
     return true;
   }
 
@@ -83,6 +93,19 @@ class FairQueue {
       taken.push_back(entry);
     }
     return taken;
+  }
+
+  // Checks the invariants in debug builds: O(log clients) for the given client, which need not be known.
+  void check_invariants(uint64_t client) const {
+    if constexpr (kDebugChecks) {
+      LOCUS_CHECK_EQ(waiting_.size() + idle_.size(), queues_.size());
+      LOCUS_CHECK_LE(idle_.size(), kMaxIdleClients);
+      const auto found = queues_.find(client);
+      if (found == queues_.end()) return;
+      const bool waits = !found->second.entries.empty();
+      LOCUS_CHECK_EQ(waiting_.contains({found->second.spent, client}), waits);
+      LOCUS_CHECK_EQ(idle_.contains({found->second.spent, client}), !waits);
+    }
   }
 
  private:

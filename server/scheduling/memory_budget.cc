@@ -1,6 +1,7 @@
 #include "server/scheduling/memory_budget.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 
 namespace locus::server {
@@ -35,6 +36,7 @@ absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field,
   MutexLock lock(mutex_);
   if (make_room(bytes)) {
     claimed_ += bytes;
+    LOCUS_DCHECK_LE(measured_ + ended_since_ + claimed_, limit_);
     return Claim(this, bytes);
   }
   Refusal refusal;
@@ -66,6 +68,7 @@ uint64_t MemoryBudget::used() const {
 
 void MemoryBudget::end(uint64_t bytes) {
   MutexLock lock(mutex_);
+  LOCUS_DCHECK_LE(bytes, claimed_);
   claimed_ -= bytes;
   ended_since_ += bytes;
 }

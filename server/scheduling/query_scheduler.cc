@@ -41,13 +41,19 @@ class QueryScheduler::Ticket {
   // job, with two bits for withdrawn and finished.
   bool begin_work() {
     uint32_t state = state_.load(std::memory_order_relaxed);
+    LOCUS_DCHECK_LT(state & kWorkers, kWorkers);
     while ((state & kWithdrawn) == 0)
       if (state_.compare_exchange_weak(state, state + 1, std::memory_order_acq_rel)) return true;
     return false;
   }
   void finish() { state_.fetch_or(kFinished, std::memory_order_relaxed); }
   // Counts this thread out; returns true to the last thread of a finished job.
-  bool end_work() { return state_.fetch_sub(1, std::memory_order_acq_rel) - 1 == kFinished; }
+  bool end_work() {
+    const uint32_t before = state_.fetch_sub(1, std::memory_order_acq_rel);
+    LOCUS_DCHECK_LT(0u, before & kWorkers);
+    LOCUS_DCHECK_EQ(before & kWithdrawn, 0u);
+    return before - 1 == kFinished;
+  }
   bool alone() const { return (state_.load(std::memory_order_relaxed) & kWorkers) == 1; }
   bool finished() const { return (state_.load(std::memory_order_relaxed) & kFinished) != 0; }
   bool withdrawn() const { return (state_.load(std::memory_order_acquire) & kWithdrawn) != 0; }
@@ -150,8 +156,10 @@ uint32_t QueryScheduler::retry_after_ms() const {
 
 void QueryScheduler::release(const Ticket& ticket) {
   Admitted& admitted = admitted_[static_cast<size_t>(ticket.admitted_as)];
-  admitted.jobs.fetch_sub(1);
-  admitted.nanoseconds.fetch_sub(ticket.nanoseconds);
+  const uint64_t jobs = admitted.jobs.fetch_sub(1);
+  const uint64_t nanoseconds = admitted.nanoseconds.fetch_sub(ticket.nanoseconds);
+  LOCUS_DCHECK_LE(1u, jobs);
+  LOCUS_DCHECK_LE(ticket.nanoseconds, nanoseconds);
 }
 
 bool QueryScheduler::withdraw(Ticket& ticket) {
@@ -189,6 +197,7 @@ void QueryScheduler::run() {
     release(*ticket);
     admitted_[static_cast<size_t>(ticket->admitted_as)].done.fetch_add(1, std::memory_order_relaxed);
     const TicketPtr last = std::move(ticket->self);
+    LOCUS_DCHECK(last != nullptr && !last->queued);
     last->job.done();
   }
 }
@@ -212,6 +221,7 @@ void QueryScheduler::drain_inbox() {
   Ticket* first = nullptr;
   while (last_first != nullptr) first = std::exchange(last_first, std::exchange(last_first->next, first));
   for (Ticket* ticket = first; ticket != nullptr; ticket = std::exchange(ticket->next, nullptr)) {
+    LOCUS_DCHECK(!ticket->queued && ticket->self != nullptr);
     queue_of(*ticket).push_back(ticket->client, ticket);
     ticket->queued = true;
   }

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
 #include "core/scene/log/state_writer.h"
@@ -87,6 +88,8 @@ bool Snapshotter::due(const Scene& scene) const {
 }
 
 absl::StatusOr<uint64_t> Snapshotter::write(Scene& scene) {
+  LOCUS_DCHECK(log_ != nullptr);
+  LOCUS_DCHECK_NE(scene.log_key(), 0u);
   const FrozenScene frozen = scene.freeze();
   StateWriter writer(frozen);
   const auto next = [&]() -> absl::StatusOr<std::optional<std::string>> {

@@ -119,6 +119,7 @@ absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& u
       ++stats_.updates;
       stats_.items += items;
       stats_.held += is_full ? 1 : 0;
+      check_invariants(scene_queue);
       return is_full ? Posted::kFull : Posted::kTaken;
     }
   }
@@ -156,6 +157,7 @@ UpdateQueue::SceneQueue* UpdateQueue::next() {
       ready_.pop_front();
     }
     if (scene_queue != nullptr) {
+      LOCUS_DCHECK(!scene_queue->busy && !scene_queue->waiting.empty());
       scene_queue->busy = true;
       return scene_queue;
     }
@@ -202,9 +204,11 @@ UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
     items += more;
     scene_queue.waiting.pop_front();
   }
+  LOCUS_DCHECK(scene_queue.busy && !group.empty());
   scene_queue.items -= items;
   stats_.items -= items;
   stats_.updates -= group.size();
+  check_invariants(scene_queue);
   return group;
 }
 
@@ -233,6 +237,7 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
     scene_queue.late = acks.status();
     return false;
   }
+  LOCUS_DCHECK(!acks.ok() || acks->size() == group.size());
   count(*scene_queue.scene, group.size());
   for (size_t i = 0; i < group.size(); ++i) group[i]->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
   return true;
@@ -251,6 +256,7 @@ void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
   ScenePtr overdue;  // keeps the scene alive: another thread may free the SceneQueue before its readers are revoked
   {
     const MutexLock lock(mutex_);
+    LOCUS_DCHECK(scene_queue.busy && !group.empty());
     requeue(scene_queue, group);
     if (scene_queue.stalled_at == SteadyTime()) {
       scene_queue.stalled_at = now;
@@ -273,9 +279,11 @@ void UpdateQueue::requeue(SceneQueue& scene_queue, const Group& group) {
     stats_.items += items;
     ++stats_.updates;
   }
+  check_invariants(scene_queue);
 }
 
 std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::finish(SceneQueue& scene_queue) {
+  LOCUS_DCHECK(scene_queue.busy);
   scene_queue.busy = false;
   scene_queue.stalled_at = {};
   if (!scene_queue.waiting.empty()) {
@@ -286,6 +294,7 @@ std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::finish(SceneQueue& scene_q
   const auto found = scene_queues_.find(scene_queue.scene.get());
   std::unique_ptr<SceneQueue> empty = std::move(found->second);
   scene_queues_.erase(found);
+  check_invariants(*empty);
   if (ended_) work_.notify_all();
   return empty;
 }
@@ -298,6 +307,17 @@ void UpdateQueue::learn(uint64_t items, SteadyTime start) {
   // Few items tell little about the cost of one, because of the fixed cost of a batch.
   const double weight = items < 64 ? 0 : kForget;
   nanoseconds_per_item_.store(known + (per_item - known) * weight, std::memory_order_relaxed);
+}
+
+// O(1): compares the counts of one SceneQueue with the totals.
+void UpdateQueue::check_invariants(const SceneQueue& scene_queue) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(scene_queue.waiting.size(), stats_.updates);
+    LOCUS_CHECK_LE(scene_queue.items, stats_.items);
+    if (scene_queue.waiting.empty()) LOCUS_CHECK_EQ(scene_queue.items, 0u);
+    LOCUS_CHECK_LE(ready_.size() + stalled_.size(), scene_queues_.size());
+    if (scene_queues_.empty()) LOCUS_CHECK_EQ(stats_.updates + stats_.items, 0u);
+  }
 }
 
 UpdateQueueStats UpdateQueue::stats() const {

@@ -121,6 +121,7 @@ class UpdateQueue {
   // that may destroy a deleted scene.
   std::unique_ptr<SceneQueue> finish(SceneQueue& scene_queue) LOCUS_REQUIRES(mutex_);
   void learn(uint64_t items, SteadyTime start);
+  void check_invariants(const SceneQueue& scene_queue) const LOCUS_REQUIRES(mutex_);
 
   const UpdateQueueOptions options_;
   mutable Mutex mutex_;

@@ -21,6 +21,7 @@ class WorkerPool::Batch {
     if (done == 0) return;
     MutexLock lock(mutex_);
     done_ += done;
+    LOCUS_DCHECK_LE(done_, n_);
     if (done_ == n_) all_done_.notify_all();
   }
 
@@ -69,6 +70,7 @@ void WorkerPool::wake_helpers(const std::shared_ptr<Batch>& batch, size_t helper
   MutexLock lock(mutex_);
   for (size_t i = 0; i < helpers && waiting_.size() < limits::kMaxWaitingBatches; ++i) {
     waiting_.push_back(batch);
+    LOCUS_DCHECK_LE(waiting_.size(), limits::kMaxWaitingBatches);
     work_.notify_one();
   }
 }

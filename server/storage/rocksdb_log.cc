@@ -177,6 +177,7 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
   }
   for (uint64_t possibly_written = at.sequence + 1; possibly_written <= start->possibly_written_end; ++possibly_written)
     LOCUS_CHECK(batch.Delete(database_->log(), log_key(key, possibly_written)).ok());
+  LOCUS_DCHECK_EQ(at.sequence, start->written.sequence + entries.size());
   const bool synced = level == AckLevel::kLocal;
   if (absl::Status status = database_->write(batch, synced && options_.sync); !status.ok()) {
     scenes_.fail_append(scene, at.sequence);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/rows.h"
@@ -113,6 +114,7 @@ absl::Status DurableMarkerFile::write(DurableMarker& durable_marker) {
     --durable_marker.write_number;
     return replace(durable_marker);
   }
+  LOCUS_DCHECK_LE(slot.size(), slot_bytes_);
   rocksdb::Status status = file_->Write(durable_marker.write_number % 2 * slot_bytes_, slot);
   if (status.ok()) status = file_->Sync();
   if (!status.ok()) file_ = nullptr;  // the slot's bytes are unknown: the next write() replaces the file
@@ -130,6 +132,8 @@ absl::Status DurableMarkerFile::replace(DurableMarker& durable_marker) {
   while (slot_bytes_ < slots[0].size() * 2) slot_bytes_ *= 2;
   for (const std::string& slot : slots) bytes.append(slot).append(slot_bytes_ - slot.size(), '\0');
   durable_marker.write_number = second.write_number;
+  LOCUS_DCHECK_EQ(bytes.size(), 2 * slot_bytes_);
+  LOCUS_DCHECK_EQ(durable_marker.write_number % 2, 1u);
 
   const std::string path = path_of(folder_);
   const std::string fresh = path + ".new";

@@ -8,6 +8,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "server/storage/rocksdb/bytes.h"
@@ -186,6 +187,7 @@ DatabaseOptions database_options_of(const StorageOptions& options) {
 }
 
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
+  LOCUS_DCHECK(options.env != nullptr && options.reserve_bytes.has_value());
   OpenedDirectory opened;
   RETURN_IF_ERROR(make_folder(*options.env, options.path));
   auto lock = DirectoryLock::acquire(*options.env, options.path);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 
 namespace locus::server {
@@ -18,7 +19,9 @@ absl::Status not_found(SceneKey scene) {
 }  // namespace
 
 void SceneTable::add(SceneLogStatePtr scene) {
+  LOCUS_DCHECK(scene != nullptr);
   MutexLock lock(mutex_);
+  check_invariants(*scene);
   scenes_[scene->key] = std::move(scene);
 }
 
@@ -62,20 +65,26 @@ absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneLogState& scene,
                                ": load it anew before writing to it"),
                   refusal);
   }
+  LOCUS_DCHECK(!scene.append_began_at.has_value());
   scene.append_began_at = database_sequence;
   return Start{scene.written, scene.possibly_written_end};
 }
 
 void SceneTable::end_append(SceneLogState& scene, Position written, bool synced) {
   MutexLock lock(mutex_);
+  LOCUS_DCHECK(scene.append_began_at.has_value());
+  LOCUS_DCHECK_LT(scene.written.sequence, written.sequence);
   scene.append_began_at.reset();
   scene.written = written;
   scene.possibly_written_end = 0;
   if (synced) scene.synced = written;
+  check_invariants(scene);
 }
 
 void SceneTable::fail_append(SceneLogState& scene, uint64_t last) {
   MutexLock lock(mutex_);
+  LOCUS_DCHECK(scene.append_began_at.has_value());
+  LOCUS_DCHECK_LT(scene.written.sequence, last);
   scene.append_began_at.reset();
   scene.possibly_written_end = std::max(scene.possibly_written_end, last);
 }
@@ -92,6 +101,7 @@ void SceneTable::mark_synced(const std::vector<std::pair<SceneLogStatePtr, Posit
   MutexLock lock(mutex_);
   for (const auto& [scene, position] : positions) {
     if (scene->synced.sequence < position.sequence) scene->synced = position;
+    check_invariants(*scene);
   }
 }
 
@@ -102,11 +112,13 @@ void SceneTable::set_catalogue(const CatalogueRow& totals) {
 
 void SceneTable::set_row(SceneLogState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals) {
   MutexLock lock(mutex_);
+  LOCUS_DCHECK_EQ(scene.key, row.key);
   if (scene.epoch != row.epoch) scene.copied = false;
   scene.epoch = row.epoch;
   scene.row_checksum = row_checksum;
   // The snapshot contains these records and is synced.
   if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.running_checksum};
+  check_invariants(scene);
   totals_ = totals;
 }
 
@@ -141,6 +153,14 @@ void SceneTable::fill_marker(uint64_t database_sequence, DurableMarker& durable_
     scene_marker.damage = scene->damage_found;
   }
   if (all_synced) durable_marker.flushed_sequence = database_sequence;
+}
+
+void SceneTable::check_invariants(const SceneLogState& scene) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(scene.synced.sequence, scene.written.sequence);
+    if (scene.synced.sequence == scene.written.sequence)
+      LOCUS_CHECK_EQ(scene.synced.running_checksum, scene.written.running_checksum);
+  }
 }
 
 }  // namespace locus::server

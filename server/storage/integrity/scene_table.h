@@ -89,6 +89,8 @@ class SceneTable {
   void fill_marker(uint64_t database_sequence, DurableMarker& durable_marker) const LOCUS_EXCLUDES(mutex_);
 
  private:
+  void check_invariants(const SceneLogState& scene) const LOCUS_REQUIRES(mutex_);
+
   mutable Mutex mutex_;
   std::map<SceneKey, SceneLogStatePtr> scenes_ LOCUS_GUARDED_BY(mutex_);
   CatalogueRow totals_ LOCUS_GUARDED_BY(mutex_);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "absl/strings/string_view.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 
@@ -28,7 +29,10 @@ class ByteWriter {
     return *this;
   }
   // Appends a 32-bit length, then `value`.
-  ByteWriter& string(absl::string_view value) { return u32(static_cast<uint32_t>(value.size())).bytes(value); }
+  ByteWriter& string(absl::string_view value) {
+    LOCUS_DCHECK_LE(value.size(), ~uint32_t{0});
+    return u32(static_cast<uint32_t>(value.size())).bytes(value);
+  }
 
   const std::string& view() const { return bytes_; }
   std::string take() { return std::move(bytes_); }

@@ -133,6 +133,7 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
 }
 
 Database::~Database() {
+  LOCUS_DCHECK_EQ(writers_.load(), 0);
   if (db_ == nullptr) return;
   for (rocksdb::ColumnFamilyHandle* family : families_) db_->DestroyColumnFamilyHandle(family).PermitUncheckedError();
   db_->Close().PermitUncheckedError();
@@ -155,6 +156,7 @@ absl::Status Database::write_now(rocksdb::WriteBatch& batch, bool sync) {
   }
   absl::Status error;
   if (broken || !status.ok()) error = fail_writes(status);
+  LOCUS_DCHECK_LT(0, writers_.load());
   --writers_;
   return error;
 }

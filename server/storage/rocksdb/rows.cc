@@ -2,6 +2,7 @@
 
 #include <xxhash.h>
 
+#include "core/base/check.h"
 #include "server/storage/rocksdb/bytes.h"
 
 namespace locus::server {
@@ -23,6 +24,7 @@ uint64_t checksum(absl::string_view bytes, uint64_t seed) {
 }
 
 void ChunkList::add(absl::string_view chunk_value) {
+  LOCUS_DCHECK_LE(kChecksumBytes, chunk_value.size());
   ++chunks;
   bytes += chunk_value.size() - kChecksumBytes;
   digest = checksum(chunk_value.substr(chunk_value.size() - kChecksumBytes), digest);
