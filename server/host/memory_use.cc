@@ -32,11 +32,11 @@ uint64_t resident_bytes() {
 }  // namespace
 
 MemoryBudget::Meter process_memory(const Registry& registry) {
-  const auto give_back = [&registry] {
+  const auto release_memory = [&registry] {
     for (const ScenePtr& scene : registry.list_scenes("", std::numeric_limits<size_t>::max())) scene->forget_recent();
     malloc_trim(0);
   };
-  return {resident_bytes, give_back};
+  return {resident_bytes, release_memory};
 }
 
 UpdateCost cost_of(const UpdateBatch& batch) {

@@ -1,7 +1,6 @@
-// Counts what is in work and lets no more in than may be: admission of calls. A pass is held for as long as the work
-// lasts.
+// Limits the number of calls in progress: each holds a Permit until it ends, and there are never more than max().
 //
-// Threads: every member may be called from any thread. Invariant: never more passes than max().
+// Threads: every member may be called from any thread. Invariant: used() permits exist, and used() <= max().
 #ifndef LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
 #define LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
 
@@ -9,39 +8,41 @@
 #include <cstdint>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/mutex.h"
 
 namespace locus::server {
 
 class AdmissionLimiter {
  public:
-  // Leaves the gate when dropped. Must not outlive it.
+  // Right to proceed; releases its place in the limiter when destroyed. Must not outlive the limiter.
   class Permit {
    public:
     Permit() = default;
-    explicit Permit(AdmissionLimiter* gate) : gate_(gate) {}
-    Permit(Permit&& other) noexcept : gate_(std::exchange(other.gate_, nullptr)) {}
+    explicit Permit(AdmissionLimiter* limiter) : limiter_(limiter) {}
+    Permit(Permit&& other) noexcept : limiter_(std::exchange(other.limiter_, nullptr)) {}
     Permit& operator=(Permit&& other) noexcept {
-      std::swap(gate_, other.gate_);
+      std::swap(limiter_, other.limiter_);
       return *this;
     }
     ~Permit() {
-      if (gate_ != nullptr) gate_->leave();
+      if (limiter_ != nullptr) limiter_->release();
     }
-    // False where there was no room.
-    explicit operator bool() const { return gate_ != nullptr; }
+    // Returns false if the limiter was full.
+    explicit operator bool() const { return limiter_ != nullptr; }
 
    private:
-    AdmissionLimiter* gate_ = nullptr;
+    AdmissionLimiter* limiter_ = nullptr;
   };
 
   explicit AdmissionLimiter(uint32_t max) : max_(max) {}
 
-  // Never waits.
+  // Returns a permit, an empty one if the limiter is full. Never waits.
   Permit enter() LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     if (used_ >= max_) return Permit();
     ++used_;
+    check_invariants();
     return Permit(this);
   }
 
@@ -51,7 +52,7 @@ class AdmissionLimiter {
   }
   uint32_t max() const { return max_; }
 
-  // Waits until nobody is inside; false when somebody still is at `deadline`.
+  // Waits until no permit is held; returns false if one still is at `deadline`.
   bool wait_until_empty(std::chrono::steady_clock::time_point deadline) LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     while (used_ > 0)
@@ -60,10 +61,13 @@ class AdmissionLimiter {
   }
 
  private:
-  void leave() LOCUS_EXCLUDES(mutex_) {
+  void release() LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
+    LOCUS_DCHECK_LT(0u, used_);
     if (--used_ == 0) emptied_.notify_all();
+    check_invariants();
   }
+  void check_invariants() const LOCUS_REQUIRES(mutex_) { LOCUS_DCHECK_LE(used_, max_); }
 
   const uint32_t max_;
   mutable Mutex mutex_;

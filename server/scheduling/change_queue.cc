@@ -28,31 +28,33 @@ ChangeQueue::~ChangeQueue() {
 
 absl::StatusOr<uint64_t> ChangeQueue::submit(uint64_t key, Job job) {
   MutexLock lock(mutex_);
-  Line& line = lines_[key];
-  const size_t pending = line.waiting.size() + (line.running ? 1 : 0);
+  KeyQueue& queue = queues_[key];
+  const size_t pending = queue.waiting.size() + (queue.running ? 1 : 0);
   if (pending >= max_waiting_)
     return refuse_full("", "pending_changes", max_waiting_, static_cast<double>(pending + 1), kRetryAfterMs);
-  if (!line.running && line.waiting.empty()) {
+  if (!queue.running && queue.waiting.empty()) {
     ready_.push_back(key);
     work_.notify_one();
   }
-  line.waiting.push_back(std::move(job));
-  return ++line.last_number;
+  queue.waiting.push_back(std::move(job));
+  ++queue.last_number;
+  check_invariants(key);
+  return queue.last_number;
 }
 
 uint32_t ChangeQueue::pending(uint64_t key) const {
   MutexLock lock(mutex_);
-  const auto line = lines_.find(key);
-  if (line == lines_.end()) return 0;
-  return static_cast<uint32_t>(line->second.waiting.size()) + (line->second.running ? 1 : 0);
+  const auto queue = queues_.find(key);
+  if (queue == queues_.end()) return 0;
+  return static_cast<uint32_t>(queue->second.waiting.size()) + (queue->second.running ? 1 : 0);
 }
 
 void ChangeQueue::forget(uint64_t key) {
   MutexLock lock(mutex_);
-  const auto line = lines_.find(key);
-  if (line == lines_.end()) return;
-  line->second.forgotten = true;
-  if (!line->second.running && line->second.waiting.empty()) lines_.erase(line);
+  const auto queue = queues_.find(key);
+  if (queue == queues_.end()) return;
+  queue->second.forgotten = true;
+  if (!queue->second.running && queue->second.waiting.empty()) queues_.erase(queue);
 }
 
 void ChangeQueue::run() {
@@ -66,11 +68,13 @@ void ChangeQueue::run() {
       if (ended_) return;
       key = ready_.front();
       ready_.pop_front();
-      Line& line = lines_[key];
-      number = line.last_number - line.waiting.size() + 1;
-      job = std::move(line.waiting.front());
-      line.waiting.pop_front();
-      line.running = true;
+      KeyQueue& queue = queues_[key];
+      LOCUS_DCHECK(!queue.running && !queue.waiting.empty());
+      number = queue.last_number - queue.waiting.size() + 1;
+      job = std::move(queue.waiting.front());
+      queue.waiting.pop_front();
+      queue.running = true;
+      check_invariants(key);
     }
     job(number);
     job = nullptr;
@@ -80,13 +84,26 @@ void ChangeQueue::run() {
 
 void ChangeQueue::finish(uint64_t key) {
   MutexLock lock(mutex_);
-  const auto line = lines_.find(key);
-  line->second.running = false;
-  if (!line->second.waiting.empty()) {
+  const auto queue = queues_.find(key);
+  LOCUS_DCHECK(queue != queues_.end() && queue->second.running);
+  queue->second.running = false;
+  if (!queue->second.waiting.empty()) {
     ready_.push_back(key);
     work_.notify_one();
-  } else if (line->second.forgotten) {
-    lines_.erase(line);
+  } else if (queue->second.forgotten) {
+    queues_.erase(queue);
+  }
+  check_invariants(key);
+}
+
+void ChangeQueue::check_invariants(uint64_t key) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(ready_.size(), queues_.size());
+    const auto found = queues_.find(key);
+    if (found == queues_.end()) return;
+    const KeyQueue& queue = found->second;
+    LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), max_waiting_);
+    LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), queue.last_number);
   }
 }
 

@@ -1,8 +1,8 @@
-// Background work in numbered order: changes of a scene's instances. Jobs of one key run one after another in the order
-// of their numbers; jobs of different keys run side by side on a few threads.
+// Queue of numbered background jobs: changes of a scene's instances. Jobs of one key run one after another in the order
+// of their numbers; jobs of different keys run concurrently on a few threads.
 //
-// Threads: every member may be called from any thread. Invariant: of one key at most one job runs, and none overtakes
-// another.
+// Threads: every member may be called from any thread. Invariant: at most one job of a key runs, and jobs of a key
+// never overtake each other.
 #ifndef LOCUS_SERVER_SCHEDULING_CHANGE_QUEUE_H_
 #define LOCUS_SERVER_SCHEDULING_CHANGE_QUEUE_H_
 
@@ -22,38 +22,39 @@ class ChangeQueue {
  public:
   using Job = std::function<void(uint64_t number)>;
 
-  // Up to `max_waiting` jobs of a key may wait, the running one included.
+  // Starts `threads` threads. Each key may have `max_waiting` jobs, the running one included.
   ChangeQueue(uint32_t threads, uint32_t max_waiting);
-  // Waits for running jobs and drops those not begun.
+  // Waits for running jobs and drops all others.
   ~ChangeQueue();
   ChangeQueue(const ChangeQueue&) = delete;
   ChangeQueue& operator=(const ChangeQueue&) = delete;
 
-  // The job's number within its key, counted from 1. RESOURCE_EXHAUSTED naming pending_changes when the key's queue is
-  // full.
+  // Queues the job and returns its number within the key, counted from 1. RESOURCE_EXHAUSTED naming pending_changes if
+  // the key's queue is full.
   absl::StatusOr<uint64_t> submit(uint64_t key, Job job) LOCUS_EXCLUDES(mutex_);
 
-  // Jobs of the key that have not ended.
+  // Returns the number of waiting and running jobs of the key.
   uint32_t pending(uint64_t key) const LOCUS_EXCLUDES(mutex_);
 
-  // Drops the key's count once its jobs have ended: for keys that never come again.
+  // Drops the key's counter once its jobs have ended. For keys that are never used again.
   void forget(uint64_t key) LOCUS_EXCLUDES(mutex_);
 
  private:
-  struct Line {
+  struct KeyQueue {
     uint64_t last_number = 0;
     bool running = false;
     bool forgotten = false;
-    std::deque<Job> waiting;  // the last has the number last_number
+    std::deque<Job> waiting;  // the last one has number last_number
   };
 
   void run() LOCUS_EXCLUDES(mutex_);
   void finish(uint64_t key) LOCUS_EXCLUDES(mutex_);
+  void check_invariants(uint64_t key) const LOCUS_REQUIRES(mutex_);
 
   const uint32_t max_waiting_;
   mutable Mutex mutex_;
   ConditionVariable work_;
-  absl::flat_hash_map<uint64_t, Line> lines_ LOCUS_GUARDED_BY(mutex_);
+  absl::flat_hash_map<uint64_t, KeyQueue> queues_ LOCUS_GUARDED_BY(mutex_);
   std::deque<uint64_t> ready_ LOCUS_GUARDED_BY(mutex_);  // keys with waiting jobs and none running, each once
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> threads_;

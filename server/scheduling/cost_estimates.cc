@@ -4,20 +4,23 @@
 #include <bit>
 #include <cmath>
 
+#include "core/base/check.h"
+
 namespace locus::server {
 namespace {
 
-// Of a block, whatever it asks.
+// Fixed cost of a block.
 constexpr double kBlockNanoseconds = 500;
-// Before anything is known: what scenes of 100,000 triangles and 10,000 objects take. In the order of CostKind.
+// Estimates before the first measurement: measured in scenes of 100,000 triangles and 10,000 objects. In the order of
+// CostKind.
 constexpr std::array<double, 8> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000};
 constexpr double kMin = 1, kMax = 1e12;
 constexpr size_t kProbes = 8;
-// So many queries weigh as much as all that was learned before.
+// Number of queries for which a measurement would have weight 1, before clamping.
 constexpr double kForgetQueries = 2048;
 constexpr double kMinWeight = 1.0 / 64, kMaxWeight = 0.5;
 
-uint64_t mixed(uint64_t x) {
+uint64_t mix(uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
   x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
   return x ^ (x >> 31);
@@ -46,27 +49,29 @@ double nanoseconds_of(uint64_t entry) { return std::bit_cast<float>(static_cast<
 
 CostKind cost_kind(const QueryBlock& block) { return std::visit(KindOf(), block.kind); }
 
-CostEstimates::Place CostEstimates::place_of(uint64_t scene, const QueryBlock& block) {
+CostEstimates::Slot CostEstimates::slot_of(uint64_t scene, const QueryBlock& block) {
   const uint64_t kind = static_cast<uint64_t>(cost_kind(block)) * 4 + static_cast<uint64_t>(block.source);
-  const uint64_t hash = mixed(mixed(scene) + kind);
+  const uint64_t hash = mix(mix(scene) + kind);
   return {hash % kEntries, static_cast<uint32_t>(hash >> 32) | 1u};
 }
 
-size_t CostEstimates::find(const Place& place) const {
-  size_t empty = place.first;
+size_t CostEstimates::find(const Slot& slot) const {
+  LOCUS_DCHECK_LT(slot.first, kEntries);
+  LOCUS_DCHECK_NE(slot.tag, 0u);
+  size_t empty = slot.first;
   for (size_t i = kProbes; i-- > 0;) {
-    const size_t number = (place.first + i) % kEntries;
-    const uint64_t entry = entries_[number].load(std::memory_order_relaxed);
-    if (tag_of(entry) == place.tag) return number;
-    if (entry == 0) empty = number;
+    const size_t index = (slot.first + i) % kEntries;
+    const uint64_t entry = entries_[index].load(std::memory_order_relaxed);
+    if (tag_of(entry) == slot.tag) return index;
+    if (entry == 0) empty = index;
   }
   return empty;
 }
 
 double CostEstimates::nanoseconds_a_query(uint64_t scene, const QueryBlock& block) const {
-  const Place place = place_of(scene, block);
-  const uint64_t entry = entries_[find(place)].load(std::memory_order_relaxed);
-  return tag_of(entry) == place.tag ? nanoseconds_of(entry) : kFirstGuess[static_cast<size_t>(cost_kind(block))];
+  const Slot slot = slot_of(scene, block);
+  const uint64_t entry = entries_[find(slot)].load(std::memory_order_relaxed);
+  return tag_of(entry) == slot.tag ? nanoseconds_of(entry) : kFirstGuess[static_cast<size_t>(cost_kind(block))];
 }
 
 uint64_t CostEstimates::nanoseconds(uint64_t scene, const QueryBatch& batch) const {
@@ -80,13 +85,14 @@ void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nano
   const auto queries = static_cast<double>(query_count(block));
   if (queries == 0) return;
   const double seen = std::clamp(static_cast<double>(nanoseconds) / queries, kMin, kMax);
-  const Place place = place_of(scene, block);
-  std::atomic<uint64_t>& at = entries_[find(place)];
+  const Slot slot = slot_of(scene, block);
+  std::atomic<uint64_t>& at = entries_[find(slot)];
   uint64_t before = at.load(std::memory_order_relaxed);
   const double weight = std::clamp(queries / kForgetQueries, kMinWeight, kMaxWeight);
   const double known = nanoseconds_of(before);
-  const double now = tag_of(before) == place.tag ? known + (seen - known) * weight : seen;
-  at.compare_exchange_strong(before, packed(place.tag, now), std::memory_order_relaxed);
+  const double now = tag_of(before) == slot.tag ? known + (seen - known) * weight : seen;
+  LOCUS_DCHECK(kMin / 2 <= now && now <= 2 * kMax);
+  at.compare_exchange_strong(before, packed(slot.tag, now), std::memory_order_relaxed);
 }
 
 }  // namespace locus::server

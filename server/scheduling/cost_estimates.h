@@ -1,8 +1,8 @@
-// What a query of some kind in some scene takes, in nanoseconds of one thread, learned from finished work. It decides
-// what is small, what is large and what is too much, never what is answered.
+// Estimated cost of a query by scene and kind, in nanoseconds of one thread, learned from finished work. Estimates
+// decide where and when a batch runs and whether it is admitted; they never change an answer.
 //
-// Threads: every member may be called from any thread and none takes a lock; of two that learn at once one may be lost.
-// Memory is fixed: a scene that is not asked for long may be forgotten for another, and starts anew.
+// Threads: every member may be called from any thread and none takes a lock; if two threads learn at once, one result
+// may be lost. Memory is fixed: the entry of one scene may be replaced by another's; its next estimate is the default.
 #ifndef LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 #define LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 
@@ -14,7 +14,7 @@
 
 namespace locus::server {
 
-// What queries of similar cost have in common.
+// Kinds of queries with similar cost.
 enum class CostKind : uint8_t { kRayFirst, kRayAny, kRayAll, kBall, kBox, kNearest, kLookup, kLookupGroups };
 CostKind cost_kind(const QueryBlock& block);
 
@@ -22,25 +22,25 @@ class CostEstimates {
  public:
   static constexpr size_t kEntries = 16384;
 
-  // Of one query of the block. `scene` is any number that stands for the scene: its epoch.
+  // Returns the estimate for one query of the block. `scene` is any id of the scene, such as its epoch.
   double nanoseconds_a_query(uint64_t scene, const QueryBlock& block) const;
 
-  // Of a whole batch.
+  // Returns the estimate for a whole batch.
   uint64_t nanoseconds(uint64_t scene, const QueryBatch& batch) const;
 
-  // The block's queries took `nanoseconds` together. The more queries, the more it counts.
+  // Updates the estimate: all queries of the block took `nanoseconds` together. The weight grows with their number.
   void learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds);
 
  private:
-  struct Place {
+  struct Slot {
     size_t first;
     uint32_t tag;
   };
-  static Place place_of(uint64_t scene, const QueryBlock& block);
-  // The entry's, or that which learning may replace.
-  size_t find(const Place& place) const;
+  static Slot slot_of(uint64_t scene, const QueryBlock& block);
+  // Returns the index of the slot's entry; if there is none, of the entry that learn() may replace.
+  size_t find(const Slot& slot) const;
 
-  // Tag in the upper half, nanoseconds as a float in the lower; 0 = nothing.
+  // Entries of a hash table: tag in the upper 32 bits, nanoseconds as a float in the lower; 0 = empty.
   std::array<std::atomic<uint64_t>, kEntries> entries_{};
 };
 

@@ -16,9 +16,9 @@ std::list<Drain::Listener>::iterator Drain::add(Listener listener) {
   return listeners_.insert(listeners_.end(), std::move(listener));
 }
 
-void Drain::remove(std::list<Listener>::iterator place) {
+void Drain::remove(std::list<Listener>::iterator position) {
   MutexLock lock(mutex_);
-  listeners_.erase(place);
+  listeners_.erase(position);
 }
 
 }  // namespace locus::server

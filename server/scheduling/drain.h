@@ -1,8 +1,8 @@
-// The way from serving to ended, seen by all who must take part: first no new work (draining), then, when the grace is
-// used up, no work at all (ended). Listeners are told of the first step, so that those who block can wake up.
+// State of a shutdown: first draining (no new work is accepted), then, after the grace period, ended (all work stops).
+// Listeners are called when draining begins, so that blocked threads can wake up.
 //
-// Threads: every member may be called from any thread, begin() and end() not from a listener. Invariant: a listener is
-// never called after its Subscription is gone, and each is called at most once.
+// Threads: every member may be called from any thread; begin() and end() not from a listener. Invariant: a listener is
+// called at most once, and never after its Subscription is destroyed.
 #ifndef LOCUS_SERVER_SCHEDULING_DRAIN_H_
 #define LOCUS_SERVER_SCHEDULING_DRAIN_H_
 
@@ -18,31 +18,31 @@ class Drain {
  public:
   using Listener = std::function<void()>;
 
-  // Ends the subscription when dropped; waits for a call of the listener that is in work.
+  // Subscription of a listener. The destructor ends it and waits for a call of the listener in progress.
   class Subscription {
    public:
-    Subscription(Drain& drain, Listener listener) : drain_(drain), place_(drain.add(std::move(listener))) {}
-    ~Subscription() { drain_.remove(place_); }
+    Subscription(Drain& drain, Listener listener) : drain_(drain), position_(drain.add(std::move(listener))) {}
+    ~Subscription() { drain_.remove(position_); }
     Subscription(const Subscription&) = delete;
     Subscription& operator=(const Subscription&) = delete;
 
    private:
     Drain& drain_;
-    std::list<Listener>::iterator place_;
+    std::list<Listener>::iterator position_;
   };
 
   bool draining() const { return draining_.load(); }
   bool ended() const { return ended_.load(); }
-  // For work that takes a flag to look at.
+  // Returns a flag for work that polls for its end.
   const std::atomic<bool>* ended_flag() const { return &ended_; }
 
   void begin() LOCUS_EXCLUDES(mutex_);
   void end() { ended_.store(true); }
 
  private:
-  // A listener that comes while draining is called at once.
+  // Adds a listener; calls it at once if draining has begun.
   std::list<Listener>::iterator add(Listener listener) LOCUS_EXCLUDES(mutex_);
-  void remove(std::list<Listener>::iterator place) LOCUS_EXCLUDES(mutex_);
+  void remove(std::list<Listener>::iterator position) LOCUS_EXCLUDES(mutex_);
 
   std::atomic<bool> draining_{false};
   std::atomic<bool> ended_{false};

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace locus::server {
 namespace {
 
 using std::chrono::steady_clock;
 
-// Sleeping for longer than any timer asks: a source's clock conversions stay far from their ends.
+// Maximum sleep without a timer. Small enough that a source's clock conversions cannot overflow.
 constexpr std::chrono::hours kLongest{1};
 
 }  // namespace
@@ -17,36 +19,38 @@ void EventLoop::post(EventTag& tag) {
   EventTag* head = posted_.load();
   do tag.next_ = head;
   while (!posted_.compare_exchange_weak(head, &tag));
-  // From here on the tag may be gone. Either this sees that the leader is asleep, or a leader sees the tag before it
-  // falls asleep.
+  // The tag may be destroyed from here on. Either this thread sees that the leader is asleep, or the leader sees the
+  // tag before it falls asleep.
   if (asleep_.exchange(false)) source_.interrupt();
 }
 
-EventLoop::Timers::iterator EventLoop::at(Time time, std::function<void()> then) {
-  // The leader may be another thread, and asleep for too long.
+EventLoop::Timers::iterator EventLoop::at(Time time, std::function<void()> callback) {
+  // Another thread may lead and sleep past `time`.
   if (asleep_.exchange(false)) source_.interrupt();
-  return timers_.emplace(time, std::move(then));
+  return timers_.emplace(time, std::move(callback));
 }
 
 bool EventLoop::turn() {
-  const std::optional<steady_clock::duration> wait = take_lead();
+  const std::optional<steady_clock::duration> wait = acquire_lead();
   if (!wait) return false;
   EventTag* tag = nullptr;
   bool ok = false;
-  const EventSource::Next what = next(*wait, &tag, &ok);
+  const EventSource::Next result = next(*wait, &tag, &ok);
   const MutexLock lock(mutex_);
-  if (what == EventSource::Next::kEnd) {
+  LOCUS_DCHECK(led_ && !ended_);
+  LOCUS_DCHECK(result != EventSource::Next::kEvent || tag != nullptr);
+  if (result == EventSource::Next::kEnd) {
     end();
     return false;
   }
-  if (what == EventSource::Next::kEvent) tag->arrived(ok);
+  if (result == EventSource::Next::kEvent) tag->arrived(ok);
   run_posted();
   run_timers();
   run_deferred();
   return true;
 }
 
-std::optional<steady_clock::duration> EventLoop::take_lead() {
+std::optional<steady_clock::duration> EventLoop::acquire_lead() {
   const MutexLock lock(mutex_);
   while (led_ && !ended_) {
     ++followers_;
@@ -55,13 +59,15 @@ std::optional<steady_clock::duration> EventLoop::take_lead() {
     mutex_.lock();
   }
   if (ended_) return std::nullopt;
+  LOCUS_DCHECK(!led_);
   led_ = true;
-  asleep_.store(true);  // before the lock is left: a timer that is set from now on interrupts
+  asleep_.store(true);  // set before the lock is released: at() interrupts from now on
   if (timers_.empty()) return kLongest;
   return std::clamp<steady_clock::duration>(timers_.begin()->first - steady_clock::now(), {}, kLongest);
 }
 
-void EventLoop::leave_lead() {
+void EventLoop::release_lead() {
+  LOCUS_DCHECK(led_);
   led_ = false;
   if (followers_ == 0) return;
   --followers_;
@@ -76,9 +82,9 @@ void EventLoop::end() {
 
 EventSource::Next EventLoop::next(steady_clock::duration wait, EventTag** tag, bool* ok) {
   if (posted_.load() != nullptr) wait = {};
-  const EventSource::Next what = source_.next(wait, tag, ok);
+  const EventSource::Next result = source_.next(wait, tag, ok);
   asleep_.store(false);
-  return what;
+  return result;
 }
 
 void EventLoop::run_posted() {
@@ -91,28 +97,27 @@ void EventLoop::run_posted() {
   }
   while (oldest != nullptr) {
     EventTag& tag = *oldest;
-    oldest = tag.next_;  // before it arrives, which may post it again
+    oldest = tag.next_;  // read before arrived(), which may post the tag again
     tag.arrived(true);
   }
 }
 
 void EventLoop::run_timers() {
   while (!timers_.empty() && timers_.begin()->first <= steady_clock::now()) {
-    const std::function<void()> then = std::move(timers_.begin()->second);
+    const std::function<void()> callback = std::move(timers_.begin()->second);
     timers_.erase(timers_.begin());
-    then();
+    callback();
   }
 }
 
-// Without work, or with short work only, the lead is just laid down: whoever is up takes it, and that is this thread,
-// in its next turn.
+// If there was no long task, releases the lead without waking a thread: this one takes it again in its next turn.
 void EventLoop::run_deferred() {
   bool leads = true;
   while (!deferred_.empty()) {
     const Deferred next = deferred_.front();
     deferred_.pop_front();
     if (leads && next.length == TaskLength::kLong) {
-      leave_lead();
+      release_lead();
       leads = false;
     }
     mutex_.unlock();
@@ -120,6 +125,7 @@ void EventLoop::run_deferred() {
     mutex_.lock();
     next.work->on_deferred_done();
   }
+  LOCUS_DCHECK(!leads || led_);
   if (leads) led_ = false;
 }
 

@@ -1,15 +1,15 @@
-// Events from one source, taken by a few threads of which one at a time waits for them: the leader. It does what
-// follows from an event, and while that is short it goes on leading, so that a stream of short work costs no wake-up at
-// all. Before work that takes a while it leaves the lead to another thread; so as many such works as there are threads
-// go on at once.
+// Event loop run by a few threads. One of them at a time, the leader, waits for the next event and runs its handler. A
+// leader with short handlers keeps the lead, so a stream of short events causes no thread switch. Before a long
+// deferred task it hands the lead to another thread, so as many long tasks run concurrently as there are threads.
+// Method: D. C. Schmidt, C. O'Ryan, I. Pyarali, M. Kircher and F. Buschmann, Leader/Followers (2000).
 //
-// Everything that happens to the members of a loop happens under its lock, so they need none of their own: handlers of
-// events and timers, and the end of work set aside, but not that work itself. Method: D. C. Schmidt, C. O'Ryan,
-// I. Pyarali, M. Kircher and F. Buschmann, Leader/Followers (2000).
+// Handlers of events and timers and on_deferred_done() run under the lock of the loop, so the objects they share need
+// no lock of their own. Deferred tasks run without it.
 //
-// Threads: post() may be called from any thread, also one of low priority: it takes no lock, so nobody waits for the
-// poster if it loses its core. Everything else belongs to handlers, or to the time before the first turn().
-// Lifetime: a poster may still be in post() when its tag has arrived, so posters end before the loop goes.
+// Threads: post() may be called from any thread. It takes no lock, so no thread waits for a poster of low priority that
+// lost its core. All other members may be called only by handlers, or before the first turn(). Lifetime: a tag may
+// arrive while its poster is still in post(), so all posters must end before the loop is destroyed. Invariant: at most
+// one thread leads.
 #ifndef LOCUS_SERVER_SCHEDULING_EVENT_LOOP_H_
 #define LOCUS_SERVER_SCHEDULING_EVENT_LOOP_H_
 
@@ -26,16 +26,16 @@
 
 namespace locus::server {
 
-// What an event source or post() gives back. One that is on its way must stay until it came.
+// Tag of an event: the event source or post() delivers it to the loop. Must live until it has arrived.
 class EventTag {
  public:
   virtual ~EventTag() = default;
-  // `ok` as the source says for the operation; true for what was posted.
+  // Handles the event. `ok` is the source's result of the operation; true for a posted tag.
   virtual void arrived(bool ok) = 0;
 
  private:
   friend class EventLoop;
-  EventTag* next_ = nullptr;  // among what was posted
+  EventTag* next_ = nullptr;  // next in the list of posted tags
 };
 
 // A tag that calls a member function of its owner.
@@ -50,27 +50,27 @@ class MemberTag final : public EventTag {
   void (Owner::*member_)(bool);
 };
 
-// Where events come from.
+// Source of events, such as a completion queue.
 class EventSource {
  public:
   enum class Next : uint8_t { kEvent, kNothing, kEnd };
 
   virtual ~EventSource() = default;
-  // Waits for an event, at most so long; kEnd when there will be none any more. Called by one thread at a time.
+  // Waits for an event, at most `wait`. Returns kEnd once there will be no more events. Called by one thread at a time.
   virtual Next next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok) = 0;
-  // Makes a next() that waits return soon. From any thread, also one of low priority: waits for nobody.
+  // Makes a waiting next() return soon. Any thread may call it; it takes no lock.
   virtual void interrupt() = 0;
 };
 
-// Work that a handler sets aside to be done without the lock, by a thread of the loop.
+// Task that a handler defers: a thread of the loop runs it without the lock.
 class DeferredTask {
  public:
   virtual ~DeferredTask() = default;
   virtual void run_deferred() = 0;
-  // Under the lock, once that has returned. The loop never touches the work again.
+  // Called under the lock after run_deferred() has returned. The loop does not use the task afterwards.
   virtual void on_deferred_done() = 0;
 };
-// Whether another thread should lead meanwhile, who may have to be woken for that.
+// Length of a deferred task. Before a long one the lead is handed to another thread, which may have to be woken.
 enum class TaskLength : uint8_t { kShort, kLong };
 
 class EventLoop {
@@ -82,18 +82,18 @@ class EventLoop {
   EventLoop(const EventLoop&) = delete;
   EventLoop& operator=(const EventLoop&) = delete;
 
-  // Hands `tag` to the loop. It may arrive, and its owner be gone, before this returns.
+  // Hands `tag` to the loop. It may arrive, and its owner be destroyed, before this returns.
   void post(EventTag& tag);
 
-  // `then` is called once it is `time`, unless cancelled.
-  Timers::iterator at(Time time, std::function<void()> then);
+  // Calls `callback` at `time`, unless it is cancelled before.
+  Timers::iterator at(Time time, std::function<void()> callback);
   void cancel(Timers::iterator timer) { timers_.erase(timer); }
 
-  // `work` is done as soon as the handler has returned.
+  // Runs `work` as soon as the handler has returned.
   void defer(DeferredTask& work, TaskLength length) { deferred_.push_back({&work, length}); }
 
-  // Waits for its turn to lead, then for something to happen, and does what follows from it; false once the source has
-  // ended. What every thread of the loop does again and again.
+  // Waits until this thread leads, then for an event, a posted tag or a timer, and handles it. Returns false once the
+  // source has ended. Every thread of the loop calls it repeatedly.
   bool turn() LOCUS_EXCLUDES(mutex_);
 
  private:
@@ -102,9 +102,9 @@ class EventLoop {
     TaskLength length;
   };
 
-  // How long the leader may sleep; none at the end.
-  std::optional<std::chrono::steady_clock::duration> take_lead() LOCUS_EXCLUDES(mutex_);
-  void leave_lead() LOCUS_REQUIRES(mutex_);
+  // Waits for the lead. Returns the time that the leader may sleep, nothing once the source has ended.
+  std::optional<std::chrono::steady_clock::duration> acquire_lead() LOCUS_EXCLUDES(mutex_);
+  void release_lead() LOCUS_REQUIRES(mutex_);
   void end() LOCUS_REQUIRES(mutex_);
   EventSource::Next next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok);
   void run_posted();
@@ -113,14 +113,14 @@ class EventLoop {
 
   EventSource& source_;
   std::atomic<EventTag*> posted_{nullptr};
-  std::atomic<bool> asleep_{false};  // the leader, or about to be: what is posted needs an interruption
+  std::atomic<bool> asleep_{false};  // the leader sleeps or is about to: post() must interrupt it
 
   Mutex mutex_;
-  Semaphore lead_;  // for those who wait to lead
+  Semaphore lead_;  // wakes one of the threads that wait for the lead
   bool led_ LOCUS_GUARDED_BY(mutex_) = false;
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   uint32_t followers_ LOCUS_GUARDED_BY(mutex_) = 0;
-  // Of handlers, who run under the lock without knowing of it.
+  // Used by handlers, which run under mutex_ but carry no annotations.
   Timers timers_;
   std::deque<Deferred> deferred_;
 };

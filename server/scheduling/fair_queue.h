@@ -1,10 +1,12 @@
-// Entries of many clients, served so that each client gets an equal share of the work done, however many entries it has
-// waiting: the client that has had least goes first, its entries in their order. A client that comes new, or back,
-// starts where those who wait are, so that nobody saves up a claim by being away; one that leaves in debt finds its
-// debt again.
+// Fair queue: entries of many clients, served so that every waiting client gets an equal share of the work, however
+// many entries it has. The client with the least work served so far is next; its entries are served in order. A client
+// that is new or returns starts at the level of the one served last (the virtual time), so an absence saves up no
+// share; a client that was served more than that is remembered while idle and resumes at its own level. Source: Goyal,
+// Vin, Cheng, Start-time Fair Queueing, 1996.
 //
-// Source: Goyal, Vin, Cheng, Start-time Fair Queueing, 1996. One thread at a time. Every operation is O(log clients),
-// remove() also O(entries of the client). Memory: a line for each client that waits, and up to kMaxDebtors more.
+// Threads: one at a time. Every operation costs O(log clients), remove() also O(entries of the client). Memory: one
+// record for each waiting client and up to kMaxIdleClients more. Invariants: every client is in exactly one of the two
+// sets, `waiting_` if it has entries, else `idle_`, under its current work served; virtual_time_ never goes back.
 #ifndef LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 #define LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 
@@ -17,64 +19,74 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 
 template <class Entry>
 class FairQueue {
  public:
-  // Clients remembered only for what they had too much.
-  static constexpr size_t kMaxDebtors = 4096;
+  // Maximum number of idle clients that are remembered because they overdrew their share.
+  static constexpr size_t kMaxIdleClients = 4096;
 
-  bool empty() const { return order_.empty(); }
-  // That wait or are remembered.
-  size_t clients() const { return lines_.size(); }
+  bool empty() const { return waiting_.empty(); }
+  // Returns the number of waiting and remembered clients.
+  size_t clients() const { return queues_.size(); }
 
-  void push_back(uint64_t client, Entry entry) { wait(client).entries.push_back(std::move(entry)); }
-  // Ahead of the client's other entries.
-  void push_front(uint64_t client, Entry entry) { wait(client).entries.push_front(std::move(entry)); }
+  void push_back(uint64_t client, Entry entry) {
+    activate(client).entries.push_back(std::move(entry));
+    check_invariants(client);
+  }
+  // Adds an entry ahead of the client's others.
+  void push_front(uint64_t client, Entry entry) {
+    activate(client).entries.push_front(std::move(entry));
+    check_invariants(client);
+  }
 
-  // The entry whose turn it is; it stays where it is. Books `cost` to its client at once, so that the next turn may be
-  // another's; correct() says later what it was in fact. Not of an empty queue.
-  Entry turn(uint64_t cost) {
-    const auto [spent, client] = *order_.begin();
-    now_ = std::max(now_, spent);
+  // Returns the next entry to serve, without removing it, and charges `cost` to its client, so that the following call
+  // may return another client's entry. Correct the estimate later by charge(). Precondition: the queue is not empty.
+  Entry next(uint64_t cost) {
+    LOCUS_DCHECK(!waiting_.empty());
+    const auto [spent, client] = *waiting_.begin();
+    virtual_time_ = std::max(virtual_time_, spent);
     forget_settled();
-    const Entry entry = lines_[client].entries.front();
-    correct(client, static_cast<int64_t>(cost));
+    const Entry entry = queues_[client].entries.front();
+    charge(client, static_cast<int64_t>(cost));
     return entry;
   }
 
-  // Adds to what a client has had, or takes from it.
-  void correct(uint64_t client, int64_t cost) {
-    const auto found = lines_.find(client);
-    if (found == lines_.end()) return;
-    Line& line = found->second;
-    std::set<Place>& places = line.entries.empty() ? debtors_ : order_;
-    places.erase({line.spent, client});
-    line.spent += static_cast<uint64_t>(cost);  // wraps as it should for a cost below 0
-    places.insert({line.spent, client});
+  // Adds `cost` to the work served to a client; negative to refund. Ignores unknown clients.
+  void charge(uint64_t client, int64_t cost) {
+    const auto found = queues_.find(client);
+    if (found == queues_.end()) return;
+    ClientQueue& queue = found->second;
+    std::set<Rank>& ranks = queue.entries.empty() ? idle_ : waiting_;
+    ranks.erase({queue.spent, client});
+    queue.spent += static_cast<uint64_t>(cost);  // a negative cost wraps around to a subtraction
+    ranks.insert({queue.spent, client});
+    check_invariants(client);
   }
 
-  // False where the client has no such entry.
+  // Removes an entry; returns false if the client has no such entry.
   bool remove(uint64_t client, const Entry& entry) {
-    const auto found = lines_.find(client);
-    if (found == lines_.end()) return false;
-    Line& line = found->second;
-    const auto place = std::find(line.entries.begin(), line.entries.end(), entry);
-    if (place == line.entries.end()) return false;
-    line.entries.erase(place);
-    if (line.entries.empty()) leave(client, line);
+    const auto found = queues_.find(client);
+    if (found == queues_.end()) return false;
+    ClientQueue& queue = found->second;
+    const auto position = std::find(queue.entries.begin(), queue.entries.end(), entry);
+    if (position == queue.entries.end()) return false;
+    queue.entries.erase(position);
+    if (queue.entries.empty()) deactivate(client, queue);
+    check_invariants(client);
     return true;
   }
 
-  // Removes every entry of which `wanted` is true, and returns them. O(entries).
+  // Removes and returns every entry for which `wanted` returns true. O(entries).
   template <class Wanted>
-  std::vector<Entry> take_if(const Wanted& wanted) {
+  std::vector<Entry> remove_if(const Wanted& wanted) {
     std::vector<std::pair<uint64_t, Entry>> found;
-    for (const Place& place : order_)
-      for (const Entry& entry : lines_[place.second].entries)
-        if (wanted(entry)) found.push_back({place.second, entry});
+    for (const Rank& rank : waiting_)
+      for (const Entry& entry : queues_[rank.second].entries)
+        if (wanted(entry)) found.push_back({rank.second, entry});
     std::vector<Entry> taken;
     for (const auto& [client, entry] : found) {
       remove(client, entry);
@@ -83,42 +95,55 @@ class FairQueue {
     return taken;
   }
 
- private:
-  using Place = std::pair<uint64_t, uint64_t>;  // what a client has had, and the client
+  // Checks the invariants in debug builds: O(log clients) for the given client, which need not be known.
+  void check_invariants(uint64_t client) const {
+    if constexpr (kDebugChecks) {
+      LOCUS_CHECK_EQ(waiting_.size() + idle_.size(), queues_.size());
+      LOCUS_CHECK_LE(idle_.size(), kMaxIdleClients);
+      const auto found = queues_.find(client);
+      if (found == queues_.end()) return;
+      const bool waits = !found->second.entries.empty();
+      LOCUS_CHECK_EQ(waiting_.contains({found->second.spent, client}), waits);
+      LOCUS_CHECK_EQ(idle_.contains({found->second.spent, client}), !waits);
+    }
+  }
 
-  struct Line {
+ private:
+  using Rank = std::pair<uint64_t, uint64_t>;  // work served to a client, the client
+
+  struct ClientQueue {
     uint64_t spent = 0;
     std::deque<Entry> entries;
   };
 
-  // The line of a client that is about to have an entry.
-  Line& wait(uint64_t client) {
-    Line& line = lines_[client];
-    if (!line.entries.empty()) return line;
-    debtors_.erase({line.spent, client});
-    line.spent = std::max(line.spent, now_);
-    order_.insert({line.spent, client});
-    return line;
+  // Returns the queue of a client that is about to get an entry.
+  ClientQueue& activate(uint64_t client) {
+    ClientQueue& queue = queues_[client];
+    if (!queue.entries.empty()) return queue;
+    idle_.erase({queue.spent, client});
+    queue.spent = std::max(queue.spent, virtual_time_);
+    waiting_.insert({queue.spent, client});
+    return queue;
   }
 
-  void leave(uint64_t client, const Line& line) {
-    order_.erase({line.spent, client});
-    debtors_.insert({line.spent, client});
-    if (debtors_.size() > kMaxDebtors) forget_least();
+  void deactivate(uint64_t client, const ClientQueue& queue) {
+    waiting_.erase({queue.spent, client});
+    idle_.insert({queue.spent, client});
+    if (idle_.size() > kMaxIdleClients) forget_least();
   }
 
   void forget_settled() {
-    while (!debtors_.empty() && debtors_.begin()->first <= now_) forget_least();
+    while (!idle_.empty() && idle_.begin()->first <= virtual_time_) forget_least();
   }
   void forget_least() {
-    lines_.erase(debtors_.begin()->second);
-    debtors_.erase(debtors_.begin());
+    queues_.erase(idle_.begin()->second);
+    idle_.erase(idle_.begin());
   }
 
-  absl::flat_hash_map<uint64_t, Line> lines_;  // each in one of the sets
-  std::set<Place> order_;                      // with entries
-  std::set<Place> debtors_;                    // without
-  uint64_t now_ = 0;                           // what the client served last had had before
+  absl::flat_hash_map<uint64_t, ClientQueue> queues_;  // by client
+  std::set<Rank> waiting_;                             // clients with entries
+  std::set<Rank> idle_;                                // clients without entries
+  uint64_t virtual_time_ = 0;                          // work served to the client served last, before it
 };
 
 }  // namespace locus::server

@@ -1,6 +1,7 @@
 #include "server/scheduling/memory_budget.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 
 namespace locus::server {
@@ -15,7 +16,7 @@ void MemoryBudget::measure() {
   ended_since_ = 0;
 }
 
-// Work under way counts twice as far as it holds already what it claimed: too much rather than too little.
+// Overestimates: memory that work in progress has already allocated counts both as measured and as claimed.
 bool MemoryBudget::fits(uint64_t bytes) const {
   const uint64_t taken = measured_ + ended_since_ + claimed_;
   return taken <= limit_ && bytes <= limit_ - taken;
@@ -24,9 +25,9 @@ bool MemoryBudget::fits(uint64_t bytes) const {
 bool MemoryBudget::make_room(uint64_t bytes) {
   if (!fits(bytes) || ended_since_ > limit_ / kStepShare) measure();
   if (fits(bytes)) return true;
-  // What can never fit is not worth the trouble.
+  // Releasing memory cannot help.
   if (bytes > limit_) return false;
-  meter_.give_back();
+  meter_.release_memory();
   measure();
   return fits(bytes);
 }
@@ -35,6 +36,7 @@ absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field,
   MutexLock lock(mutex_);
   if (make_room(bytes)) {
     claimed_ += bytes;
+    LOCUS_DCHECK_LE(measured_ + ended_since_ + claimed_, limit_);
     return Claim(this, bytes);
   }
   Refusal refusal;
@@ -53,7 +55,7 @@ absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field,
 
 MemoryBudget::Claim MemoryBudget::claim_anyway(uint64_t bytes) {
   MutexLock lock(mutex_);
-  // Nobody can be refused, so looking now and then is enough.
+  // The work is never refused, so an occasional measurement is enough.
   if (ended_since_ > limit_ / kStepShare) make_room(bytes);
   claimed_ += bytes;
   return Claim(this, bytes);
@@ -66,6 +68,7 @@ uint64_t MemoryBudget::used() const {
 
 void MemoryBudget::end(uint64_t bytes) {
   MutexLock lock(mutex_);
+  LOCUS_DCHECK_LE(bytes, claimed_);
   claimed_ -= bytes;
   ended_since_ += bytes;
 }

@@ -1,9 +1,10 @@
-// How much memory the process may take, and whether a piece of work still fits: so that it is refused instead of the
-// whole process being ended by the kernel, and every scene with it. What counts is what the process really holds
-// (messages, old revisions and the allocator's spare parts included), plus what the work under way has claimed.
+// Memory limit of the process. Work that would pass it is refused, so that the kernel does not kill the process and all
+// its scenes. The budget counts the memory that the process holds (messages, old revisions and the allocator's free
+// memory included) plus the claims of work in progress.
 //
-// Threads: every member may be called from any thread; `meter` is called by one at a time. Cheap: the process is
-// measured only once the work admitted since the last time amounts to a share of the limit, or when it seems full.
+// Threads: every member may be called from any thread; one thread at a time calls `meter`. Cost: the process is
+// measured only after the work that ended since the last measurement amounts to a share of the limit, or if the budget
+// seems exhausted. Invariant: claimed_ is the sum of the live claims.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 #define LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 
@@ -20,11 +21,11 @@ namespace locus::server {
 class MemoryBudget {
  public:
   struct Meter {
-    std::function<uint64_t()> used;   // bytes that the process holds
-    std::function<void()> give_back;  // drops what can be dropped and hands free memory back to the kernel; slow
+    std::function<uint64_t()> used;        // returns the bytes that the process holds
+    std::function<void()> release_memory;  // frees what it can and returns free memory to the kernel; slow
   };
 
-  // Bytes claimed by work under way. Must not outlive the budget.
+  // Claim of work in progress; released when destroyed. Must not outlive the budget.
   class Claim {
    public:
     Claim(MemoryBudget* budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {}
@@ -41,18 +42,19 @@ class MemoryBudget {
 
   MemoryBudget(uint64_t limit, Meter meter);
 
-  // For work that may add `bytes` at its peak. RESOURCE_EXHAUSTED naming `field` and the limit memory_bytes where that
-  // would pass the limit even after giving back.
+  // Claims `bytes`, the peak that the work may add. RESOURCE_EXHAUSTED naming `field` and the limit memory_bytes if
+  // that would pass the limit even after release_memory().
   absl::StatusOr<Claim> claim(absl::string_view field, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
-  // For work that is never refused, since it only changes what is there; gives back where it would pass the limit.
+  // Claims `bytes` for work that is never refused because it only changes existing objects. Calls release_memory() if
+  // it would pass the limit.
   Claim claim_anyway(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
 
   uint64_t limit() const { return limit_; }
-  // What the process holds now.
+  // Returns the bytes that the process holds now.
   uint64_t used() const LOCUS_EXCLUDES(mutex_);
 
  private:
-  // Of the limit: how much may be admitted between two measurements.
+  // Divisor of the limit: claims that may end between two measurements.
   static constexpr uint64_t kStepShare = 32;
 
   bool make_room(uint64_t bytes) LOCUS_REQUIRES(mutex_);
@@ -64,8 +66,8 @@ class MemoryBudget {
   const Meter meter_;
   mutable Mutex mutex_;
   uint64_t measured_ LOCUS_GUARDED_BY(mutex_) = 0;
-  uint64_t ended_since_ LOCUS_GUARDED_BY(mutex_) = 0;  // claims that ended since the last measurement
-  uint64_t claimed_ LOCUS_GUARDED_BY(mutex_) = 0;      // by work under way
+  uint64_t ended_since_ LOCUS_GUARDED_BY(mutex_) = 0;  // bytes of claims that ended since the last measurement
+  uint64_t claimed_ LOCUS_GUARDED_BY(mutex_) = 0;      // bytes claimed by work in progress
 };
 
 }  // namespace locus::server

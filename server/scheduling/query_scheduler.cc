@@ -13,11 +13,11 @@
 namespace locus::server {
 namespace {
 
-constexpr double kNanosecondsAMs = 1e6;
-constexpr uint32_t kLongestRetryMs = 10'000;
-// Of the work done while both classes wait, large jobs get a part in so many.
+constexpr double kNanosecondsPerMs = 1e6;
+constexpr uint32_t kMaxRetryMs = 10'000;
+// While both classes wait, large jobs get one turn in this many.
 constexpr uint64_t kLargeShare = 5;
-// Withdrawn tickets that may stay in line until their turn comes.
+// Maximum number of withdrawn tickets that stay queued until their turn.
 constexpr uint32_t kMaxTombstones = 256;
 
 constexpr const char* kJobLimits[kJobClasses] = {"small_batches", "large_batches"};
@@ -25,7 +25,7 @@ constexpr const char* kWorkLimits[kJobClasses] = {"small_batch_work_ms", "large_
 constexpr const char* kAllJobsLimit = "batches";
 constexpr const char* kAllWorkLimit = "batch_work_ms";
 
-SchedulerOptions filled_in(SchedulerOptions options) {
+SchedulerOptions with_clock(SchedulerOptions options) {
   if (!options.clock) options.clock = &steady_nanoseconds;
   return options;
 }
@@ -37,16 +37,23 @@ class QueryScheduler::Ticket {
   Ticket(QueryJob& of, uint64_t whose, uint64_t estimated, JobClass as)
       : job(of), client(whose), nanoseconds(estimated), admitted_as(as), job_class(as) {}
 
-  // False once it was withdrawn. `state_` counts the threads at work; the two bits close it.
+  // Counts this thread in; returns false if the ticket was withdrawn. `state_` is the number of threads working on the
+  // job, with two bits for withdrawn and finished.
   bool begin_work() {
     uint32_t state = state_.load(std::memory_order_relaxed);
+    LOCUS_DCHECK_LT(state & kWorkers, kWorkers);
     while ((state & kWithdrawn) == 0)
       if (state_.compare_exchange_weak(state, state + 1, std::memory_order_acq_rel)) return true;
     return false;
   }
   void finish() { state_.fetch_or(kFinished, std::memory_order_relaxed); }
-  // True to the last thread of a finished job.
-  bool end_work() { return state_.fetch_sub(1, std::memory_order_acq_rel) - 1 == kFinished; }
+  // Counts this thread out; returns true to the last thread of a finished job.
+  bool end_work() {
+    const uint32_t before = state_.fetch_sub(1, std::memory_order_acq_rel);
+    LOCUS_DCHECK_LT(0u, before & kWorkers);
+    LOCUS_DCHECK_EQ(before & kWithdrawn, 0u);
+    return before - 1 == kFinished;
+  }
   bool alone() const { return (state_.load(std::memory_order_relaxed) & kWorkers) == 1; }
   bool finished() const { return (state_.load(std::memory_order_relaxed) & kFinished) != 0; }
   bool withdrawn() const { return (state_.load(std::memory_order_acquire) & kWithdrawn) != 0; }
@@ -57,14 +64,14 @@ class QueryScheduler::Ticket {
 
   QueryJob& job;
   const uint64_t client;
-  const uint64_t nanoseconds;  // as estimated
+  const uint64_t nanoseconds;  // estimated work
   const JobClass admitted_as;
-  Ticket* next = nullptr;        // in the inbox
-  std::shared_ptr<Ticket> self;  // for as long as the scheduler may look at it
+  Ticket* next = nullptr;        // next in the inbox
+  std::shared_ptr<Ticket> self;  // keeps the ticket alive while the scheduler may use it
 
-  // Of pool threads, under the scheduler's mutex.
+  // Used by pool threads only, under the scheduler's mutex.
   JobClass job_class;
-  bool in_line = false;
+  bool queued = false;
   uint64_t spent = 0;
 
  private:
@@ -73,7 +80,7 @@ class QueryScheduler::Ticket {
   std::atomic<uint32_t> state_{0};
 };
 
-QueryScheduler::QueryScheduler(const SchedulerOptions& options) : options_(filled_in(options)) {
+QueryScheduler::QueryScheduler(const SchedulerOptions& options) : options_(with_clock(options)) {
   LOCUS_CHECK_LE(1u, options.threads);
   LOCUS_CHECK_LE(options.threads, limits::kMaxThreads);
   for (uint32_t i = 0; i < options.threads; ++i) threads_.emplace_back([this] { run(); });
@@ -96,7 +103,7 @@ absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::submit(QueryJob& job, 
   RETURN_IF_ERROR(admit(job_class, nanoseconds));
   auto ticket = std::make_shared<Ticket>(job, client, nanoseconds, job_class);
   ticket->self = ticket;
-  // From here on the job may be done at any moment.
+  // Once it is in the inbox the job may be done at any time.
   Ticket* first = inbox_.load(std::memory_order_relaxed);
   do ticket->next = first;
   while (!inbox_.compare_exchange_weak(first, ticket.get(), std::memory_order_release, std::memory_order_relaxed));
@@ -105,18 +112,18 @@ absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::submit(QueryJob& job, 
 }
 
 absl::Status QueryScheduler::admit(JobClass job_class, uint64_t nanoseconds) {
-  const auto number = static_cast<size_t>(job_class);
-  Admitted& admitted = admitted_[number];
-  const Admitted& other = admitted_[1 - number];
-  // Booked first, so that two at once never take the same place.
+  const auto index = static_cast<size_t>(job_class);
+  Admitted& admitted = admitted_[index];
+  const Admitted& other = admitted_[1 - index];
+  // Counted before the check, so that concurrent calls never pass a limit together.
   const uint64_t jobs = admitted.jobs.fetch_add(1) + 1;
   const uint64_t work = admitted.nanoseconds.fetch_add(nanoseconds) + nanoseconds;
-  absl::Status status = check_jobs(kJobLimits[number], options_.limits[number].jobs, jobs);
+  absl::Status status = check_jobs(kJobLimits[index], options_.limits[index].jobs, jobs);
   if (status.ok()) status = check_jobs(kAllJobsLimit, options_.limit.jobs, jobs + other.jobs.load());
   if (!status.ok()) {
     admitted.refused_jobs.fetch_add(1, std::memory_order_relaxed);
   } else {
-    status = check_work(kWorkLimits[number], options_.limits[number].nanoseconds, work, nanoseconds);
+    status = check_work(kWorkLimits[index], options_.limits[index].nanoseconds, work, nanoseconds);
     if (status.ok())
       status = check_work(kAllWorkLimit, options_.limit.nanoseconds, work + other.nanoseconds.load(), nanoseconds);
     if (!status.ok()) admitted.refused_work.fetch_add(1, std::memory_order_relaxed);
@@ -127,30 +134,32 @@ absl::Status QueryScheduler::admit(JobClass job_class, uint64_t nanoseconds) {
   return status;
 }
 
-absl::Status QueryScheduler::check_jobs(const char* limit, uint64_t most, uint64_t jobs) const {
-  if (jobs <= most) return absl::OkStatus();
-  return refuse_full("", limit, static_cast<double>(most), static_cast<double>(jobs), retry_after_ms());
+absl::Status QueryScheduler::check_jobs(const char* name, uint64_t limit, uint64_t jobs) const {
+  if (jobs <= limit) return absl::OkStatus();
+  return refuse_full("", name, static_cast<double>(limit), static_cast<double>(jobs), retry_after_ms());
 }
 
-absl::Status QueryScheduler::check_work(const char* limit, uint64_t most, uint64_t work, uint64_t of_this) const {
-  most *= options_.threads;
-  if (work <= most || work == of_this) return absl::OkStatus();
-  return refuse_full("", limit, static_cast<double>(most) / kNanosecondsAMs,
-                     static_cast<double>(work) / kNanosecondsAMs, retry_after_ms());
+absl::Status QueryScheduler::check_work(const char* name, uint64_t limit, uint64_t work, uint64_t job_work) const {
+  limit *= options_.threads;
+  if (work <= limit || work == job_work) return absl::OkStatus();
+  return refuse_full("", name, static_cast<double>(limit) / kNanosecondsPerMs,
+                     static_cast<double>(work) / kNanosecondsPerMs, retry_after_ms());
 }
 
-// When half of what is there should be done.
+// Returns the time in which half of the admitted work should be done.
 uint32_t QueryScheduler::retry_after_ms() const {
   double work = 0;
   for (const Admitted& admitted : admitted_) work += static_cast<double>(admitted.nanoseconds.load());
-  const double milliseconds = work / 2 / options_.threads / kNanosecondsAMs;
-  return static_cast<uint32_t>(std::clamp(milliseconds, 1.0, static_cast<double>(kLongestRetryMs)));
+  const double milliseconds = work / 2 / options_.threads / kNanosecondsPerMs;
+  return static_cast<uint32_t>(std::clamp(milliseconds, 1.0, static_cast<double>(kMaxRetryMs)));
 }
 
 void QueryScheduler::release(const Ticket& ticket) {
   Admitted& admitted = admitted_[static_cast<size_t>(ticket.admitted_as)];
-  admitted.jobs.fetch_sub(1);
-  admitted.nanoseconds.fetch_sub(ticket.nanoseconds);
+  const uint64_t jobs = admitted.jobs.fetch_sub(1);
+  const uint64_t nanoseconds = admitted.nanoseconds.fetch_sub(ticket.nanoseconds);
+  LOCUS_DCHECK_LE(1u, jobs);
+  LOCUS_DCHECK_LE(ticket.nanoseconds, nanoseconds);
 }
 
 bool QueryScheduler::withdraw(Ticket& ticket) {
@@ -184,10 +193,11 @@ void QueryScheduler::run() {
     const Progress progress = ticket->job.work(options_.turn_nanoseconds);
     const uint64_t spent = options_.clock() - start;
     worked_.fetch_add(spent, std::memory_order_relaxed);
-    if (!settle(*ticket, progress, spent)) continue;
+    if (!end_turn(*ticket, progress, spent)) continue;
     release(*ticket);
     admitted_[static_cast<size_t>(ticket->admitted_as)].done.fetch_add(1, std::memory_order_relaxed);
     const TicketPtr last = std::move(ticket->self);
+    LOCUS_DCHECK(last != nullptr && !last->queued);
     last->job.done();
   }
 }
@@ -196,8 +206,8 @@ QueryScheduler::Ticket* QueryScheduler::next() {
   while (true) {
     {
       MutexLock lock(mutex_);
-      take_in();
-      if (Ticket* const ticket = take_turn()) return ticket;
+      drain_inbox();
+      if (Ticket* const ticket = start_turn()) return ticket;
       if (ended_.load()) return nullptr;
       sleepers_.fetch_add(1);
     }
@@ -206,20 +216,21 @@ QueryScheduler::Ticket* QueryScheduler::next() {
   }
 }
 
-void QueryScheduler::take_in() {
+void QueryScheduler::drain_inbox() {
   Ticket* last_first = inbox_.exchange(nullptr, std::memory_order_acquire);
   Ticket* first = nullptr;
   while (last_first != nullptr) first = std::exchange(last_first, std::exchange(last_first->next, first));
   for (Ticket* ticket = first; ticket != nullptr; ticket = std::exchange(ticket->next, nullptr)) {
+    LOCUS_DCHECK(!ticket->queued && ticket->self != nullptr);
     queue_of(*ticket).push_back(ticket->client, ticket);
-    ticket->in_line = true;
+    ticket->queued = true;
   }
   if (tombstones_.load(std::memory_order_relaxed) > kMaxTombstones) drop_withdrawn();
 }
 
 void QueryScheduler::drop_withdrawn() {
   for (FairQueue<Ticket*>& queue : queues_)
-    for (Ticket* const ticket : queue.take_if([](const Ticket* entry) { return entry->withdrawn(); })) drop(*ticket);
+    for (Ticket* const ticket : queue.remove_if([](const Ticket* entry) { return entry->withdrawn(); })) drop(*ticket);
 }
 
 void QueryScheduler::drop(Ticket& ticket) {
@@ -231,7 +242,7 @@ FairQueue<QueryScheduler::Ticket*>& QueryScheduler::queue_of(const Ticket& ticke
   return queues_[static_cast<size_t>(ticket.job_class)];
 }
 
-FairQueue<QueryScheduler::Ticket*>& QueryScheduler::class_in_turn() {
+FairQueue<QueryScheduler::Ticket*>& QueryScheduler::next_class() {
   FairQueue<Ticket*>& small = queues_[static_cast<size_t>(JobClass::kSmall)];
   FairQueue<Ticket*>& large = queues_[static_cast<size_t>(JobClass::kLarge)];
   if (large.empty()) {
@@ -246,46 +257,47 @@ FairQueue<QueryScheduler::Ticket*>& QueryScheduler::class_in_turn() {
   return large;
 }
 
-QueryScheduler::Ticket* QueryScheduler::take_turn() {
+QueryScheduler::Ticket* QueryScheduler::start_turn() {
   while (true) {
-    FairQueue<Ticket*>& queue = class_in_turn();
+    FairQueue<Ticket*>& queue = next_class();
     if (queue.empty()) return nullptr;
-    Ticket* const ticket = queue.turn(options_.turn_nanoseconds);
+    Ticket* const ticket = queue.next(options_.turn_nanoseconds);
     if (ticket->begin_work()) {
-      // It stays in line, and others may help where it is worth waking them.
+      // The ticket stays queued, so other threads may help. Wake one if the job is long enough.
       const bool long_enough = ticket->spent > 0 || ticket->nanoseconds > options_.turn_nanoseconds;
       if (long_enough && sleepers_.load() > 0) wake_.post();
       return ticket;
     }
-    queue.correct(ticket->client, -static_cast<int64_t>(options_.turn_nanoseconds));
+    queue.charge(ticket->client, -static_cast<int64_t>(options_.turn_nanoseconds));
     queue.remove(ticket->client, ticket);
     drop(*ticket);
   }
 }
 
-bool QueryScheduler::settle(Ticket& ticket, Progress progress, uint64_t spent) {
+bool QueryScheduler::end_turn(Ticket& ticket, Progress progress, uint64_t spent) {
   MutexLock lock(mutex_);
   const auto more = static_cast<int64_t>(spent) - static_cast<int64_t>(options_.turn_nanoseconds);
-  queue_of(ticket).correct(ticket.client, more);
+  queue_of(ticket).charge(ticket.client, more);
   ticket.spent += spent;
   if (progress == Progress::kDone) ticket.finish();
-  put_in_place(ticket, progress);
+  requeue(ticket, progress);
   return ticket.end_work();
 }
 
-// A job with nothing to begin leaves the line until one of those at work on it comes back with more. Where this is the
-// last of them, the word was overtaken on its way here, and the job is looked at again.
-void QueryScheduler::put_in_place(Ticket& ticket, Progress progress) {
+// Removes the job from the queue while it has no more work to begin, until one of the threads working on it returns
+// kMore. If this is the last of these threads, the job is queued again even without kMore, because another thread's
+// kMore may have been processed before this kBegun.
+void QueryScheduler::requeue(Ticket& ticket, Progress progress) {
   const bool waits = !ticket.finished() && (progress == Progress::kMore || ticket.alone());
   const bool grown = ticket.job_class == JobClass::kSmall && ticket.spent > 2 * options_.small_nanoseconds;
-  if (ticket.in_line && (!waits || grown)) {
+  if (ticket.queued && (!waits || grown)) {
     queue_of(ticket).remove(ticket.client, &ticket);
-    ticket.in_line = false;
+    ticket.queued = false;
   }
   if (grown) ticket.job_class = JobClass::kLarge;
-  if (!waits || ticket.in_line) return;
+  if (!waits || ticket.queued) return;
   queue_of(ticket).push_front(ticket.client, &ticket);
-  ticket.in_line = true;
+  ticket.queued = true;
 }
 
 }  // namespace locus::server

@@ -1,5 +1,5 @@
-// Wakes threads without a lock that both sides would have to take: whoever posts never waits for a sleeper that has
-// lost its processor. Thread-safe. The system's own, since std::counting_semaphore of this library may miss a wake-up.
+// Counting semaphore (sem_t). Poster and waiter share no lock, so post() never waits for a waiter that lost its core.
+// Not std::counting_semaphore, because libstdc++ 12's may miss a wake-up. Thread-safe.
 #ifndef LOCUS_SERVER_SCHEDULING_SEMAPHORE_H_
 #define LOCUS_SERVER_SCHEDULING_SEMAPHORE_H_
 
@@ -16,7 +16,7 @@ class Semaphore {
   Semaphore(const Semaphore&) = delete;
   Semaphore& operator=(const Semaphore&) = delete;
 
-  // One more wait() returns.
+  // Lets one wait() return.
   void post() { sem_post(&semaphore_); }
   void wait() {
     while (sem_wait(&semaphore_) != 0) {  // a signal was handled

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
 #include "core/scene/log/state_writer.h"
@@ -15,7 +16,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// What an object takes in a snapshot, about.
+// Approximate bytes of an object in a snapshot.
 constexpr uint64_t kObjectBytes = 80;
 
 }  // namespace
@@ -35,7 +36,7 @@ Snapshotter::~Snapshotter() {
   thread_.join();
 }
 
-SnapshotKeeperStats Snapshotter::stats() const {
+SnapshotterStats Snapshotter::stats() const {
   const MutexLock lock(mutex_);
   return stats_;
 }
@@ -54,11 +55,11 @@ bool Snapshotter::wait_for(std::chrono::milliseconds time) {
 
 void Snapshotter::run() {
   take_batch_priority(BatchPriority::kNice);
-  bool good = true;
-  while (wait_for(good ? options_.look_every : options_.retry_after)) good = look_at_all();
+  bool ok = true;
+  while (wait_for(ok ? options_.poll_interval : options_.retry_after)) ok = snapshot_due_scenes();
 }
 
-bool Snapshotter::look_at_all() {
+bool Snapshotter::snapshot_due_scenes() {
   std::string after;
   while (true) {
     const std::vector<ScenePtr> scenes = registry_.list_scenes(after, limits::kMaxPageSize);
@@ -67,9 +68,9 @@ bool Snapshotter::look_at_all() {
       if (ended()) return true;
       if (!due(*scene)) continue;
       const absl::StatusOr<uint64_t> bytes = write(*scene);
-      // A scene that was deleted meanwhile needs none.
+      // A scene that was deleted meanwhile needs no snapshot.
       if (ended() || absl::IsNotFound(bytes.status())) return true;
-      if (options_.tell) options_.tell(*scene, bytes);
+      if (options_.on_snapshot) options_.on_snapshot(*scene, bytes);
       const MutexLock lock(mutex_);
       stats_.written += bytes.ok() ? 1 : 0;
       stats_.bytes += bytes.value_or(0);
@@ -82,11 +83,13 @@ bool Snapshotter::look_at_all() {
 
 bool Snapshotter::due(const Scene& scene) const {
   if (scene.log_key() == 0) return false;
-  const uint64_t takes = kObjectBytes * scene.latest()->objects.size();
-  return scene.log_position().bytes > std::max(options_.log_bytes, takes);
+  const uint64_t scene_bytes = kObjectBytes * scene.latest()->objects.size();
+  return scene.log_position().bytes > std::max(options_.log_bytes, scene_bytes);
 }
 
 absl::StatusOr<uint64_t> Snapshotter::write(Scene& scene) {
+  LOCUS_DCHECK(log_ != nullptr);
+  LOCUS_DCHECK_NE(scene.log_key(), 0u);
   const FrozenScene frozen = scene.freeze();
   StateWriter writer(frozen);
   const auto next = [&]() -> absl::StatusOr<std::optional<std::string>> {

@@ -1,8 +1,8 @@
-// Keeps logs short: where the records of a scene have become many, a snapshot of it takes their place, so that a
-// restart has little to do again and the disk holds little more than the scenes themselves.
+// Writes a snapshot of a scene when its log has grown long; the snapshot replaces the records. So a restart replays
+// little, and the disk holds little more than the scenes themselves.
 //
-// Threads: a thread of its own, below those that serve; stats() from any. Nobody waits for it: a scene goes on while
-// its snapshot is written.
+// Threads: runs a thread of low priority; stats() may be called from any thread. Updates and queries never wait for it:
+// a scene continues to change while its snapshot is written.
 #ifndef LOCUS_SERVER_SCHEDULING_SNAPSHOTTER_H_
 #define LOCUS_SERVER_SCHEDULING_SNAPSHOTTER_H_
 
@@ -20,41 +20,41 @@
 namespace locus::server {
 
 struct SnapshotterOptions {
-  // Of records since the last snapshot: a scene with more gets another. For a scene that takes more than that itself,
-  // as much as it takes, so that snapshots never write more than the log does. Lower it for a faster restart.
+  // Bytes of log records after which a scene is snapshotted again: at least this, and at least the size of the scene
+  // itself, so that snapshots never write more than the log. Lower it for a faster restart.
   uint64_t log_bytes = limits::kSnapshotAfterBytes;
-  // Between two looks at all scenes.
-  std::chrono::milliseconds look_every{250};
-  // After a failure, for example of a full disk.
+  // Time between two checks of all scenes.
+  std::chrono::milliseconds poll_interval{250};
+  // Time until the next check after a failure, such as a full disk.
   std::chrono::milliseconds retry_after{5000};
-  // Hears of each snapshot, with its size, or why there is none. Called by the keeper's thread.
-  std::function<void(const Scene& scene, const absl::StatusOr<uint64_t>& bytes)> tell;
+  // Called after each snapshot, on the snapshotter's thread, with the size in bytes or the error.
+  std::function<void(const Scene& scene, const absl::StatusOr<uint64_t>& bytes)> on_snapshot;
 };
 
-struct SnapshotKeeperStats {
+struct SnapshotterStats {
   uint64_t written = 0;
-  uint64_t bytes = 0;  // of all that were written
+  uint64_t bytes = 0;  // total size of the snapshots written
   uint64_t failed = 0;
 };
 
 class Snapshotter {
  public:
-  // Both outlive it. Without a log it does nothing.
+  // `registry` and `log` must outlive it. Does nothing if `log` is null.
   Snapshotter(const Registry& registry, UpdateLog* log, SnapshotterOptions options);
-  // Gives up a snapshot that is being written: the one before is still there.
+  // Abandons a snapshot in progress; the previous one stays valid.
   ~Snapshotter();
   Snapshotter(const Snapshotter&) = delete;
   Snapshotter& operator=(const Snapshotter&) = delete;
 
-  SnapshotKeeperStats stats() const LOCUS_EXCLUDES(mutex_);
+  SnapshotterStats stats() const LOCUS_EXCLUDES(mutex_);
 
  private:
   void run() LOCUS_EXCLUDES(mutex_);
-  // True after that time, false at the end.
+  // Waits; returns false if the destructor was called meanwhile.
   bool wait_for(std::chrono::milliseconds time) LOCUS_EXCLUDES(mutex_);
   bool ended() const LOCUS_EXCLUDES(mutex_);
-  // Until one fails.
-  bool look_at_all() LOCUS_EXCLUDES(mutex_);
+  // Checks all scenes and writes the snapshots that are due; returns false at the first failure.
+  bool snapshot_due_scenes() LOCUS_EXCLUDES(mutex_);
   bool due(const Scene& scene) const;
   absl::StatusOr<uint64_t> write(Scene& scene) LOCUS_EXCLUDES(mutex_);
 
@@ -64,7 +64,7 @@ class Snapshotter {
   mutable Mutex mutex_;
   ConditionVariable end_;
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
-  SnapshotKeeperStats stats_ LOCUS_GUARDED_BY(mutex_);
+  SnapshotterStats stats_ LOCUS_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

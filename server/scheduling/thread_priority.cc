@@ -15,7 +15,7 @@ constexpr int kSteps = 10;
 constexpr int kLowest = 19;
 constexpr uint64_t kSliceNanoseconds = 100'000;
 
-// Linux's sched_attr, which this C library does not know.
+// Linux's sched_attr, which this C library does not declare.
 struct SchedulingAttributes {
   uint32_t size;
   uint32_t policy;
@@ -35,7 +35,7 @@ void take_batch_priority(BatchPriority priority) {
     sched_setscheduler(0, SCHED_IDLE, &parameter);
     return;
   }
-  // Linux keeps niceness thread by thread.
+  // On Linux niceness belongs to a thread, not to the process.
   const auto self = static_cast<id_t>(gettid());
   setpriority(PRIO_PROCESS, self, std::min(getpriority(PRIO_PROCESS, self) + kSteps, kLowest));
   take_short_slices();

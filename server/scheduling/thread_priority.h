@@ -1,6 +1,6 @@
-// How threads stand beside each other: those that answer large query batches below those that talk to clients and apply
-// updates, so that no flood of queries makes anybody else wait. Each function is about the calling thread, for good.
-// What the system refuses, or is too old for, is left as it is: the work is the same, somebody only waits longer.
+// Priorities of threads: threads that answer large query batches run below those that serve clients and apply updates,
+// so that no flood of queries delays the rest. Each function changes the calling thread permanently. A setting that the
+// system refuses or does not know is left unchanged; only latencies get worse.
 #ifndef LOCUS_SERVER_SCHEDULING_THREAD_PRIORITY_H_
 #define LOCUS_SERVER_SCHEDULING_THREAD_PRIORITY_H_
 
@@ -8,12 +8,12 @@
 
 namespace locus::server {
 
-// Of a thread that answers large batches. Without kIdle it gives its core to whoever wakes up after a short slice: by
-// itself Linux lets it go on for milliseconds, however low it stands.
+// Sets the priority of a thread that answers large batches. kNice also asks for short slices, since Linux otherwise
+// lets even a nice thread run for milliseconds after another thread has woken up.
 void take_batch_priority(BatchPriority priority);
 
-// Asks Linux, from 6.12 on, for slices of 0.1 ms: for the same share of a core it comes on sooner when it wakes up, and
-// goes sooner.
+// Asks Linux (6.12 or later) for time slices of 0.1 ms: with the same share of a core the thread starts sooner after it
+// wakes up, and yields sooner.
 void take_short_slices();
 
 }  // namespace locus::server

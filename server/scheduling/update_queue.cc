@@ -13,17 +13,17 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-// Applying one item, before anything is known.
+// Nanoseconds to apply one item, before the first measurement.
 constexpr double kFirstGuess = 100;
-// Of a batch, whatever it holds: its revision.
+// Fixed cost of a batch: its revision.
 constexpr uint64_t kBatchNanoseconds = 5'000;
 constexpr double kForget = 0.1;
 constexpr uint32_t kRetryAfterMs = 5;
-// Logged at once: many times what a sync costs, and soon applied.
-constexpr uint64_t kItemsASync = uint64_t{1} << 15;
-// Between two looks whether a scene's readers have ended, and how long they may take for that.
-constexpr milliseconds kLookAgain{2};
-constexpr milliseconds kReadersMayTake{1000};
+// Maximum of items logged with one sync: their cost is many times that of the sync, and they are applied soon.
+constexpr uint64_t kMaxItemsPerSync = uint64_t{1} << 15;
+// Interval for checking whether a scene's readers have ended, and the time after which overdue readers are revoked.
+constexpr milliseconds kReaderPollInterval{2};
+constexpr milliseconds kReaderGrace{1000};
 
 uint64_t items_of(const UpdateBatch& batch) {
   uint64_t items = batch.remove_ids.size() + batch.remove_groups.size();
@@ -33,22 +33,22 @@ uint64_t items_of(const UpdateBatch& batch) {
   return items;
 }
 
-bool joins(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
+bool coalesces(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
 
-// Whether each ack is on the disk first. What waits is then logged together: a sync costs the same for many.
+// Returns whether acks wait for the disk. Waiting batches are then logged together: a sync costs the same for many.
 bool waits_for_disk(const Scene& scene) {
   return scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
 }
 
 absl::StatusOr<Scene::Acks> apply_all(Scene& scene, absl::Span<const UpdateBatch* const> batches) {
-  const auto at_once = steady_clock::time_point::min();
-  if (batches.size() > 1 && joins(scene)) return scene.apply_joined(batches, at_once);
-  return scene.apply_each(batches, at_once);
+  const auto no_wait = steady_clock::time_point::min();
+  if (batches.size() > 1 && coalesces(scene)) return scene.apply_joined(batches, no_wait);
+  return scene.apply_each(batches, no_wait);
 }
 
 }  // namespace
 
-UpdateQueue::UpdateQueue(const UpdateQueueOptions& options) : options_(options), nanoseconds_an_item_(kFirstGuess) {
+UpdateQueue::UpdateQueue(const UpdateQueueOptions& options) : options_(options), nanoseconds_per_item_(kFirstGuess) {
   LOCUS_CHECK_LE(1u, options.threads);
   LOCUS_CHECK_LE(options.threads, limits::kMaxThreads);
   for (uint32_t i = 0; i < options.threads; ++i) threads_.emplace_back([this] { run(); });
@@ -63,7 +63,7 @@ UpdateQueue::~UpdateQueue() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-UpdateQueue::SceneQueue& UpdateQueue::mailbox_of(const ScenePtr& scene) {
+UpdateQueue::SceneQueue& UpdateQueue::queue_of(const ScenePtr& scene) {
   std::unique_ptr<SceneQueue>& scene_queue = scene_queues_[scene.get()];
   if (scene_queue == nullptr) {
     scene_queue = std::make_unique<SceneQueue>();
@@ -78,7 +78,7 @@ bool UpdateQueue::full(const SceneQueue& scene_queue, uint64_t items) const {
 }
 
 absl::Status UpdateQueue::refuse(const SceneQueue& scene_queue, uint64_t items) const {
-  const double nanoseconds = nanoseconds_an_item_.load(std::memory_order_relaxed);
+  const double nanoseconds = nanoseconds_per_item_.load(std::memory_order_relaxed);
   const double drain = static_cast<double>(scene_queue.items) * nanoseconds / 2 / 1e6;
   const auto retry = static_cast<uint32_t>(std::clamp(drain, double{kRetryAfterMs}, 1000.0));
   if (scene_queue.waiting.size() >= options_.max_updates)
@@ -88,29 +88,29 @@ absl::Status UpdateQueue::refuse(const SceneQueue& scene_queue, uint64_t items) 
                      static_cast<double>(scene_queue.items + items), retry);
 }
 
-// What looks at every object may take as long as it likes, and so may the disk.
+// Batches that scan all objects, or wait for the disk, never run inline.
 bool UpdateQueue::fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const {
   if (waits_for_disk(scene) || batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
-  const double nanoseconds = static_cast<double>(items) * nanoseconds_an_item_.load(std::memory_order_relaxed);
+  const double nanoseconds = static_cast<double>(items) * nanoseconds_per_item_.load(std::memory_order_relaxed);
   return nanoseconds + kBatchNanoseconds < static_cast<double>(options_.inline_nanoseconds);
 }
 
 absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) {
   const uint64_t items = items_of(update.batch());
-  SceneQueue* here = nullptr;
+  SceneQueue* idle = nullptr;
   {
     const MutexLock lock(mutex_);
-    SceneQueue& scene_queue = mailbox_of(scene);
-    if (!scene_queue.at_work && scene_queue.waiting.empty() && fits_inline(*scene, update.batch(), items)) {
-      scene_queue.at_work = true;
-      here = &scene_queue;
+    SceneQueue& scene_queue = queue_of(scene);
+    if (!scene_queue.busy && scene_queue.waiting.empty() && fits_inline(*scene, update.batch(), items)) {
+      scene_queue.busy = true;
+      idle = &scene_queue;
     } else {
-      const bool no_more = full(scene_queue, items);
-      if (no_more && when_full == WhenFull::kRefuse) {
+      const bool is_full = full(scene_queue, items);
+      if (is_full && when_full == WhenFull::kRefuse) {
         ++stats_.refused;
         return refuse(scene_queue, items);
       }
-      if (scene_queue.waiting.empty() && !scene_queue.at_work) {
+      if (scene_queue.waiting.empty() && !scene_queue.busy) {
         ready_.push_back(&scene_queue);
         work_.notify_one();
       }
@@ -118,15 +118,16 @@ absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& u
       scene_queue.items += items;
       ++stats_.updates;
       stats_.items += items;
-      stats_.held += no_more ? 1 : 0;
-      return no_more ? Posted::kFull : Posted::kTaken;
+      stats_.held += is_full ? 1 : 0;
+      check_invariants(scene_queue);
+      return is_full ? Posted::kFull : Posted::kTaken;
     }
   }
-  apply_here(*here, update, items);
+  apply_inline(*idle, update, items);
   return Posted::kTaken;
 }
 
-void UpdateQueue::apply_here(SceneQueue& scene_queue, PendingUpdate& update, uint64_t items) {
+void UpdateQueue::apply_inline(SceneQueue& scene_queue, PendingUpdate& update, uint64_t items) {
   Group group = {&update};
   const SteadyTime start = steady_clock::now();
   if (!apply(scene_queue, group)) return stall(scene_queue, group);
@@ -134,7 +135,7 @@ void UpdateQueue::apply_here(SceneQueue& scene_queue, PendingUpdate& update, uin
   std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
   ++stats_.applied_inline;
-  empty = leave(scene_queue);
+  empty = finish(scene_queue);
 }
 
 void UpdateQueue::run() {
@@ -156,14 +157,15 @@ UpdateQueue::SceneQueue* UpdateQueue::next() {
       ready_.pop_front();
     }
     if (scene_queue != nullptr) {
-      scene_queue->at_work = true;
+      LOCUS_DCHECK(!scene_queue->busy && !scene_queue->waiting.empty());
+      scene_queue->busy = true;
       return scene_queue;
     }
     if (ended_ && scene_queues_.empty()) return nullptr;
     if (stalled_.empty())
       work_.wait(mutex_);
     else
-      work_.wait_until(mutex_, now + kLookAgain);
+      work_.wait_until(mutex_, now + kReaderPollInterval);
   }
 }
 
@@ -181,32 +183,37 @@ void UpdateQueue::work_on(SceneQueue& scene_queue) {
   if (!waits_for_disk(*scene_queue.scene)) learn(items, start);
   std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
-  empty = leave(scene_queue);
+  empty = finish(scene_queue);
 }
 
-// Batches that become one revision, or that one sync serves.
+// Takes the batches that become one revision, or that share one sync.
 UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
-  const bool joined = joins(*scene_queue.scene);
-  const uint64_t most_items = joined ? limits::kMaxUpdateItems : waits_for_disk(*scene_queue.scene) ? kItemsASync : 0;
+  const bool coalescing = coalesces(*scene_queue.scene);
+  const uint64_t max_items = coalescing                           ? limits::kMaxUpdateItems
+                             : waits_for_disk(*scene_queue.scene) ? kMaxItemsPerSync
+                                                                  : 0;
   Group group;
   uint64_t items = 0;
   while (!scene_queue.waiting.empty()) {
     PendingUpdate* const update = scene_queue.waiting.front();
     const uint64_t more = items_of(update->batch());
-    const bool fits =
-        group.empty() || (items + more <= most_items && (!joined || may_join(group.front()->batch(), update->batch())));
+    const bool fits = group.empty() ||
+                      (items + more <= max_items && (!coalescing || may_join(group.front()->batch(), update->batch())));
     if (!fits) break;
     group.push_back(update);
     items += more;
     scene_queue.waiting.pop_front();
   }
+  LOCUS_DCHECK(scene_queue.busy && !group.empty());
   scene_queue.items -= items;
   stats_.items -= items;
   stats_.updates -= group.size();
+  check_invariants(scene_queue);
   return group;
 }
 
-// Who no longer wants it is told so first, and what it waited for where that made it too late.
+// Completes and removes the batches of the group that were cancelled or whose deadline has passed. If the deadline
+// passed during a stall, the error says what the readers hold.
 void UpdateQueue::drop_stopped(const SceneQueue& scene_queue, Group& group) {
   const auto stopped = [&scene_queue](PendingUpdate* update) {
     absl::Status status = update->stop();
@@ -224,45 +231,47 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
   if (group.empty()) return true;
   std::vector<const UpdateBatch*> batches;
   for (const PendingUpdate* update : group) batches.push_back(&update->batch());
-  // Without waiting for readers, who may take long.
+  // Does not wait for readers, which may take long.
   absl::StatusOr<Scene::Acks> acks = apply_all(*scene_queue.scene, batches);
   if (acks.status().code() == absl::StatusCode::kDeadlineExceeded) {
     scene_queue.late = acks.status();
     return false;
   }
+  LOCUS_DCHECK(!acks.ok() || acks->size() == group.size());
   count(*scene_queue.scene, group.size());
   for (size_t i = 0; i < group.size(); ++i) group[i]->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
   return true;
 }
 
-// Before those who wait are told, so that who was told finds itself counted.
+// Call before done(), so that the statistics include a batch by the time its caller sees the ack.
 void UpdateQueue::count(const Scene& scene, size_t updates) {
   const MutexLock lock(mutex_);
   stats_.applied += updates;
-  if (updates > 1 && joins(scene)) stats_.coalesced += updates - 1;
+  if (updates > 1 && coalesces(scene)) stats_.coalesced += updates - 1;
 }
 
-// Readers that were told to end hold too much memory. Their scene waits, other scenes do not.
+// Revoked readers still hold too much memory. Their scene waits; other scenes do not.
 void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
   const SteadyTime now = steady_clock::now();
-  ScenePtr too_slow;  // others may be done with the mailbox before its readers are cut off
+  ScenePtr overdue;  // keeps the scene alive: another thread may free the SceneQueue before its readers are revoked
   {
     const MutexLock lock(mutex_);
-    put_back(scene_queue, group);
+    LOCUS_DCHECK(scene_queue.busy && !group.empty());
+    requeue(scene_queue, group);
     if (scene_queue.stalled_at == SteadyTime()) {
       scene_queue.stalled_at = now;
       ++stats_.stalls;
     }
-    if (now - scene_queue.stalled_at > kReadersMayTake) too_slow = scene_queue.scene;
-    scene_queue.retry_at = now + kLookAgain;
-    scene_queue.at_work = false;
+    if (now - scene_queue.stalled_at > kReaderGrace) overdue = scene_queue.scene;
+    scene_queue.retry_at = now + kReaderPollInterval;
+    scene_queue.busy = false;
     stalled_.push_back(&scene_queue);
     work_.notify_one();
   }
-  if (too_slow != nullptr) too_slow->revoke_overdue_readers();
+  if (overdue != nullptr) overdue->revoke_overdue_readers();
 }
 
-void UpdateQueue::put_back(SceneQueue& scene_queue, const Group& group) {
+void UpdateQueue::requeue(SceneQueue& scene_queue, const Group& group) {
   for (auto update = group.rbegin(); update != group.rend(); ++update) {
     const uint64_t items = items_of((*update)->batch());
     scene_queue.waiting.push_front(*update);
@@ -270,19 +279,22 @@ void UpdateQueue::put_back(SceneQueue& scene_queue, const Group& group) {
     stats_.items += items;
     ++stats_.updates;
   }
+  check_invariants(scene_queue);
 }
 
-std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::leave(SceneQueue& scene_queue) {
-  scene_queue.at_work = false;
+std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::finish(SceneQueue& scene_queue) {
+  LOCUS_DCHECK(scene_queue.busy);
+  scene_queue.busy = false;
   scene_queue.stalled_at = {};
   if (!scene_queue.waiting.empty()) {
     ready_.push_back(&scene_queue);
     work_.notify_one();
     return nullptr;
   }
-  const auto place = scene_queues_.find(scene_queue.scene.get());
-  std::unique_ptr<SceneQueue> empty = std::move(place->second);
-  scene_queues_.erase(place);
+  const auto found = scene_queues_.find(scene_queue.scene.get());
+  std::unique_ptr<SceneQueue> empty = std::move(found->second);
+  scene_queues_.erase(found);
+  check_invariants(*empty);
   if (ended_) work_.notify_all();
   return empty;
 }
@@ -290,14 +302,25 @@ std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::leave(SceneQueue& scene_qu
 void UpdateQueue::learn(uint64_t items, SteadyTime start) {
   if (items == 0) return;
   const auto spent = std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start).count();
-  const double an_item = static_cast<double>(spent) / static_cast<double>(items);
-  const double known = nanoseconds_an_item_.load(std::memory_order_relaxed);
-  // Few items say little: a batch has its own cost.
+  const double per_item = static_cast<double>(spent) / static_cast<double>(items);
+  const double known = nanoseconds_per_item_.load(std::memory_order_relaxed);
+  // Few items tell little about the cost of one, because of the fixed cost of a batch.
   const double weight = items < 64 ? 0 : kForget;
-  nanoseconds_an_item_.store(known + (an_item - known) * weight, std::memory_order_relaxed);
+  nanoseconds_per_item_.store(known + (per_item - known) * weight, std::memory_order_relaxed);
 }
 
-UpdatePumpStats UpdateQueue::stats() const {
+// O(1): compares the counts of one SceneQueue with the totals.
+void UpdateQueue::check_invariants(const SceneQueue& scene_queue) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(scene_queue.waiting.size(), stats_.updates);
+    LOCUS_CHECK_LE(scene_queue.items, stats_.items);
+    if (scene_queue.waiting.empty()) LOCUS_CHECK_EQ(scene_queue.items, 0u);
+    LOCUS_CHECK_LE(ready_.size() + stalled_.size(), scene_queues_.size());
+    if (scene_queues_.empty()) LOCUS_CHECK_EQ(stats_.updates + stats_.items, 0u);
+  }
+}
+
+UpdateQueueStats UpdateQueue::stats() const {
   const MutexLock lock(mutex_);
   return stats_;
 }

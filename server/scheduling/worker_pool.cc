@@ -9,7 +9,8 @@
 
 namespace locus::server {
 
-// One parallel_for(). A helper that comes too late finds no number left and never touches `fn_`, which is gone by then.
+// One call of parallel_for(). A helper that starts late finds no index left and never uses `fn_`, which may be
+// destroyed by then.
 class WorkerPool::Batch {
  public:
   Batch(size_t n, const std::function<void(size_t)>& fn) : n_(n), fn_(&fn) {}
@@ -20,6 +21,7 @@ class WorkerPool::Batch {
     if (done == 0) return;
     MutexLock lock(mutex_);
     done_ += done;
+    LOCUS_DCHECK_LE(done_, n_);
     if (done_ == n_) all_done_.notify_all();
   }
 
@@ -40,7 +42,7 @@ class WorkerPool::Batch {
 WorkerPool::WorkerPool(uint32_t threads) {
   LOCUS_CHECK_LE(1u, threads);
   LOCUS_CHECK_LE(threads, limits::kMaxThreads);
-  for (uint32_t i = 1; i < threads; ++i) helpers_.emplace_back([this] { help(); });
+  for (uint32_t i = 1; i < threads; ++i) helpers_.emplace_back([this] { run_helper(); });
 }
 
 WorkerPool::~WorkerPool() {
@@ -59,20 +61,21 @@ void WorkerPool::parallel_for(size_t n, const std::function<void(size_t)>& fn) {
     return;
   }
   const auto batch = std::make_shared<Batch>(n, fn);
-  ask_for_help(batch, helpers);
+  wake_helpers(batch, helpers);
   batch->work();
   batch->wait();
 }
 
-void WorkerPool::ask_for_help(const std::shared_ptr<Batch>& batch, size_t helpers) {
+void WorkerPool::wake_helpers(const std::shared_ptr<Batch>& batch, size_t helpers) {
   MutexLock lock(mutex_);
   for (size_t i = 0; i < helpers && waiting_.size() < limits::kMaxWaitingBatches; ++i) {
     waiting_.push_back(batch);
+    LOCUS_DCHECK_LE(waiting_.size(), limits::kMaxWaitingBatches);
     work_.notify_one();
   }
 }
 
-void WorkerPool::help() {
+void WorkerPool::run_helper() {
   while (true) {
     std::shared_ptr<Batch> batch;
     {

@@ -184,7 +184,7 @@ absl::Status recover_all(Host& host, const std::atomic<bool>& stop) { return Rec
 SnapshotterOptions Host::snapshotter_options(const ServerConfig& config) {
   SnapshotterOptions options;
   options.log_bytes = config.snapshot_after;
-  options.tell = log_snapshot;
+  options.on_snapshot = log_snapshot;
   return options;
 }
 

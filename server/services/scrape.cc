@@ -50,7 +50,7 @@ void add_server(const Host& host, bool ready, MetricPage& page) {
 
 void add_queues(const Host& host, MetricPage& page) {
   const SchedulerStats queries = host.scheduler.stats();
-  const UpdatePumpStats updates = host.updates.stats();
+  const UpdateQueueStats updates = host.updates.stats();
   constexpr auto kSmall = static_cast<size_t>(JobClass::kSmall);
   constexpr auto kLarge = static_cast<size_t>(JobClass::kLarge);
   page.begin("locus_queue_depth",
@@ -70,7 +70,7 @@ void add_queues(const Host& host, MetricPage& page) {
 }
 
 void add_storage(const Host& host, MetricPage& page) {
-  const SnapshotKeeperStats snapshots = host.snapshots.stats();
+  const SnapshotterStats snapshots = host.snapshots.stats();
   page.add_one("locus_snapshots_total", "Snapshots that took the place of a scene's log.", MetricKind::kCounter,
                static_cast<double>(snapshots.written));
   page.add_one("locus_snapshot_failures_total", "Snapshots that could not be written.", MetricKind::kCounter,

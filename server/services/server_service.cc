@@ -42,7 +42,7 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
   add_queue("batches", "batch_work_ms", options.limit, threads, now.jobs[0] + now.jobs[1],
             now.nanoseconds[0] + now.nanoseconds[1], all);
   // Of each scene; used by all together.
-  const UpdatePumpStats updates = host.updates.stats();
+  const UpdateQueueStats updates = host.updates.stats();
   all.push_back({"waiting_updates", static_cast<double>(host.updates.options().max_updates),
                  static_cast<double>(updates.updates)});
   all.push_back({"waiting_update_items", static_cast<double>(host.updates.options().max_items),

@@ -15,10 +15,10 @@
 namespace locus::server {
 namespace {
 
-constexpr auto kKeeperPause = std::chrono::milliseconds(100);  // between two looks at the disk
-constexpr uint64_t kBatchOverhead = 128;                       // of RocksDB, a record
-constexpr uint64_t kBytesBetweenLooks = uint64_t{8} << 20;
-constexpr uint64_t kRoomToRecover = uint64_t{1} << 20;
+constexpr auto kPollInterval = std::chrono::milliseconds(100);
+constexpr uint64_t kBatchOverhead = 128;                    // RocksDB's bytes for each record of a batch
+constexpr uint64_t kBytesBetweenPolls = uint64_t{8} << 20;  // writes after which the free space is read again
+constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;      // disk space for a recovery, beside the memory tables
 
 absl::Status too_large(uint64_t bytes) {
   return refuse_limit("entries", "record_bytes", static_cast<double>(UpdateLog::kMaxRecordBytes),
@@ -31,7 +31,7 @@ absl::StatusOr<std::unique_ptr<RocksdbLog>> RocksdbLog::open(const StorageOption
   const StorageOptions resolved = with_defaults(options);
   ASSIGN_OR_RETURN(OpenedDirectory opened, open_directory(resolved));
   std::unique_ptr<RocksdbLog> log(new RocksdbLog(resolved, std::move(opened)));
-  RETURN_IF_ERROR(log->begin());
+  RETURN_IF_ERROR(log->finish_opening());
   return log;
 }
 
@@ -46,46 +46,46 @@ RocksdbLog::RocksdbLog(const StorageOptions& options, OpenedDirectory opened)
       durable_marker_(std::move(opened.durable_marker)) {}
 
 RocksdbLog::~RocksdbLog() {
-  if (!keeper_.joinable()) return;  // it never began
+  if (!background_thread_.joinable()) return;  // opening failed
   {
-    MutexLock lock(keeper_mutex_);
+    MutexLock lock(background_mutex_);
     ended_ = true;
-    keeper_wakes_.notify_all();
+    background_wakeup_.notify_all();
   }
-  keeper_.join();
+  background_thread_.join();
   const auto written = scenes_.written();
   const bool in_order = database_->sync().ok();
-  if (in_order) scenes_.on_disk(written);
-  write_high_water(in_order);
+  if (in_order) scenes_.mark_synced(written);
+  write_durable_marker(in_order);
 }
 
 void RocksdbLog::list_stored() {
   for (const SceneHealth& found : damage_report_.scenes) {
     StoredScene& stored = stored_scenes_.emplace_back();
-    auto place = std::make_shared<SceneLogState>();
-    place->key = stored.key = found.key;
-    place->name = stored.name = found.name;
+    auto log_state = std::make_shared<SceneLogState>();
+    log_state->key = stored.key = found.key;
+    log_state->name = stored.name = found.name;
     stored.last_sequence = found.last;
     stored.log_bytes = found.log_bytes;
     if (found.row) {
       stored.spec = found.row->spec;
-      place->epoch = stored.epoch = found.row->epoch;
+      log_state->epoch = stored.epoch = found.row->epoch;
       stored.snapshot_sequence = found.row->snapshot_sequence;
     }
     if (!found.damage.empty()) {
       stored.damage = absl::DataLossError(
           absl::StrCat("scene '", found.name, "' is damaged: ", found.damage, repair_hint(options_.path)));
-      place->damage = stored.damage;
-      place->damage_found = found.damage;
+      log_state->damage = stored.damage;
+      log_state->damage_found = found.damage;
     }
-    place->row_checksum = found.row_checksum;
-    place->copied = stored.copied = found.copied;
-    place->written = {found.last, found.running_checksum};
-    place->synced = place->written;  // all that is there was synced before it was read
-    // What must be there stays what it was where it is not.
+    log_state->row_checksum = found.row_checksum;
+    log_state->copied = stored.copied = found.copied;
+    log_state->written = {found.last, found.running_checksum};
+    log_state->synced = log_state->written;  // open_directory() synced the log before reading it
+    // If records are missing, keep the marker's sequence number as the expected one.
     if (found.last < found.expected_sequence)
-      place->synced.sequence = place->written.sequence = found.expected_sequence;
-    scenes_.add(std::move(place));
+      log_state->synced.sequence = log_state->written.sequence = found.expected_sequence;
+    scenes_.add(std::move(log_state));
   }
   std::sort(stored_scenes_.begin(), stored_scenes_.end(),
             [](const StoredScene& a, const StoredScene& b) { return a.name < b.name; });
@@ -103,14 +103,14 @@ void RocksdbLog::list_stored() {
   }
 }
 
-absl::Status RocksdbLog::begin() {
+absl::Status RocksdbLog::finish_opening() {
   list_stored();
   {
     MutexLock lock(catalogue_mutex_);
-    MutexLock high_water_lock(high_water_mutex_);
-    const CatalogueRow said = damage_report_.catalogue.value_or(CatalogueRow());
-    catalogue_ = Catalogue(std::move(damage_report_.rows), std::max(said.generation, durable_marker_.catalogue),
-                           std::max(said.next_scene, durable_marker_.next_scene));
+    MutexLock marker_lock(marker_mutex_);
+    const CatalogueRow stored = damage_report_.catalogue.value_or(CatalogueRow());
+    catalogue_ = Catalogue(std::move(damage_report_.rows), std::max(stored.generation, durable_marker_.catalogue),
+                           std::max(stored.next_scene, durable_marker_.next_scene));
     next_scene_ = catalogue_.totals().next_scene;
     rocksdb::WriteBatch batch;
     for (const std::string& key : damage_report_.pending) {
@@ -122,30 +122,31 @@ absl::Status RocksdbLog::begin() {
         next_scene_ = std::max(next_scene_, ByteReader(absl::string_view(key).substr(1)).big_u64() + 1);
       LOCUS_CHECK(batch.Delete(database_->meta(), key).ok());
     }
-    // From now on records are written that programs of older formats do not know.
+    // Older programs must not open the directory from here on: they cannot read the records that follow.
     if (damage_report_.format < kFormat)
       LOCUS_CHECK(
           batch
               .Put(database_->meta(), slice_of(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()))
               .ok());
-    const bool whole = said.generation == catalogue_.totals().generation &&
-                       said.scene_sum == catalogue_.totals().scene_sum && said.mesh_sum == catalogue_.totals().mesh_sum;
-    if (!whole || batch.Count() > 0) {
+    const bool consistent = stored.generation == catalogue_.totals().generation &&
+                            stored.scene_sum == catalogue_.totals().scene_sum &&
+                            stored.mesh_sum == catalogue_.totals().mesh_sum;
+    if (!consistent || batch.Count() > 0) {
       RETURN_IF_ERROR(commit(CatalogueChange(), batch));
     }
     scenes_.set_catalogue(catalogue_.totals());
-    topologies_.drop_all_but(contents());
+    topologies_.drop_unused(content_hashes());
   }
   damage_report_ = DamageReport();
-  look_at_the_disk();
-  write_high_water(false);
-  if (high_water_failed_)
+  poll_free_space();
+  write_durable_marker(false);
+  if (marker_failed_)
     return absl::UnavailableError(absl::StrCat("writing ", options_.path, "/", DurableMarkerFile::kName));
-  keeper_ = std::thread([this] { keep(); });
+  background_thread_ = std::thread([this] { run_background(); });
   return absl::OkStatus();
 }
 
-std::set<Sha256> RocksdbLog::contents() const {
+std::set<Sha256> RocksdbLog::content_hashes() const {
   std::set<Sha256> contents;
   const std::string start(1, kContentTag);
   for (auto row = catalogue_.rows().lower_bound(start); row != catalogue_.rows().end(); ++row) {
@@ -158,13 +159,13 @@ std::set<Sha256> RocksdbLog::contents() const {
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel level) {
-  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
-  SceneLogState& scene = *place;
+  ASSIGN_OR_RETURN(const SceneLogStatePtr log_state, scenes_.find(key));
+  SceneLogState& scene = *log_state;
   if (entries.empty()) return scenes_.last_of(scene);
   uint64_t bytes = 0;
   for (const LogEntry& entry : entries) bytes += entry.bytes.size();
   if (bytes > kMaxRecordBytes) return too_large(bytes);
-  RETURN_IF_ERROR(room_for("appending", bytes));
+  RETURN_IF_ERROR(check_free_space("appending", bytes));
 
   MutexLock lock(scene.writing);
   const auto start = scenes_.begin_append(scene, entries.front().epoch, database_->db().GetLatestSequenceNumber());
@@ -176,13 +177,14 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
     const std::string record_key = log_key(key, ++at.sequence);
     const std::string head = record_head(entry);
     at.running_checksum = record_checksum(record_key, head, entry.bytes, at.running_checksum);
-    const std::string seal = ByteWriter().u64(at.running_checksum).take();
+    const std::string checksum_bytes = ByteWriter().u64(at.running_checksum).take();
     const rocksdb::Slice key_part(record_key);
-    const rocksdb::Slice parts[] = {head, slice_of(entry.bytes), seal};
+    const rocksdb::Slice parts[] = {head, slice_of(entry.bytes), checksum_bytes};
     LOCUS_CHECK(batch.Put(database_->log(), rocksdb::SliceParts(&key_part, 1), rocksdb::SliceParts(parts, 3)).ok());
   }
-  for (uint64_t doubtful = at.sequence + 1; doubtful <= start->possibly_written_end; ++doubtful)
-    LOCUS_CHECK(batch.Delete(database_->log(), log_key(key, doubtful)).ok());
+  for (uint64_t possibly_written = at.sequence + 1; possibly_written <= start->possibly_written_end; ++possibly_written)
+    LOCUS_CHECK(batch.Delete(database_->log(), log_key(key, possibly_written)).ok());
+  LOCUS_DCHECK_EQ(at.sequence, start->written.sequence + entries.size());
   const bool synced = level == AckLevel::kLocal;
   if (absl::Status status = database_->write(batch, synced && options_.sync); !status.ok()) {
     scenes_.fail_append(scene, at.sequence);
@@ -190,13 +192,13 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
   }
   written_bytes_ += bytes;
   scenes_.end_append(scene, at, synced);
-  wake_keeper(synced);
+  wake_background(synced);
   return at.sequence;
 }
 
 absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
-  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
-  const uint64_t last = scenes_.last_of(*place);
+  ASSIGN_OR_RETURN(const SceneLogStatePtr log_state, scenes_.find(key));
+  const uint64_t last = scenes_.last_of(*log_state);
   SceneRow row;
   {
     MutexLock lock(catalogue_mutex_);
@@ -206,16 +208,16 @@ absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) cons
   if (from <= row.snapshot_sequence)
     return refuse_argument(
         Reason::kOutOfRange, "from", std::nullopt,
-        absl::StrCat("the records up to ", row.snapshot_sequence, " are in the snapshot: read that"));
+        absl::StrCat("the records up to ", row.snapshot_sequence, " are in the snapshot: read it instead"));
   if (from > last) return absl::OkStatus();
-  ASSIGN_OR_RETURN(const uint64_t running_checksum, chain_of(row, from - 1));
+  ASSIGN_OR_RETURN(const uint64_t running_checksum, running_checksum_at(row, from - 1));
   absl::Status status = read_records(*database_, key, from, last, running_checksum, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(
       absl::StrCat("scene '", row.name, "' is damaged: ", status.message(), repair_hint(options_.path)));
 }
 
-absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequence) const {
+absl::StatusOr<uint64_t> RocksdbLog::running_checksum_at(const SceneRow& row, uint64_t sequence) const {
   if (sequence == row.snapshot_sequence) return row.running_checksum;
   rocksdb::PinnableSlice value;
   const rocksdb::Status status =
@@ -228,8 +230,8 @@ absl::StatusOr<uint64_t> RocksdbLog::chain_of(const SceneRow& row, uint64_t sequ
 }
 
 absl::StatusOr<uint64_t> RocksdbLog::latest(SceneKey key) const {
-  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
-  return scenes_.last_of(*place);
+  ASSIGN_OR_RETURN(const SceneLogStatePtr log_state, scenes_.find(key));
+  return scenes_.last_of(*log_state);
 }
 
 absl::Status RocksdbLog::back_up(const std::string& path) {
@@ -237,20 +239,21 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   const std::string unfinished = path + ".unfinished";
   if (env.FileExists(path).ok() || env.FileExists(unfinished).ok())
     return refuse_argument(Reason::kAlreadyExists, "path", std::nullopt,
-                           absl::StrCat(path, " or ", unfinished, " is there already: name a directory that is not"));
+                           absl::StrCat(path, " or ", unfinished, " exists already: name a new directory"));
   MutexLock lock(catalogue_mutex_);
   DurableMarker durable_marker;
   {
-    // Taken before the copy, and so never more than what is in it; after a sync, so that it is nearly as much.
+    // The marker is filled before the copy is made, so it never names more than the copy holds. The sync before it
+    // keeps the difference small.
     const auto written = scenes_.written();
     RETURN_IF_ERROR(database_->sync());
-    scenes_.on_disk(written);
-    scenes_.describe(0, durable_marker);
-    // Here the scenes go on: what follows in the copy is another history.
+    scenes_.mark_synced(written);
+    scenes_.fill_marker(0, durable_marker);
+    // The scenes continue in this directory, so new records in the copy belong to another history.
     for (SceneMarker& scene_marker : durable_marker.scene_markers) scene_marker.copied = true;
   }
   {
-    MutexLock high_water_lock(high_water_mutex_);
+    MutexLock marker_lock(marker_mutex_);
     durable_marker.catalogue_damage = durable_marker_.catalogue_damage;
   }
   rocksdb::Status status = env.CreateDir(unfinished);
@@ -265,86 +268,86 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   return status.ok() ? absl::OkStatus() : disk_error(absl::StrCat("backing up to ", path), status);
 }
 
-absl::Status RocksdbLog::room_for(absl::string_view what, uint64_t bytes) {
-  if (written_bytes_ + bytes > kBytesBetweenLooks) look_at_the_disk();
+absl::Status RocksdbLog::check_free_space(absl::string_view what, uint64_t bytes) {
+  if (written_bytes_ + bytes > kBytesBetweenPolls) poll_free_space();
   const uint64_t free = free_bytes_;
   if (free < *options_.reserve_bytes || free - *options_.reserve_bytes < bytes)
     return refuse_full_disk(what, *options_.reserve_bytes, free);
-  if (high_water_failed_)
-    return absl::UnavailableError(
-        absl::StrCat(options_.path, "/", DurableMarkerFile::kName, " cannot be written; writing goes on when it can"));
+  if (marker_failed_)
+    return absl::UnavailableError(absl::StrCat(options_.path, "/", DurableMarkerFile::kName,
+                                               " cannot be written; the log accepts records again when it can"));
   return absl::OkStatus();
 }
 
-void RocksdbLog::look_at_the_disk() {
+void RocksdbLog::poll_free_space() {
   uint64_t free = 0;
   written_bytes_ = 0;
   free_bytes_ = options_.env->GetFreeSpace(options_.path, &free).ok() ? free : ~uint64_t{0};
 }
 
-void RocksdbLog::write_high_water(bool closed) {
-  MutexLock lock(high_water_mutex_);
-  scenes_.describe(database_->db().GetLatestSequenceNumber(), durable_marker_);
+void RocksdbLog::write_durable_marker(bool closed) {
+  MutexLock lock(marker_mutex_);
+  scenes_.fill_marker(database_->db().GetLatestSequenceNumber(), durable_marker_);
   describe_file_list(*database_, durable_marker_);
   durable_marker_.closed = closed;
-  high_water_failed_ = !durable_marker_file_->write(durable_marker_).ok();
+  marker_failed_ = !durable_marker_file_->write(durable_marker_).ok();
 }
 
-void RocksdbLog::wake_keeper(bool synced) {
-  MutexLock lock(keeper_mutex_);
+void RocksdbLog::wake_background(bool synced) {
+  MutexLock lock(background_mutex_);
   const SteadyTime now = std::chrono::steady_clock::now();
   bool earlier = false;
-  if (synced && !marks_due_) {
-    marks_due_ = now + options_.high_water_delay;
+  if (synced && !marker_due_) {
+    marker_due_ = now + options_.durable_marker_delay;
     earlier = true;
   }
   if (!synced && !sync_due_) {
     sync_due_ = now + options_.memory_sync_delay;
     earlier = true;
   }
-  if (earlier) keeper_wakes_.notify_one();
+  if (earlier) background_wakeup_.notify_one();
 }
 
-void RocksdbLog::keep() {
-  SteadyTime look = std::chrono::steady_clock::now();
+void RocksdbLog::run_background() {
+  SteadyTime poll_at = std::chrono::steady_clock::now();
   while (true) {
-    bool scene_markers = false;
+    bool marker = false;
     bool sync = false;
     {
-      MutexLock lock(keeper_mutex_);
-      SteadyTime until = look;
-      if (marks_due_) until = std::min(until, *marks_due_);
+      MutexLock lock(background_mutex_);
+      SteadyTime until = poll_at;
+      if (marker_due_) until = std::min(until, *marker_due_);
       if (sync_due_) until = std::min(until, *sync_due_);
-      if (!ended_) keeper_wakes_.wait_until(keeper_mutex_, until);
+      if (!ended_) background_wakeup_.wait_until(background_mutex_, until);
       if (ended_) return;
       const SteadyTime now = std::chrono::steady_clock::now();
-      scene_markers = marks_due_ && *marks_due_ <= now;
+      marker = marker_due_ && *marker_due_ <= now;
       sync = sync_due_ && *sync_due_ <= now;
-      if (scene_markers) marks_due_.reset();
+      if (marker) marker_due_.reset();
       if (sync) sync_due_.reset();
     }
     if (sync) {
       const auto written = scenes_.written();
-      if (database_->sync().ok()) scenes_.on_disk(written);
-      scene_markers = true;
+      if (database_->sync().ok()) scenes_.mark_synced(written);
+      marker = true;
     }
-    if (scene_markers || high_water_failed_) write_high_water(false);
-    if (const SteadyTime now = std::chrono::steady_clock::now(); look <= now) {
-      look = now + kKeeperPause;
-      look_after();
+    if (marker || marker_failed_) write_durable_marker(false);
+    if (const SteadyTime now = std::chrono::steady_clock::now(); poll_at <= now) {
+      poll_at = now + kPollInterval;
+      poll_disk();
     }
   }
 }
 
-void RocksdbLog::look_after() {
-  look_at_the_disk();
+void RocksdbLog::poll_disk() {
+  poll_free_space();
   if (!database_->needs_recovery()) return;
-  // Recovery writes what is in memory into tables.
-  if (free_bytes_ < database_->buffered_bytes() + kRoomToRecover) return;
+  // Recovery flushes all memory tables, which needs this much disk space.
+  if (free_bytes_ < database_->buffered_bytes() + kRecoveryBytes) return;
   const auto written = scenes_.written();
-  if (!database_->recover().ok()) return;  // writes say why not
-  scenes_.on_disk(written);
-  write_high_water(false);
+  if (!database_->recover().ok()) return;  // every write fails with this error
+  scenes_.mark_synced(written);
+  write_durable_marker(false);
 }
 
 }  // namespace locus::server

@@ -1,8 +1,9 @@
-// UpdateLog in RocksDB: the durable log of one machine. How a data directory is laid out, what damage it notices and
-// what is done about it: README.md in this folder.
+// UpdateLog on RocksDB: the durable log of one machine. README.md in this folder describes the data directory, the
+// damage that is detected and the repair.
 //
-// Threads: as of UpdateLog. One thread of its own brings records of AckLevel::kMemory to the disk, keeps HIGH_WATER up
-// to date, watches the room on the disk, and gets the database over errors of the disk, within a second of their end.
+// Threads: any thread may call any member, as UpdateLog says. A background thread syncs records of AckLevel::kMemory,
+// rewrites the durable marker (file HIGH_WATER), polls the free disk space, and resumes the database within a second
+// after disk errors end.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_LOG_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_LOG_H_
 
@@ -29,11 +30,12 @@ namespace locus::server {
 
 class RocksdbLog final : public UpdateLog {
  public:
-  // A directory that does not exist or is empty becomes an empty log. Damaged scenes and meshes are among the stored
-  // ones, and say so. FAILED_PRECONDITION where another process has it open or another version wrote it; DATA_LOSS
-  // where nothing can be had from it; UNAVAILABLE or RESOURCE_EXHAUSTED for what the disk says.
+  // Opens the data directory; creates it if it is missing or empty. Damaged scenes and meshes are listed among the
+  // stored ones with their damage. Errors: FAILED_PRECONDITION if another process has the directory open or another
+  // version of locusd wrote it, DATA_LOSS if nothing in it is readable, UNAVAILABLE or RESOURCE_EXHAUSTED for an error
+  // of the disk.
   static absl::StatusOr<std::unique_ptr<RocksdbLog>> open(const StorageOptions& options);
-  // In order: everything is on the disk afterwards.
+  // Closes in order: syncs every record and writes a durable marker with `closed` set.
   ~RocksdbLog() override;
   RocksdbLog(const RocksdbLog&) = delete;
   RocksdbLog& operator=(const RocksdbLog&) = delete;
@@ -71,46 +73,49 @@ class RocksdbLog final : public UpdateLog {
   using SteadyTime = std::chrono::steady_clock::time_point;
 
   RocksdbLog(const StorageOptions& options, OpenedDirectory opened);
-  // After opening: what is stored, the catalogue as it is believed from now on, no unfinished chunks.
-  absl::Status begin() LOCUS_EXCLUDES(catalogue_mutex_);
+  // Finishes opening: lists the stored scenes and meshes, corrects the catalogue's row, deletes unfinished chunks, and
+  // starts the background thread.
+  absl::Status finish_opening() LOCUS_EXCLUDES(catalogue_mutex_);
   void list_stored();
 
-  // Chunks under `prefix` of a family, whose column `pending` says in meta that they are not in use yet.
+  // Writes the chunks of `source` under `prefix` and, before them, the row `pending` in meta, which marks them as
+  // unfinished until a commit() deletes it. Does not sync. After an error the chunks are deleted.
   absl::StatusOr<ChunkList> put_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending,
                                        const std::string& prefix, ChunkSource source);
   void drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending, const std::string& prefix);
-  // Writes `batch` and the change with it, synced.
+  // Adds the change to `batch` and writes the batch, synced.
   absl::Status commit(const CatalogueChange& change, rocksdb::WriteBatch& batch) LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<SceneRow> row_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
-  uint64_t seal_of_row(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
-  absl::StatusOr<uint64_t> chain_of(const SceneRow& row, uint64_t sequence) const;
-  // `before` is the number of the snapshot it replaces.
-  absl::Status put_snapshot(const SceneLogStatePtr& place, uint64_t before, uint64_t sequence,
+  uint64_t row_checksum_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
+  absl::StatusOr<uint64_t> running_checksum_at(const SceneRow& row, uint64_t sequence) const;
+  // Replaces the snapshot `replaced_id` and the records up to `sequence` by `snapshot`. ABORTED if another snapshot was
+  // written since.
+  absl::Status put_snapshot(const SceneLogStatePtr& log_state, uint64_t replaced_id, uint64_t sequence,
                             const ContentRow& snapshot) LOCUS_EXCLUDES(catalogue_mutex_);
-  // Whether the chunks of a pending key are those of a snapshot or mesh by now.
+  // Returns whether the chunks of a pending key belong to a committed snapshot or mesh.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
   // Returns the row of a mesh's name, or nothing.
   std::optional<MeshRow> mesh_row(absl::string_view name) const LOCUS_REQUIRES(catalogue_mutex_);
   // Returns whether `number` is that of the parts of any name of that content.
   bool parts_in_use(absl::string_view sha256, uint64_t number) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::Status read_mesh_chunks(const Sha256& sha256, const ContentRow& row, ChunkSink sink) const;
-  std::set<Sha256> contents() const LOCUS_REQUIRES(catalogue_mutex_);
+  std::set<Sha256> content_hashes() const LOCUS_REQUIRES(catalogue_mutex_);
   bool content_in_use(const Sha256& sha256, absl::string_view but) const LOCUS_REQUIRES(catalogue_mutex_);
 
-  absl::Status room_for(absl::string_view what, uint64_t bytes);
-  void look_at_the_disk();
+  absl::Status check_free_space(absl::string_view what, uint64_t bytes);
+  void poll_free_space();
 
-  // HIGH_WATER, as of now.
-  void write_high_water(bool closed) LOCUS_EXCLUDES(high_water_mutex_);
-  void keep() LOCUS_EXCLUDES(keeper_mutex_);
-  void look_after();
-  // A record was written, or written and synced.
-  void wake_keeper(bool synced) LOCUS_EXCLUDES(keeper_mutex_);
+  // Writes the durable marker for the current synced positions. An error sets marker_failed_, which stops appending.
+  void write_durable_marker(bool closed) LOCUS_EXCLUDES(marker_mutex_);
+  void run_background() LOCUS_EXCLUDES(background_mutex_);
+  void poll_disk();
+  // Schedules the work that follows a write: a new durable marker if it was synced, else a sync.
+  void wake_background(bool synced) LOCUS_EXCLUDES(background_mutex_);
 
   const StorageOptions options_;
   const std::unique_ptr<DirectoryLock> lock_;
   const std::unique_ptr<Database> database_;
-  DamageReport damage_report_;  // until begin() is done
+  DamageReport damage_report_;  // empty once finish_opening() has returned
   std::vector<StoredScene> stored_scenes_;
   std::vector<StoredMesh> stored_meshes_;
   absl::Status catalogue_damage_;
@@ -118,25 +123,25 @@ class RocksdbLog final : public UpdateLog {
 
   TopologyFiles topologies_;
   SceneTable scenes_;
-  mutable Mutex catalogue_mutex_;  // held while a change of the catalogue is written; before the two below
+  mutable Mutex catalogue_mutex_;  // held while the catalogue is changed; locked before marker_mutex_
   Catalogue catalogue_ LOCUS_GUARDED_BY(catalogue_mutex_);
   SceneKey next_scene_ LOCUS_GUARDED_BY(catalogue_mutex_) = 1;
-  Mutex adding_mesh_;  // one mesh at a time, so that content is written once; before catalogue_mutex_
+  Mutex adding_mesh_;  // serializes meshes, so that content is written once; locked before catalogue_mutex_
 
-  Mutex high_water_mutex_;
-  std::unique_ptr<DurableMarkerFile> durable_marker_file_ LOCUS_GUARDED_BY(high_water_mutex_);
-  DurableMarker durable_marker_ LOCUS_GUARDED_BY(high_water_mutex_);
-  std::atomic<bool> high_water_failed_ = false;
+  Mutex marker_mutex_;
+  std::unique_ptr<DurableMarkerFile> durable_marker_file_ LOCUS_GUARDED_BY(marker_mutex_);
+  DurableMarker durable_marker_ LOCUS_GUARDED_BY(marker_mutex_);
+  std::atomic<bool> marker_failed_ = false;
 
   std::atomic<uint64_t> free_bytes_ = ~uint64_t{0};
-  std::atomic<uint64_t> written_bytes_ = 0;  // since the room was looked at
+  std::atomic<uint64_t> written_bytes_ = 0;  // bytes written since free_bytes_ was read
 
-  Mutex keeper_mutex_;
-  ConditionVariable keeper_wakes_;
-  std::optional<SteadyTime> marks_due_ LOCUS_GUARDED_BY(keeper_mutex_);
-  std::optional<SteadyTime> sync_due_ LOCUS_GUARDED_BY(keeper_mutex_);
-  bool ended_ LOCUS_GUARDED_BY(keeper_mutex_) = false;
-  std::thread keeper_;
+  Mutex background_mutex_;
+  ConditionVariable background_wakeup_;
+  std::optional<SteadyTime> marker_due_ LOCUS_GUARDED_BY(background_mutex_);
+  std::optional<SteadyTime> sync_due_ LOCUS_GUARDED_BY(background_mutex_);
+  bool ended_ LOCUS_GUARDED_BY(background_mutex_) = false;
+  std::thread background_thread_;
 };
 
 }  // namespace locus::server

@@ -1,4 +1,4 @@
-// RocksdbLog: what changes the catalogue, and the chunks of snapshots and meshes.
+// RocksdbLog: changes of the catalogue, and the chunks of snapshots and meshes.
 #include <random>
 #include <utility>
 
@@ -15,26 +15,26 @@
 namespace locus::server {
 namespace {
 
-// What is written at once: small enough that an append beside it waits little for the disk.
+// Maximum bytes of chunks in one write: small enough that a concurrent append waits little for the disk.
 constexpr size_t kChunkBatchBytes = size_t{2} << 20;
-// What may lie in memory and in logs after a snapshot before it is worth making tables of.
+// Bytes in memory tables after a snapshot from which a flush is worthwhile: it frees the log files.
 constexpr uint64_t kBufferedWorthFlushing = uint64_t{8} << 20;
 
-absl::Status already_there(absl::string_view field, absl::string_view what) {
+absl::Status already_stored(absl::string_view field, absl::string_view what) {
   Refusal refusal;
   refusal.reason = Reason::kAlreadyExists;
   refusal.field = std::string(field);
   return refuse(absl::StatusCode::kAlreadyExists, what, refusal);
 }
 
-absl::Status not_there(absl::string_view what) {
+absl::Status not_stored(absl::string_view what) {
   Refusal refusal;
   refusal.reason = Reason::kNotFound;
   return refuse(absl::StatusCode::kNotFound, what, refusal);
 }
 
-// Of a snapshot or mesh: never the same again.
-uint64_t new_number() {
+// Returns a random id for the chunks of a snapshot or mesh. Never reused.
+uint64_t new_content_id() {
   std::random_device random;
   return uint64_t{random()} << 32 | random();
 }
@@ -57,11 +57,11 @@ absl::Status RocksdbLog::commit(const CatalogueChange& change, rocksdb::WriteBat
 absl::StatusOr<SceneRow> RocksdbLog::row_of(SceneKey scene) const {
   const std::optional<absl::string_view> bytes = catalogue_.find(scene_key(scene));
   std::optional<SceneRow> row = bytes ? decode_scene(*bytes) : std::nullopt;
-  if (!row) return not_there(absl::StrCat("the log has no scene ", scene, "; it may have been deleted"));
+  if (!row) return not_stored(absl::StrCat("the log has no scene ", scene, "; it may have been deleted"));
   return *std::move(row);
 }
 
-uint64_t RocksdbLog::seal_of_row(SceneKey scene) const {
+uint64_t RocksdbLog::row_checksum_of(SceneKey scene) const {
   const auto row = catalogue_.rows().find(scene_key(scene));
   return row == catalogue_.rows().end() ? 0 : stored_checksum(row->second);
 }
@@ -87,7 +87,7 @@ absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* fa
     }
     if (*chunk && batch.GetDataSize() < kChunkBatchBytes) continue;
     database_->wait_for_buffers(family);
-    // What makes these chunks count is written and synced after them, in the same log.
+    // No sync: the commit() that makes these chunks part of the catalogue follows in the same log and is synced.
     status = database_->write(batch, false);
     batch.Clear();
     if (status.ok() && !*chunk) return list;
@@ -101,13 +101,13 @@ void RocksdbLog::drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::str
   rocksdb::WriteBatch batch;
   LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
   LOCUS_CHECK(batch.DeleteRange(family, prefix, end_of(prefix)).ok());
-  // If this fails, the next opening does it.
+  // If this fails, the next opening deletes them.
   database_->write(batch, false).IgnoreError();
 }
 
 absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                                   ChunkSource state) {
-  RETURN_IF_ERROR(room_for("a new scene", spec.size()));
+  RETURN_IF_ERROR(check_free_space("a new scene", spec.size()));
   if (scenes_.size() >= limits::kMaxScenes)
     return refuse_full("", "scenes", limits::kMaxScenes, static_cast<double>(scenes_.size() + 1), 0);
   SceneRow row;
@@ -118,18 +118,18 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
   row.name = std::string(name);
   row.spec = std::string(spec);
   row.epoch = epoch;
-  row.snapshot_number = new_number();
+  row.snapshot_id = new_content_id();
   row.running_checksum = checksum(scene_key(row.key));
-  const std::string pending = pending_snapshot_key(row.key, row.snapshot_number);
-  const std::string prefix = snapshot_prefix(row.key, row.snapshot_number);
+  const std::string pending = pending_snapshot_key(row.key, row.snapshot_id);
+  const std::string prefix = snapshot_prefix(row.key, row.snapshot_id);
   ASSIGN_OR_RETURN(ChunkList chunks, put_chunks(database_->snapshot(), pending, prefix, state));
   row.snapshot = chunks;
   {
     MutexLock lock(catalogue_mutex_);
     absl::Status status;
     if (scenes_.has_name(name))
-      status = already_there("name",
-                             absl::StrCat("a scene '", name, "' is stored already: delete it or choose another name"));
+      status = already_stored("name",
+                              absl::StrCat("a scene '", name, "' is stored already: delete it or choose another name"));
     if (status.ok()) {
       CatalogueChange change = change_of(row);
       change.next_scene = next_scene_;
@@ -141,22 +141,22 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
       drop_chunks(database_->snapshot(), pending, prefix);
       return status;
     }
-    auto place = std::make_shared<SceneLogState>();
-    place->key = row.key;
-    place->name = row.name;
-    place->written = place->synced = {0, row.running_checksum};
-    SceneLogState& scene = *place;
-    scenes_.add(std::move(place));
-    scenes_.set_row(scene, row, seal_of_row(row.key), catalogue_.totals());
-    write_high_water(false);
+    auto log_state = std::make_shared<SceneLogState>();
+    log_state->key = row.key;
+    log_state->name = row.name;
+    log_state->written = log_state->synced = {0, row.running_checksum};
+    SceneLogState& scene = *log_state;
+    scenes_.add(std::move(log_state));
+    scenes_.set_row(scene, row, row_checksum_of(row.key), catalogue_.totals());
+    write_durable_marker(false);
   }
   return row.key;
 }
 
 absl::Status RocksdbLog::delete_scene(SceneKey key) {
-  const SceneLogStatePtr place = scenes_.find_any(key);
-  if (place == nullptr) return not_there(absl::StrCat("the log has no scene ", key, "; it may have been deleted"));
-  MutexLock writing(place->writing);
+  const SceneLogStatePtr log_state = scenes_.find_any(key);
+  if (log_state == nullptr) return not_stored(absl::StrCat("the log has no scene ", key, "; it may have been deleted"));
+  MutexLock writing(log_state->writing);
   MutexLock lock(catalogue_mutex_);
   rocksdb::WriteBatch batch;
   const std::string prefix = scene_prefix(key);
@@ -164,41 +164,41 @@ absl::Status RocksdbLog::delete_scene(SceneKey key) {
   LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), prefix, end_of(prefix)).ok());
   RETURN_IF_ERROR(commit({{{scene_key(key), std::nullopt}}, 0}, batch));
   scenes_.remove(key, catalogue_.totals());
-  write_high_water(false);
+  write_durable_marker(false);
   return absl::OkStatus();
 }
 
 absl::Status RocksdbLog::restart_scene(SceneKey key, uint64_t epoch) {
-  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
-  MutexLock writing(place->writing);
+  ASSIGN_OR_RETURN(const SceneLogStatePtr log_state, scenes_.find(key));
+  MutexLock writing(log_state->writing);
   MutexLock lock(catalogue_mutex_);
   ASSIGN_OR_RETURN(SceneRow row, row_of(key));
   row.epoch = epoch;
   rocksdb::WriteBatch batch;
   RETURN_IF_ERROR(commit(change_of(row), batch));
-  scenes_.set_row(*place, row, seal_of_row(key), catalogue_.totals());
-  write_high_water(false);
+  scenes_.set_row(*log_state, row, row_checksum_of(key), catalogue_.totals());
+  write_durable_marker(false);
   return absl::OkStatus();
 }
 
 absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSource state) {
-  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
-  uint64_t before = 0;
+  ASSIGN_OR_RETURN(const SceneLogStatePtr log_state, scenes_.find(key));
+  uint64_t replaced_id = 0;
   {
     MutexLock lock(catalogue_mutex_);
     ASSIGN_OR_RETURN(const SceneRow row, row_of(key));
-    const uint64_t last = scenes_.last_of(*place);
+    const uint64_t last = scenes_.last_of(*log_state);
     if (sequence < row.snapshot_sequence || sequence > last)
       return refuse_argument(Reason::kOutOfRange, "sequence", std::nullopt,
-                             absl::StrCat("a snapshot may hold the records up to one from ", row.snapshot_sequence,
+                             absl::StrCat("the last record of a snapshot must be one from ", row.snapshot_sequence,
                                           " to ", last, ", not ", sequence));
-    before = row.snapshot_number;
+    replaced_id = row.snapshot_id;
   }
-  const uint64_t number = new_number();
-  const std::string pending = pending_snapshot_key(key, number);
-  const std::string prefix = snapshot_prefix(key, number);
+  const uint64_t content_id = new_content_id();
+  const std::string pending = pending_snapshot_key(key, content_id);
+  const std::string prefix = snapshot_prefix(key, content_id);
   ASSIGN_OR_RETURN(const ChunkList chunks, put_chunks(database_->snapshot(), pending, prefix, state));
-  absl::Status status = put_snapshot(place, before, sequence, {number, chunks});
+  absl::Status status = put_snapshot(log_state, replaced_id, sequence, {content_id, chunks});
   if (!status.ok()) {
     drop_chunks(database_->snapshot(), pending, prefix);
     return status;
@@ -207,31 +207,31 @@ absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSo
   return absl::OkStatus();
 }
 
-absl::Status RocksdbLog::put_snapshot(const SceneLogStatePtr& place, uint64_t before, uint64_t sequence,
+absl::Status RocksdbLog::put_snapshot(const SceneLogStatePtr& log_state, uint64_t replaced_id, uint64_t sequence,
                                       const ContentRow& snapshot) {
   MutexLock lock(catalogue_mutex_);
-  const SceneKey key = place->key;
+  const SceneKey key = log_state->key;
   ASSIGN_OR_RETURN(SceneRow row, row_of(key));
-  if (row.snapshot_number != before)
-    return absl::AbortedError(absl::StrCat("another snapshot of scene '", row.name, "' was written meanwhile"));
-  ASSIGN_OR_RETURN(const uint64_t running_checksum, chain_of(row, sequence));
-  const std::string dropped = snapshot_prefix(key, before);
-  row.snapshot_number = snapshot.number;
+  if (row.snapshot_id != replaced_id)
+    return absl::AbortedError(absl::StrCat("another snapshot of scene '", row.name, "' was written at the same time"));
+  ASSIGN_OR_RETURN(const uint64_t running_checksum, running_checksum_at(row, sequence));
+  const std::string dropped = snapshot_prefix(key, replaced_id);
+  row.snapshot_id = snapshot.content_id;
   row.snapshot_sequence = sequence;
   row.running_checksum = running_checksum;
   row.snapshot = snapshot.chunks;
   rocksdb::WriteBatch batch;
-  LOCUS_CHECK(batch.Delete(database_->meta(), pending_snapshot_key(key, snapshot.number)).ok());
+  LOCUS_CHECK(batch.Delete(database_->meta(), pending_snapshot_key(key, snapshot.content_id)).ok());
   LOCUS_CHECK(batch.DeleteRange(database_->snapshot(), dropped, end_of(dropped)).ok());
   LOCUS_CHECK(batch.DeleteRange(database_->log(), scene_prefix(key), log_key(key, sequence + 1)).ok());
   RETURN_IF_ERROR(commit(change_of(row), batch));
-  scenes_.set_row(*place, row, seal_of_row(key), catalogue_.totals());
-  write_high_water(false);
+  scenes_.set_row(*log_state, row, row_checksum_of(key), catalogue_.totals());
+  write_durable_marker(false);
   return absl::OkStatus();
 }
 
 absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
-  ASSIGN_OR_RETURN(const SceneLogStatePtr place, scenes_.find(key));
+  ASSIGN_OR_RETURN(const SceneLogStatePtr log_state, scenes_.find(key));
   absl::StatusOr<SceneRow> row;
   {
     MutexLock lock(catalogue_mutex_);
@@ -239,7 +239,7 @@ absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
   }
   if (!row.ok()) return row.status();
   absl::Status status =
-      read_chunks(*database_, database_->snapshot(), snapshot_prefix(key, row->snapshot_number), row->snapshot, sink);
+      read_chunks(*database_, database_->snapshot(), snapshot_prefix(key, row->snapshot_id), row->snapshot, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(
       absl::StrCat("scene '", row->name, "' is damaged: its snapshot: ", status.message(), repair_hint(options_.path)));
@@ -249,13 +249,13 @@ bool RocksdbLog::in_use(absl::string_view pending) const {
   ByteReader in(pending.substr(1));
   if (pending[0] == kPendingSnapshotTag) {
     const absl::StatusOr<SceneRow> row = row_of(in.big_u64());
-    return row.ok() && row->snapshot_number == in.big_u64();
+    return row.ok() && row->snapshot_id == in.big_u64();
   }
   const absl::string_view sha256 = in.bytes(Sha256().size());
   const std::optional<absl::string_view> bytes = catalogue_.find(absl::StrCat(std::string(1, kContentTag), sha256));
   const std::optional<ContentRow> row = bytes ? decode_content(*bytes) : std::nullopt;
   const uint64_t number = in.big_u64();
-  return (row && row->number == number) || parts_in_use(sha256, number);
+  return (row && row->content_id == number) || parts_in_use(sha256, number);
 }
 
 std::optional<MeshRow> RocksdbLog::mesh_row(absl::string_view name) const {
@@ -268,7 +268,7 @@ bool RocksdbLog::parts_in_use(absl::string_view sha256, uint64_t number) const {
   for (auto row = catalogue_.rows().lower_bound(start); row != catalogue_.rows().end() && row->first[0] == kMeshTag;
        ++row) {
     const std::optional<MeshRow> mesh = mesh_row(absl::string_view(row->first).substr(1));
-    if (mesh && mesh->parts && mesh->parts->number == number && encode(MeshRow{mesh->sha256, {}}) == sha256)
+    if (mesh && mesh->parts && mesh->parts->content_id == number && encode(MeshRow{mesh->sha256, {}}) == sha256)
       return true;
   }
   return false;
@@ -288,16 +288,16 @@ bool RocksdbLog::content_in_use(const Sha256& sha256, absl::string_view but) con
 absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, ChunkSource content,
                                   ChunkSource parts) {
   MutexLock adding(adding_mesh_);
-  RETURN_IF_ERROR(room_for("a new mesh", 0));
+  RETURN_IF_ERROR(check_free_space("a new mesh", 0));
   bool known = false;
   {
     MutexLock lock(catalogue_mutex_);
     const std::optional<MeshRow> there = mesh_row(name);
     if (there && there->sha256 == sha256) return absl::OkStatus();
     if (catalogue_.find(mesh_key(name)))
-      return already_there("name", absl::StrCat("a mesh '", name,
-                                                "' of other content is stored already: delete it or "
-                                                "choose another name"));
+      return already_stored("name", absl::StrCat("a mesh '", name,
+                                                 "' of other content is stored already: delete it or "
+                                                 "choose another name"));
     known = catalogue_.find(content_key(sha256)).has_value();
   }
   CatalogueChange change;
@@ -308,7 +308,7 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
       drop_chunks(database_->mesh(), pending_mesh_key(sha256, number), mesh_prefix(sha256, number));
   };
   const auto put = [&](ChunkSource source) -> absl::StatusOr<ContentRow> {
-    const uint64_t number = new_number();
+    const uint64_t number = new_content_id();
     const std::string pending = pending_mesh_key(sha256, number);
     ASSIGN_OR_RETURN(const ChunkList chunks,
                      put_chunks(database_->mesh(), pending, mesh_prefix(sha256, number), source));
@@ -332,14 +332,14 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
     return status;
   }
   scenes_.set_catalogue(catalogue_.totals());
-  write_high_water(false);
+  write_durable_marker(false);
   return absl::OkStatus();
 }
 
 absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
   MutexLock adding(adding_mesh_);
   MutexLock lock(catalogue_mutex_);
-  if (!catalogue_.find(mesh_key(name))) return not_there(absl::StrCat("the log has no mesh '", name, "'"));
+  if (!catalogue_.find(mesh_key(name))) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
   const MeshRow mesh = mesh_row(name).value_or(MeshRow());
   CatalogueChange change{{{mesh_key(name), std::nullopt}}, 0};
   rocksdb::WriteBatch batch;
@@ -348,13 +348,13 @@ absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
     const std::string all = content_key(mesh.sha256).substr(1);
     LOCUS_CHECK(batch.DeleteRange(database_->mesh(), all, end_of(all)).ok());
   } else if (mesh.parts) {
-    const std::string prefix = mesh_prefix(mesh.sha256, mesh.parts->number);
+    const std::string prefix = mesh_prefix(mesh.sha256, mesh.parts->content_id);
     LOCUS_CHECK(batch.DeleteRange(database_->mesh(), prefix, end_of(prefix)).ok());
   }
   RETURN_IF_ERROR(commit(change, batch));
   if (change.rows.size() > 1) topologies_.drop(mesh.sha256);
   scenes_.set_catalogue(catalogue_.totals());
-  write_high_water(false);
+  write_durable_marker(false);
   return absl::OkStatus();
 }
 
@@ -365,7 +365,7 @@ absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
     const std::optional<absl::string_view> bytes = catalogue_.find(content_key(sha256));
     if (bytes) row = decode_content(*bytes);
   }
-  if (!row) return not_there("the log has no mesh of this content");
+  if (!row) return not_stored("the log has no mesh of this content");
   return read_mesh_chunks(sha256, *row, sink);
 }
 
@@ -375,18 +375,19 @@ absl::Status RocksdbLog::read_parts(absl::string_view name, ChunkSink sink) cons
     MutexLock lock(catalogue_mutex_);
     row = mesh_row(name);
   }
-  if (!row) return not_there(absl::StrCat("the log has no mesh '", name, "'"));
+  if (!row) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
   return row->parts ? read_mesh_chunks(row->sha256, *row->parts, sink) : absl::OkStatus();
 }
 
 absl::Status RocksdbLog::read_mesh_chunks(const Sha256& sha256, const ContentRow& row, ChunkSink sink) const {
-  absl::Status status = read_chunks(*database_, database_->mesh(), mesh_prefix(sha256, row.number), row.chunks, sink);
+  absl::Status status =
+      read_chunks(*database_, database_->mesh(), mesh_prefix(sha256, row.content_id), row.chunks, sink);
   if (!absl::IsDataLoss(status)) return status;
   return absl::DataLossError(absl::StrCat("a mesh is damaged: ", status.message(), repair_hint(options_.path)));
 }
 
 void RocksdbLog::keep_outline(const Sha256& sha256, absl::string_view bytes) {
-  if (!room_for("an outline", bytes.size()).ok()) return;
+  if (!check_free_space("an outline", bytes.size()).ok()) return;
   topologies_.keep(sha256, bytes);
   written_bytes_ += bytes.size();
 }

@@ -11,11 +11,11 @@
 namespace locus::server {
 namespace {
 
-// Nobody may write while this reads. A copy that was never open has no lock, and a disk that cannot be written needs
-// none.
-absl::Status take_lock(const StorageOptions& options, std::unique_ptr<DirectoryLock>& lock) {
+// Locks the directory, so that no process writes during the check. A backup that was never opened has no lock file, and
+// on a read-only disk the lock cannot be taken; both are checked without it.
+absl::Status acquire_lock(const StorageOptions& options, std::unique_ptr<DirectoryLock>& lock) {
   if (!options.env->FileExists(absl::StrCat(options.path, "/", DirectoryLock::kName)).ok()) return absl::OkStatus();
-  auto taken = DirectoryLock::take(*options.env, options.path);
+  auto taken = DirectoryLock::acquire(*options.env, options.path);
   if (absl::IsFailedPrecondition(taken.status())) return taken.status();
   if (taken.ok()) lock = *std::move(taken);
   return absl::OkStatus();
@@ -24,9 +24,9 @@ absl::Status take_lock(const StorageOptions& options, std::unique_ptr<DirectoryL
 }  // namespace
 
 bool DirectoryReport::intact() const {
-  const auto is_sound = [](const auto& one) { return one.damage.empty(); };
-  return damage.empty() && catalogue_damage.empty() && std::all_of(scenes.begin(), scenes.end(), is_sound) &&
-         std::all_of(meshes.begin(), meshes.end(), is_sound);
+  const auto is_intact = [](const auto& part) { return part.damage.empty(); };
+  return damage.empty() && catalogue_damage.empty() && std::all_of(scenes.begin(), scenes.end(), is_intact) &&
+         std::all_of(meshes.begin(), meshes.end(), is_intact);
 }
 
 DirectoryReport report_of(const DamageReport& damage_report) {
@@ -61,7 +61,7 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
       !options.env->FileExists(absl::StrCat(options.path, "/", DurableMarkerFile::kName)).ok())
     return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
   std::unique_ptr<DirectoryLock> lock;
-  RETURN_IF_ERROR(take_lock(options, lock));
+  RETURN_IF_ERROR(acquire_lock(options, lock));
 
   DirectoryReport report;
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
@@ -74,7 +74,7 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
   }
   std::unique_ptr<Database> database;
   const rocksdb::Status strict = Database::open(wanted, OpenMode::kReadOnly, database);
-  if (!strict.ok() && !says_damage(strict)) return disk_error(absl::StrCat("opening ", options.path), strict);
+  if (!strict.ok() && !is_damage(strict)) return disk_error(absl::StrCat("opening ", options.path), strict);
   if (!strict.ok() && !Database::open(wanted, OpenMode::kReadOnlyLenient, database).ok()) {
     report.damage = strict.ToString();
     return report;

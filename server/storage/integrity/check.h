@@ -1,5 +1,5 @@
-// What is wrong with a data directory, if anything: for `locusd check`, and for whoever repairs one. Reads every byte
-// and changes none. Free functions; any thread.
+// Verifies a data directory for `locusd check` and for repair(). Reads every byte and changes none. Free functions; any
+// thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_CHECK_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_CHECK_H_
 
@@ -19,12 +19,12 @@ struct SceneReport {
   std::string name;
   uint64_t epoch = 0;
   uint64_t snapshot_sequence = 0;
-  uint64_t last_sequence = 0;      // records are there without a gap up to here ...
-  uint64_t expected_sequence = 0;  // ... and must be up to here at least
+  uint64_t last_sequence = 0;      // last record before the first gap
+  uint64_t expected_sequence = 0;  // last record that must exist
   uint64_t snapshot_chunks = 0;
   uint64_t snapshot_bytes = 0;
   uint64_t log_bytes = 0;
-  std::string damage;  // empty where it is sound
+  std::string damage;  // empty if it is intact
 };
 
 struct MeshReport {
@@ -35,8 +35,8 @@ struct MeshReport {
 };
 
 struct DirectoryReport {
-  std::string damage;            // nothing can be read, and why
-  std::string catalogue_damage;  // names may be missing below, or were deleted
+  std::string damage;            // reason why nothing is readable
+  std::string catalogue_damage;  // reason why scenes or meshes may be missing below, or may have been deleted before
   bool closed_in_order = false;
   std::vector<SceneReport> scenes;  // by name
   std::vector<MeshReport> meshes;   // by name
@@ -44,10 +44,11 @@ struct DirectoryReport {
   bool intact() const;
 };
 
-// NOT_FOUND where there is no data directory, FAILED_PRECONDITION where a process has it open or another version wrote
-// it, UNAVAILABLE for a disk that fails. Damage is no error.
+// Verifies every byte. Damage is part of the report, not an error. Errors: NOT_FOUND if there is no data directory,
+// FAILED_PRECONDITION if a process has it open or another version wrote it, UNAVAILABLE if the disk fails.
 absl::StatusOr<DirectoryReport> check(const StorageOptions& options);
 
+// Converts the result of verify() for people.
 DirectoryReport report_of(const DamageReport& damage_report);
 
 }  // namespace locus::server

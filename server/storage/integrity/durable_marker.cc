@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/rows.h"
@@ -43,7 +44,7 @@ absl::Status error(const std::string& folder, const rocksdb::Status& status) {
 
 std::string encode(const DurableMarker& durable_marker) {
   ByteWriter out;
-  out.u64(durable_marker.number)
+  out.u64(durable_marker.write_number)
       .u8(durable_marker.closed ? 1 : 0)
       .u64(durable_marker.catalogue)
       .u64(durable_marker.next_scene);
@@ -64,7 +65,7 @@ std::string encode(const DurableMarker& durable_marker) {
 std::optional<DurableMarker> decode_durable_marker(absl::string_view bytes) {
   ByteReader in(bytes);
   DurableMarker found;
-  found.number = in.u64();
+  found.write_number = in.u64();
   found.closed = in.u8() != 0;
   found.catalogue = in.u64();
   found.next_scene = in.u64();
@@ -97,39 +98,42 @@ absl::StatusOr<DurableMarker> DurableMarkerFile::read(rocksdb::Env& env, const s
   if (status.ok() && size <= kMaxFileBytes) status = rocksdb::ReadFileToString(&env, path, &bytes);
   if (!status.ok()) return disk_error(absl::StrCat("reading ", path), status);
   std::optional<DurableMarker> newest;
-  // A file that was cut still has its first slot where it was; of the second nobody knows.
+  // The second slot begins at half the file's size. If the file was truncated, only the first slot is found.
   for (const size_t start : {size_t{0}, bytes.size() / 2}) {
     std::optional<DurableMarker> found = unframed(absl::string_view(bytes).substr(start));
-    if (found && (!newest || newest->number < found->number)) newest = std::move(found);
+    if (found && (!newest || newest->write_number < found->write_number)) newest = std::move(found);
   }
   if (!newest) return absl::DataLossError(absl::StrCat(path, " cannot be read"));
   return *newest;
 }
 
 absl::Status DurableMarkerFile::write(DurableMarker& durable_marker) {
-  ++durable_marker.number;
+  ++durable_marker.write_number;
   const std::string slot = framed(encode(durable_marker));
   if (file_ == nullptr || slot.size() > slot_bytes_) {
-    --durable_marker.number;
+    --durable_marker.write_number;
     return replace(durable_marker);
   }
-  rocksdb::Status status = file_->Write(durable_marker.number % 2 * slot_bytes_, slot);
+  LOCUS_DCHECK_LE(slot.size(), slot_bytes_);
+  rocksdb::Status status = file_->Write(durable_marker.write_number % 2 * slot_bytes_, slot);
   if (status.ok()) status = file_->Sync();
-  if (!status.ok()) file_ = nullptr;  // what is in it now is not known: make another
+  if (!status.ok()) file_ = nullptr;  // the slot's bytes are unknown: the next write() replaces the file
   return status.ok() ? absl::OkStatus() : error(folder_, status);
 }
 
 absl::Status DurableMarkerFile::replace(DurableMarker& durable_marker) {
   file_ = nullptr;
   std::string bytes;
-  durable_marker.number += 2 - durable_marker.number % 2;
+  durable_marker.write_number += 2 - durable_marker.write_number % 2;
   DurableMarker second = durable_marker;
-  ++second.number;
+  ++second.write_number;
   const std::string slots[2] = {framed(encode(durable_marker)), framed(encode(second))};
   slot_bytes_ = kFirstSlotBytes;
   while (slot_bytes_ < slots[0].size() * 2) slot_bytes_ *= 2;
   for (const std::string& slot : slots) bytes.append(slot).append(slot_bytes_ - slot.size(), '\0');
-  durable_marker.number = second.number;
+  durable_marker.write_number = second.write_number;
+  LOCUS_DCHECK_EQ(bytes.size(), 2 * slot_bytes_);
+  LOCUS_DCHECK_EQ(durable_marker.write_number % 2, 1u);
 
   const std::string path = path_of(folder_);
   const std::string fresh = path + ".new";

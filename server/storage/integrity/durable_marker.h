@@ -1,9 +1,10 @@
-// HIGH_WATER, the small file beside the database that says what must be in it: the scenes, how far each one's log was
-// synced, and how often the catalogue was changed. What the database lost without noticing, a cut tail of its own log
-// for one, is noticed by this. It never says more than what is on the disk.
+// The durable marker: a small file, HIGH_WATER, beside the database. It records which data the database must contain:
+// the scenes, the last synced record of each, and the generation of the catalogue. So it reveals losses that RocksDB
+// does not detect, such as a truncated log. Invariant: it never names data that is not synced.
 //
-// The file is two slots of one size; writes alternate between them, in place, each with a number that grows and a
-// checksum, so that a torn write leaves the one before. A file whose slots became too small is replaced as a whole.
+// The file has two slots of equal size; ../rocksdb/FORMAT.md describes their bytes. Writes alternate between the slots,
+// in place; each carries an increasing write number and a checksum, so that a torn write leaves the other slot valid.
+// When a slot is too small, the whole file is replaced.
 //
 // Threads: one at a time.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
@@ -22,27 +23,27 @@
 
 namespace locus::server {
 
-// A scene as it must be found.
+// The state that a scene must have at least.
 struct SceneMarker {
   SceneKey scene = 0;
   std::string name;
-  uint64_t sequence = 0;          // at least up to here there are records
-  uint64_t running_checksum = 0;  // the checksum of that record, or of the snapshot's last
-  uint64_t row_checksum = 0;      // of its row in the catalogue, exactly
-  bool copied = false;            // by back_up(), and not restarted since
-  std::string damage;             // found earlier; stays until the scene is deleted or repaired
+  uint64_t sequence = 0;          // last synced record
+  uint64_t running_checksum = 0;  // checksum of that record
+  uint64_t row_checksum = 0;      // checksum of the scene's row in the catalogue
+  bool copied = false;            // copied by back_up() and not restarted since
+  std::string damage;             // damage found before; kept until the scene is deleted or repaired
 };
 
 struct DurableMarker {
-  uint64_t number = 0;            // of this write
-  bool closed = false;            // nothing came after this
-  uint64_t catalogue = 0;         // generation; 0 before the database was made
-  SceneKey next_scene = 1;        // keys below were given to scenes
-  uint64_t mesh_sum = 0;          // of the catalogue's rows of meshes
-  uint64_t flushed_sequence = 0;  // of RocksDB: all writes up to here are in what this says
-  std::string manifest;           // RocksDB's list of its files ...
-  uint64_t manifest_bytes = 0;    // ... and how long it was at least
-  std::string catalogue_damage;   // found earlier, of the catalogue as a whole
+  uint64_t write_number = 0;      // of this write
+  bool closed = false;            // closed in order: no write followed this marker
+  uint64_t catalogue = 0;         // generation of the catalogue; 0 until the database is created
+  SceneKey next_scene = 1;        // next free scene key
+  uint64_t mesh_sum = 0;          // sum of the checksums of the catalogue's mesh rows
+  uint64_t flushed_sequence = 0;  // RocksDB sequence number up to which every write is covered by this marker
+  std::string manifest;           // name of RocksDB's list of its files
+  uint64_t manifest_bytes = 0;    // minimum length of that file
+  std::string catalogue_damage;   // damage of the catalogue found before
   std::vector<SceneMarker> scene_markers;
 };
 
@@ -53,14 +54,16 @@ class DurableMarkerFile {
  public:
   static constexpr absl::string_view kName = "HIGH_WATER";
 
-  // What the file in `folder` says: NOT_FOUND where there is none, DATA_LOSS where neither slot can be read.
+  // Reads the newer valid slot of the file in `folder`. NOT_FOUND if there is no file, DATA_LOSS if neither slot is
+  // valid, UNAVAILABLE for an error of the disk.
   static absl::StatusOr<DurableMarker> read(rocksdb::Env& env, const std::string& folder);
 
   DurableMarkerFile(rocksdb::Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
 
-  // On the disk when this returns. Numbers the write; the first makes the file or replaces it whole.
+  // Increments the write number, writes one slot and syncs it. The first call, a call after an error, and a call whose
+  // slot would be too large replace the file.
   absl::Status write(DurableMarker& durable_marker);
-  // The same for both slots: what is written must not be undone by damage to one of them.
+  // Writes both slots of a new file and renames it into place, synced: no damage to a single slot can undo this write.
   absl::Status replace(DurableMarker& durable_marker);
 
  private:

@@ -8,6 +8,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "server/storage/rocksdb/bytes.h"
@@ -22,13 +23,13 @@ constexpr uint64_t kReserveShare = 20;
 constexpr uint64_t kBufferShare = 16;
 constexpr uint64_t kMinBuffer = uint64_t{256} << 10;
 
-absl::Status nothing_opens(const StorageOptions& options, absl::string_view why) {
+absl::Status unopenable(const StorageOptions& options, absl::string_view why) {
   return absl::DataLossError(
       absl::StrCat("the data directory ", options.path, " cannot be opened: ", why, repair_hint(options.path)));
 }
 
 absl::Status open_error(const StorageOptions& options, const rocksdb::Status& status) {
-  if (says_damage(status)) return nothing_opens(options, status.ToString());
+  if (is_damage(status)) return unopenable(options, status.ToString());
   return disk_error(absl::StrCat("opening ", options.path), status);
 }
 
@@ -38,8 +39,8 @@ std::vector<std::string> files_in(rocksdb::Env& env, const std::string& folder) 
   return names;
 }
 
-// Logs that a process wrote and did not sync are read from the kernel's memory, and what they say is served: so it has
-// to be on the disk first.
+// Syncs RocksDB's log files. A killed process may have left records in the page cache only; this process will read and
+// serve them, so they must be on the disk first.
 rocksdb::Status sync_logs(rocksdb::Env& env, const std::string& folder) {
   rocksdb::Status status;
   for (const std::string& name : files_in(env, folder)) {
@@ -59,7 +60,7 @@ absl::Status make_folder(rocksdb::Env& env, const std::string& path) {
   return status.ok() ? absl::OkStatus() : disk_error(absl::StrCat("making the data directory ", path), status);
 }
 
-// Whether there never was a database here, or its making did not come to an end.
+// Returns whether the directory has no database, or one whose creation was interrupted.
 absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<DurableMarker>& durable_marker) {
   if (durable_marker.ok()) return durable_marker->catalogue == 0;
   if (!absl::IsNotFound(durable_marker.status())) return false;
@@ -70,8 +71,8 @@ absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<
   return true;
 }
 
-absl::Status make_new(const StorageOptions& options, OpenedDirectory& opened) {
-  // First of all: from now on an empty database is known to be one that was never finished.
+absl::Status create_database(const StorageOptions& options, OpenedDirectory& opened) {
+  // First a marker of generation 0: it tells the next opening that the creation of the database may be incomplete.
   RETURN_IF_ERROR(opened.durable_marker_file->replace(opened.durable_marker));
   const DatabaseOptions wanted = database_options_of(options);
   rocksdb::Status status = Database::open(wanted, OpenMode::kCreate, opened.database);
@@ -89,8 +90,8 @@ absl::Status make_new(const StorageOptions& options, OpenedDirectory& opened) {
   return opened.durable_marker_file->replace(opened.durable_marker);
 }
 
-// Takes over what was judged of a damaged directory, so that the next one to open it finds the same.
-void remember(const DamageReport& damage_report, DurableMarker& durable_marker) {
+// Copies the damage found into the durable marker, so that the next opening reports it too.
+void record_damage(const DamageReport& damage_report, DurableMarker& durable_marker) {
   std::vector<SceneMarker> scene_markers;
   for (const SceneHealth& scene : damage_report.scenes) {
     SceneMarker& scene_marker = scene_markers.emplace_back();
@@ -111,54 +112,56 @@ void remember(const DamageReport& damage_report, DurableMarker& durable_marker) 
   durable_marker.catalogue = std::max<uint64_t>(durable_marker.catalogue, 1);
 }
 
-bool is_sound(const DamageReport& damage_report) {
+bool is_intact(const DamageReport& damage_report) {
   return damage_report.catalogue_damage.empty() &&
          std::all_of(damage_report.scenes.begin(), damage_report.scenes.end(),
                      [](const SceneHealth& scene) { return scene.damage.empty(); });
 }
 
-// Judges, and writes down what is damaged before anything else happens.
-absl::Status judge_and_remember(const Database& database, const DurableMarker* must, OpenedDirectory& opened) {
-  ASSIGN_OR_RETURN(DamageReport damage_report, verify(database, must, Depth::kKeys));
+// Verifies the database; if it is damaged, writes the damage into the durable marker before any other file changes.
+absl::Status verify_and_record(const Database& database, const DurableMarker* expected, OpenedDirectory& opened) {
+  ASSIGN_OR_RETURN(DamageReport damage_report, verify(database, expected, Depth::kKeys));
   opened.damage_report = std::move(damage_report);
-  if (is_sound(opened.damage_report)) return absl::OkStatus();
-  remember(opened.damage_report, opened.durable_marker);
+  if (is_intact(opened.damage_report)) return absl::OkStatus();
+  record_damage(opened.damage_report, opened.durable_marker);
   return opened.durable_marker_file->replace(opened.durable_marker);
 }
 
-// What a strict opening refused.
-absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& why, const DurableMarker* must,
+// Opens a database that a strict opening refused for `why`. First verifies it read-only and records the damage; then
+// opens it leniently, which drops its unreadable parts for good.
+absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& why, const DurableMarker* expected,
                           OpenedDirectory& opened) {
   const DatabaseOptions wanted = database_options_of(options);
   {
     std::unique_ptr<Database> reader;
-    if (!Database::open(wanted, OpenMode::kReadOnlyLenient, reader).ok()) return nothing_opens(options, why.ToString());
-    absl::Status judged = judge_and_remember(*reader, must, opened);
-    if (!judged.ok()) return judged;
+    if (!Database::open(wanted, OpenMode::kReadOnlyLenient, reader).ok()) return unopenable(options, why.ToString());
+    absl::Status recorded = verify_and_record(*reader, expected, opened);
+    if (!recorded.ok()) return recorded;
   }
   rocksdb::Status status = Database::open(wanted, OpenMode::kLenient, opened.database);
-  if (!status.ok()) return nothing_opens(options, status.ToString());
-  // A damaged log is gone with that, and a strict database gets over errors of the disk.
+  if (!status.ok()) return unopenable(options, status.ToString());
+  // The lenient opening has removed a damaged log, so a strict opening may succeed now. A strict database is preferred:
+  // it stops at errors of the disk, and recover() resumes it.
   opened.database = nullptr;
   if (Database::open(wanted, OpenMode::kStrict, opened.database).ok()) return absl::OkStatus();
   status = Database::open(wanted, OpenMode::kLenient, opened.database);
-  return status.ok() ? absl::OkStatus() : nothing_opens(options, status.ToString());
+  return status.ok() ? absl::OkStatus() : unopenable(options, status.ToString());
 }
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::take(rocksdb::Env& env, const std::string& path) {
+absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::acquire(rocksdb::Env& env, const std::string& path) {
   rocksdb::FileLock* lock = nullptr;
   const rocksdb::Status status = env.LockFile(absl::StrCat(path, "/", kName), &lock);
   if (status.ok()) return std::unique_ptr<DirectoryLock>(new DirectoryLock(env, lock));
-  const std::string what = status.ToString();
-  // In another process, or in this one.
-  if (absl::StrContains(what, "Resource temporarily unavailable") || absl::StrContains(what, "lock hold")) {
+  const std::string message = status.ToString();
+  // RocksDB's messages for a lock held by another process, and by this one.
+  if (absl::StrContains(message, "Resource temporarily unavailable") || absl::StrContains(message, "lock hold")) {
     Refusal refusal;
     refusal.reason = Reason::kInUse;
     return refuse(absl::StatusCode::kFailedPrecondition,
                   absl::StrCat("the data directory ", path,
-                               " is in use: stop the locusd that has it open, or name another (", what, ")"),
+                               " is in use: stop the locusd that has it open, or name another (", message, ")"),
                   refusal);
   }
   return disk_error(absl::StrCat("locking the data directory ", path), status);
@@ -168,11 +171,11 @@ DirectoryLock::~DirectoryLock() { env_.UnlockFile(lock_).PermitUncheckedError();
 
 StorageOptions with_defaults(StorageOptions options) {
   if (options.env == nullptr) options.env = rocksdb::Env::Default();
-  // Of the disk that it will be on, where it is yet to be made.
+  // If the directory is missing, measure the disk of its nearest existing parent.
   std::error_code failed;
-  std::filesystem::path place = std::filesystem::absolute(options.path, failed);
-  while (!std::filesystem::exists(place, failed) && place.has_relative_path()) place = place.parent_path();
-  const std::filesystem::space_info space = std::filesystem::space(place, failed);
+  std::filesystem::path parent = std::filesystem::absolute(options.path, failed);
+  while (!std::filesystem::exists(parent, failed) && parent.has_relative_path()) parent = parent.parent_path();
+  const std::filesystem::space_info space = std::filesystem::space(parent, failed);
   const uint64_t capacity = failed ? ~uint64_t{0} : uint64_t{space.capacity};
   if (!options.reserve_bytes) options.reserve_bytes = std::min(kMaxReserve, capacity / kReserveShare);
   options.log_buffer_bytes = std::max(kMinBuffer, std::min(options.log_buffer_bytes, capacity / kBufferShare));
@@ -184,44 +187,45 @@ DatabaseOptions database_options_of(const StorageOptions& options) {
 }
 
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
+  LOCUS_DCHECK(options.env != nullptr && options.reserve_bytes.has_value());
   OpenedDirectory opened;
   RETURN_IF_ERROR(make_folder(*options.env, options.path));
-  auto lock = DirectoryLock::take(*options.env, options.path);
+  auto lock = DirectoryLock::acquire(*options.env, options.path);
   if (!lock.ok()) return lock.status();
   opened.lock = *std::move(lock);
   const std::string repaired = absl::StrCat(options.path, "/", kRepairedFolder);
   if (options.env->FileExists(repaired).ok())
-    return absl::FailedPreconditionError(absl::StrCat(
-        "a repair of ", options.path, " did not come to its end: run `locusd repair ", options.path, "` again"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("a repair of ", options.path, " was interrupted: run `locusd repair ", options.path, "` again"));
   opened.durable_marker_file = std::make_unique<DurableMarkerFile>(*options.env, options.path);
   absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
   if (absl::IsUnavailable(durable_marker.status())) return durable_marker.status();
   const absl::StatusOr<bool> fresh = is_new(options, durable_marker);
   if (durable_marker.ok()) opened.durable_marker = *durable_marker;
-  const DurableMarker* must = durable_marker.ok() ? &*durable_marker : nullptr;
+  const DurableMarker* expected = durable_marker.ok() ? &*durable_marker : nullptr;
   if (*fresh) {
-    RETURN_IF_ERROR(make_new(options, opened));
+    RETURN_IF_ERROR(create_database(options, opened));
     durable_marker = opened.durable_marker;
-    must = &*durable_marker;
+    expected = &*durable_marker;
   } else {
     const DatabaseOptions wanted = database_options_of(options);
-    if (must != nullptr) {
-      const absl::Status list = check_file_list(*options.env, wanted.folder, *must);
-      if (absl::IsDataLoss(list)) return nothing_opens(options, list.message());
+    if (expected != nullptr) {
+      const absl::Status list = check_file_list(*options.env, wanted.folder, *expected);
+      if (absl::IsDataLoss(list)) return unopenable(options, list.message());
       if (!list.ok()) return list;
     }
     rocksdb::Status status = sync_logs(*options.env, wanted.folder);
     if (status.ok()) status = Database::open(wanted, OpenMode::kStrict, opened.database);
     if (!status.ok()) {
-      if (!says_damage(status)) return open_error(options, status);
-      absl::Status found = open_damaged(options, status, must, opened);
+      if (!is_damage(status)) return open_error(options, status);
+      absl::Status found = open_damaged(options, status, expected, opened);
       if (!found.ok()) return found;
-      must = &opened.durable_marker;
+      expected = &opened.durable_marker;
     }
   }
-  absl::Status judged = judge_and_remember(*opened.database, must, opened);
-  if (!judged.ok()) return judged;
-  if (!opened.damage_report.has_format) return nothing_opens(options, "its catalogue is lost");
+  absl::Status recorded = verify_and_record(*opened.database, expected, opened);
+  if (!recorded.ok()) return recorded;
+  if (!opened.damage_report.has_format) return unopenable(options, "its catalogue is lost");
   return opened;
 }
 

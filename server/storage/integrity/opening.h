@@ -1,6 +1,6 @@
-// From a path to a database whose contents are judged: makes a new data directory, opens a sound one, and gets out of a
-// damaged one what can be read. What damage was found is in HIGH_WATER before anything on the disk is changed, so that
-// opening a directory never makes damage unseen. Free functions; any thread.
+// Opens a data directory: creates a new one, opens and verifies an intact one, and salvages the readable part of a
+// damaged one. Damage is recorded in the durable marker before any other file changes, so that every later opening
+// reports it again. README.md one folder up draws the order. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_OPENING_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_OPENING_H_
 
@@ -16,13 +16,13 @@
 
 namespace locus::server {
 
-// Held by whoever has the data directory open; released with it.
+// Exclusive lock of a data directory, the file IN_USE; released by the destructor.
 class DirectoryLock {
  public:
   static constexpr absl::string_view kName = "IN_USE";
 
-  // FAILED_PRECONDITION where another process, or this one, has it.
-  static absl::StatusOr<std::unique_ptr<DirectoryLock>> take(rocksdb::Env& env, const std::string& path);
+  // Acquires the lock. FAILED_PRECONDITION if another process, or this one, holds it.
+  static absl::StatusOr<std::unique_ptr<DirectoryLock>> acquire(rocksdb::Env& env, const std::string& path);
   ~DirectoryLock();
   DirectoryLock(const DirectoryLock&) = delete;
   DirectoryLock& operator=(const DirectoryLock&) = delete;
@@ -38,24 +38,26 @@ struct OpenedDirectory {
   std::unique_ptr<DirectoryLock> lock;
   std::unique_ptr<Database> database;
   std::unique_ptr<DurableMarkerFile> durable_marker_file;
-  DurableMarker durable_marker;  // as it was found, with what damage was found since
+  DurableMarker durable_marker;  // marker as read, plus the damage found by this opening
   DamageReport damage_report;
 };
 
-// The options with nothing left open: env, and reserve and buffer as this disk allows.
+// Fills in the defaults: the file system, and a reserve and a buffer that fit the size of the disk.
 StorageOptions with_defaults(StorageOptions options);
 DatabaseOptions database_options_of(const StorageOptions& options);
 
-// `options` are settled. Errors as of RocksdbLog::open().
+// Opens and verifies the directory. Precondition: `options` come from with_defaults(). Errors: those of
+// RocksdbLog::open().
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options);
 
-// How the database's list of its files compares with HIGH_WATER: DATA_LOSS where it is not there, or shorter.
+// Compares RocksDB's list of its files (MANIFEST) with the durable marker. DATA_LOSS if the database is missing, or if
+// the list is missing or shorter than the marker says.
 absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder,
                              const DurableMarker& durable_marker);
-// The list's name and length now, of what is on the disk.
+// Stores the current name and length of that list in the durable marker.
 void describe_file_list(const Database& database, DurableMarker& durable_marker);
 
-// A repair that did not come to its end leaves this folder in the data directory.
+// Folder in the data directory that exists only during a repair; an interrupted repair leaves it.
 inline constexpr absl::string_view kRepairedFolder = "repaired";
 
 }  // namespace locus::server

@@ -23,17 +23,17 @@ constexpr absl::string_view kReadyName = "READY";
 constexpr absl::string_view kSalvageFolder = "salvage";
 constexpr size_t kBatchBytes = size_t{4} << 20;
 
-absl::Status moved(const fs::path& from, const fs::path& to) {
+absl::Status move_if_exists(const fs::path& from, const fs::path& to) {
   std::error_code failed;
   if (fs::exists(from)) fs::rename(from, to, failed);
   return failed ? absl::UnavailableError(absl::StrCat("moving ", from.string(), ": ", failed.message()))
                 : absl::OkStatus();
 }
 
-// Collects what goes into the new database, and writes it in pieces.
-class Copy {
+// Writes rows, records and chunks into the new database, in batches of kBatchBytes.
+class Copier {
  public:
-  explicit Copy(Database& target) : target_(target) {}
+  explicit Copier(Database& target) : target_(target) {}
 
   void put(rocksdb::ColumnFamilyHandle* family, const std::string& key, const std::string& value) {
     LOCUS_CHECK(batch_.Put(family, key, value).ok());
@@ -53,17 +53,17 @@ class Copy {
 };
 
 absl::Status copy_chunks(const Database& source, rocksdb::ColumnFamilyHandle* from, rocksdb::ColumnFamilyHandle* to,
-                         const std::string& prefix, const ChunkList& list, Copy& copy) {
+                         const std::string& prefix, const ChunkList& list, Copier& copier) {
   uint32_t index = 0;
   return read_chunks(source, from, prefix, list, [&](absl::string_view chunk) {
     const std::string key = chunk_key(prefix, index++);
-    copy.put(to, key, with_checksum(key, chunk));
-    return copy.write_if_large();
+    copier.put(to, key, with_checksum(key, chunk));
+    return copier.write_if_large();
   });
 }
 
-// Records as far as they are sound; `last` and `chain` say how far that was.
-absl::Status copy_records(const Database& source, const SceneRow& row, Position& last, Copy& copy) {
+// Copies the records up to the first damaged or missing one; stores the position of the last copied record in `last`.
+absl::Status copy_records(const Database& source, const SceneRow& row, Position& last, Copier& copier) {
   absl::Status failed;
   last = {row.snapshot_sequence, row.running_checksum};
   const absl::Status read =
@@ -71,54 +71,54 @@ absl::Status copy_records(const Database& source, const SceneRow& row, Position&
         const std::string key = log_key(row.key, record.sequence);
         const std::string head = record_head(record.entry);
         last = {record.sequence, record_checksum(key, head, record.entry.bytes, last.running_checksum)};
-        copy.put(copy.target().log(), key,
-                 absl::StrCat(head, record.entry.bytes, ByteWriter().u64(last.running_checksum).view()));
-        failed = copy.write_if_large();
+        copier.put(copier.target().log(), key,
+                   absl::StrCat(head, record.entry.bytes, ByteWriter().u64(last.running_checksum).view()));
+        failed = copier.write_if_large();
         return failed;
       });
   if (!failed.ok()) return failed;
   return absl::IsDataLoss(read) ? absl::OkStatus() : read;
 }
 
-// What the new directory will say of itself.
+// Catalogue rows and durable marker of the new directory.
 struct Result {
   Catalogue::Rows rows;
   DurableMarker durable_marker;
 };
 
-void keep_row(const std::string& key, const std::string& value, Result& result, Copy& copy) {
+void put_row(const std::string& key, const std::string& value, Result& result, Copier& copier) {
   result.rows[key] = value;
-  copy.put(copy.target().meta(), key, value);
+  copier.put(copier.target().meta(), key, value);
 }
 
-absl::Status copy_scene(const Database& source, const SceneHealth& found, const DurableMarker* must, Copy& copy,
+absl::Status copy_scene(const Database& source, const SceneHealth& found, const DurableMarker* expected, Copier& copier,
                         Result& result, RepairReport& report) {
   SceneRepair repaired;
   repaired.key = found.key;
   repaired.name = found.name;
   repaired.damage = found.damage;
-  bool marked = must == nullptr;
-  if (must != nullptr) {
-    for (const SceneMarker& scene_marker : must->scene_markers) marked = marked || scene_marker.scene == found.key;
+  bool marked = expected == nullptr;
+  if (expected != nullptr) {
+    for (const SceneMarker& scene_marker : expected->scene_markers) marked = marked || scene_marker.scene == found.key;
   }
   const bool damaged = !found.damage.empty();
-  repaired.deleted = damaged && !marked && must->catalogue_damage.empty();
+  repaired.deleted = damaged && !marked && expected->catalogue_damage.empty();
   repaired.dropped = !found.row || repaired.deleted;
   Position last;
   if (!repaired.dropped) {
     const SceneRow& row = *found.row;
-    const absl::Status chunks = copy_chunks(source, source.snapshot(), copy.target().snapshot(),
-                                            snapshot_prefix(row.key, row.snapshot_number), row.snapshot, copy);
+    const absl::Status chunks = copy_chunks(source, source.snapshot(), copier.target().snapshot(),
+                                            snapshot_prefix(row.key, row.snapshot_id), row.snapshot, copier);
     if (!chunks.ok() && !absl::IsDataLoss(chunks)) return chunks;
     repaired.dropped = !chunks.ok();
   }
   if (!repaired.dropped) {
     SceneRow row = *found.row;
-    RETURN_IF_ERROR(copy_records(source, row, last, copy));
+    RETURN_IF_ERROR(copy_records(source, row, last, copier));
     if (damaged) ++row.epoch;
     const std::string key = scene_key(row.key);
     const std::string value = with_checksum(key, encode(row));
-    keep_row(key, value, result, copy);
+    put_row(key, value, result, copier);
     result.durable_marker.scene_markers.push_back({row.key, row.name, last.sequence, last.running_checksum,
                                                    stored_checksum(value), found.copied && !damaged, ""});
     repaired.epoch = row.epoch;
@@ -132,30 +132,30 @@ absl::Status copy_scene(const Database& source, const SceneHealth& found, const 
   return absl::OkStatus();
 }
 
-absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copy& copy, Result& result,
+absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& copier, Result& result,
                        RepairReport& report) {
   const std::string content = content_key(found.sha256);
   absl::Status status = absl::DataLossError("");
   if (result.rows.contains(content)) {
     status = absl::OkStatus();
-  } else if (found.content.number != 0) {
-    status = copy_chunks(source, source.mesh(), copy.target().mesh(), mesh_prefix(found.sha256, found.content.number),
-                         found.content.chunks, copy);
+  } else if (found.content.content_id != 0) {
+    status = copy_chunks(source, source.mesh(), copier.target().mesh(),
+                         mesh_prefix(found.sha256, found.content.content_id), found.content.chunks, copier);
   }
   if (status.ok() && found.parts)
-    status = copy_chunks(source, source.mesh(), copy.target().mesh(), mesh_prefix(found.sha256, found.parts->number),
-                         found.parts->chunks, copy);
+    status = copy_chunks(source, source.mesh(), copier.target().mesh(),
+                         mesh_prefix(found.sha256, found.parts->content_id), found.parts->chunks, copier);
   if (!status.ok() && !absl::IsDataLoss(status)) return status;
   if (status.ok()) {
-    keep_row(content, with_checksum(content, encode(found.content)), result, copy);
+    put_row(content, with_checksum(content, encode(found.content)), result, copier);
     const std::string key = mesh_key(found.name);
-    keep_row(key, with_checksum(key, encode(MeshRow{found.sha256, found.parts})), result, copy);
+    put_row(key, with_checksum(key, encode(MeshRow{found.sha256, found.parts})), result, copier);
   }
   if (!found.damage.empty()) report.meshes.push_back({found.name, found.damage, !status.ok()});
   return absl::OkStatus();
 }
 
-absl::Status make_copy(const Database& source, const DamageReport& damage_report, const DurableMarker* must,
+absl::Status make_copy(const Database& source, const DamageReport& damage_report, const DurableMarker* expected,
                        const StorageOptions& options, const std::string& folder, RepairReport& report) {
   DatabaseOptions wanted = database_options_of(options);
   wanted.folder = absl::StrCat(folder, "/", kDatabaseFolder);
@@ -163,23 +163,23 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
   rocksdb::Status opened = options.env->CreateDirIfMissing(folder);
   if (opened.ok()) opened = Database::open(wanted, OpenMode::kCreate, target);
   if (!opened.ok()) return disk_error("making the repaired database", opened);
-  Copy copy(*target);
+  Copier copier(*target);
   Result result;
   DurableMarker& durable_marker = result.durable_marker;
-  if (must != nullptr) durable_marker.next_scene = must->next_scene;
+  if (expected != nullptr) durable_marker.next_scene = expected->next_scene;
   for (const SceneHealth& scene : damage_report.scenes) {
     durable_marker.next_scene = std::max(durable_marker.next_scene, scene.key + 1);
-    RETURN_IF_ERROR(copy_scene(source, scene, must, copy, result, report));
+    RETURN_IF_ERROR(copy_scene(source, scene, expected, copier, result, report));
   }
   for (const MeshHealth& mesh : damage_report.meshes) {
-    RETURN_IF_ERROR(copy_mesh(source, mesh, copy, result, report));
+    RETURN_IF_ERROR(copy_mesh(source, mesh, copier, result, report));
   }
-  const uint64_t generation = std::max(must == nullptr ? 0 : must->catalogue,
+  const uint64_t generation = std::max(expected == nullptr ? 0 : expected->catalogue,
                                        damage_report.catalogue ? damage_report.catalogue->generation : 0);
   const Catalogue catalogue(result.rows, generation, durable_marker.next_scene);
-  copy.put(target->meta(), std::string(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
-  catalogue.add_to(copy.batch(), target->meta(), CatalogueChange());
-  RETURN_IF_ERROR(copy.write(true));
+  copier.put(target->meta(), std::string(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
+  catalogue.add_to(copier.batch(), target->meta(), CatalogueChange());
+  RETURN_IF_ERROR(copier.write(true));
   durable_marker.catalogue = generation + 1;
   durable_marker.mesh_sum = catalogue.totals().mesh_sum;
   durable_marker.closed = true;
@@ -188,20 +188,22 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
   return DurableMarkerFile(*options.env, folder).replace(durable_marker);
 }
 
-// From here on repaired/ is what the directory is to be.
-absl::Status put_in_place(const StorageOptions& options, std::string& kept_at) {
+// Moves the old database and marker into before-repair-N and the repaired ones into their place. Called once
+// repaired/READY exists, which is the commit point of a repair: from then on a restart only repeats these moves, each
+// of which is skipped if it was done before.
+absl::Status install_repaired(const StorageOptions& options, std::string& kept_at) {
   rocksdb::Env& env = *options.env;
   const fs::path here = options.path;
   const fs::path repaired = here / std::string(kRepairedFolder);
   const fs::path ready = repaired / std::string(kReadyName);
   rocksdb::Status status = rocksdb::ReadFileToString(&env, ready.string(), &kept_at);
   if (status.ok()) status = env.CreateDirIfMissing(kept_at);
-  if (!status.ok()) return disk_error("ending the repair", status);
+  if (!status.ok()) return disk_error("finishing the repair", status);
   for (const absl::string_view name : {kDatabaseFolder, DurableMarkerFile::kName}) {
     const std::string part(name);
-    if (!fs::exists(repaired / part)) continue;  // it is in place already
-    absl::Status done = moved(here / part, fs::path(kept_at) / part);
-    if (done.ok()) done = moved(repaired / part, here / part);
+    if (!fs::exists(repaired / part)) continue;  // moved before a restart
+    absl::Status done = move_if_exists(here / part, fs::path(kept_at) / part);
+    if (done.ok()) done = move_if_exists(repaired / part, here / part);
     if (!done.ok()) return done;
   }
   status = sync_folder(env, kept_at);
@@ -209,17 +211,17 @@ absl::Status put_in_place(const StorageOptions& options, std::string& kept_at) {
   std::error_code failed;
   if (status.ok()) fs::remove_all(repaired, failed);
   if (status.ok()) status = sync_folder(env, here.string());
-  return status.ok() && !failed ? absl::OkStatus() : disk_error("ending the repair", status);
+  return status.ok() && !failed ? absl::OkStatus() : disk_error("finishing the repair", status);
 }
 
-std::string free_name(const std::string& path) {
-  for (int number = 1;; ++number) {
-    std::string name = absl::StrCat(path, "/before-repair-", number);
+std::string next_backup_folder(const std::string& path) {
+  for (int index = 1;; ++index) {
+    std::string name = absl::StrCat(path, "/before-repair-", index);
     if (!fs::exists(name)) return name;
   }
 }
 
-// A database that opens in no way is taken apart by RocksDB, in a copy.
+// Salvages a database that opens in no mode: copies it and runs rocksdb::RepairDB() on the copy.
 absl::Status open_salvage(const StorageOptions& options, const std::string& folder,
                           std::unique_ptr<Database>& database) {
   DatabaseOptions wanted = database_options_of(options);
@@ -234,16 +236,16 @@ absl::Status open_salvage(const StorageOptions& options, const std::string& fold
   if (status.ok()) status = Database::open(wanted, OpenMode::kReadOnlyLenient, database);
   if (status.ok()) return absl::OkStatus();
   return absl::DataLossError(
-      absl::StrCat("nothing of ", options.path, " can be read (", status.ToString(), "): restore a backup"));
+      absl::StrCat("no part of ", options.path, " can be read (", status.ToString(), "): restore a backup"));
 }
 
-absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& options, const DurableMarker* must,
+absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& options, const DurableMarker* expected,
                                                       const std::string& folder) {
   const DatabaseOptions wanted = database_options_of(options);
   std::unique_ptr<Database> database;
-  const bool whole = must == nullptr || check_file_list(*options.env, wanted.folder, *must).ok();
-  if (whole && Database::open(wanted, OpenMode::kReadOnly, database).ok()) return database;
-  if (whole && Database::open(wanted, OpenMode::kReadOnlyLenient, database).ok()) return database;
+  const bool file_list_intact = expected == nullptr || check_file_list(*options.env, wanted.folder, *expected).ok();
+  if (file_list_intact && Database::open(wanted, OpenMode::kReadOnly, database).ok()) return database;
+  if (file_list_intact && Database::open(wanted, OpenMode::kReadOnlyLenient, database).ok()) return database;
   RETURN_IF_ERROR(open_salvage(options, folder, database));
   return database;
 }
@@ -255,23 +257,23 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   const std::string folder = absl::StrCat(options.path, "/", kRepairedFolder);
   RepairReport report;
   if (!fs::exists(options.path)) return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
-  const auto lock = DirectoryLock::take(*options.env, options.path);
+  const auto lock = DirectoryLock::acquire(*options.env, options.path);
   if (!lock.ok()) return lock.status();
   if (fs::exists(absl::StrCat(folder, "/", kReadyName))) {
     std::string kept_at;
-    RETURN_IF_ERROR(put_in_place(options, kept_at));
+    RETURN_IF_ERROR(install_repaired(options, kept_at));
   }
   std::error_code failed;
   fs::remove_all(folder, failed);
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
-  const DurableMarker* must = durable_marker.ok() ? &*durable_marker : nullptr;
+  const DurableMarker* expected = durable_marker.ok() ? &*durable_marker : nullptr;
   {
-    const auto source = open_source(options, must, folder);
+    const auto source = open_source(options, expected, folder);
     if (!source.ok()) return source.status();
-    ASSIGN_OR_RETURN(const DamageReport damage_report, verify(**source, must, Depth::kEverything));
+    ASSIGN_OR_RETURN(const DamageReport damage_report, verify(**source, expected, Depth::kEverything));
     report.found = report_of(damage_report);
     if (report.found.intact() && !fs::exists(folder)) return report;
-    if (absl::Status status = make_copy(**source, damage_report, must, options, folder, report); !status.ok()) {
+    if (absl::Status status = make_copy(**source, damage_report, expected, options, folder, report); !status.ok()) {
       fs::remove_all(folder, failed);
       return status;
     }
@@ -279,12 +281,12 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   fs::remove_all(absl::StrCat(folder, "/", kSalvageFolder), failed);
   rocksdb::Status status = sync_folder(*options.env, folder);
   if (status.ok())
-    status =
-        rocksdb::WriteStringToFile(options.env, free_name(options.path), absl::StrCat(folder, "/", kReadyName), true);
+    status = rocksdb::WriteStringToFile(options.env, next_backup_folder(options.path),
+                                        absl::StrCat(folder, "/", kReadyName), true);
   if (status.ok()) status = sync_folder(*options.env, folder);
   if (!status.ok()) return disk_error("writing the repaired database", status);
   report.changed = true;
-  RETURN_IF_ERROR(put_in_place(options, report.kept_at));
+  RETURN_IF_ERROR(install_repaired(options, report.kept_at));
   return report;
 }
 

@@ -1,5 +1,5 @@
-// Makes a damaged data directory one that opens: for `locusd repair`. What is sound is copied into a new database; what
-// was there stays as it was, in a folder beside. Free functions; any thread.
+// Repairs a damaged data directory for `locusd repair`: copies every intact part into a new database and moves the old
+// one, unchanged, into the folder before-repair-N. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_REPAIR_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_REPAIR_H_
 
@@ -13,17 +13,17 @@
 
 namespace locus::server {
 
-// What became of a scene that was damaged.
+// Outcome for a damaged scene.
 struct SceneRepair {
   SceneKey key = 0;
   std::string name;
   std::string damage;
-  bool dropped = false;    // nothing of it could be kept
-  bool deleted = false;    // it had been deleted before, and is again: nothing is lost
-  uint64_t kept_to = 0;    // records up to here are there
-  uint64_t lost_from = 0;  // 0 = none that is known of
+  bool dropped = false;    // no part of it could be kept
+  bool deleted = false;    // it had been deleted, reappeared, and is deleted again: nothing is lost
+  uint64_t kept_to = 0;    // last record that was kept
+  uint64_t lost_from = 0;  // first lost record; 0 = no lost record is known
   uint64_t lost_to = 0;
-  uint64_t epoch = 0;  // from now on; another than before, since readers may have seen what is lost
+  uint64_t epoch = 0;  // epoch from now on; it differs from the old one because readers may have seen lost records
 };
 
 struct MeshRepair {
@@ -33,15 +33,16 @@ struct MeshRepair {
 };
 
 struct RepairReport {
-  DirectoryReport found;            // before
-  bool changed = false;             // false: everything was sound, and nothing was touched
-  std::vector<SceneRepair> scenes;  // that were damaged
-  std::vector<MeshRepair> meshes;   // likewise
-  std::string kept_at;              // the folder with what was there before
+  DirectoryReport found;            // state before the repair
+  bool changed = false;             // false: everything was intact, no file was changed
+  std::vector<SceneRepair> scenes;  // damaged scenes only
+  std::vector<MeshRepair> meshes;   // damaged meshes only
+  std::string kept_at;              // folder with the old database
 };
 
-// Nobody may have the directory open. It needs room for a copy of what is sound. After an error, or if the process
-// ends, everything is as it was, or the next repair goes on. Errors as of check(), and RESOURCE_EXHAUSTED.
+// Repairs the directory, which no process may have open. Needs disk space for a copy of the intact part. After an error
+// or a crash the directory is either unchanged, or the next repair finishes this one. Errors: those of check(), and
+// RESOURCE_EXHAUSTED.
 absl::StatusOr<RepairReport> repair(const StorageOptions& options);
 
 }  // namespace locus::server

@@ -1,4 +1,5 @@
-// What check and repair found, as lines for people. Plain functions.
+// Text of the reports of check() and repair(), one line for each scene and mesh, for people. Free functions; any
+// thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_REPORT_TEXT_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_REPORT_TEXT_H_
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 
 namespace locus::server {
@@ -18,7 +19,9 @@ absl::Status not_found(SceneKey scene) {
 }  // namespace
 
 void SceneTable::add(SceneLogStatePtr scene) {
+  LOCUS_DCHECK(scene != nullptr);
   MutexLock lock(mutex_);
+  check_invariants(*scene);
   scenes_[scene->key] = std::move(scene);
 }
 
@@ -62,21 +65,27 @@ absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneLogState& scene,
                                ": load it anew before writing to it"),
                   refusal);
   }
-  scene.begun_at = database_sequence;
+  LOCUS_DCHECK(!scene.append_began_at.has_value());
+  scene.append_began_at = database_sequence;
   return Start{scene.written, scene.possibly_written_end};
 }
 
 void SceneTable::end_append(SceneLogState& scene, Position written, bool synced) {
   MutexLock lock(mutex_);
-  scene.begun_at.reset();
+  LOCUS_DCHECK(scene.append_began_at.has_value());
+  LOCUS_DCHECK_LT(scene.written.sequence, written.sequence);
+  scene.append_began_at.reset();
   scene.written = written;
   scene.possibly_written_end = 0;
   if (synced) scene.synced = written;
+  check_invariants(scene);
 }
 
 void SceneTable::fail_append(SceneLogState& scene, uint64_t last) {
   MutexLock lock(mutex_);
-  scene.begun_at.reset();
+  LOCUS_DCHECK(scene.append_began_at.has_value());
+  LOCUS_DCHECK_LT(scene.written.sequence, last);
+  scene.append_began_at.reset();
   scene.possibly_written_end = std::max(scene.possibly_written_end, last);
 }
 
@@ -88,10 +97,11 @@ std::vector<std::pair<SceneLogStatePtr, Position>> SceneTable::written() const {
   return positions;
 }
 
-void SceneTable::on_disk(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) {
+void SceneTable::mark_synced(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) {
   MutexLock lock(mutex_);
   for (const auto& [scene, position] : positions) {
     if (scene->synced.sequence < position.sequence) scene->synced = position;
+    check_invariants(*scene);
   }
 }
 
@@ -102,11 +112,13 @@ void SceneTable::set_catalogue(const CatalogueRow& totals) {
 
 void SceneTable::set_row(SceneLogState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals) {
   MutexLock lock(mutex_);
+  LOCUS_DCHECK_EQ(scene.key, row.key);
   if (scene.epoch != row.epoch) scene.copied = false;
   scene.epoch = row.epoch;
   scene.row_checksum = row_checksum;
-  // The snapshot holds these records, and is on the disk.
+  // The snapshot contains these records and is synced.
   if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.running_checksum};
+  check_invariants(scene);
   totals_ = totals;
 }
 
@@ -120,7 +132,7 @@ void SceneTable::remove(SceneKey scene, const CatalogueRow& totals) {
   totals_ = totals;
 }
 
-void SceneTable::describe(uint64_t database_sequence, DurableMarker& durable_marker) const {
+void SceneTable::fill_marker(uint64_t database_sequence, DurableMarker& durable_marker) const {
   MutexLock lock(mutex_);
   durable_marker.catalogue = totals_.generation;
   durable_marker.next_scene = totals_.next_scene;
@@ -128,8 +140,8 @@ void SceneTable::describe(uint64_t database_sequence, DurableMarker& durable_mar
   durable_marker.scene_markers.clear();
   bool all_synced = true;
   for (const auto& [key, scene] : scenes_) {
-    // An append that is at work has a number above the one it began at, and is not in the marks.
-    if (scene->begun_at) database_sequence = std::min(database_sequence, *scene->begun_at);
+    // The writes of an append in progress come after append_began_at and are not in the marker yet.
+    if (scene->append_began_at) database_sequence = std::min(database_sequence, *scene->append_began_at);
     all_synced = all_synced && scene->synced.sequence == scene->written.sequence;
     SceneMarker& scene_marker = durable_marker.scene_markers.emplace_back();
     scene_marker.scene = key;
@@ -141,6 +153,14 @@ void SceneTable::describe(uint64_t database_sequence, DurableMarker& durable_mar
     scene_marker.damage = scene->damage_found;
   }
   if (all_synced) durable_marker.flushed_sequence = database_sequence;
+}
+
+void SceneTable::check_invariants(const SceneLogState& scene) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(scene.synced.sequence, scene.written.sequence);
+    if (scene.synced.sequence == scene.written.sequence)
+      LOCUS_CHECK_EQ(scene.synced.running_checksum, scene.written.running_checksum);
+  }
 }
 
 }  // namespace locus::server

@@ -1,7 +1,7 @@
-// Where each scene's log stands: how far it was written and how far it is on the disk, from which HIGH_WATER is made.
+// Table of the scenes' logs: the last written and the last synced record of each. The durable marker is filled from it.
 //
-// Threads: every member may be called from any thread; the lock is held for moments, never while the disk is waited
-// for. Invariant: what marks() says was on the disk before it was called.
+// Threads: every member may be called from any thread; the lock is held briefly, never during disk I/O. Invariants:
+// `synced` never passes `written`, and neither goes back; so fill_marker() names only data that is already synced.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_SCENE_TABLE_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_SCENE_TABLE_H_
 
@@ -21,29 +21,30 @@
 
 namespace locus::server {
 
-// A record by its number, and its checksum.
+// Position in a scene's log: the last record up to there, and its checksum.
 struct Position {
   uint64_t sequence = 0;
   uint64_t running_checksum = 0;
 };
 
-// A scene's place in the log. The table's lock guards all but `writing`.
+// State of a scene's log. The lock of the table guards every member except `writing`.
 struct SceneLogState {
   SceneKey key = 0;
   std::string name;
   absl::Status damage;
-  std::string damage_found;  // the same for HIGH_WATER
+  std::string damage_found;  // the damage as the durable marker stores it
   uint64_t epoch = 0;
   uint64_t row_checksum = 0;
   bool copied = false;
   Position written;
   Position synced;
-  // Records up to here failed to be appended, and may turn up: the next append deletes those that it does not replace.
+  // Last record of failed appends. Such records may still be in RocksDB's log and reappear; the next append overwrites
+  // or deletes them.
   uint64_t possibly_written_end = 0;
-  // An append is at work; RocksDB's number of the last write before it.
-  std::optional<uint64_t> begun_at;
+  // Set while an append is in progress: RocksDB's last sequence number before it.
+  std::optional<uint64_t> append_began_at;
   bool deleted = false;
-  Mutex writing;  // held while something is written that another write to the scene must not overtake
+  Mutex writing;  // held from begin_append() to the end of the write: writes to a scene never overtake each other
 };
 
 using SceneLogStatePtr = std::shared_ptr<SceneLogState>;
@@ -56,36 +57,40 @@ class SceneTable {
   };
 
   void add(SceneLogStatePtr scene) LOCUS_EXCLUDES(mutex_);
-  // NOT_FOUND, or the scene's damage.
+  // Returns the scene. NOT_FOUND if it is unknown, its damage if it is damaged.
   absl::StatusOr<SceneLogStatePtr> find(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
-  // Also a damaged one; null where it is not known.
+  // Returns the scene even if it is damaged; null if it is unknown.
   SceneLogStatePtr find_any(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
   bool has_name(absl::string_view name) const LOCUS_EXCLUDES(mutex_);
   size_t size() const LOCUS_EXCLUDES(mutex_);
   uint64_t last_of(const SceneLogState& scene) const LOCUS_EXCLUDES(mutex_);
 
-  // Between the two `writing` is held. FAILED_PRECONDITION for another epoch, NOT_FOUND for a scene deleted meanwhile.
+  // Begins an append. The caller holds `writing` until end_append() or fail_append(). FAILED_PRECONDITION for another
+  // epoch, NOT_FOUND if the scene was deleted.
   absl::StatusOr<Start> begin_append(SceneLogState& scene, uint64_t epoch, uint64_t database_sequence)
       LOCUS_EXCLUDES(mutex_);
+  // Ends an append that succeeded: `written` is the position of its last record.
   void end_append(SceneLogState& scene, Position written, bool synced) LOCUS_EXCLUDES(mutex_);
+  // Ends an append that failed: its records, up to `last`, may still be in RocksDB's log.
   void fail_append(SceneLogState& scene, uint64_t last) LOCUS_EXCLUDES(mutex_);
 
-  // Where all scenes have been written to; after the disk has it, on_disk() takes the same list.
+  // Returns the written positions of all scenes. After a sync the caller hands them to mark_synced().
   std::vector<std::pair<SceneLogStatePtr, Position>> written() const LOCUS_EXCLUDES(mutex_);
-  void on_disk(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) LOCUS_EXCLUDES(mutex_);
+  void mark_synced(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) LOCUS_EXCLUDES(mutex_);
 
-  // A change of the catalogue has come to the disk: its totals, and the row of `scene` if the change was of one;
-  // without a row the scene is gone.
+  // Record a synced change of the catalogue: its new totals, and the changed row of a scene or its removal.
   void set_catalogue(const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
   void set_row(SceneLogState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals)
       LOCUS_EXCLUDES(mutex_);
   void remove(SceneKey scene, const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
 
-  // All that HIGH_WATER says of scenes and the catalogue, over what it said before. `database_sequence` is RocksDB's
-  // number of the last write, asked for before this.
-  void describe(uint64_t database_sequence, DurableMarker& durable_marker) const LOCUS_EXCLUDES(mutex_);
+  // Fills the marker's entries for scenes and catalogue; keeps its other members. `database_sequence` is RocksDB's last
+  // sequence number, read before this call.
+  void fill_marker(uint64_t database_sequence, DurableMarker& durable_marker) const LOCUS_EXCLUDES(mutex_);
 
  private:
+  void check_invariants(const SceneLogState& scene) const LOCUS_REQUIRES(mutex_);
+
   mutable Mutex mutex_;
   std::map<SceneKey, SceneLogStatePtr> scenes_ LOCUS_GUARDED_BY(mutex_);
   CatalogueRow totals_ LOCUS_GUARDED_BY(mutex_);

@@ -14,14 +14,13 @@
 namespace locus::server {
 namespace {
 
-constexpr absl::string_view kNoHighWater =
-    "HIGH_WATER is lost, which says how much must be here, so that nobody knows whether all is";
+constexpr absl::string_view kNoMarker = "HIGH_WATER is missing or unreadable, so lost records cannot be detected";
 
-// How what the database says of its catalogue compares with what it must say.
-struct Standing {
-  bool whole = false;   // it is of the time of HIGH_WATER or later, and its rows are those it was made of
-  bool later = false;   // changes came after HIGH_WATER was written
-  bool meshes = false;  // the rows of meshes are those that must be there
+// Result of comparing the catalogue in the database with the durable marker.
+struct CatalogueState {
+  bool intact = false;         // not older than the marker, and its rows match its sums
+  bool newer = false;          // changed after the marker was written
+  bool meshes_intact = false;  // its mesh rows match their expected sum
 };
 
 std::string count_of(uint64_t count, absl::string_view thing) {
@@ -50,96 +49,97 @@ absl::Status read_meta(const Database& database, DamageReport& found) {
       found.rows.emplace(key, view_of(at->value()));
     }
   }
-  // What follows a place that cannot be read is as good as lost, and missed below.
-  if (at->status().ok() || says_damage(at->status())) return absl::OkStatus();
+  // Rows after an unreadable block count as lost; the checks of the sums and of the marker report them.
+  if (at->status().ok() || is_damage(at->status())) return absl::OkStatus();
   return read_error("reading the catalogue", at->status());
 }
 
-Standing compare(const DamageReport& found, const DurableMarker& must) {
+CatalogueState compare(const DamageReport& found, const DurableMarker& expected) {
   CatalogueRow sums;
   Catalogue::add_sums(found.rows, sums);
-  const CatalogueRow said = found.catalogue.value_or(CatalogueRow());
-  Standing standing;
-  standing.later = said.generation > must.catalogue;
-  standing.whole =
-      said.generation >= must.catalogue && said.scene_sum == sums.scene_sum && said.mesh_sum == sums.mesh_sum;
-  standing.meshes = sums.mesh_sum == (standing.later ? said.mesh_sum : must.mesh_sum);
-  return standing;
+  const CatalogueRow stored = found.catalogue.value_or(CatalogueRow());
+  CatalogueState catalogue;
+  catalogue.newer = stored.generation > expected.catalogue;
+  catalogue.intact =
+      stored.generation >= expected.catalogue && stored.scene_sum == sums.scene_sum && stored.mesh_sum == sums.mesh_sum;
+  catalogue.meshes_intact = sums.mesh_sum == (catalogue.newer ? stored.mesh_sum : expected.mesh_sum);
+  return catalogue;
 }
 
-// What is wrong with the scene's row, apart from its log.
-std::string row_damage(const SceneHealth& scene, const SceneMarker* scene_marker, const Standing& standing) {
-  if (standing.whole && standing.later) return "";
+// Returns the damage of the scene's row, empty if it is intact.
+std::string row_damage(const SceneHealth& scene, const SceneMarker* scene_marker, const CatalogueState& catalogue) {
+  if (catalogue.intact && catalogue.newer) return "";
   if (scene_marker == nullptr)
-    return standing.whole ? "it was deleted, and is back" : "it is not in HIGH_WATER, and the catalogue is not whole";
+    return catalogue.intact ? "it was deleted, but its entry in the catalogue is back"
+                            : "HIGH_WATER does not name it, and the catalogue is damaged";
   if (!scene.row) return "its entry in the catalogue is lost";
-  if (scene_marker->row_checksum != scene.row_checksum) return "its entry in the catalogue is of another time";
+  if (scene_marker->row_checksum != scene.row_checksum) return "its entry in the catalogue is not the latest one";
   return "";
 }
 
-// A disk that fails is no damage: that goes into `disk`.
+// Returns the message of `status` if it is damage; stores an error of the disk in `disk`.
 std::string damage_of(const absl::Status& status, absl::Status& disk) {
   if (!status.ok() && !absl::IsDataLoss(status)) disk.Update(status);
   return std::string(status.message());
 }
 
-std::string log_damage(SceneHealth& scene, const SceneMarker* scene_marker, const DurableMarker& must,
+std::string log_damage(SceneHealth& scene, const SceneMarker* scene_marker, const DurableMarker& expected,
                        const Database& database, absl::Status& disk) {
   const SceneRow& row = *scene.row;
-  uint64_t chain_at = 0;
+  uint64_t marked_checksum = 0;
   const bool marked = scene_marker != nullptr && scene_marker->sequence >= row.snapshot_sequence;
   if (marked) scene.expected_sequence = scene_marker->sequence;
-  const RecordScan scan = scan_records(database, row, scene.expected_sequence, chain_at);
+  const RecordScan scan = scan_records(database, row, scene.expected_sequence, marked_checksum);
   scene.last = scan.last;
   scene.running_checksum = scan.running_checksum;
   scene.log_bytes = scan.bytes;
   if (!scan.error.ok()) return damage_of(scan.error, disk);
-  if (scan.beyond != 0)
-    return absl::StrCat(count_of(scan.beyond - scan.last - 1, "record"), " from ", scan.last + 1,
-                        " on missing, before ", count_of(scan.after, "other"));
+  if (scan.first_after_gap != 0)
+    return absl::StrCat("missing: ", count_of(scan.first_after_gap - scan.last - 1, "record"), " from ", scan.last + 1,
+                        " on, followed by ", count_of(scan.count_after_gap, "other"));
   if (scan.last < scene.expected_sequence)
-    return absl::StrCat("the last ", count_of(scene.expected_sequence - scan.last, "acknowledged record"), " from ",
-                        scan.last + 1, " on missing");
-  if (marked && chain_at != scene_marker->running_checksum)
-    return absl::StrCat("record ", scene_marker->sequence, " is not the one that was written");
+    return absl::StrCat("missing: the last ", count_of(scene.expected_sequence - scan.last, "acknowledged record"),
+                        ", from ", scan.last + 1, " on");
+  if (marked && marked_checksum != scene_marker->running_checksum)
+    return absl::StrCat("record ", scene_marker->sequence, " does not match the checksum in HIGH_WATER");
   const uint64_t gap_end = database.wal_watch().gap_end();
-  if (gap_end > must.flushed_sequence && !must.closed && !database.wal_watch().has_records_after_gap(scene.key))
-    return absl::StrCat("part of the log before the crash cannot be read, and records after ", scan.last,
-                        " may have stood there");
+  if (gap_end > expected.flushed_sequence && !expected.closed && !database.wal_watch().has_records_after_gap(scene.key))
+    return absl::StrCat("part of the log is unreadable, so records after ", scan.last, " may be lost");
   return "";
 }
 
-// Every byte, for whoever asks for it.
+// Reads every byte of the scene's snapshot and records; returns the damage.
 std::string deep_damage(const SceneHealth& scene, const Database& database, absl::Status& disk) {
   const SceneRow& row = *scene.row;
-  const auto nowhere = [](absl::string_view) { return absl::OkStatus(); };
+  const auto discard = [](absl::string_view) { return absl::OkStatus(); };
   absl::Status status =
-      read_chunks(database, database.snapshot(), snapshot_prefix(row.key, row.snapshot_number), row.snapshot, nowhere);
+      read_chunks(database, database.snapshot(), snapshot_prefix(row.key, row.snapshot_id), row.snapshot, discard);
   if (!status.ok()) return absl::StrCat("its snapshot: ", damage_of(status, disk));
   status = read_records(database, row.key, row.snapshot_sequence + 1, scene.last, row.running_checksum,
                         [](const LogRecord&) { return absl::OkStatus(); });
   return damage_of(status, disk);
 }
 
-absl::Status judge_scene(SceneHealth& scene, const SceneMarker* scene_marker, const DurableMarker* must,
-                         const Standing& standing, const Database& database, Depth depth) {
+absl::Status verify_scene(SceneHealth& scene, const SceneMarker* scene_marker, const DurableMarker* expected,
+                          const CatalogueState& catalogue, const Database& database, Depth depth) {
   absl::Status disk;
   if (scene_marker != nullptr) scene.expected_sequence = scene_marker->sequence;
   scene.copied = scene_marker != nullptr && scene_marker->copied;
   scene.damage = scene_marker != nullptr ? scene_marker->damage : "";
-  std::string more = must == nullptr ? std::string(kNoHighWater) : row_damage(scene, scene_marker, standing);
-  // The numbers are wanted of a damaged scene, too.
+  std::string damage = expected == nullptr ? std::string(kNoMarker) : row_damage(scene, scene_marker, catalogue);
+  // A damaged scene is scanned too, for the sequence numbers in the report.
   if (scene.row) {
-    std::string log = log_damage(scene, scene_marker, must == nullptr ? DurableMarker() : *must, database, disk);
-    if (more.empty()) more = std::move(log);
-    if (more.empty() && depth == Depth::kEverything) more = deep_damage(scene, database, disk);
+    std::string log =
+        log_damage(scene, scene_marker, expected == nullptr ? DurableMarker() : *expected, database, disk);
+    if (damage.empty()) damage = std::move(log);
+    if (damage.empty() && depth == Depth::kEverything) damage = deep_damage(scene, database, disk);
   }
-  if (scene.damage.empty()) scene.damage = std::move(more);
+  if (scene.damage.empty()) scene.damage = std::move(damage);
   return disk;
 }
 
-absl::Status find_scenes(const DurableMarker* must, const Standing& standing, const Database& database, Depth depth,
-                         DamageReport& found) {
+absl::Status find_scenes(const DurableMarker* expected, const CatalogueState& catalogue, const Database& database,
+                         Depth depth, DamageReport& found) {
   std::map<SceneKey, SceneHealth> scenes;
   std::map<SceneKey, const SceneMarker*> scene_markers;
   for (const auto& [key, value] : found.rows) {
@@ -152,12 +152,12 @@ absl::Status find_scenes(const DurableMarker* must, const Standing& standing, co
     scene.row_checksum = stored_checksum(value);
     scene.row = std::move(row);
   }
-  if (must != nullptr) {
-    for (const SceneMarker& scene_marker : must->scene_markers) {
+  if (expected != nullptr) {
+    for (const SceneMarker& scene_marker : expected->scene_markers) {
       scene_markers[scene_marker.scene] = &scene_marker;
       if (scenes.contains(scene_marker.scene)) continue;
-      // Deleted after HIGH_WATER was written, and rightly so.
-      if (standing.whole && standing.later && scene_marker.damage.empty()) continue;
+      // The scene was deleted after the marker was written.
+      if (catalogue.intact && catalogue.newer && scene_marker.damage.empty()) continue;
       SceneHealth& scene = scenes[scene_marker.scene];
       scene.key = scene_marker.scene;
       scene.name = scene_marker.name;
@@ -165,8 +165,8 @@ absl::Status find_scenes(const DurableMarker* must, const Standing& standing, co
   }
   for (auto& [key, scene] : scenes) {
     const auto scene_marker = scene_markers.find(key);
-    absl::Status disk = judge_scene(scene, scene_marker == scene_markers.end() ? nullptr : scene_marker->second, must,
-                                    standing, database, depth);
+    absl::Status disk = verify_scene(scene, scene_marker == scene_markers.end() ? nullptr : scene_marker->second,
+                                     expected, catalogue, database, depth);
     if (!disk.ok()) return disk;
     found.scenes.push_back(std::move(scene));
   }
@@ -191,11 +191,11 @@ absl::Status find_meshes(const Database& database, Depth depth, DamageReport& fo
     if (!list && mesh.damage.empty()) mesh.damage = "its content is lost";
     if (!mesh.damage.empty() || depth == Depth::kKeys) continue;
     const auto nowhere = [](absl::string_view) { return absl::OkStatus(); };
-    absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.content.number),
+    absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.content.content_id),
                                     mesh.content.chunks, nowhere);
     if (read.ok() && mesh.parts)
-      read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.parts->number), mesh.parts->chunks,
-                         nowhere);
+      read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.parts->content_id),
+                         mesh.parts->chunks, nowhere);
     mesh.damage = damage_of(read, disk);
   }
   return disk;
@@ -206,28 +206,28 @@ absl::Status find_meshes(const Database& database, Depth depth, DamageReport& fo
 absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth) {
   DamageReport found;
   RETURN_IF_ERROR(read_meta(database, found));
-  Standing standing;
-  if (durable_marker != nullptr) standing = compare(found, *durable_marker);
+  CatalogueState catalogue;
+  if (durable_marker != nullptr) catalogue = compare(found, *durable_marker);
   if (durable_marker == nullptr) {
-    found.catalogue_damage = std::string(kNoHighWater);
+    found.catalogue_damage = std::string(kNoMarker);
   } else if (!durable_marker->catalogue_damage.empty()) {
     found.catalogue_damage = durable_marker->catalogue_damage;
-  } else if (!standing.meshes) {
+  } else if (!catalogue.meshes_intact) {
     found.catalogue_damage =
-        "the catalogue of meshes is not the one that was written: names may be missing, or be back";
-  } else if (standing.later && !standing.whole) {
+        "the catalogue of meshes is not the latest one: names may be missing, or deleted ones may be present";
+  } else if (catalogue.newer && !catalogue.intact) {
     found.catalogue_damage =
-        "the catalogue of scenes is not the one that was written: names may be missing, or be back";
+        "the catalogue of scenes is not the latest one: names may be missing, or deleted ones may be present";
   }
-  absl::Status disk = find_scenes(durable_marker, standing, database, depth, found);
+  absl::Status disk = find_scenes(durable_marker, catalogue, database, depth, found);
   if (disk.ok()) disk = find_meshes(database, depth, found);
   if (!disk.ok()) return disk;
   return found;
 }
 
 std::string repair_hint(const std::string& path) {
-  return absl::StrCat("; `locusd check ", path, "` says more, `locusd repair ", path,
-                      "` keeps what is sound, or restore a backup");
+  return absl::StrCat("; `locusd check ", path, "` reports details, `locusd repair ", path,
+                      "` keeps the intact part; or restore a backup");
 }
 
 }  // namespace locus::server

@@ -1,5 +1,5 @@
-// Judges what a data directory holds: every scene by its own numbers and checksums and by what HIGH_WATER says must be
-// there. What RocksDB believes of itself counts for nothing here, only what it hands out. Free functions; any thread.
+// Verifies the contents of a data directory: every scene and mesh by sequence numbers, checksums and the durable
+// marker. Trusts only the bytes that RocksDB returns, not its own verdict about them. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_VERIFY_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_VERIFY_H_
 
@@ -19,14 +19,14 @@ namespace locus::server {
 struct SceneHealth {
   SceneKey key = 0;
   std::string name;
-  std::optional<SceneRow> row;  // nothing where it is lost
+  std::optional<SceneRow> row;  // nothing if the row is lost
   uint64_t row_checksum = 0;
-  uint64_t last = 0;  // of the records that are there without a gap ...
-  uint64_t running_checksum = 0;
+  uint64_t last = 0;              // last record before the first gap
+  uint64_t running_checksum = 0;  // checksum of record `last`
   uint64_t log_bytes = 0;
-  uint64_t expected_sequence = 0;  // ... and how far they must go at least
-  bool copied = false;             // as of Mark
-  std::string damage;              // what is wrong, empty where nothing is
+  uint64_t expected_sequence = 0;  // last record that must exist
+  bool copied = false;             // SceneMarker::copied
+  std::string damage;              // description of the damage; empty if the scene is intact
 };
 
 struct MeshHealth {
@@ -40,22 +40,22 @@ struct MeshHealth {
 struct DamageReport {
   bool has_format = false;
   uint32_t format = kFormat;
-  Catalogue::Rows rows;  // all that are sound by themselves
+  Catalogue::Rows rows;  // every row with a correct checksum
   std::optional<CatalogueRow> catalogue;
-  std::vector<SceneHealth> scenes;   // those that are there and those that must be, by key
+  std::vector<SceneHealth> scenes;   // scenes of the catalogue and of the durable marker, by key
   std::vector<MeshHealth> meshes;    // by name
-  std::string catalogue_damage;      // names may be missing, or be back; then no mesh is believed
-  std::vector<std::string> pending;  // keys of chunks whose snapshot or mesh was not finished
+  std::string catalogue_damage;      // set if names may be missing or deleted ones present; then all meshes are damaged
+  std::vector<std::string> pending;  // keys of unfinished snapshots and meshes
 };
 
-// Whether a chunk or record is read, or only its key.
+// Depth of the verification: kKeys reads keys and stored checksums, kEverything every byte of chunks and records.
 enum class Depth : uint8_t { kKeys, kEverything };
 
-// UNAVAILABLE where the disk fails, and FAILED_PRECONDITION for a format of another version. `high_water` is null where
-// it was lost; then everything is damaged.
+// Verifies the database against the durable marker, null if it is lost; then everything counts as damaged. Errors:
+// UNAVAILABLE if the disk fails, FAILED_PRECONDITION for a format of another version.
 absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth);
 
-// What to do about damage, as the end of a message.
+// Returns advice about damage, which ends an error message.
 std::string repair_hint(const std::string& path);
 
 }  // namespace locus::server

@@ -1,6 +1,7 @@
-// Numbers and strings as bytes and back, for whatever the data directory holds: little endian in values, big endian in
-// keys, so that keys sort by their numbers. A reader never passes the end: what is short makes it not ok. Any thread,
-// one at a time each.
+// Binary encoding of integers and strings in the data directory: little endian in values, big endian in keys, so that
+// keys sort numerically. A reader never reads past the end: on short input it returns zeros and ok() becomes false.
+//
+// Threads: one at a time for each object.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_BYTES_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_BYTES_H_
 
@@ -8,6 +9,7 @@
 #include <string>
 
 #include "absl/strings/string_view.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 
@@ -21,12 +23,16 @@ class ByteWriter {
   ByteWriter& u64(uint64_t value) { return little(value, 8); }
   ByteWriter& big_u32(uint32_t value) { return big(value, 4); }
   ByteWriter& big_u64(uint64_t value) { return big(value, 8); }
-  // As they are, without their number.
+  // Appends `value` without a length.
   ByteWriter& bytes(absl::string_view value) {
     bytes_.append(value.data(), value.size());
     return *this;
   }
-  ByteWriter& string(absl::string_view value) { return u32(static_cast<uint32_t>(value.size())).bytes(value); }
+  // Appends a 32-bit length, then `value`.
+  ByteWriter& string(absl::string_view value) {
+    LOCUS_DCHECK_LE(value.size(), ~uint32_t{0});
+    return u32(static_cast<uint32_t>(value.size())).bytes(value);
+  }
 
   const std::string& view() const { return bytes_; }
   std::string take() { return std::move(bytes_); }
@@ -66,7 +72,7 @@ class ByteReader {
 
   absl::string_view rest() const { return rest_; }
   bool ok() const { return ok_; }
-  // Everything was there, and nothing more.
+  // Returns whether every read succeeded and no bytes are left.
   bool ended() const { return ok_ && rest_.empty(); }
 
  private:

@@ -70,6 +70,7 @@ void Catalogue::apply(const CatalogueChange& change) {
   for (const CatalogueChange::Row& row : change.rows) {
     if (row.value) {
       rows_[row.key] = with_checksum(row.key, *row.value);
+      LOCUS_DCHECK(find(row.key) == *row.value);
     } else {
       rows_.erase(row.key);
     }

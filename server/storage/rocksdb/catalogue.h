@@ -1,9 +1,9 @@
-// The catalogue: which scenes and meshes there are. Its rows stand in the column family meta; here they are kept in
-// memory, with the sums by which a row that was lost, changed or came back is noticed. A change is one batch, numbered
-// without gaps.
+// The catalogue: the rows of all scenes and meshes. They stand in the column family meta; this class keeps a copy in
+// memory, with the sums of the rows' checksums, which reveal a row that was lost, changed or restored from an earlier
+// time. A change is one write batch and increments the generation.
 //
-// A change that failed may turn up after a restart, since the log may have it all the same. The next one therefore puts
-// the rows it touched right again.
+// A batch that failed may still be in RocksDB's log and reappear after a restart. Therefore the next change rewrites
+// every row that a failed change touched.
 //
 // Threads: one at a time.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_CATALOGUE_H_
@@ -21,46 +21,47 @@
 
 namespace locus::server {
 
-// Rows to put or, without a value, to delete. Values are not sealed yet.
+// Rows to put or, without a value, to delete. Values come without their checksum.
 struct CatalogueChange {
   struct Row {
     std::string key;
     std::optional<std::string> value;
   };
   std::vector<Row> rows;
-  SceneKey next_scene = 0;  // 0 = as it was
+  SceneKey next_scene = 0;  // 0 = unchanged
 };
 
 class Catalogue {
  public:
-  // By key, sealed.
+  // Rows by key; values end with their checksum.
   using Rows = std::map<std::string, std::string, std::less<>>;
 
   Catalogue() = default;
-  // As found on the disk.
+  // Takes the rows that were read from the disk.
   Catalogue(Rows rows, uint64_t generation, SceneKey next_scene);
 
   const CatalogueRow& totals() const { return totals_; }
   const Rows& rows() const { return rows_; }
-  // The bytes of a row, or nothing.
+  // Returns the value of a row without its checksum, nothing if there is no such row.
   std::optional<absl::string_view> find(absl::string_view key) const;
 
-  // Writes the change into `batch`; then the batch is written, and one of the two below is called.
+  // Adds the change, the rows of failed changes and the new totals to `batch`. The caller writes the batch and then
+  // calls apply() if that succeeded, else fail().
   void add_to(rocksdb::WriteBatch& batch, rocksdb::ColumnFamilyHandle* meta, const CatalogueChange& change) const;
   void apply(const CatalogueChange& change);
   void fail(const CatalogueChange& change);
 
-  // The sums of a set of rows.
+  // Adds the checksums of `rows` to the sums in `totals`.
   static void add_sums(const Rows& rows, CatalogueRow& totals);
 
  private:
   static uint64_t& sum_of(absl::string_view key, CatalogueRow& totals);
-  // Totals after the change.
+  // Returns the totals after the change.
   CatalogueRow after(const CatalogueChange& change) const;
 
   Rows rows_;
   CatalogueRow totals_;
-  std::set<std::string, std::less<>> possibly_written_;  // keys that failed changes touched
+  std::set<std::string, std::less<>> possibly_written_;  // keys of failed changes, which may be on the disk
 };
 
 }  // namespace locus::server

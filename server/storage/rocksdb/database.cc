@@ -14,21 +14,21 @@
 namespace locus::server {
 namespace {
 
-constexpr uint64_t kTableBytes = uint64_t{32} << 20;  // of the buffers of chunks
-constexpr uint64_t kMetaBytes = uint64_t{4} << 20;
+constexpr uint64_t kTableBytes = uint64_t{32} << 20;  // memory table of a family of chunks
+constexpr uint64_t kMetaBytes = uint64_t{4} << 20;    // memory table of meta
 constexpr size_t kBlockBytes = size_t{64} << 10;
 constexpr size_t kCacheBytes = size_t{8} << 20;
 constexpr int kBuffers = 4;
-// Tables of the first level that RocksDB may gather; beyond the last it would make writers wait, which never helps
-// here.
+// Tables in level 0 before RocksDB merges them. RocksDB must never stall writers for having more of them, since waiting
+// does not help here: the limit is out of reach.
 constexpr int kTablesToMerge = 4;
-constexpr int kTablesWithoutEnd = 1 << 20;
+constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
 constexpr size_t kInfoLogBytes = size_t{1} << 20;
 constexpr uint64_t kLogBuffersOnDisk = 4;
 constexpr auto kBufferPoll = std::chrono::milliseconds(1);
 
-// Where nothing may be written, not even why.
+// Logger that drops every message, for the read-only modes.
 class NoLogger final : public rocksdb::Logger {
  public:
   using rocksdb::Logger::Logv;
@@ -44,11 +44,11 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
   options.max_write_buffer_number = kBuffers;
   options.compression = rocksdb::kNoCompression;
   options.level0_file_num_compaction_trigger = kTablesToMerge;
-  options.level0_slowdown_writes_trigger = kTablesWithoutEnd;
-  options.level0_stop_writes_trigger = kTablesWithoutEnd;
+  options.level0_slowdown_writes_trigger = kUnlimitedTables;
+  options.level0_stop_writes_trigger = kUnlimitedTables;
   options.soft_pending_compaction_bytes_limit = 0;
   options.hard_pending_compaction_bytes_limit = 0;
-  // Merging would end at the first block that cannot be read, and all writing with it.
+  // A compaction that meets an unreadable block would stop all writes.
   options.disable_auto_compactions = lenient(mode);
   rocksdb::BlockBasedTableOptions table;
   table.block_size = kBlockBytes;
@@ -60,8 +60,8 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
 
 }  // namespace
 
-// Sees to it that errors of the disk can be got over: by us, and by going on in a new log. RocksDB would give up on
-// some for as long as the process lives, and try the others every five seconds.
+// Makes all errors of the disk recoverable, by recover() only. Without it RocksDB would refuse writes for the life of
+// the process after some errors, and retry after the others on its own every five seconds.
 class Database::ErrorWatch final : public rocksdb::EventListener {
  public:
   std::atomic<bool> seen = false;
@@ -81,11 +81,11 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   found.create_if_missing = mode == OpenMode::kCreate;
   found.create_missing_column_families = mode == OpenMode::kCreate;
   found.paranoid_checks = !lenient(mode);
-  // The default, recovery to a point in time, drops all that follows a place it cannot read, and says nothing.
+  // RocksDB's default, point-in-time recovery, silently drops everything after the first unreadable record.
   found.wal_recovery_mode = lenient(mode) ? rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords
                                           : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
-  // A log that was read is kept, and synced before (see RocksdbLog::open): writing it into tables would double the time
-  // to the first query. Of one with damage what could be read goes into tables, so that the rest can be left behind.
+  // The log is kept after reading it, because flushing it into tables would double the time to the first query
+  // (open_directory() has synced it). Only a damaged log is flushed, so that its unreadable rest can be deleted.
   found.avoid_flush_during_recovery = mode != OpenMode::kLenient;
   found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
   found.max_manifest_file_size = kManifestBytes;
@@ -95,7 +95,7 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   found.stats_dump_period_sec = 0;
   found.stats_persist_period_sec = 0;
   found.skip_stats_update_on_db_open = true;
-  found.max_file_opening_threads = 1;  // the default starts sixty-four threads to open what are a few files
+  found.max_file_opening_threads = 1;  // the default starts 64 threads to open a few files
   if (read_only(mode)) found.info_log = std::make_shared<NoLogger>();
   return found;
 }
@@ -109,7 +109,9 @@ std::vector<rocksdb::ColumnFamilyDescriptor> families(const DatabaseOptions& opt
 }
 
 Database::Database(OpenMode mode)
-    : mode_(mode), wal_watch_(lenient(mode) ? AtGap::kGoOn : AtGap::kRefuse), errors_(std::make_shared<ErrorWatch>()) {}
+    : mode_(mode),
+      wal_watch_(lenient(mode) ? AtGap::kContinue : AtGap::kRefuse),
+      errors_(std::make_shared<ErrorWatch>()) {}
 
 rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, std::unique_ptr<Database>& result) {
   std::unique_ptr<Database> database(new Database(mode));
@@ -126,11 +128,12 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
   if (!status.ok()) return status;
   database->db_.reset(db);
   result = std::move(database);
-  if (mode == OpenMode::kCreate) status = result->renew();
+  if (mode == OpenMode::kCreate) status = result->flush_to_new_log();
   return status;
 }
 
 Database::~Database() {
+  LOCUS_DCHECK_EQ(writers_.load(), 0);
   if (db_ == nullptr) return;
   for (rocksdb::ColumnFamilyHandle* family : families_) db_->DestroyColumnFamilyHandle(family).PermitUncheckedError();
   db_->Close().PermitUncheckedError();
@@ -152,39 +155,41 @@ absl::Status Database::write_now(rocksdb::WriteBatch& batch, bool sync) {
     status = db_->Write(options, &batch);
   }
   absl::Status error;
-  if (broken || !status.ok()) error = break_with(status);
+  if (broken || !status.ok()) error = fail_writes(status);
+  LOCUS_DCHECK_LT(0, writers_.load());
   --writers_;
   return error;
 }
 
-absl::Status Database::break_with(const rocksdb::Status& status) {
+absl::Status Database::fail_writes(const rocksdb::Status& status) {
   MutexLock lock(mutex_);
   if (!status.ok()) error_ = disk_error("writing the log", status);
   broken_ = true;
   return error_;
 }
 
-// SyncWAL() would do, but ends the process where another thread's write has just failed.
+// Uses an empty synced write, because SyncWAL() aborts the process if another thread's write has just failed.
 absl::Status Database::sync() {
-  rocksdb::WriteBatch nothing;
-  return write(nothing, true);
+  rocksdb::WriteBatch empty;
+  return write(empty, true);
 }
 
 bool Database::needs_recovery() const { return broken_ || errors_->seen; }
 
 absl::Status Database::recover() {
-  if (!broken_) break_with(rocksdb::Status::IOError("a table could not be written")).IgnoreError();
-  // RocksDB ends the process at a write to a log that failed before, and between the two steps it would allow one.
+  if (!broken_) fail_writes(rocksdb::Status::IOError("a table could not be written")).IgnoreError();
+  // RocksDB aborts the process on a write to a log file that failed before. Resume() accepts writes again before
+  // flush_to_new_log() replaces that file, so all writers must have left.
   while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
   errors_->seen = false;
   rocksdb::Status status = db_->Resume();
-  // With nothing in memory that took nothing: RocksDB would go on in the log that it could not write. Then this fails,
-  // too, but leaves something in memory, and the next time both succeed.
-  if (status.ok()) status = renew();
+  // If the memory tables are empty, Resume() flushes nothing and keeps the log file that failed. flush_to_new_log()
+  // then fails too, but leaves a row in memory, so that the next recover() succeeds.
+  if (status.ok()) status = flush_to_new_log();
   if (!status.ok()) {
     errors_->seen = true;
     MutexLock lock(mutex_);
-    error_ = disk_error("going on after an error", status);
+    error_ = disk_error("resuming after an error", status);
     return error_;
   }
   MutexLock lock(mutex_);
@@ -193,17 +198,17 @@ absl::Status Database::recover() {
   return absl::OkStatus();
 }
 
-rocksdb::Status Database::renew() {
+rocksdb::Status Database::flush_to_new_log() {
   rocksdb::WriteBatch batch;
-  const absl::string_view scene_marker(kFamilyMark);
-  const std::string value = with_checksum(scene_marker, "");
+  const absl::string_view key(kFamilyMark);
+  const std::string value = with_checksum(key, "");
   rocksdb::Status status;
   for (rocksdb::ColumnFamilyHandle* family : families_) {
-    if (status.ok()) status = batch.Put(family, rocksdb::Slice(scene_marker.data(), scene_marker.size()), value);
+    if (status.ok()) status = batch.Put(family, rocksdb::Slice(key.data(), key.size()), value);
   }
-  rocksdb::WriteOptions past_the_log;
-  past_the_log.disableWAL = true;
-  if (status.ok()) status = db_->Write(past_the_log, &batch);
+  rocksdb::WriteOptions without_wal;
+  without_wal.disableWAL = true;
+  if (status.ok()) status = db_->Write(without_wal, &batch);
   if (status.ok()) status = db_->Flush(rocksdb::FlushOptions(), families_);
   return status;
 }

@@ -1,7 +1,7 @@
-// The RocksDB database in a data directory: its column families, the ways it is opened, and writing that stops at the
-// first error until the database has been brought in order again.
+// The RocksDB database in a data directory: its column families, its open modes, and writes. After the first failed
+// write every write fails until recover() succeeds.
 //
-// Threads: write() from any thread; recover() and renew() by one at a time, others may write meanwhile.
+// Threads: any thread may call any member; recover() one thread at a time, others may write meanwhile.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_DATABASE_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_DATABASE_H_
 
@@ -26,20 +26,21 @@ inline constexpr absl::string_view kDatabaseFolder = "rocksdb";
 inline constexpr absl::string_view kLogFamily = "log";
 
 enum class OpenMode : uint8_t {
-  kCreate,           // a new one
-  kStrict,           // refuses what does not hold together, but for a torn end of its log
-  kLenient,          // reads what can be read and drops the rest for good
-  kReadOnly,         // strict, and not a byte is changed
-  kReadOnlyLenient,  // lenient, and not a byte is changed
+  kCreate,           // creates the database
+  kStrict,           // refuses damage, except a torn end of the write-ahead log
+  kLenient,          // reads every readable part and drops the rest for good
+  kReadOnly,         // kStrict without changing any file
+  kReadOnlyLenient,  // kLenient without changing any file
 };
 
 struct DatabaseOptions {
   rocksdb::Env* env = nullptr;
-  std::string folder;  // the database's own
+  std::string folder;  // rocksdb/ below the data directory
   uint64_t log_buffer_bytes = 0;
 };
 
-// Options of the database and of its families, meta first, for whatever opens or repairs it.
+// Return the options of the database and of its column families (in the order meta, log, snapshot, mesh), for opening
+// and for rocksdb::RepairDB().
 rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mode);
 std::vector<rocksdb::ColumnFamilyDescriptor> families(const DatabaseOptions& options, OpenMode mode);
 
@@ -57,19 +58,22 @@ class Database {
   rocksdb::ColumnFamilyHandle* mesh() const { return families_[3]; }
   const WalWatch& wal_watch() const { return wal_watch_; }
 
-  // All or nothing. After an error every write fails with it until recover() succeeds.
+  // Writes the batch, all or nothing. After an error every write fails with that error until recover() succeeds.
   absl::Status write(rocksdb::WriteBatch& batch, bool sync) LOCUS_EXCLUDES(mutex_);
-  // What was written before the call is on the disk.
+  // Syncs every earlier write.
   absl::Status sync();
 
   bool needs_recovery() const;
-  // After an error: goes on in a new log, so that nothing is written behind a torn record.
+  // Resumes writing after an error, in a new log file, so that no record follows a torn one. Waits for writers to
+  // leave; they fail meanwhile.
   absl::Status recover() LOCUS_EXCLUDES(mutex_);
-  // Into tables, so that logs can leave the disk. In the background; an error shows up in the next write.
+  // Starts flushing all memory tables, so that log files can be deleted. Returns at once; the next write reports an
+  // error.
   void flush_soon();
-  // Returns once less than two of a family's buffers wait for the disk: filling them would make all writers wait.
+  // Waits until fewer than two full memory tables of the family wait for the disk. RocksDB stalls all writers when the
+  // last one fills up.
   void wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const;
-  // What waits in memory to be written into tables.
+  // Returns the bytes in memory tables that are not flushed.
   uint64_t buffered_bytes() const;
 
  private:
@@ -77,22 +81,22 @@ class Database {
 
   Database(OpenMode mode);
   absl::Status write_now(rocksdb::WriteBatch& batch, bool sync) LOCUS_EXCLUDES(mutex_);
-  // Writes fail from now on; the error they fail with.
-  absl::Status break_with(const rocksdb::Status& status) LOCUS_EXCLUDES(mutex_);
-  // Marks in every family, past the log, and all into tables: after this the logs before are not needed.
-  rocksdb::Status renew();
+  // Makes every write fail from now on; returns the error they fail with.
+  absl::Status fail_writes(const rocksdb::Status& status) LOCUS_EXCLUDES(mutex_);
+  // Puts kFamilyMark into every family without the log and flushes all families: no earlier log file is needed then.
+  rocksdb::Status flush_to_new_log();
 
   const OpenMode mode_;
   WalWatch wal_watch_;
   std::shared_ptr<ErrorWatch> errors_;
-  std::unique_ptr<rocksdb::Env> env_;  // before what uses it
+  std::unique_ptr<rocksdb::Env> env_;  // declared before db_, which uses it
   std::unique_ptr<rocksdb::DB> db_;
   std::vector<rocksdb::ColumnFamilyHandle*> families_;
   std::atomic<bool> broken_ = false;
-  std::atomic<int> writers_ = 0;  // that are at work
-  Mutex lenient_;                 // held by every write to a lenient database, which would go on after an error
+  std::atomic<int> writers_ = 0;  // calls of write_now() in progress
+  Mutex lenient_;  // serializes writes in the lenient modes, in which RocksDB would accept writes after a failed one
   mutable Mutex mutex_;
-  absl::Status error_ LOCUS_GUARDED_BY(mutex_);  // of the write that broke it
+  absl::Status error_ LOCUS_GUARDED_BY(mutex_);  // error of the write that set broken_
 };
 
 }  // namespace locus::server

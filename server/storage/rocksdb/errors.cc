@@ -20,7 +20,7 @@ absl::Status full_disk(absl::string_view message, double limit, double asked) {
   return refuse(absl::StatusCode::kResourceExhausted, message, refusal);
 }
 
-bool says_full(const rocksdb::Status& status) {
+bool is_full(const rocksdb::Status& status) {
   return status.IsNoSpace() || status.subcode() == rocksdb::Status::SubCode::kSpaceLimit;
 }
 
@@ -28,8 +28,8 @@ bool says_full(const rocksdb::Status& status) {
 
 absl::Status disk_error(absl::string_view doing, const rocksdb::Status& status) {
   const std::string message = absl::StrCat(doing, ": ", status.ToString());
-  if (says_full(status))
-    return full_disk(absl::StrCat(message, "; free some of the disk, and writing goes on within seconds"), 0, 0);
+  if (is_full(status))
+    return full_disk(absl::StrCat(message, "; free some disk space, and writing resumes within seconds"), 0, 0);
   if (status.IsCorruption()) return absl::DataLossError(message);
   return absl::UnavailableError(message);
 }
@@ -40,16 +40,17 @@ absl::Status read_error(absl::string_view doing, const rocksdb::Status& status) 
 }
 
 absl::Status refuse_full_disk(absl::string_view what, uint64_t reserve_bytes, uint64_t free_bytes) {
-  return full_disk(absl::StrCat(what, ": the disk has ", free_bytes, " bytes left, and the last ", reserve_bytes,
-                                " are for snapshots and recovery; free some, and writing goes on within seconds"),
+  return full_disk(absl::StrCat(what, ": the disk has ", free_bytes, " free bytes, and the last ", reserve_bytes,
+                                " are reserved for snapshots and recovery; free some disk space, and writing resumes "
+                                "within seconds"),
                    static_cast<double>(reserve_bytes), static_cast<double>(free_bytes));
 }
 
-bool says_damage(const rocksdb::Status& status) {
-  if (status.ok() || says_full(status) || status.IsBusy() || status.IsTimedOut() || status.IsAborted() ||
+bool is_damage(const rocksdb::Status& status) {
+  if (status.ok() || is_full(status) || status.IsBusy() || status.IsTimedOut() || status.IsAborted() ||
       status.IsMemoryLimit() || status.IsShutdownInProgress())
     return false;
-  if (status.IsPathNotFound()) return true;  // a file that the list of files names
+  if (status.IsPathNotFound()) return true;  // a file that RocksDB's list of files names is missing
   return !status.IsIOError();
 }
 

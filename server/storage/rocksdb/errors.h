@@ -1,5 +1,5 @@
-// What RocksDB and the file system say, as the statuses that UpdateLog promises, and small things every file here asks
-// of the file system. Free functions; any thread.
+// Conversion of RocksDB's statuses into the errors that UpdateLog documents, and syncing of folders. Free functions;
+// any thread.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_ERRORS_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_ERRORS_H_
 
@@ -12,20 +12,21 @@
 
 namespace locus::server {
 
-// RESOURCE_EXHAUSTED for a full disk, DATA_LOSS for what does not hold together, UNAVAILABLE for any other failure of
-// the disk. `doing` says what was tried.
+// Converts an error of a write or of the file system: RESOURCE_EXHAUSTED for a full disk, DATA_LOSS for damage,
+// UNAVAILABLE for any other failure. `doing` names the operation in the message.
 absl::Status disk_error(absl::string_view doing, const rocksdb::Status& status);
 
-// The same for what RocksDB reads from its own files: one that is missing is damage, too.
+// Converts an error of reading RocksDB's own files as disk_error() does, but a missing file is DATA_LOSS.
 absl::Status read_error(absl::string_view doing, const rocksdb::Status& status);
 
-// RESOURCE_EXHAUSTED: `free_bytes` are left of the disk, of which `reserve_bytes` are not for this.
+// Returns RESOURCE_EXHAUSTED: of the `free_bytes` of the disk, the last `reserve_bytes` are kept for snapshots.
+// `what` names the refused operation in the message.
 absl::Status refuse_full_disk(absl::string_view what, uint64_t reserve_bytes, uint64_t free_bytes);
 
-// Whether RocksDB said of its files, and not of the disk beneath, that they are not as they were written.
-bool says_damage(const rocksdb::Status& status);
+// Returns whether `status` reports damaged or missing files, as opposed to a failing, full or busy disk.
+bool is_damage(const rocksdb::Status& status);
 
-// New and renamed files of `folder` are there after a power loss, too.
+// Syncs `folder`, so that new and renamed files in it survive a power loss.
 rocksdb::Status sync_folder(rocksdb::Env& env, const std::string& folder);
 
 }  // namespace locus::server

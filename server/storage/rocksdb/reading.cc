@@ -12,7 +12,7 @@ namespace {
 
 constexpr size_t kReadAhead = size_t{2} << 20;
 
-// Walks the keys of one prefix in order.
+// Iterator over a range of keys of one family.
 class Walk {
  public:
   Walk(const Database& database, rocksdb::ColumnFamilyHandle* family, const std::string& from, std::string end)
@@ -49,17 +49,17 @@ rocksdb::ReadOptions reading_options() {
   return options;
 }
 
-RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t sequence, uint64_t& chain_at) {
+RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t sequence, uint64_t& checksum_at) {
   RecordScan found;
   found.last = row.snapshot_sequence;
   found.running_checksum = row.running_checksum;
-  if (sequence == row.snapshot_sequence) chain_at = row.running_checksum;
+  if (sequence == row.snapshot_sequence) checksum_at = row.running_checksum;
   Walk walk(database, database.log(), log_key(row.key, row.snapshot_sequence + 1), end_of(scene_prefix(row.key)));
   for (; walk.more(); walk.next()) {
     const uint64_t at = sequence_of(walk.key());
-    if (found.beyond == 0 && at != found.last + 1) found.beyond = at;
-    if (found.beyond != 0) {
-      ++found.after;
+    if (found.first_after_gap == 0 && at != found.last + 1) found.first_after_gap = at;
+    if (found.first_after_gap != 0) {
+      ++found.count_after_gap;
       continue;
     }
     const absl::string_view value = walk.value();
@@ -70,7 +70,7 @@ RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t 
     found.last = at;
     found.running_checksum = stored_checksum(value);
     found.bytes += value.size() - kRecordOverhead;
-    if (at == sequence) chain_at = found.running_checksum;
+    if (at == sequence) checksum_at = found.running_checksum;
   }
   if (!walk.status().ok())
     found.error = read_error(absl::StrCat("reading the record after ", found.last), walk.status());
@@ -86,10 +86,10 @@ absl::Status read_records(const Database& database, SceneKey scene, uint64_t fro
       return damaged(absl::StrCat("record ", record.sequence, " is missing"));
     const absl::string_view value = walk.value();
     const std::optional<LogEntry> entry = decode_record(value);
-    if (!entry) return damaged(absl::StrCat("record ", record.sequence, " is no record"));
+    if (!entry) return damaged(absl::StrCat("record ", record.sequence, " is malformed"));
     running_checksum = record_checksum(walk.key(), value.substr(0, kRecordHeadBytes), entry->bytes, running_checksum);
     if (running_checksum != stored_checksum(value))
-      return damaged(absl::StrCat("record ", record.sequence, " is not the one that was written"));
+      return damaged(absl::StrCat("record ", record.sequence, " does not match its checksum"));
     record.entry = *entry;
     RETURN_IF_ERROR(sink(record));
   }
@@ -106,14 +106,14 @@ absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* 
     if (walk.key() != chunk_key(prefix, static_cast<uint32_t>(found.chunks)))
       return damaged(absl::StrCat("chunk ", found.chunks, " is missing"));
     const std::optional<absl::string_view> bytes = verified(walk.key(), walk.value());
-    if (!bytes) return damaged(absl::StrCat("chunk ", found.chunks, " is not the one that was written"));
+    if (!bytes) return damaged(absl::StrCat("chunk ", found.chunks, " does not match its checksum"));
     found.add(walk.value());
     RETURN_IF_ERROR(sink(*bytes));
   }
   if (!walk.status().ok()) return read_error(absl::StrCat("reading chunk ", found.chunks), walk.status());
   if (found == list) return absl::OkStatus();
   return damaged(
-      absl::StrCat("there are ", found.chunks, " of ", list.chunks, " chunks, and not those that were written"));
+      absl::StrCat("the chunks (", found.chunks, " of ", list.chunks, ") do not match the checksum of their list"));
 }
 
 }  // namespace locus::server

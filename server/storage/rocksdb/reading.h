@@ -1,5 +1,5 @@
-// Reads records and chunks out of a database, and judges each as it comes by: what is handed on is what was written.
-// Free functions; any thread.
+// Reads records and chunks from a database and verifies the checksum of each before handing it to the sink. Free
+// functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_READING_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_READING_H_
 
@@ -17,30 +17,31 @@ namespace locus::server {
 inline absl::string_view view_of(const rocksdb::Slice& slice) { return {slice.data(), slice.size()}; }
 inline rocksdb::Slice slice_of(absl::string_view view) { return {view.data(), view.size()}; }
 
-// How everything here is read. What was deleted as a range is seen again: RocksDB 7.8 crashes where it meets both such
-// a range and a table that cannot be read. It costs nothing, since no key is used for two things.
+// Returns the options of every read. They ignore range deletions, so deleted keys are visible: RocksDB 7.8 crashes if
+// an iterator meets both a range deletion and an unreadable table. This is safe because no key is ever reused.
 rocksdb::ReadOptions reading_options();
 
-// What one look over a scene's records finds without judging their bytes.
+// Result of a scan over a scene's records that reads stored checksums but does not compute them.
 struct RecordScan {
-  uint64_t last = 0;              // up to here none is missing
-  uint64_t running_checksum = 0;  // the checksum of that one
-  uint64_t bytes = 0;
-  uint64_t beyond = 0;  // the first that comes after a missing one, or 0
-  uint64_t after = 0;   // how many there are from there on
-  absl::Status error;   // what ended the look, if not the scene's end
+  uint64_t last = 0;              // last sequence number before the first gap
+  uint64_t running_checksum = 0;  // stored checksum of record `last`
+  uint64_t bytes = 0;             // payload of the records up to `last`
+  uint64_t first_after_gap = 0;   // first record after a missing one; 0 if none is missing
+  uint64_t count_after_gap = 0;   // records from first_after_gap on
+  absl::Status error;             // error that ended the scan early
 };
 
-// Of the records after `row`'s snapshot. `sequence` is one whose checksum is wanted beside, in `chain_at` (unchanged
-// where it is not there).
-RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t sequence, uint64_t& chain_at);
+// Scans the records after `row`'s snapshot. Stores the checksum of record `sequence` in `checksum_at`, which stays
+// unchanged if that record is missing.
+RecordScan scan_records(const Database& database, const SceneRow& row, uint64_t sequence, uint64_t& checksum_at);
 
-// The records from number `from` on, which must go up to `last` at least, until `sink` fails; `chain` is the checksum
-// of the one before.
+// Hands the records from sequence number `from` on to `sink`, until it fails. `running_checksum` is the checksum of the
+// record before `from`. DATA_LOSS at the first record that is missing or damaged, and if they end before `last`.
 absl::Status read_records(const Database& database, SceneKey scene, uint64_t from, uint64_t last,
                           uint64_t running_checksum, RecordSink sink);
 
-// The chunks whose keys begin with `prefix`, which must be those that `list` was made of.
+// Hands the chunks whose keys begin with `prefix` to `sink`, in order, until it fails. DATA_LOSS if a chunk is damaged
+// or if all of them together do not match `list`.
 absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* family, const std::string& prefix,
                          const ChunkList& list, ChunkSink sink);
 

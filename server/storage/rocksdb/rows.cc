@@ -4,13 +4,14 @@
 
 #include <algorithm>
 
+#include "core/base/check.h"
 #include "server/storage/rocksdb/bytes.h"
 
 namespace locus::server {
 namespace {
 
 constexpr uint8_t kRecordFormat = 1;
-constexpr size_t kSealBytes = 8;
+constexpr size_t kChecksumBytes = 8;
 
 std::string tagged(char tag, absl::string_view rest) { return std::string(1, tag).append(rest.data(), rest.size()); }
 
@@ -25,34 +26,35 @@ uint64_t checksum(absl::string_view bytes, uint64_t seed) {
 }
 
 void ChunkList::add(absl::string_view chunk_value) {
+  LOCUS_DCHECK_LE(kChecksumBytes, chunk_value.size());
   ++chunks;
-  bytes += chunk_value.size() - kSealBytes;
-  digest = checksum(chunk_value.substr(chunk_value.size() - kSealBytes), digest);
+  bytes += chunk_value.size() - kChecksumBytes;
+  digest = checksum(chunk_value.substr(chunk_value.size() - kChecksumBytes), digest);
 }
 
 std::string scene_key(SceneKey scene) { return ByteWriter().u8(kSceneTag).big_u64(scene).take(); }
 std::string mesh_key(absl::string_view name) { return tagged(kMeshTag, name); }
 std::string content_key(const Sha256& sha256) { return tagged(kContentTag, view_of(sha256)); }
-std::string pending_snapshot_key(SceneKey scene, uint64_t number) {
-  return ByteWriter().u8(kPendingSnapshotTag).big_u64(scene).big_u64(number).take();
+std::string pending_snapshot_key(SceneKey scene, uint64_t content_id) {
+  return ByteWriter().u8(kPendingSnapshotTag).big_u64(scene).big_u64(content_id).take();
 }
-std::string pending_mesh_key(const Sha256& sha256, uint64_t number) {
-  return ByteWriter().u8(kPendingMeshTag).bytes(view_of(sha256)).big_u64(number).take();
+std::string pending_mesh_key(const Sha256& sha256, uint64_t content_id) {
+  return ByteWriter().u8(kPendingMeshTag).bytes(view_of(sha256)).big_u64(content_id).take();
 }
 std::string log_key(SceneKey scene, uint64_t sequence) { return ByteWriter().big_u64(scene).big_u64(sequence).take(); }
 
 std::string end_of(std::string prefix) {
   while (!prefix.empty() && prefix.back() == '\xff') prefix.pop_back();
-  if (prefix.empty()) return std::string(64, '\xff');  // longer than any key
+  if (prefix.empty()) return std::string(64, '\xff');  // sorts after every key, since none is as long
   prefix.back() = static_cast<char>(prefix.back() + 1);
   return prefix;
 }
 std::string scene_prefix(SceneKey scene) { return ByteWriter().big_u64(scene).take(); }
-std::string snapshot_prefix(SceneKey scene, uint64_t number) {
-  return ByteWriter().big_u64(scene).big_u64(number).take();
+std::string snapshot_prefix(SceneKey scene, uint64_t content_id) {
+  return ByteWriter().big_u64(scene).big_u64(content_id).take();
 }
-std::string mesh_prefix(const Sha256& sha256, uint64_t number) {
-  return ByteWriter().bytes(view_of(sha256)).big_u64(number).take();
+std::string mesh_prefix(const Sha256& sha256, uint64_t content_id) {
+  return ByteWriter().bytes(view_of(sha256)).big_u64(content_id).take();
 }
 std::string chunk_key(absl::string_view prefix, uint32_t index) {
   return ByteWriter().bytes(prefix).big_u32(index).take();
@@ -60,24 +62,24 @@ std::string chunk_key(absl::string_view prefix, uint32_t index) {
 
 std::string with_checksum(absl::string_view key, absl::string_view bytes) {
   std::string value;
-  value.reserve(bytes.size() + kSealBytes);
+  value.reserve(bytes.size() + kChecksumBytes);
   value.append(bytes.data(), bytes.size());
   return value.append(ByteWriter().u64(checksum(bytes, checksum(key))).view());
 }
 
 std::optional<absl::string_view> verified(absl::string_view key, absl::string_view value) {
-  if (value.size() < kSealBytes) return std::nullopt;
-  const absl::string_view bytes = value.substr(0, value.size() - kSealBytes);
+  if (value.size() < kChecksumBytes) return std::nullopt;
+  const absl::string_view bytes = value.substr(0, value.size() - kChecksumBytes);
   if (stored_checksum(value) != checksum(bytes, checksum(key))) return std::nullopt;
   return bytes;
 }
 
 uint64_t stored_checksum(absl::string_view value) {
-  return value.size() < kSealBytes ? 0 : ByteReader(value.substr(value.size() - kSealBytes)).u64();
+  return value.size() < kChecksumBytes ? 0 : ByteReader(value.substr(value.size() - kChecksumBytes)).u64();
 }
 
 std::string encode(const ContentRow& row) {
-  return ByteWriter().u64(row.number).u64(row.chunks.chunks).u64(row.chunks.bytes).u64(row.chunks.digest).take();
+  return ByteWriter().u64(row.content_id).u64(row.chunks.chunks).u64(row.chunks.bytes).u64(row.chunks.digest).take();
 }
 
 std::string encode(const MeshRow& row) {
@@ -95,7 +97,7 @@ std::string encode(const SceneRow& row) {
       .u64(row.epoch)
       .u64(row.snapshot_sequence)
       .u64(row.running_checksum);
-  return out.bytes(encode(ContentRow{row.snapshot_number, row.snapshot})).take();
+  return out.bytes(encode(ContentRow{row.snapshot_id, row.snapshot})).take();
 }
 
 std::string encode(const CatalogueRow& row) {
@@ -105,7 +107,7 @@ std::string encode(const CatalogueRow& row) {
 std::optional<ContentRow> decode_content(absl::string_view bytes) {
   ByteReader in(bytes);
   ContentRow row;
-  row.number = in.u64();
+  row.content_id = in.u64();
   row.chunks.chunks = in.u64();
   row.chunks.bytes = in.u64();
   row.chunks.digest = in.u64();
@@ -134,7 +136,7 @@ std::optional<SceneRow> decode_scene(absl::string_view bytes) {
   row.running_checksum = in.u64();
   const std::optional<ContentRow> snapshot = decode_content(in.rest());
   if (!in.ok() || !snapshot) return std::nullopt;
-  row.snapshot_number = snapshot->number;
+  row.snapshot_id = snapshot->content_id;
   row.snapshot = snapshot->chunks;
   return row;
 }

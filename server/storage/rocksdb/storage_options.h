@@ -1,4 +1,4 @@
-// How a data directory is opened: the options as documentation. Plain data.
+// Options for opening a data directory. Plain data.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_STORAGE_OPTIONS_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_STORAGE_OPTIONS_H_
 
@@ -14,27 +14,28 @@ class Env;
 namespace locus::server {
 
 struct StorageOptions {
-  // The data directory, which is made where it is missing. One process at a time has it open.
+  // Data directory; created if it is missing. One process at a time may have it open.
   std::string path;
 
-  // The files beneath; the machine's own where null. Tests put faults here. Borrowed.
+  // File system; null = that of the machine. Tests inject faults here. Borrowed.
   rocksdb::Env* env = nullptr;
 
-  // Room on the disk that appending leaves alone, so that snapshots, which free what the log takes, and RocksDB's own
-  // files still find some. 64 MiB or 5 % of the disk, whichever is less, where nothing is given.
+  // Free disk space that appending leaves unused, so that snapshots (which shorten the log) and RocksDB's own files can
+  // still be written. Default: 64 MiB or 5 % of the disk, whichever is less.
   std::optional<uint64_t> reserve_bytes;
 
-  // What the log may take in memory before RocksDB writes it into tables of its own. What is larger is written twice
-  // less often, and takes longer to read when a killed daemon starts again.
+  // Size of RocksDB's memory table for log records. With a larger one, more records are dropped by a snapshot before
+  // they are written a second time, into a table; but a killed daemon reads more of the log when it starts again.
   uint64_t log_buffer_bytes = uint64_t{64} << 20;
 
-  // Records of AckLevel::kMemory are on the disk so long after they were appended.
+  // Maximum delay between the append of an AckLevel::kMemory record and its sync.
   std::chrono::milliseconds memory_sync_delay{50};
 
-  // HIGH_WATER says so long after a sync what was synced: the time before a crash for which a cut log is not noticed.
-  std::chrono::milliseconds high_water_delay{10};
+  // Delay between a sync of the log and the update of the durable marker. A log that loses its end is not detected if
+  // the lost records were synced within this time before a crash.
+  std::chrono::milliseconds durable_marker_delay{10};
 
-  // For the tests that show that they would see a loss: false acknowledges what is not on the disk.
+  // False acknowledges records without syncing them. For tests that prove that they detect a loss.
   bool sync = true;
 };
 

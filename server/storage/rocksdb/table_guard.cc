@@ -12,10 +12,11 @@
 namespace locus::server {
 namespace {
 
-// A table ends with a block that lists the others, and a footer: the kind of checksums, where that block is and where
-// the index, and zeros up to the version and the magic number. Source: RocksDB 7, table formats 2 to 5.
+// A table ends with the metaindex block, which lists the positions of other blocks (the properties among them), the
+// index and a footer: the checksum type, the positions of the metaindex and index blocks, zeros, the format version and
+// a magic number. Source: RocksDB 7, table formats 2 to 5.
 constexpr size_t kFooterBytes = 53;
-constexpr size_t kTrailerBytes = 5;  // how it is compressed, and a checksum
+constexpr size_t kTrailerBytes = 5;  // after each block: compression type and checksum
 constexpr char kXxh3 = 4;
 constexpr absl::string_view kProperties = "rocksdb.properties";
 constexpr uint64_t kMaxBytes = uint64_t{16} << 20;
@@ -42,11 +43,12 @@ std::optional<Handle> read_handle(absl::string_view bytes) {
   return size ? std::optional(Handle{*offset, *size}) : std::nullopt;
 }
 
+// End of a table file: verifies the checksums of its metaindex and properties blocks.
 class Tail {
  public:
   Tail(rocksdb::FSRandomAccessFile& file, uint64_t size) : file_(file), size_(size) {}
 
-  bool is_sound() {
+  bool is_intact() {
     std::string footer, list, properties;
     if (size_ < kFooterBytes || !read(size_ - kFooterBytes, kFooterBytes, footer) || footer.front() != kXxh3)
       return false;
@@ -71,12 +73,12 @@ class Tail {
 
   bool read_block(const Handle& handle, std::string& bytes) {
     if (handle.size > kMaxBytes || !read(handle.offset, handle.size + kTrailerBytes, bytes)) return false;
-    uint32_t said = 0;
-    std::memcpy(&said, bytes.data() + handle.size + 1, sizeof(said));
-    const auto last = static_cast<uint8_t>(bytes[handle.size]);
-    const auto sum = static_cast<uint32_t>(XXH3_64bits(bytes.data(), handle.size)) ^ last * 0x6B9083D9u;
+    uint32_t stored = 0;
+    std::memcpy(&stored, bytes.data() + handle.size + 1, sizeof(stored));
+    const auto compression = static_cast<uint8_t>(bytes[handle.size]);
+    const auto computed = static_cast<uint32_t>(XXH3_64bits(bytes.data(), handle.size)) ^ compression * 0x6B9083D9u;
     bytes.resize(handle.size);
-    return sum == said;
+    return computed == stored;
   }
 
   rocksdb::FSRandomAccessFile& file_;
@@ -92,7 +94,7 @@ rocksdb::IOStatus TableGuard::NewRandomAccessFile(const std::string& path, const
   if (!status.ok() || !absl::EndsWith(path, ".sst")) return status;
   uint64_t size = 0;
   status = GetFileSize(path, options.io_options, &size, context);
-  if (status.ok() && !Tail(**file, size).is_sound())
+  if (status.ok() && !Tail(**file, size).is_intact())
     status = rocksdb::IOStatus::Corruption("the end of the table is damaged", path);
   if (!status.ok()) file->reset();
   return status;

@@ -1,8 +1,8 @@
-// Keeps RocksDB from tables whose properties are damaged. It looks into that block before it compares the checksum, and
-// Debian's build ends the process over what it then finds. Here such a table cannot be opened, like any other that is
-// damaged.
+// File system that refuses to open tables (.sst files) whose properties block is damaged. RocksDB reads that block
+// before it verifies its checksum, and Debian's build aborts the process on a damaged one. With this guard such a table
+// is an ordinary damaged table.
 //
-// Threads: as of rocksdb::FileSystem.
+// Threads: any thread, as rocksdb::FileSystem requires.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TABLE_GUARD_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_TABLE_GUARD_H_
 
@@ -18,7 +18,7 @@ class TableGuard final : public rocksdb::FileSystemWrapper {
   explicit TableGuard(const std::shared_ptr<rocksdb::FileSystem>& files) : FileSystemWrapper(files) {}
 
   const char* Name() const override { return "locus.TableGuard"; }
-  // Corruption for a table whose last blocks are not what was written.
+  // Opens a file; Corruption if it is a table whose last blocks do not match their checksums.
   rocksdb::IOStatus NewRandomAccessFile(const std::string& path, const rocksdb::FileOptions& options,
                                         std::unique_ptr<rocksdb::FSRandomAccessFile>* file,
                                         rocksdb::IODebugContext* context) override;

@@ -11,15 +11,15 @@ namespace locus::server {
 namespace {
 
 constexpr absl::string_view kUnfinished = ".new";
-// Of an outline, more than any has: what is larger was not written here, and is not read.
+// Upper bound of the size of any topology file. Larger files were not written by this class and are not read.
 constexpr uint64_t kMaxBytes = uint64_t{8} * limits::kMaxMeshTriangles;
 
 std::string name_of(const Sha256& sha256) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
 }
 
-// Or of one that was left unfinished.
-bool is_name(absl::string_view name) {
+// Returns whether `name` is that of a topology file or of a leftover temporary file.
+bool is_outline_name(absl::string_view name) {
   name = absl::StripSuffix(name, kUnfinished);
   return name.size() == 2 * Sha256().size() && name.find_first_not_of("0123456789abcdef") == name.npos;
 }
@@ -54,13 +54,13 @@ std::optional<std::string> TopologyFiles::read(const Sha256& sha256) const {
 
 void TopologyFiles::drop(const Sha256& sha256) { env_.DeleteFile(path_of(name_of(sha256))).PermitUncheckedError(); }
 
-void TopologyFiles::drop_all_but(const std::set<Sha256>& used) {
+void TopologyFiles::drop_unused(const std::set<Sha256>& used) {
   std::set<std::string> names;
   for (const Sha256& sha256 : used) names.insert(name_of(sha256));
-  std::vector<std::string> there;
-  if (!env_.GetChildren(folder_, &there).ok()) return;
-  for (const std::string& name : there) {
-    if (is_name(name) && !names.contains(name)) env_.DeleteFile(path_of(name)).PermitUncheckedError();
+  std::vector<std::string> present;
+  if (!env_.GetChildren(folder_, &present).ok()) return;
+  for (const std::string& name : present) {
+    if (is_outline_name(name) && !names.contains(name)) env_.DeleteFile(path_of(name)).PermitUncheckedError();
   }
 }
 

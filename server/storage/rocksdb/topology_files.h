@@ -1,8 +1,9 @@
-// The folder `outlines` of a data directory: a file for each mesh's outline, named by the mesh's content, which may be
-// taken away at any time. Nothing here fails: what cannot be written is not kept, and what is not as it was written is
-// not read. So files are not synced either. Files of other names are left alone.
+// The folder outlines/ of a data directory: a cache of the tree topologies of meshes, one file each, named by the
+// mesh's SHA-256. Any file may be deleted at any time. No function fails: a file that cannot be written is not kept,
+// and a file with a wrong checksum reads as missing. Therefore files are not synced. Files with other names are never
+// touched.
 //
-// Threads: any, of one content one at a time.
+// Threads: any; one at a time for each SHA-256.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
 
@@ -20,14 +21,14 @@ class TopologyFiles {
  public:
   static constexpr absl::string_view kFolder = "outlines";
 
-  // Below the data directory `path`.
+  // Takes the path of the data directory.
   TopologyFiles(rocksdb::Env& env, absl::string_view path);
 
   void keep(const Sha256& sha256, absl::string_view bytes);
   std::optional<std::string> read(const Sha256& sha256) const;
   void drop(const Sha256& sha256);
-  // All of no content in `used`, and what a process left unfinished.
-  void drop_all_but(const std::set<Sha256>& used);
+  // Deletes every file whose SHA-256 is not in `used`, and leftover temporary files.
+  void drop_unused(const std::set<Sha256>& used);
 
  private:
   std::string path_of(const std::string& name) const;

@@ -6,7 +6,7 @@
 namespace locus::server {
 namespace {
 
-// Collects the scenes whose records a batch holds; of the rest nothing is asked.
+// Collects the scenes that have records in a batch; ignores all other entries.
 class SceneCollector final : public rocksdb::WriteBatch::Handler {
  public:
   SceneCollector(uint32_t log_family, absl::flat_hash_set<SceneKey>& scenes)
@@ -37,19 +37,19 @@ void WalWatch::ColumnFamilyLogNumberMap(const std::map<uint32_t, uint64_t>&,
 rocksdb::WalFilter::WalProcessingOption WalWatch::LogRecordFound(unsigned long long, const std::string&,
                                                                  const rocksdb::WriteBatch& batch, rocksdb::WriteBatch*,
                                                                  bool*) {
-  // A batch begins with the number of its first write; WriteBatch shows it in no other way.
+  // A batch begins with the RocksDB sequence number of its first write. WriteBatch has no accessor for it.
   const std::string& bytes = batch.Data();
   const uint64_t first = ByteReader(bytes).u64();
-  const bool gap = next_ != 0 && first > next_;
+  const bool gap = next_write_ != 0 && first > next_write_;
   if (gap && at_gap_ == AtGap::kRefuse) return WalProcessingOption::kCorruptedRecord;
   if (gap) {
     gap_end_ = first - 1;
     after_gap_.clear();
   }
-  next_ = first + batch.Count();
+  next_write_ = first + batch.Count();
   if (gap_end_ != 0) {
     SceneCollector collector(log_family_, after_gap_);
-    batch.Iterate(&collector).PermitUncheckedError();  // what it has collected so far is true
+    batch.Iterate(&collector).PermitUncheckedError();  // after an error the scenes collected so far are still correct
   }
   return WalProcessingOption::kContinueProcessing;
 }

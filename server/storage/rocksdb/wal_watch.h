@@ -1,8 +1,9 @@
-// Watches what RocksDB reads from its write-ahead log while it opens: each batch carries the number of its first write,
-// so that a batch that went missing leaves a gap, however RocksDB came over it. It knows of what skipped over a place
-// it could not read, and which scenes have records after it, so that only those others are in doubt.
+// Detects gaps in RocksDB's write-ahead log (WAL) while the database opens. Each batch in it carries the RocksDB
+// sequence number of its first write, so a lost batch leaves a gap in these numbers even if RocksDB skipped it
+// silently. Also collects the scenes that have records after the last gap: for them, dense record numbers prove that no
+// record is missing; for the other scenes that is unknown.
 //
-// Threads: RocksDB calls it from the thread that opens; read it after that.
+// Threads: RocksDB calls it from the opening thread; read the results after that.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_WAL_WATCH_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_WAL_WATCH_H_
 
@@ -16,17 +17,17 @@
 
 namespace locus::server {
 
-// What becomes of a gap.
+// Reaction to a gap.
 enum class AtGap : uint8_t {
   kRefuse,  // the database does not open
-  kGoOn,
+  kContinue,
 };
 
 class WalWatch final : public rocksdb::WalFilter {
  public:
   explicit WalWatch(AtGap at_gap) : at_gap_(at_gap) {}
 
-  // The number of the last write before the end of the last gap; 0 where there was none.
+  // Returns the RocksDB sequence number of the last missing write; 0 if there was no gap.
   uint64_t gap_end() const { return gap_end_; }
   bool has_records_after_gap(SceneKey scene) const { return after_gap_.contains(scene); }
 
@@ -40,7 +41,7 @@ class WalWatch final : public rocksdb::WalFilter {
  private:
   const AtGap at_gap_;
   uint32_t log_family_ = 0;
-  uint64_t next_ = 0;  // number of the next write, 0 before the first
+  uint64_t next_write_ = 0;  // expected RocksDB sequence number of the next batch, 0 before the first
   uint64_t gap_end_ = 0;
   absl::flat_hash_set<SceneKey> after_gap_;
 };

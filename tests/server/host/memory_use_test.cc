@@ -73,7 +73,7 @@ TEST(MemoryUseTest, GivingBackForgetsTheOldRevisionsOfEveryScene) {
     ASSERT_TRUE(scene->apply(batch).ok());
     ASSERT_TRUE(scene->view({View::Kind::kExactly, 0, 0}, kNow).ok());
   }
-  process_memory(registry).give_back();
+  process_memory(registry).release_memory();
   for (const ScenePtr& scene : scenes) {
     EXPECT_FALSE(scene->view({View::Kind::kExactly, 0, 0}, kNow).ok());
     EXPECT_TRUE(scene->view({View::Kind::kExactly, 1, 0}, kNow).ok());

@@ -29,7 +29,7 @@ TEST(ChangeQueueTest, JobsOfOneKeyRunInTheOrderOfTheirNumbers) {
   for (uint64_t i = 0; i < kJobs; ++i) EXPECT_EQ(order[i], i + 1);
 }
 
-TEST(ChangeQueueTest, ASlowKeyDoesNotHoldUpAnother) {
+TEST(ChangeQueueTest, ASlowKeyDoesNotDelayAnotherKey) {
   std::promise<void> release;
   const std::shared_future<void> released = release.get_future().share();
   std::promise<void> other_ran;
@@ -41,7 +41,7 @@ TEST(ChangeQueueTest, ASlowKeyDoesNotHoldUpAnother) {
   release.set_value();
 }
 
-TEST(ChangeQueueTest, AFullLineRefusesNamingTheLimit) {
+TEST(ChangeQueueTest, AFullQueueRefusesAndNamesTheLimit) {
   std::promise<void> release;
   const std::shared_future<void> released = release.get_future().share();
   ChangeQueue queue(1, 2);
@@ -58,7 +58,7 @@ TEST(ChangeQueueTest, AFullLineRefusesNamingTheLimit) {
   release.set_value();
 }
 
-TEST(ChangeQueueTest, AForgottenKeyEndsItsJobsAndStartsOver) {
+TEST(ChangeQueueTest, AForgottenKeyFinishesItsJobsAndCountsFromOneAgain) {
   std::promise<void> started;
   std::promise<void> release;
   const std::shared_future<void> released = release.get_future().share();
@@ -80,7 +80,7 @@ TEST(ChangeQueueTest, AForgottenKeyEndsItsJobsAndStartsOver) {
   EXPECT_EQ(*queue.submit(1, [](uint64_t) {}), 1u);
 }
 
-TEST(ChangeQueueTest, TheDestructorWaitsForWhatHasBegun) {
+TEST(ChangeQueueTest, TheDestructorWaitsForTheRunningJob) {
   std::atomic<int> ended{0};
   std::promise<void> started;
   {

@@ -8,7 +8,7 @@
 namespace locus::server {
 namespace {
 
-TEST(ClocksTest, WorkCountsAndSleepDoesNot) {
+TEST(ClocksTest, ThreadClockCountsWorkButNotSleep) {
   const uint64_t start = thread_nanoseconds();
   while (thread_nanoseconds() < start + 1'000'000) {
   }
@@ -18,7 +18,7 @@ TEST(ClocksTest, WorkCountsAndSleepDoesNot) {
   EXPECT_LT(thread_nanoseconds() - worked, 100'000'000u);
 }
 
-TEST(ClocksTest, EachThreadHasItsOwn) {
+TEST(ClocksTest, EachThreadHasItsOwnThreadClock) {
   while (thread_nanoseconds() < 1'000'000) {
   }
   uint64_t other = 0;

@@ -9,7 +9,7 @@
 namespace locus::server {
 namespace {
 
-// Of so many queries; the columns' numbers are never looked at.
+// Makes a block of the given kind. Its number of queries comes from the columns; their values are never read.
 QueryBlock block_of(decltype(QueryBlock::kind) kind, Source source = Source::kBoth) {
   QueryBlock block;
   block.kind = kind;
@@ -21,21 +21,21 @@ class CostEstimatesTest : public testing::Test {
  protected:
   QueryBlock rays(size_t count, RayMode mode = RayMode::kFirst, Source source = Source::kBoth) const {
     RayColumns columns;
-    columns.origins = absl::MakeConstSpan(numbers_).subspan(0, 3 * count);
+    columns.origins = absl::MakeConstSpan(values_).subspan(0, 3 * count);
     columns.mode = mode;
     return block_of(columns, source);
   }
   QueryBlock balls(size_t count) const {
     BallColumns columns;
-    columns.centers = absl::MakeConstSpan(numbers_).subspan(0, 3 * count);
+    columns.centers = absl::MakeConstSpan(values_).subspan(0, 3 * count);
     return block_of(columns);
   }
 
-  const std::vector<float> numbers_ = std::vector<float>(30'000);
+  const std::vector<float> values_ = std::vector<float>(30'000);
   const std::unique_ptr<CostEstimates> costs_ = std::make_unique<CostEstimates>();
 };
 
-TEST_F(CostEstimatesTest, BeforeAnythingIsKnownEveryKindHasAGuess) {
+TEST_F(CostEstimatesTest, EveryKindHasAFirstGuess) {
   for (const QueryBlock& block : {rays(1), rays(1, RayMode::kAll), balls(1), block_of(NearestColumns()),
                                   block_of(BoxColumns()), block_of(LookupColumns())}) {
     EXPECT_GE(costs_->nanoseconds_a_query(1, block), 1);
@@ -57,7 +57,7 @@ TEST_F(CostEstimatesTest, ScenesKindsAndSourcesAreKeptApart) {
   EXPECT_NE(costs_->nanoseconds_a_query(1, balls(1)), costs_->nanoseconds_a_query(1, rays(1)));
 }
 
-TEST_F(CostEstimatesTest, AnEstimateFollowsWhatIsSeen) {
+TEST_F(CostEstimatesTest, AnEstimateFollowsTheMeasuredCost) {
   costs_->learn(1, rays(1000), 100'000);
   for (int i = 0; i < 20; ++i) costs_->learn(1, rays(1000), 1'000'000);
   EXPECT_NEAR(costs_->nanoseconds_a_query(1, rays(1)), 1000, 10);
@@ -72,7 +72,7 @@ TEST_F(CostEstimatesTest, FewQueriesCountLessThanMany) {
   EXPECT_GT(costs_->nanoseconds_a_query(2, rays(1)), 100'000);
 }
 
-TEST_F(CostEstimatesTest, ABatchTakesWhatItsBlocksTakeTogether) {
+TEST_F(CostEstimatesTest, TheEstimateOfABatchIsTheSumOfItsBlocks) {
   costs_->learn(1, rays(1000), 100'000);
   costs_->learn(1, balls(1000), 900'000);
   QueryBatch batch;
@@ -80,19 +80,19 @@ TEST_F(CostEstimatesTest, ABatchTakesWhatItsBlocksTakeTogether) {
   EXPECT_NEAR(static_cast<double>(costs_->nanoseconds(1, batch)), 100 * 100 + 10 * 900, 2000);
 }
 
-TEST_F(CostEstimatesTest, ABlockWithoutQueriesTeachesNothing) {
+TEST_F(CostEstimatesTest, ABlockWithoutQueriesChangesNoEstimate) {
   const double before = costs_->nanoseconds_a_query(1, rays(1));
   costs_->learn(1, rays(0), 1'000'000);
   EXPECT_EQ(costs_->nanoseconds_a_query(1, rays(1)), before);
 }
 
-TEST_F(CostEstimatesTest, MoreScenesThanThereIsRoomForAreNoHarm) {
+TEST_F(CostEstimatesTest, MoreScenesThanEntriesGiveUsableEstimates) {
   for (uint64_t scene = 0; scene < 3 * CostEstimates::kEntries; ++scene) costs_->learn(scene, rays(1000), 50'000);
   const uint64_t last = 3 * CostEstimates::kEntries - 1;
   EXPECT_NEAR(costs_->nanoseconds_a_query(last, rays(1)), 50, 0.1) << "the latest is known";
 }
 
-TEST_F(CostEstimatesTest, ThreadsThatLearnAtOnceLeaveAValueThatOneOfThemSaw) {
+TEST_F(CostEstimatesTest, ConcurrentLearningLeavesAValueOfOneThread) {
   std::vector<std::thread> threads;
   for (uint64_t thread = 1; thread <= 4; ++thread)
     threads.emplace_back([this, thread] {

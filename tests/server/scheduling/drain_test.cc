@@ -8,7 +8,7 @@
 namespace locus::server {
 namespace {
 
-TEST(DrainTest, ListenersAreToldOnce) {
+TEST(DrainTest, ListenersAreCalledOnce) {
   Drain drain;
   int calls = 0;
   const Drain::Subscription subscription(drain, [&calls] { ++calls; });
@@ -20,7 +20,7 @@ TEST(DrainTest, ListenersAreToldOnce) {
   EXPECT_EQ(calls, 1);
 }
 
-TEST(DrainTest, AListenerThatComesLateIsToldAtOnce) {
+TEST(DrainTest, AListenerAddedWhileDrainingIsCalledAtOnce) {
   Drain drain;
   drain.begin();
   int calls = 0;
@@ -28,7 +28,7 @@ TEST(DrainTest, AListenerThatComesLateIsToldAtOnce) {
   EXPECT_EQ(calls, 1);
 }
 
-TEST(DrainTest, ADroppedSubscriptionIsNotTold) {
+TEST(DrainTest, ADroppedSubscriptionIsNotCalled) {
   Drain drain;
   int calls = 0;
   {
@@ -38,7 +38,7 @@ TEST(DrainTest, ADroppedSubscriptionIsNotTold) {
   EXPECT_EQ(calls, 0);
 }
 
-TEST(DrainTest, SubscribersThatComeAndGoMeetTheBeginningSafely) {
+TEST(DrainTest, ConcurrentSubscriptionsAndBeginAreSafe) {
   Drain drain;
   std::atomic<int> told{0};
   std::thread subscriber([&] {

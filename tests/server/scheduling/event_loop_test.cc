@@ -14,7 +14,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// A queue that any thread may put tags into. Complains where two threads wait at once.
+// Event source: a queue of tags. Fails the test if two threads wait in next() at once.
 class QueueSource final : public EventSource {
  public:
   void put(EventTag& tag) {
@@ -73,7 +73,7 @@ class Work final : public DeferredTask {
   std::function<void()> run_, done_;
 };
 
-// A loop served by so many threads until it is dropped.
+// Event loop that `threads` threads run until it is destroyed.
 class Served {
  public:
   explicit Served(size_t threads) {
@@ -95,7 +95,7 @@ class Served {
   std::vector<std::thread> threads_;
 };
 
-TEST(EventLoopTest, WhatIsPostedArrivesInItsOrderThoughTheLeaderSleeps) {
+TEST(EventLoopTest, PostedTagsArriveInOrderWhileTheLeaderSleeps) {
   std::vector<int> order;
   std::latch all(3);
   Served served(2);
@@ -107,9 +107,9 @@ TEST(EventLoopTest, WhatIsPostedArrivesInItsOrderThoughTheLeaderSleeps) {
   EXPECT_EQ(order, (std::vector<int>{1, 2, 3}));
 }
 
-TEST(EventLoopTest, LongWorkSetAsideLeavesTheLeadToAnother) {
+TEST(EventLoopTest, ALongDeferredTaskHandsTheLeadToAnotherThread) {
   std::latch meet(2), all(2);
-  // Each waits for the other: on one thread neither would end.
+  // Each task waits for the other, so on one thread neither would end.
   const auto run = [&meet] { meet.arrive_and_wait(); };
   Work one(run, [&all] { all.count_down(); }), other(run, [&all] { all.count_down(); });
   Served served(2);
@@ -120,7 +120,7 @@ TEST(EventLoopTest, LongWorkSetAsideLeavesTheLeadToAnother) {
   all.wait();
 }
 
-TEST(EventLoopTest, WithAsManyLongWorksAsThreadsEventsWaitForTheFirstToEnd) {
+TEST(EventLoopTest, EventsWaitWhileEveryThreadRunsALongTask) {
   std::latch begun(2), go(1), all(3);
   const auto run = [&] {
     begun.count_down();
@@ -142,7 +142,7 @@ TEST(EventLoopTest, WithAsManyLongWorksAsThreadsEventsWaitForTheFirstToEnd) {
   all.wait();
 }
 
-TEST(EventLoopTest, ShortWorkSetAsideKeepsTheLead) {
+TEST(EventLoopTest, AShortDeferredTaskKeepsTheLead) {
   std::latch begun(1), go(1), all(2);
   Work work(
       [&] {
@@ -158,12 +158,12 @@ TEST(EventLoopTest, ShortWorkSetAsideKeepsTheLead) {
   begun.wait();
   served.source.put(second);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  EXPECT_FALSE(arrived) << "nobody leads meanwhile";
+  EXPECT_FALSE(arrived) << "no thread leads meanwhile";
   go.count_down();
   all.wait();
 }
 
-TEST(EventLoopTest, ATimerThatIsSetByWhoDoesNotLeadWakesTheLeader) {
+TEST(EventLoopTest, ATimerSetByAnotherThreadWakesTheLeader) {
   std::latch rung(1);
   Served served(2);
   Work work([] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); },
@@ -187,20 +187,20 @@ TEST(EventLoopTest, ACancelledTimerIsNotCalled) {
   EXPECT_FALSE(called);
 }
 
-TEST(EventLoopTest, TheEndIsToldToEveryThread) {
+TEST(EventLoopTest, TheEndOfTheSourceStopsEveryThread) {
   Served served(4);
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
-// What handlers share needs no lock: ThreadSanitizer judges that. Every event is handled once and every work done once.
-TEST(EventLoopTest, HandlersNeverRunAtOnceAndNothingIsLost) {
+// Handlers share data without a lock, which ThreadSanitizer verifies. Every event and every task is handled once.
+TEST(EventLoopTest, HandlersNeverRunConcurrentlyAndNoEventIsLost) {
   constexpr uint64_t kChains = 24, kSteps = 400;
-  uint64_t shared = 0;  // of handlers
+  uint64_t shared = 0;  // data shared by handlers
   std::atomic<uint64_t> worked{0};
   std::latch all(kChains);
   Served served(3);
 
-  // From an event to work set aside, to a post by another thread, to a timer, and round again.
+  // Cycle: an event, a deferred task, a post by another thread, a timer, and again an event.
   struct Chain {
     Chain(uint64_t number, Served& with, uint64_t& count, std::atomic<uint64_t>& works, std::latch& end)
         : served(with),

@@ -15,10 +15,10 @@ using testing::ElementsAre;
 
 constexpr uint64_t kTurn = 10;
 
-// Whose turns the next `count` are; entries are their clients' numbers times 1000 and stay in line.
+// Returns the clients of the next `count` turns. An entry is its client times 1000 plus an index, and stays queued.
 std::vector<uint64_t> clients_in_turn(FairQueue<int>& queue, int count) {
   std::vector<uint64_t> clients;
-  for (int i = 0; i < count; ++i) clients.push_back(static_cast<uint64_t>(queue.turn(kTurn) / 1000));
+  for (int i = 0; i < count; ++i) clients.push_back(static_cast<uint64_t>(queue.next(kTurn) / 1000));
   return clients;
 }
 
@@ -34,30 +34,30 @@ TEST(FairQueueTest, EntriesOfAClientKeepTheirOrder) {
   queue.push_back(1, 1001);
   queue.push_back(1, 1002);
   queue.push_front(1, 1000);
-  EXPECT_EQ(queue.turn(kTurn), 1000);
+  EXPECT_EQ(queue.next(kTurn), 1000);
   EXPECT_TRUE(queue.remove(1, 1000));
-  EXPECT_EQ(queue.turn(kTurn), 1001);
+  EXPECT_EQ(queue.next(kTurn), 1001);
 }
 
-TEST(FairQueueTest, WhoHadMoreThanWasBookedWaitsLonger) {
+TEST(FairQueueTest, AClientThatUsedMoreThanChargedWaitsLonger) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   queue.push_back(2, 2000);
-  EXPECT_EQ(queue.turn(kTurn), 1000);
-  queue.correct(1, 2 * kTurn);
+  EXPECT_EQ(queue.next(kTurn), 1000);
+  queue.charge(1, 2 * kTurn);
   EXPECT_THAT(clients_in_turn(queue, 5), ElementsAre(2, 2, 2, 1, 2));
 }
 
-TEST(FairQueueTest, WhoHadLessThanWasBookedGoesAgainSooner) {
+TEST(FairQueueTest, AClientThatUsedLessThanChargedIsServedSooner) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   queue.push_back(2, 2000);
-  EXPECT_EQ(queue.turn(kTurn), 1000);
-  queue.correct(1, -static_cast<int64_t>(kTurn));
-  EXPECT_EQ(queue.turn(kTurn), 1000);
+  EXPECT_EQ(queue.next(kTurn), 1000);
+  queue.charge(1, -static_cast<int64_t>(kTurn));
+  EXPECT_EQ(queue.next(kTurn), 1000);
 }
 
-TEST(FairQueueTest, NobodySavesUpAClaimByBeingAway) {
+TEST(FairQueueTest, AnAbsentClientSavesUpNoShare) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   clients_in_turn(queue, 1000);
@@ -66,41 +66,41 @@ TEST(FairQueueTest, NobodySavesUpAClaimByBeingAway) {
   EXPECT_LE(std::count(turns.begin(), turns.end(), 2), 6);
 }
 
-TEST(FairQueueTest, WhoLeavesInDebtFindsItsDebtAgain) {
+TEST(FairQueueTest, AClientThatLeavesOverdrawnReturnsOverdrawn) {
   FairQueue<int> queue;
   queue.push_back(1, 1000);
   queue.push_back(2, 2000);
-  EXPECT_EQ(queue.turn(kTurn), 1000);
-  queue.correct(1, 4 * kTurn);
+  EXPECT_EQ(queue.next(kTurn), 1000);
+  queue.charge(1, 4 * kTurn);
   queue.remove(1, 1000);
   queue.push_back(1, 1000);
   EXPECT_THAT(clients_in_turn(queue, 5), ElementsAre(2, 2, 2, 2, 2));
-  EXPECT_EQ(queue.turn(kTurn), 1000);
+  EXPECT_EQ(queue.next(kTurn), 1000);
 }
 
-TEST(FairQueueTest, WhatIsTakenOutIsGone) {
+TEST(FairQueueTest, RemovedEntriesAreNotServed) {
   FairQueue<int> queue;
   for (int i = 0; i < 10; ++i) queue.push_back(static_cast<uint64_t>(i % 3), i);
-  EXPECT_THAT(queue.take_if([](int entry) { return entry % 2 == 0; }), testing::UnorderedElementsAre(0, 2, 4, 6, 8));
+  EXPECT_THAT(queue.remove_if([](int entry) { return entry % 2 == 0; }), testing::UnorderedElementsAre(0, 2, 4, 6, 8));
   EXPECT_FALSE(queue.remove(0, 0));
   EXPECT_FALSE(queue.remove(77, 0)) << "no such client";
   for (int i = 1; i < 10; i += 2) EXPECT_TRUE(queue.remove(static_cast<uint64_t>(i % 3), i));
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(FairQueueTest, ClientsThatComeAndGoAreForgottenInTheEnd) {
+TEST(FairQueueTest, IdleClientsAreForgotten) {
   FairQueue<int> queue;
-  for (uint64_t client = 0; client < 3 * FairQueue<int>::kMaxDebtors; ++client) {
+  for (uint64_t client = 0; client < 3 * FairQueue<int>::kMaxIdleClients; ++client) {
     queue.push_back(client, 1);
-    queue.turn(kTurn);
-    queue.correct(client, 1'000'000);
+    queue.next(kTurn);
+    queue.charge(client, 1'000'000);
     queue.remove(client, 1);
   }
   EXPECT_TRUE(queue.empty());
-  EXPECT_LE(queue.clients(), FairQueue<int>::kMaxDebtors);
+  EXPECT_LE(queue.clients(), FairQueue<int>::kMaxIdleClients);
 }
 
-// Random turns of random cost: each client that always waits has had the same, but for one turn.
+// Turns of random cost: clients that always wait get equal work, up to the cost of one turn.
 TEST(FairQueueTest, SharesAreEqualByWorkNotByTurns) {
   FairQueue<int> queue;
   std::mt19937 random(1);
@@ -108,10 +108,10 @@ TEST(FairQueueTest, SharesAreEqualByWorkNotByTurns) {
   std::map<int, double> had;
   constexpr uint64_t kMax = 100;
   for (int i = 0; i < 10'000; ++i) {
-    const int client = queue.turn(kTurn) / 1000;
-    // Client 5 takes its time.
+    const int client = queue.next(kTurn) / 1000;
+    // The turns of client 5 are long.
     const uint64_t cost = random() % (client == 5 ? kMax : 5);
-    queue.correct(static_cast<uint64_t>(client), static_cast<int64_t>(cost) - static_cast<int64_t>(kTurn));
+    queue.charge(static_cast<uint64_t>(client), static_cast<int64_t>(cost) - static_cast<int64_t>(kTurn));
     had[client] += static_cast<double>(cost);
   }
   for (const auto& [client, cost] : had) EXPECT_NEAR(cost, had[1], double{kMax + kTurn}) << client;

@@ -29,7 +29,7 @@ class MemoryBudgetTest : public testing::Test {
   }
 
   uint64_t used_ = 0;
-  uint64_t spare_ = 0;  // of used_: what giving back frees
+  uint64_t spare_ = 0;  // part of used_ that release_memory() frees
   int measurements_ = 0;
   int given_back_ = 0;
 };
@@ -56,7 +56,7 @@ TEST_F(MemoryBudgetTest, ARefusalNamesTheLimitAndWhatToDo) {
   EXPECT_EQ(refusal->asked, 3500);
 }
 
-TEST_F(MemoryBudgetTest, WorkUnderWayKeepsItsClaimUntilItEnds) {
+TEST_F(MemoryBudgetTest, AClaimCountsUntilTheWorkEnds) {
   MemoryBudget budget(kLimit, meter());
   std::optional<MemoryBudget::Claim> first(*budget.claim("mesh", 3000));
   EXPECT_FALSE(budget.claim("mesh", 300).ok());
@@ -64,7 +64,7 @@ TEST_F(MemoryBudgetTest, WorkUnderWayKeepsItsClaimUntilItEnds) {
   EXPECT_TRUE(budget.claim("mesh", 300).ok());
 }
 
-TEST_F(MemoryBudgetTest, WhatEndedWorkReallyTookCountsAfterwards) {
+TEST_F(MemoryBudgetTest, MemoryUsedByEndedWorkCountsAfterwards) {
   MemoryBudget budget(kLimit, meter());
   EXPECT_TRUE(budget.claim("mesh", 3000).ok());
   used_ = 2500;
@@ -72,7 +72,7 @@ TEST_F(MemoryBudgetTest, WhatEndedWorkReallyTookCountsAfterwards) {
   EXPECT_TRUE(budget.claim("mesh", 700).ok());
 }
 
-TEST_F(MemoryBudgetTest, MemoryIsGivenBackBeforeWorkIsRefused) {
+TEST_F(MemoryBudgetTest, MemoryIsReleasedBeforeWorkIsRefused) {
   used_ = 3000;
   spare_ = 1000;
   MemoryBudget budget(kLimit, meter());
@@ -80,14 +80,14 @@ TEST_F(MemoryBudgetTest, MemoryIsGivenBackBeforeWorkIsRefused) {
   EXPECT_EQ(given_back_, 1);
 }
 
-TEST_F(MemoryBudgetTest, WorkThatCanNeverFitGivesNothingBack) {
+TEST_F(MemoryBudgetTest, WorkLargerThanTheLimitReleasesNoMemory) {
   MemoryBudget budget(kLimit, meter());
   EXPECT_FALSE(budget.claim("mesh", kLimit + 1).ok());
   EXPECT_FALSE(budget.claim("mesh", UINT64_MAX).ok());
   EXPECT_EQ(given_back_, 0);
 }
 
-TEST_F(MemoryBudgetTest, WorkThatIsNeverRefusedStillMakesRoom) {
+TEST_F(MemoryBudgetTest, WorkThatIsNeverRefusedReleasesMemoryToo) {
   used_ = 3300;
   spare_ = 1000;
   MemoryBudget budget(kLimit, meter());
@@ -96,7 +96,7 @@ TEST_F(MemoryBudgetTest, WorkThatIsNeverRefusedStillMakesRoom) {
   EXPECT_LE(used_, kLimit);
 }
 
-TEST_F(MemoryBudgetTest, SmallWorkIsMeasuredNowAndThenOnly) {
+TEST_F(MemoryBudgetTest, SmallWorkIsMeasuredRarely) {
   MemoryBudget budget(kLimit, meter());
   for (int i = 0; i < 1000; ++i) EXPECT_TRUE(budget.claim("inserts", 1).ok());
   EXPECT_LT(measurements_, 20);

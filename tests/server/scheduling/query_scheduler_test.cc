@@ -21,7 +21,7 @@ using testing::HasSubstr;
 constexpr uint64_t kTurn = 100'000;
 constexpr uint64_t kSmall = 200'000, kLarge = 2'000'000;
 
-// Time that passes only where a job works, thread by thread.
+// Clock of each thread, which advances only while a job works on it.
 thread_local uint64_t worked_here = 0;
 
 SchedulerOptions options_of(uint32_t threads) {
@@ -32,7 +32,7 @@ SchedulerOptions options_of(uint32_t threads) {
   return options;
 }
 
-// What was worked on, in order.
+// List of the clients whose jobs were worked on, in order.
 class Book {
  public:
   void add(uint64_t client) {
@@ -49,7 +49,7 @@ class Book {
   std::vector<uint64_t> turns_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// A job of so many turns, which any number of threads may take at once.
+// Job of `turns` turns, which any number of threads may run at once.
 class TurnsJob final : public QueryJob {
  public:
   TurnsJob(uint32_t turns, uint64_t client = 0, Book* book = nullptr) : turns_(turns), client_(client), book_(book) {}
@@ -65,17 +65,17 @@ class TurnsJob final : public QueryJob {
     worked_here += nanoseconds;
     if (hold_ != nullptr && turn == held_turn_)
       while (hold_->load()) std::this_thread::yield();
-    most_inside_ = std::max(most_inside_.load(), inside_.load());
+    max_inside_ = std::max(max_inside_.load(), inside_.load());
     --inside_;
     if (ended_.fetch_add(1) + 1 == turns_) return Progress::kDone;
     return turn + 1 < turns_ ? Progress::kMore : Progress::kBegun;
   }
   void done() override {
-    EXPECT_EQ(inside_.load(), 0u) << "done while somebody works";
+    EXPECT_EQ(inside_.load(), 0u) << "done while a thread works";
     done_.fetch_add(1);
   }
 
-  // That turn waits until it is let go.
+  // Makes one turn wait while `*hold` is true.
   void hold(std::atomic<bool>* hold, uint32_t turn = 0) {
     hold_ = hold;
     held_turn_ = turn;
@@ -92,10 +92,10 @@ class TurnsJob final : public QueryJob {
   Book* const book_;
   std::atomic<bool>* hold_ = nullptr;
   uint32_t held_turn_ = 0;
-  std::atomic<uint32_t> begun_{0}, ended_{0}, inside_{0}, most_inside_{0}, done_{0};
+  std::atomic<uint32_t> begun_{0}, ended_{0}, inside_{0}, max_inside_{0}, done_{0};
 };
 
-// Keeps the only thread of a scheduler busy until it is let go.
+// Keeps the only thread of a scheduler busy until release().
 class Blocker {
  public:
   explicit Blocker(QueryScheduler& scheduler) : job_(1) {
@@ -104,10 +104,10 @@ class Blocker {
     while (!job_.begun()) std::this_thread::yield();
   }
   ~Blocker() {
-    let_go();
+    release();
     job_.wait();
   }
-  void let_go() { held_ = false; }
+  void release() { held_ = false; }
 
  private:
   std::atomic<bool> held_{true};
@@ -143,7 +143,7 @@ TEST(QuerySchedulerTest, AJobEstimatedUnderTheBudgetIsRunByItsCallerAndNeverQueu
   EXPECT_EQ(scheduler.stats().worked_nanoseconds, 0u);
 }
 
-TEST(QuerySchedulerTest, WhatAnInlineRunDoesNotFinishCanBeQueued) {
+TEST(QuerySchedulerTest, TheRestOfAnInlineRunCanBeQueued) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(5);
   EXPECT_EQ(scheduler.run_inline(job), Progress::kMore);
@@ -152,7 +152,7 @@ TEST(QuerySchedulerTest, WhatAnInlineRunDoesNotFinishCanBeQueued) {
   EXPECT_EQ(scheduler.stats().inline_done, 0u);
 }
 
-// One thread, two clients whose jobs all wait: turns must alternate however many jobs each has.
+// With one thread and two clients whose jobs all wait, turns alternate however many jobs each has.
 TEST(QuerySchedulerTest, AClientWithAHundredJobsDelaysAnotherByNoMoreThanItsShare) {
   Book book;
   std::vector<std::unique_ptr<TurnsJob>> jobs;
@@ -221,13 +221,13 @@ TEST(QuerySchedulerTest, AJobThatTurnsOutLargeGivesWayToSmallOnes) {
   honest.wait();
   sly.wait();
   const std::vector<uint64_t> turns = book.turns();
-  EXPECT_LE(std::find(turns.begin(), turns.end(), 2) - turns.begin(), 22) << "in line behind it, it would come last";
+  EXPECT_LE(std::find(turns.begin(), turns.end(), 2) - turns.begin(), 22) << "queued behind it, it would come last";
 }
 
 TEST(QuerySchedulerTest, SeveralThreadsWorkOnOneJob) {
   QueryScheduler scheduler(options_of(3));
   std::atomic<uint32_t> here{0};
-  // Each turn waits until three threads are inside.
+  // Each turn waits until three threads are working.
   class Meeting final : public QueryJob {
    public:
     explicit Meeting(std::atomic<uint32_t>& here) : here_(here) {}
@@ -269,7 +269,7 @@ TEST(QuerySchedulerTest, AWaitingJobIsWithdrawnAtOnceAndNeverTouchedAgain) {
   EXPECT_FALSE(scheduler.withdraw(**ticket)) << "once";
 }
 
-TEST(QuerySchedulerTest, AJobInWorkIsNotWithdrawnButDone) {
+TEST(QuerySchedulerTest, ARunningJobIsNotWithdrawnButDone) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(1);
   std::atomic<bool> held{true};
@@ -282,7 +282,7 @@ TEST(QuerySchedulerTest, AJobInWorkIsNotWithdrawnButDone) {
   EXPECT_FALSE(scheduler.withdraw(**ticket)) << "done by now";
 }
 
-TEST(QuerySchedulerTest, WithdrawnJobsTakeNoPlaceHoweverManyTheyAre) {
+TEST(QuerySchedulerTest, WithdrawnJobsFreeTheirPlaceInTheQueue) {
   SchedulerOptions options = options_of(1);
   options.limits[1].jobs = 2;
   QueryScheduler scheduler(options);
@@ -329,7 +329,7 @@ TEST(QuerySchedulerTest, TooManyJobsOfAClassAreRefusedAtOnceNamingTheLimit) {
   EXPECT_GE(refusal->retry_after_ms, 1u);
   EXPECT_TRUE(scheduler.submit(small, 2, kSmall).ok()) << "the other class has room";
   EXPECT_EQ(scheduler.stats().refused_jobs[1], 1u);
-  blocker.let_go();
+  blocker.release();
   first.wait();
   second.wait();
   small.wait();
@@ -352,11 +352,11 @@ TEST(QuerySchedulerTest, TooMuchEstimatedWorkIsRefusedWithARetryAfterHalfOfItIsD
   EXPECT_GE(refusal->retry_after_ms, 100u);
   EXPECT_LE(refusal->retry_after_ms, 201u);
   EXPECT_EQ(scheduler.stats().refused_work[1], 1u);
-  blocker.let_go();
+  blocker.release();
   first.wait();
 }
 
-TEST(QuerySchedulerTest, OneJobIsLetInHoweverLargeItIs) {
+TEST(QuerySchedulerTest, OneJobIsAdmittedHoweverLargeItIs) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(3);
   ASSERT_TRUE(scheduler.submit(job, 1, 1'000'000'000'000).ok());
@@ -367,12 +367,12 @@ TEST(QuerySchedulerTest, BothClassesTogetherHaveALimitToo) {
   SchedulerOptions options = options_of(1);
   options.limit.jobs = 2;
   QueryScheduler scheduler(options);
-  Blocker blocker(scheduler);  // one
+  Blocker blocker(scheduler);  // the first job
   TurnsJob second(1), third(1);
   ASSERT_TRUE(scheduler.submit(second, 1, kLarge).ok());
   EXPECT_EQ(refusal_of(scheduler.submit(third, 1, kSmall).status())->limit, "batches");
   EXPECT_THAT(std::string(scheduler.submit(third, 1, kSmall).status().message()), HasSubstr("batches"));
-  blocker.let_go();
+  blocker.release();
   second.wait();
 }
 

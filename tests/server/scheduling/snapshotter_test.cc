@@ -23,19 +23,19 @@ class SnapshotterTest : public testing::Test {
     scene_ = created->scene;
   }
 
-  // One that looks all the time at scenes with more than a few records.
+  // Returns options for a snapshotter that checks every millisecond and snapshots after a few records.
   SnapshotterOptions eager() {
     SnapshotterOptions options;
     options.log_bytes = 2'000;
-    options.look_every = milliseconds(1);
+    options.poll_interval = milliseconds(1);
     options.retry_after = milliseconds(1);
-    options.tell = [this](const Scene&, const absl::StatusOr<uint64_t>& bytes) {
-      if (!bytes.ok()) ++told_failures_;
+    options.on_snapshot = [this](const Scene&, const absl::StatusOr<uint64_t>& bytes) {
+      if (!bytes.ok()) ++reported_failures_;
     };
     return options;
   }
 
-  // So many records of a point each.
+  // Appends `count` records, each with one point.
   void apply(uint64_t count) {
     for (uint64_t i = 0; i < count; ++i) {
       const std::vector<uint64_t> ids = {++last_id_};
@@ -48,11 +48,11 @@ class SnapshotterTest : public testing::Test {
     }
   }
 
-  void wait_for_snapshots(const Snapshotter& keeper, uint64_t count) {
-    while (keeper.stats().written < count) std::this_thread::yield();
+  void wait_for_snapshots(const Snapshotter& snapshotter, uint64_t count) {
+    while (snapshotter.stats().written < count) std::this_thread::yield();
   }
 
-  // The scene as a restart after a crash makes it.
+  // Returns the scene as recovered after a crash.
   ScenePtr recovered() {
     crashed_ = std::make_unique<test::MemoryLog>(log_.crash());
     absl::StatusOr<ScenePtr> scene =
@@ -65,15 +65,15 @@ class SnapshotterTest : public testing::Test {
   Registry registry_{&log_};
   ScenePtr scene_;
   uint64_t last_id_ = 0;
-  std::atomic<uint64_t> told_failures_{0};
+  std::atomic<uint64_t> reported_failures_{0};
   std::unique_ptr<test::MemoryLog> crashed_;
 };
 
-TEST_F(SnapshotterTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn) {
-  const Snapshotter keeper(registry_, &log_, eager());
+TEST_F(SnapshotterTest, ASnapshotReplacesManyRecordsWhileTheSceneChanges) {
+  const Snapshotter snapshotter(registry_, &log_, eager());
   apply(200);
-  wait_for_snapshots(keeper, 1);
-  EXPECT_GT(keeper.stats().bytes, 0u);
+  wait_for_snapshots(snapshotter, 1);
+  EXPECT_GT(snapshotter.stats().bytes, 0u);
   const LogPosition position = scene_->log_position();
   EXPECT_GT(position.snapshot_sequence, 0u);
   apply(50);
@@ -83,39 +83,39 @@ TEST_F(SnapshotterTest, ASnapshotTakesThePlaceOfManyRecordsAndTheSceneGoesOn) {
   EXPECT_EQ(again->latest()->objects.size(), 250u);
 }
 
-TEST_F(SnapshotterTest, FewRecordsAreLeftAlone) {
+TEST_F(SnapshotterTest, FewRecordsCauseNoSnapshot) {
   apply(3);
-  std::atomic<bool> told{false};
+  std::atomic<bool> reported{false};
   SnapshotterOptions options = eager();
   options.log_bytes = scene_->log_position().bytes;
-  options.tell = [&told](const Scene&, const absl::StatusOr<uint64_t>&) { told = true; };
+  options.on_snapshot = [&reported](const Scene&, const absl::StatusOr<uint64_t>&) { reported = true; };
   {
-    const Snapshotter keeper(registry_, &log_, options);
+    const Snapshotter snapshotter(registry_, &log_, options);
     std::this_thread::sleep_for(milliseconds(20));
-    EXPECT_EQ(keeper.stats().written, 0u);
-    // One more, and it is due: so it did look.
+    EXPECT_EQ(snapshotter.stats().written, 0u);
+    // One more record makes a snapshot due, which shows that the scenes were checked.
     apply(1);
-    wait_for_snapshots(keeper, 1);
+    wait_for_snapshots(snapshotter, 1);
   }
-  EXPECT_TRUE(told);
+  EXPECT_TRUE(reported);
 }
 
-TEST_F(SnapshotterTest, AFullDiskIsToldOfAndTriedAgain) {
+TEST_F(SnapshotterTest, AFailedSnapshotIsReportedAndRetried) {
   apply(200);
   log_.fail_with(absl::ResourceExhaustedError("full"));
-  const Snapshotter keeper(registry_, &log_, eager());
-  while (keeper.stats().failed < 2) std::this_thread::yield();
-  EXPECT_EQ(keeper.stats().written, 0u);
-  EXPECT_GE(told_failures_, 1u);
+  const Snapshotter snapshotter(registry_, &log_, eager());
+  while (snapshotter.stats().failed < 2) std::this_thread::yield();
+  EXPECT_EQ(snapshotter.stats().written, 0u);
+  EXPECT_GE(reported_failures_, 1u);
   log_.fail_with(absl::OkStatus());
-  wait_for_snapshots(keeper, 1);
+  wait_for_snapshots(snapshotter, 1);
   EXPECT_EQ(recovered()->latest()->objects.size(), 200u);
 }
 
 TEST_F(SnapshotterTest, WithoutALogItDoesNothing) {
   Registry registry;
-  const Snapshotter keeper(registry, nullptr, eager());
-  EXPECT_EQ(keeper.stats().written, 0u);
+  const Snapshotter snapshotter(registry, nullptr, eager());
+  EXPECT_EQ(snapshotter.stats().written, 0u);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 
 int nice_of_this_thread() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
 
-// Linux's sched_attr up to what it says of slices; 0 where it is too old to tell.
+// Returns the time slice of this thread in nanoseconds; 0 if Linux is too old to report it.
 uint64_t slice_of_this_thread() {
   struct {
     uint32_t size, policy;
@@ -27,7 +27,7 @@ uint64_t slice_of_this_thread() {
   return attributes.slice;
 }
 
-TEST(ThreadPriorityTest, SlicesAreShortWhereLinuxTellsThem) {
+TEST(ThreadPriorityTest, SlicesAreShortIfLinuxReportsThem) {
   uint64_t usual = 0, of_batches = 0, asked = 0;
   std::thread([&] {
     usual = slice_of_this_thread();
@@ -43,7 +43,7 @@ TEST(ThreadPriorityTest, SlicesAreShortWhereLinuxTellsThem) {
   EXPECT_EQ(of_batches, wanted);
 }
 
-TEST(ThreadPriorityTest, NiceIsTheThreadsOwn) {
+TEST(ThreadPriorityTest, NicenessIsSetForOneThread) {
   const int before = nice_of_this_thread();
   int there = 0;
   std::thread([&there] {
@@ -66,7 +66,7 @@ TEST(ThreadPriorityTest, ShortSlicesLeaveNicenessAndPolicyAsTheyWere) {
   EXPECT_EQ(policy, SCHED_OTHER);
 }
 
-TEST(ThreadPriorityTest, IdleThreadsRunWhenNobodyElseDoes) {
+TEST(ThreadPriorityTest, IdlePrioritySetsTheIdlePolicyOfTheThread) {
   int policy = 0;
   std::thread([&policy] {
     take_batch_priority(BatchPriority::kIdle);

@@ -10,7 +10,7 @@
 namespace locus::server {
 namespace {
 
-TEST(WorkerPoolTest, EveryNumberIsGivenOnceWhateverTheNumberOfThreads) {
+TEST(WorkerPoolTest, EveryIndexIsVisitedOnceForAnyNumberOfThreads) {
   for (const uint32_t threads : {1u, 2u, 4u}) {
     WorkerPool pool(threads);
     for (const size_t n : {size_t{0}, size_t{1}, size_t{2}, size_t{1000}}) {
@@ -42,7 +42,7 @@ TEST(WorkerPoolTest, ManyCallersShareThePool) {
   EXPECT_EQ(total.load(), size_t{8} * 50 * 17);
 }
 
-TEST(WorkerPoolTest, AListWithinAListEndsThoughAllHelpersAreBusy) {
+TEST(WorkerPoolTest, ANestedListEndsThoughAllHelpersAreBusy) {
   WorkerPool pool(2);
   std::atomic<size_t> total{0};
   pool.parallel_for(8, [&](size_t) { pool.parallel_for(8, [&](size_t) { total.fetch_add(1); }); });

@@ -1,5 +1,5 @@
-// Damage to a small data directory, one place at a time: whatever is flipped, cut or removed, each scene is refused or
-// is what was written, and a second opening comes to the same verdict as the first.
+// Damages a small data directory at one position at a time (flipped bytes, truncated, zeroed and missing files) and
+// opens it twice: each scene is either refused or identical to the written one, and both openings report the same.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ using test::FaultyFiles;
 using test::Random;
 using test::StoredModel;
 
-// By their paths below the data directory.
+// Contents of files by their paths below the data directory.
 using Files = std::map<std::string, std::string>;
 
 // How the sample's last process ended.
@@ -34,11 +34,11 @@ struct Sample {
   StoredModel model;
 };
 
-// What one opening says.
+// Result of one opening.
 struct Verdict {
   std::string opening;                        // the error, if it did not open
-  std::map<std::string, std::string> damage;  // by scene; also of the catalogue, under ""
-  std::string difference;                     // from what was promised
+  std::map<std::string, std::string> damage;  // by scene; "" = damage of the catalogue
+  std::string difference;                     // difference from the acknowledged contents
   size_t served = 0;
 
   bool operator==(const Verdict&) const = default;
@@ -67,20 +67,21 @@ StorageOptions small_options(const std::string& path, rocksdb::Env* env) {
   options.env = env;
   options.reserve_bytes = 0;
   options.log_buffer_bytes = 1 << 16;  // RocksDB reserves that much for its log each time it opens
-  options.high_water_delay = std::chrono::milliseconds(1);
+  options.durable_marker_delay = std::chrono::milliseconds(1);
   options.memory_sync_delay = std::chrono::milliseconds(1);
   return options;
 }
 
-// Whether the log takes anything.
+// Returns whether the log accepts a write.
 bool write_mesh(UpdateLog& log) {
   const test::ChunksFrom content({"content"});
   return log.add_mesh("probe", test::hash_of(99), content, test::ChunksFrom({"parts"})).ok() &&
          log.delete_mesh("probe").ok();
 }
 
-// A few scenes with snapshots and records, in tables and in the log, and meshes.
-Sample make_sample(Ending ending, int most_steps) {
+// Makes a directory with a few scenes, whose snapshots and records are partly in tables and partly in the log, and with
+// meshes.
+Sample make_sample(Ending ending, int max_steps) {
   Sample sample;
   const test::TemporaryFolder folder;
   const auto faulty = std::make_shared<FaultyFiles>(folder.path(), folder.file("graves"));
@@ -90,17 +91,17 @@ Sample make_sample(Ending ending, int most_steps) {
   for (int life = 0; life < 3; ++life) {
     auto log = RocksdbLog::open(options);
     LOCUS_CHECK(log.ok());
-    const int steps = life == 2 ? most_steps / 2 : most_steps;
-    const int failing = most_steps * 2 / 3;
+    const int steps = life == 2 ? max_steps / 2 : max_steps;
+    const int failing = max_steps * 2 / 3;
     for (int step = 0; step < steps; ++step) {
-      // Getting over an error writes tables.
+      // The recovery after an error writes tables.
       if (life < 2 && step == failing) faulty->fail_syncs(1);
       sample.model.step(**log, random);
       while (life < 2 && step == failing && !write_mesh(**log))
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     if (life < 2 || ending == Ending::kInOrder) continue;
-    // HIGH_WATER has caught up; what is in the files now is what a killed process leaves.
+    // After this the durable marker is up to date, and the files are those that a killed process leaves.
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     sample.files = files_below(options.path);
   }
@@ -128,8 +129,8 @@ Verdict open_once(const std::string& path, rocksdb::Env* env, const StoredModel&
   return verdict;
 }
 
-// Opens the damaged files so many times.
-std::vector<Verdict> judge_damage(const Files& files, const StoredModel& model, int times) {
+// Opens a directory of these files `times` times; returns the result of each opening.
+std::vector<Verdict> open_damaged_files(const Files& files, const StoredModel& model, int times) {
   const test::TemporaryFolder folder;
   write_files(files, folder.file("data"));
   const auto faulty = std::make_shared<FaultyFiles>(folder.path(), folder.file("graves"));
@@ -141,8 +142,8 @@ std::vector<Verdict> judge_damage(const Files& files, const StoredModel& model, 
 
 enum class Trials : uint8_t { kFew, kEvery };
 
-uint64_t stride(Trials trials, uint64_t places, uint64_t few) {
-  return trials == Trials::kEvery ? 1 : std::max<uint64_t>(1, places / test::scaled_count(few));
+uint64_t stride(Trials trials, uint64_t positions, uint64_t few) {
+  return trials == Trials::kEvery ? 1 : std::max<uint64_t>(1, positions / test::scaled_count(few));
 }
 
 bool holds_data(const std::string& name) {
@@ -156,12 +157,12 @@ class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
     static const Sample killed = make_sample(Ending::kKilled, 60);
     return GetParam() == Ending::kInOrder ? in_order : killed;
   }
-  // The second opening of one in so many is judged.
+  // Returns n: every n-th directory is opened twice.
   virtual uint64_t opened_again() const { return 1; }
 
   void expect_no_silent_loss(const Files& files, const std::string& what) {
     const bool again = tried_++ % opened_again() == 0;
-    const std::vector<Verdict> verdicts = judge_damage(files, sample().model, again ? 2 : 1);
+    const std::vector<Verdict> verdicts = open_damaged_files(files, sample().model, again ? 2 : 1);
     EXPECT_EQ(verdicts.front().difference, "") << what;
     EXPECT_EQ(verdicts.back().difference, "") << what << ", opened again";
     EXPECT_EQ(verdicts.front().opening, verdicts.back().opening) << what;
@@ -175,25 +176,25 @@ class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
       if (!holds_data(name)) continue;
       const uint64_t step = stride(trials, bytes.size(), 8);
       for (uint64_t at = 0; at < bytes.size(); at += step) {
-        const uint64_t place = step == 1 ? at : at + Random(at).below(std::min(step, bytes.size() - at));
+        const uint64_t position = step == 1 ? at : at + Random(at).below(std::min(step, bytes.size() - at));
         Files files = sample().files;
-        files[name][place] = static_cast<char>(files[name][place] ^ (1 << place % 8));
-        expect_no_silent_loss(files, absl::StrCat(name, " flipped at ", place, " of ", bytes.size()));
+        files[name][position] = static_cast<char>(files[name][position] ^ (1 << position % 8));
+        expect_no_silent_loss(files, absl::StrCat(name, " flipped at ", position, " of ", bytes.size()));
       }
     }
     EXPECT_GT(noticed_, 5u);
     EXPECT_GT(served_beside_, 0u);
   }
 
-  // The last blocks of a table are read before any of its checksums is compared.
+  // Flips bytes in the last blocks of tables, which RocksDB reads before it verifies any checksum.
   void flip_ends_of_tables() {
     constexpr size_t kFromEnd = 130, kToEnd = 100;
     for (const auto& [name, bytes] : sample().files) {
       if (!absl::EndsWith(name, ".sst")) continue;
-      for (size_t place = bytes.size() - kFromEnd; place < bytes.size() - kToEnd; place += test::kSlowdown) {
+      for (size_t position = bytes.size() - kFromEnd; position < bytes.size() - kToEnd; position += test::kSlowdown) {
         Files files = sample().files;
-        files[name][place] = static_cast<char>(files[name][place] ^ 0x80);
-        expect_no_silent_loss(files, absl::StrCat(name, " flipped at ", place, " of ", bytes.size()));
+        files[name][position] = static_cast<char>(files[name][position] ^ 0x80);
+        expect_no_silent_loss(files, absl::StrCat(name, " flipped at ", position, " of ", bytes.size()));
       }
     }
     EXPECT_GT(noticed_, 5u);
@@ -238,7 +239,7 @@ class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
   uint64_t served_beside_ = 0;
 };
 
-// So small that every place can be tried.
+// Uses a sample so small that every byte can be damaged.
 class LongRocksdbLogDamageTest : public RocksdbLogDamageTest {
  protected:
   const Sample& sample() const override {
@@ -250,8 +251,8 @@ class LongRocksdbLogDamageTest : public RocksdbLogDamageTest {
   void TearDown() override { report(); }
 };
 
-TEST_P(RocksdbLogDamageTest, SampleIsSound) {
-  const std::vector<Verdict> verdicts = judge_damage(sample().files, sample().model, 2);
+TEST_P(RocksdbLogDamageTest, SampleIsIntact) {
+  const std::vector<Verdict> verdicts = open_damaged_files(sample().files, sample().model, 2);
   for (const Verdict& verdict : verdicts) {
     EXPECT_EQ(verdict.opening, "");
     EXPECT_TRUE(verdict.damage.empty());

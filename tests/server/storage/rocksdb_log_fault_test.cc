@@ -1,5 +1,5 @@
-// A disk that fails for a while: syncs and writes that fail, and no room. Nothing is acknowledged that is not there,
-// and writing comes back by itself.
+// A disk that fails for a while: failing syncs and writes, and a full disk. No lost record is acknowledged, and writing
+// resumes by itself.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -24,7 +24,7 @@ using test::record_difference;
 using test::SmallDisk;
 using test::write_snapshot;
 
-// Tries until it is over; false where it is not after a minute. The bound is for a slow machine: nothing here is timed.
+// Repeats `once` until it succeeds; returns false after a minute. The bound is for slow machines; no test is timed.
 template <class Try>
 bool succeeds_soon(const Try& once) {
   for (int i = 0; i < 6000; ++i) {
@@ -65,7 +65,7 @@ class RocksdbLogFaultTest : public ::testing::Test {
   std::unique_ptr<RocksdbLog> log_;
 };
 
-TEST_F(RocksdbLogFaultTest, FailedSyncAcknowledgesNothingAndPasses) {
+TEST_F(RocksdbLogFaultTest, FailedSyncAcknowledgesNothingAndWritingResumes) {
   const SceneKey scene = create_scene(*log_, "a", 1).value();
   ASSERT_EQ(append_records(*log_, scene, 7, 5), absl::OkStatus());
   files_->fail_syncs(1);
@@ -78,8 +78,8 @@ TEST_F(RocksdbLogFaultTest, FailedSyncAcknowledgesNothingAndPasses) {
   expect_records(scene, 6);
 }
 
-// With nothing in memory RocksDB would go on in the very log that failed.
-TEST_F(RocksdbLogFaultTest, FailedWriteRightAfterOpeningPasses) {
+// With empty memory tables RocksDB's Resume() would keep writing to the log file that failed.
+TEST_F(RocksdbLogFaultTest, WritingResumesAfterAWriteThatFailsRightAfterOpening) {
   const SceneKey scene = create_scene(*log_, "a", 1).value();
   for (int times = 0; times < 3; ++times) {
     files_->fail_writes(1);
@@ -90,7 +90,7 @@ TEST_F(RocksdbLogFaultTest, FailedWriteRightAfterOpeningPasses) {
   expect_records(scene, 3);
 }
 
-TEST_F(RocksdbLogFaultTest, RefusedRecordsDoNotComeBackBehindOthers) {
+TEST_F(RocksdbLogFaultTest, RefusedRecordsDoNotReappearAfterLaterOnes) {
   const SceneKey scene = create_scene(*log_, "a", 1).value();
   ASSERT_EQ(append_records(*log_, scene, 7, 2), absl::OkStatus());
   const std::string bytes = "refused";
@@ -98,7 +98,7 @@ TEST_F(RocksdbLogFaultTest, RefusedRecordsDoNotComeBackBehindOthers) {
   files_->fail_syncs(1);
   EXPECT_FALSE(log_->append(scene, refused, AckLevel::kLocal).ok());
   EXPECT_TRUE(succeeds_soon([&] { return append_records(*log_, scene, 7, 1); }));
-  // The process is killed, and with it the power goes: what the disk has is what counts.
+  // The process is killed and the power fails: only synced data remains.
   test::Random random(1);
   files_->stop_before(0);
   log_ = nullptr;
@@ -109,7 +109,7 @@ TEST_F(RocksdbLogFaultTest, RefusedRecordsDoNotComeBackBehindOthers) {
   expect_records(scene, 3);
 }
 
-TEST_F(RocksdbLogFaultTest, FailedSyncOfManyAppendersAcknowledgesNothingThatIsLost) {
+TEST_F(RocksdbLogFaultTest, FailedSyncsOfManyAppendersLoseNoAcknowledgedRecord) {
   constexpr SceneKey kScenes = 6;
   for (SceneKey scene = 1; scene <= kScenes; ++scene)
     ASSERT_EQ(create_scene(*log_, absl::StrCat("s", scene), scene).value(), scene);
@@ -148,7 +148,7 @@ TEST_F(RocksdbLogFaultTest, FailedSyncOfManyAppendersAcknowledgesNothingThatIsLo
   EXPECT_EQ(log_->stored_scenes().size(), kScenes);
 }
 
-TEST_F(RocksdbLogFaultTest, FullDiskRefusesByNameAndPasses) {
+TEST_F(RocksdbLogFaultTest, FullDiskIsRefusedByLimitAndWritingResumes) {
   const SceneKey scene = create_scene(*log_, "a", 1).value();
   ASSERT_EQ(append_records(*log_, scene, 7, 5), absl::OkStatus());
   files_->fill(true);
@@ -169,7 +169,7 @@ TEST_F(RocksdbLogFaultTest, FullDiskRefusesByNameAndPasses) {
   EXPECT_EQ(test::find_stored(*log_, "a")->snapshot_sequence, 3u);
 }
 
-TEST_F(RocksdbLogFaultTest, SmallDiskFillsUpAndComesBack) {
+TEST_F(RocksdbLogFaultTest, SmallDiskFillsUpToItsReserveAndWritingResumes) {
   const SmallDisk disk(folder_.file("small"), 48);
   if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
   options_ = StorageOptions();
@@ -192,7 +192,7 @@ TEST_F(RocksdbLogFaultTest, SmallDiskFillsUpAndComesBack) {
   EXPECT_EQ(found, last + 1);
 }
 
-TEST_F(RocksdbLogFaultTest, DiskThatIsFullInEarnestLosesNothing) {
+TEST_F(RocksdbLogFaultTest, DiskWithoutFreeBytesLosesNoRecord) {
   const SmallDisk disk(folder_.file("small"), 48);
   if (!disk.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
   options_ = StorageOptions();

@@ -1,5 +1,5 @@
-// Power losses at random moments, by a file system that drops what was not synced. The suite named Long... has a
-// thousand, or as many as LOCUS_FAULT_RUNS says.
+// Power losses at random moments, simulated by a file system that drops unsynced data. The Long suite runs a thousand,
+// or LOCUS_FAULT_RUNS if that is set.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -26,8 +26,8 @@ struct Outcome {
   uint64_t acknowledged = 0;
 };
 
-// Works on a log until the power goes, perhaps after the process was killed and started again; the difference between
-// what was promised and what is there after that.
+// Writes to a log until the power fails, in some runs after the process was killed and restarted. Returns the
+// difference between the acknowledged contents and those found afterwards.
 Outcome lose_power_once(uint64_t seed, Syncing syncing) {
   Random random(seed);
   const test::TemporaryFolder folder;
@@ -38,8 +38,8 @@ Outcome lose_power_once(uint64_t seed, Syncing syncing) {
   options.path = folder.file("disk/data");
   options.env = env.get();
   options.reserve_bytes = 0;
-  options.log_buffer_bytes = 0;  // the least: tables are written all the time
-  options.high_water_delay = std::chrono::milliseconds(1);
+  options.log_buffer_bytes = 0;  // the minimum: tables are written all the time
+  options.durable_marker_delay = std::chrono::milliseconds(1);
   options.memory_sync_delay = std::chrono::milliseconds(2);
   options.sync = syncing == Syncing::kAsPromised;
   StoredModel model;
@@ -75,14 +75,14 @@ void expect_nothing_lost(uint64_t first_seed, uint64_t runs) {
             << first_seed << std::endl;
 }
 
-TEST(RocksdbLogPowerTest, PowerLossTakesNothingThatWasAcknowledged) { expect_nothing_lost(1, test::scaled_count(20)); }
+TEST(RocksdbLogPowerTest, PowerLossLosesNoAcknowledgedRecord) { expect_nothing_lost(1, test::scaled_count(20)); }
 
-TEST(LongRocksdbLogPowerTest, PowerLossTakesNothingThatWasAcknowledged) {
+TEST(LongRocksdbLogPowerTest, PowerLossLosesNoAcknowledgedRecord) {
   const char* runs = std::getenv("LOCUS_FAULT_RUNS");
   expect_nothing_lost(1000, runs == nullptr ? 1000 : std::strtoull(runs, nullptr, 10));
 }
 
-TEST(RocksdbLogPowerTest, TestSeesTheLossWhereNothingIsSynced) {
+TEST(RocksdbLogPowerTest, LossWithoutSyncsIsDetected) {
   uint64_t seen = 0;
   for (uint64_t seed = 1; seed <= 5; ++seed) seen += !lose_power_once(seed, Syncing::kNever).difference.empty();
   EXPECT_GT(seen, 0u);

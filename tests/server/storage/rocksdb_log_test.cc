@@ -49,7 +49,7 @@ class RocksdbLogTest : public ::testing::Test {
     return *key;
   }
   void append(SceneKey scene, uint64_t count) { ASSERT_EQ(append_records(*log_, scene, 7, count), absl::OkStatus()); }
-  // That the records after the snapshot are `first` to `last`, as written.
+  // Expects that the records from `first` on are intact and end at `last`.
   void expect_records(SceneKey scene, uint64_t first, uint64_t last) {
     uint64_t found = 0;
     EXPECT_EQ(record_difference(*log_, scene, first, found), "");
@@ -87,7 +87,7 @@ TEST_F(RocksdbLogTest, RecordsAreReadBackAsTheyWereAppended) {
   expect_snapshot(scene, 0);
 }
 
-TEST_F(RocksdbLogTest, SeveralEntriesGetNumbersInTheirOrder) {
+TEST_F(RocksdbLogTest, SeveralEntriesGetConsecutiveSequenceNumbers) {
   const SceneKey scene = create("a", 1);
   std::vector<std::string> bytes;
   for (uint64_t i = 1; i <= 5; ++i) bytes.push_back(test::record_bytes(scene, i));
@@ -98,7 +98,7 @@ TEST_F(RocksdbLogTest, SeveralEntriesGetNumbersInTheirOrder) {
   expect_records(scene, 1, 5);
 }
 
-TEST_F(RocksdbLogTest, EverythingIsThereAfterReopening) {
+TEST_F(RocksdbLogTest, ReopenedLogHasEverySceneRecordAndMesh) {
   const SceneKey a = create("a", 1);
   const SceneKey b = create("b", 2);
   append(a, 10);
@@ -143,7 +143,7 @@ TEST_F(RocksdbLogTest, SnapshotDropsTheRecordsItHolds) {
   EXPECT_EQ(find_stored(*log_, "a")->snapshot_sequence, 10u);
 }
 
-TEST_F(RocksdbLogTest, SnapshotOfWhatIsNotThereIsRefused) {
+TEST_F(RocksdbLogTest, SnapshotOfMissingRecordsIsRefused) {
   const SceneKey scene = create("a", 1);
   append(scene, 3);
   EXPECT_EQ(write_snapshot(*log_, scene, 4).code(), absl::StatusCode::kInvalidArgument);
@@ -153,7 +153,7 @@ TEST_F(RocksdbLogTest, SnapshotOfWhatIsNotThereIsRefused) {
   expect_records(scene, 3, 3);
 }
 
-TEST_F(RocksdbLogTest, SnapshotThatFailsLeavesTheOneBefore) {
+TEST_F(RocksdbLogTest, FailedSnapshotKeepsThePreviousOne) {
   const SceneKey scene = create("a", 1);
   append(scene, 3);
   int left = 2;
@@ -175,7 +175,7 @@ TEST_F(RocksdbLogTest, SnapshotThatFailsLeavesTheOneBefore) {
   expect_snapshot(scene, 3);
 }
 
-TEST_F(RocksdbLogTest, DeletedSceneIsGoneAndItsKeyIsNotGivenAgain) {
+TEST_F(RocksdbLogTest, KeyOfADeletedSceneIsNeverReused) {
   const SceneKey a = create("a", 1);
   append(a, 3);
   ASSERT_EQ(log_->delete_scene(a), absl::OkStatus());
@@ -187,15 +187,15 @@ TEST_F(RocksdbLogTest, DeletedSceneIsGoneAndItsKeyIsNotGivenAgain) {
   expect_records(2, 1, 0);
 }
 
-TEST_F(RocksdbLogTest, NameThatIsTakenIsRefused) {
+TEST_F(RocksdbLogTest, TakenNameIsRefused) {
   create("a", 1);
   EXPECT_EQ(create_scene(*log_, "a", 2).status().code(), absl::StatusCode::kAlreadyExists);
-  EXPECT_EQ(log_->stored_scenes().size(), 0u) << "what is stored is of the time of opening";
+  EXPECT_EQ(log_->stored_scenes().size(), 0u) << "stored_scenes() shows the state at opening";
   open();
   EXPECT_EQ(log_->stored_scenes().size(), 1u);
 }
 
-TEST_F(RocksdbLogTest, RestartedSceneTakesRecordsOfTheNewEpochAlone) {
+TEST_F(RocksdbLogTest, RestartedSceneAcceptsOnlyRecordsOfTheNewEpoch) {
   const SceneKey scene = create("a", 1);
   append(scene, 2);
   ASSERT_EQ(log_->restart_scene(scene, 8), absl::OkStatus());
@@ -208,7 +208,7 @@ TEST_F(RocksdbLogTest, RestartedSceneTakesRecordsOfTheNewEpochAlone) {
   expect_records(scene, 1, 3);
 }
 
-TEST_F(RocksdbLogTest, MeshIsKeptOnceAndGoesWithItsLastName) {
+TEST_F(RocksdbLogTest, MeshIsStoredOnceAndDeletedWithItsLastName) {
   const std::vector<std::string> content = {"some", "content"};
   ASSERT_EQ(add_mesh("a", 1, content), absl::OkStatus());
   EXPECT_EQ(asked_, 2u);
@@ -300,7 +300,7 @@ TEST_F(RocksdbLogTest, OutlineIsKeptBesideTheMeshAndGoesWithIt) {
   EXPECT_EQ(log_->read_outline(hash_of(1)), std::nullopt);
 }
 
-TEST_F(RocksdbLogTest, OutlinesOfNoMeshAndUnfinishedOnesGoWhenItOpens) {
+TEST_F(RocksdbLogTest, OpeningDeletesOutlinesWithoutMeshAndTemporaryFiles) {
   ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
   log_->keep_outline(hash_of(1), "outline");
   log_->keep_outline(hash_of(2), "of no mesh");
@@ -314,7 +314,7 @@ TEST_F(RocksdbLogTest, OutlinesOfNoMeshAndUnfinishedOnesGoWhenItOpens) {
   EXPECT_EQ(log_->read_outline(hash_of(1)), "outline");
 }
 
-TEST_F(RocksdbLogTest, NoOutlineIsKeptWhereTheReserveIsAllThereIs) {
+TEST_F(RocksdbLogTest, NoOutlineIsWrittenIntoTheReserve) {
   ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
   options_.reserve_bytes = ~uint64_t{0} / 2;
   open();
@@ -329,7 +329,7 @@ TEST_F(RocksdbLogTest, SecondOpenerIsRefused) {
   EXPECT_THAT(second.status().message(), HasSubstr("in use"));
 }
 
-TEST_F(RocksdbLogTest, BackupIsALogOfItsOwn) {
+TEST_F(RocksdbLogTest, BackupOpensAsAnIndependentLog) {
   const SceneKey scene = create("a", 1);
   append(scene, 5);
   ASSERT_EQ(add_mesh("m", 1, {"content"}), absl::OkStatus());
@@ -345,13 +345,13 @@ TEST_F(RocksdbLogTest, BackupIsALogOfItsOwn) {
   append(scene, 1);
 }
 
-TEST_F(RocksdbLogTest, CopiedScenesSayThatTheyAreUntilTheyAreRestarted) {
+TEST_F(RocksdbLogTest, CopiedScenesStayMarkedUntilTheyAreRestarted) {
   create("a", 1);
   create("b", 2);
   const std::string copy = folder_.file("copy");
   ASSERT_EQ(log_->back_up(copy), absl::OkStatus());
   open();
-  EXPECT_FALSE(find_stored(*log_, "a")->copied) << "the one that was copied goes on as it was";
+  EXPECT_FALSE(find_stored(*log_, "a")->copied) << "the original is not marked as copied";
   options_.path = copy;
   for (int time = 0; time < 2; ++time) {
     open();
@@ -364,7 +364,7 @@ TEST_F(RocksdbLogTest, CopiedScenesSayThatTheyAreUntilTheyAreRestarted) {
   EXPECT_TRUE(find_stored(*log_, "b")->copied);
 }
 
-TEST_F(RocksdbLogTest, PrunedLogLeavesTheDisk) {
+TEST_F(RocksdbLogTest, SnapshotsFreeTheDiskSpaceOfTheLog) {
   options_.log_buffer_bytes = uint64_t{1} << 20;
   open();
   const SceneKey scene = create("a", 1);
@@ -383,8 +383,8 @@ TEST_F(RocksdbLogTest, PrunedLogLeavesTheDisk) {
   EXPECT_LT(size(), uint64_t{40} << 20) << "of 80 MB that were written";
 }
 
-// Appenders of scenes of their own, and one thread that writes snapshots of all.
-TEST_F(RocksdbLogTest, ManyAppendersAndSnapshotsDoNotDisturbEachOther) {
+// Runs one appending thread for each scene and one thread that writes snapshots of all of them.
+TEST_F(RocksdbLogTest, ConcurrentAppendsAndSnapshotsKeepEveryRecord) {
   constexpr int kScenes = 8;
   const uint64_t records = test::scaled_count(200);
   for (int i = 0; i < kScenes; ++i) create("scene" + std::to_string(i), static_cast<SceneKey>(i + 1));

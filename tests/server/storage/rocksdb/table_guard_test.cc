@@ -20,7 +20,7 @@ class TableGuardTest : public ::testing::Test {
     bytes_ = test::file_bytes(path_);
   }
 
-  // Whether the guard lets a table of these bytes be opened.
+  // Returns whether the guard opens a table with these bytes.
   bool opens(const std::string& bytes) {
     test::write_file_bytes(path_, bytes);
     std::unique_ptr<rocksdb::FSRandomAccessFile> file;
@@ -36,25 +36,25 @@ class TableGuardTest : public ::testing::Test {
   std::string bytes_;
 };
 
-TEST_F(TableGuardTest, SoundTableOpens) { EXPECT_TRUE(opens(bytes_)); }
+TEST_F(TableGuardTest, IntactTableOpens) { EXPECT_TRUE(opens(bytes_)); }
 
-// From the block of properties on, which is the first that RocksDB trusts too early, up to the footer's first place:
-// the kind of checksums. The rest of the footer RocksDB compares before it trusts any of it.
-TEST_F(TableGuardTest, AnyByteTurnedFromThePropertiesToTheFooterKeepsItShut) {
+// Flips bytes from the properties block, which RocksDB reads before verifying it, to the first byte of the footer, the
+// checksum type. RocksDB verifies the rest of the footer itself.
+TEST_F(TableGuardTest, AnyFlippedByteFromPropertiesToFooterIsRefused) {
   const size_t properties = bytes_.find("rocksdb.block.based.table.index.type");
   ASSERT_NE(properties, std::string::npos);
   constexpr size_t kFooterBytes = 53;
   ASSERT_LT(properties + 500, bytes_.size() - kFooterBytes) << "the properties and the list of blocks";
-  for (size_t place = properties; place <= bytes_.size() - kFooterBytes; ++place) {
+  for (size_t position = properties; position <= bytes_.size() - kFooterBytes; ++position) {
     std::string wrong = bytes_;
-    wrong[place] = static_cast<char>(wrong[place] ^ (1 << place % 8));
-    ASSERT_FALSE(opens(wrong)) << place;
+    wrong[position] = static_cast<char>(wrong[position] ^ (1 << position % 8));
+    ASSERT_FALSE(opens(wrong)) << position;
   }
 }
 
-TEST_F(TableGuardTest, AFooterThatPointsElsewhereKeepsItShut) {
-  size_t at = bytes_.size() - 52;  // behind the kind of checksums: where the list of blocks is, and its length
-  for (int number = 0; number < 2; ++number) {
+TEST_F(TableGuardTest, FooterWithWrongPositionsIsRefused) {
+  size_t at = bytes_.size() - 52;  // after the checksum type: offset and length of the metaindex block
+  for (int varint = 0; varint < 2; ++varint) {
     for (bool more = true; more; ++at) {
       std::string wrong = bytes_;
       wrong[at] = static_cast<char>(wrong[at] ^ 1);
@@ -64,11 +64,11 @@ TEST_F(TableGuardTest, AFooterThatPointsElsewhereKeepsItShut) {
   }
 }
 
-TEST_F(TableGuardTest, NoCutTableOpens) {
+TEST_F(TableGuardTest, TruncatedTableIsRefused) {
   for (size_t size = 0; size < bytes_.size(); ++size) ASSERT_FALSE(opens(bytes_.substr(0, size))) << size;
 }
 
-TEST_F(TableGuardTest, OtherFilesAreNotLookedAt) {
+TEST_F(TableGuardTest, OtherFilesAreNotChecked) {
   const std::string log = folder_.file("000008.log");
   test::write_file_bytes(log, "anything");
   std::unique_ptr<rocksdb::FSRandomAccessFile> file;
