@@ -22,7 +22,7 @@ constexpr int kServiceField = 1;  // HealthCheckRequest.service, string
 constexpr int kStatusField = 1;   // HealthCheckResponse.status, enum
 constexpr std::array kServices = {"", "locus.v1.ServerService", "locus.v1.SceneService", "locus.v1.UpdateService",
                                   "locus.v1.QueryService"};
-// How late a watcher's thread notices that nobody listens any more.
+// A watcher's thread checks this often whether its call was cancelled.
 constexpr std::chrono::milliseconds kLookAgain{100};
 constexpr uint32_t kRetryAfterMs = 1000;
 
@@ -78,15 +78,15 @@ bool HealthService::write(State state, grpc::ServerWriter<Empty>& writer) {
 
 grpc::Status HealthService::watch(grpc::ServerContext& context, const Empty& request,
                                   grpc::ServerWriter<Empty>& writer) {
-  const AdmissionLimiter::Permit pass = host_.health_watchers.enter();
-  if (!pass)
+  const AdmissionLimiter::Permit permit = host_.health_watchers.enter();
+  if (!permit)
     return to_grpc(refuse_full("", "health_watchers", kMaxHealthWatchers, kMaxHealthWatchers + 1.0, kRetryAfterMs));
   const bool known = is_known(service_of(request));
-  std::optional<State> told;
+  std::optional<State> sent;
   for (State now = state(); !context.IsCancelled(); now = wait(context, now)) {
-    const State tell = known ? std::min(now, State::kNotServing) : State::kServiceUnknown;
-    if (tell != told && !write(tell, writer)) break;
-    told = tell;
+    const State shown = known ? std::min(now, State::kNotServing) : State::kServiceUnknown;
+    if (shown != sent && !write(shown, writer)) break;
+    sent = shown;
     if (now == State::kEnded) break;
   }
   return to_grpc(draining());

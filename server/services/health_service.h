@@ -1,10 +1,10 @@
-// The standard health service, grpc.health.v1.Health: whether this server, or one of its services, serves. For load
-// balancers, orchestrators and `locus health`.
+// The standard health service, grpc.health.v1.Health: reports whether the server, or one of its services, is serving.
+// For load balancers, orchestrators and `locus health`.
 //
-// gRPC's own is not used: it brings completion queues of its own, whose threads then read from every connection and
-// hand what came to the IO threads, at the price of a wake-up a message.
-// Threads: every member may be called from any thread. A watcher keeps a thread of the server; there may be
-// kMaxHealthWatchers.
+// gRPC's own implementation is not used: it adds completion queues whose threads then read from every connection and
+// pass the messages on to the IO threads, which costs a wake-up a message.
+// Threads: every member may be called from any thread. Each watcher occupies a thread of the server; at most
+// kMaxHealthWatchers are admitted.
 #ifndef LOCUS_SERVER_SERVICES_HEALTH_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_HEALTH_SERVICE_H_
 
@@ -25,15 +25,15 @@ class HealthService final : public grpc::Service {
 
   void serving() { set(State::kServing); }
   void not_serving() { set(State::kNotServing); }
-  // No watcher is left soon after.
+  // Ends all watchers within 100 ms.
   void end() { set(State::kEnded); }
 
  private:
-  // Of the protocol, as far as they are its numbers.
+  // Values of HealthCheckResponse.ServingStatus, and kEnded, which is never sent.
   enum class State : uint8_t { kServing = 1, kNotServing = 2, kServiceUnknown = 3, kEnded };
 
-  // Requests and responses have one field each; Debian ships no schema of them, and any message is an Empty with
-  // unknown fields.
+  // Requests and responses have one field each. Debian ships no .proto file for them, so both are parsed as an Empty
+  // with unknown fields.
   using Empty = google::protobuf::Empty;
 
   grpc::Status check(const Empty& request, Empty& response) const LOCUS_EXCLUDES(mutex_);
@@ -42,7 +42,7 @@ class HealthService final : public grpc::Service {
   static bool write(State state, grpc::ServerWriter<Empty>& writer);
   void set(State state) LOCUS_EXCLUDES(mutex_);
   State state() const LOCUS_EXCLUDES(mutex_);
-  // Returns when it is no longer `known`, or `context` was given up.
+  // Blocks until the state differs from `known` or the call of `context` is cancelled, and returns the state.
   State wait(const grpc::ServerContext& context, State known) LOCUS_EXCLUDES(mutex_);
 
   Host& host_;

@@ -13,7 +13,8 @@
 namespace locus::server {
 namespace {
 
-// Things a piece. One thing takes at most its columns, the frame of a run of its own, and a mesh's name.
+// Objects and instances ("things") a piece. One thing takes at most the bytes of its columns, of the frame of a new
+// run, and of a mesh's name.
 constexpr size_t kThingsPerPiece = 16384;
 constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
@@ -64,7 +65,7 @@ void add_shape(const Shape& shape, v1::Insert* to) {
   }
 }
 
-// Fills pieces and hands each over when it is full.
+// Fills pieces and passes each to `take` when it is full. Neighbours of equal shape or mesh share a run of columns.
 class Dump {
  public:
   Dump(const SceneSnapshot& snapshot, const TakePiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
@@ -99,7 +100,7 @@ class Dump {
   }
 
  private:
-  // False once a piece was not taken.
+  // Passes on the piece if it is full, and counts a thing. Returns false once `take` has ended the dump.
   bool make_room() {
     if (taken_ && things_ == kThingsPerPiece) {
       taken_ = take_(piece_);
@@ -127,8 +128,8 @@ class Dump {
   const StaticMesh* last_mesh_ = nullptr;
 };
 
-// Placed meshes can be known under several names, and not under the one they were first uploaded as, if that was
-// deleted before they were placed. Any name that is known will do; the lowest is taken.
+// Returns a function from a mesh to its lowest registered name. A mesh can have several names, and the name of its
+// first upload may have been deleted, so the mesh's own name() is only used if none is registered.
 MeshName names_of(const Registry& registry) {
   absl::flat_hash_map<const StaticMesh*, std::string> names;
   std::string after;
@@ -168,7 +169,7 @@ absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneReq
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
   ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(caller, request.scene(), "scene"));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
-  // Its caller may take what is written as slowly as it likes.
+  // A caller that reads slowly could hold the snapshot for any time, so revoking the pin cancels the call.
   snapshot.on_revoke([&caller] { caller.cancel(); });
   const auto take = [&](const v1::DumpSceneResponse& piece) {
     return snapshot.status().ok() && caller.stop().ok() && writer.Write(piece);

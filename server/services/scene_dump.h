@@ -1,4 +1,5 @@
-// DumpScene: everything in a scene at one revision, in pieces of bounded size that can be sent back as they are.
+// DumpScene: sends all objects and instances of a scene at one revision, in pieces of bounded size. A piece has the
+// messages of inserts and placements, so that a client can send it back unchanged. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_SCENE_DUMP_H_
 #define LOCUS_SERVER_SERVICES_SCENE_DUMP_H_
 
@@ -13,14 +14,16 @@
 
 namespace locus::server {
 
-// A mesh's name as callers know it.
+// Returns a name under which callers know the mesh.
 using MeshName = std::function<std::string(const StaticMesh&)>;
-// Takes a piece; false ends the dump.
+// Writes a piece to the caller; returns false to end the dump.
 using TakePiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
-// Objects, then instances, each ascending by id. At least one piece. False when `take` ended it.
+// Sends objects, then instances, each in ascending order of ids, in at least one piece. Returns false if `take` ended
+// the dump.
 bool dump_snapshot(const SceneSnapshot& snapshot, const MeshName& mesh_name, const TakePiece& take);
 
+// Serves one DumpScene call. Pins the snapshot meanwhile; cancels the call if the pin is revoked.
 absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request,
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer);
 
