@@ -11,7 +11,7 @@
 namespace locus::server {
 namespace {
 
-// What the kernel takes for the path of a unix socket, its ending zero included.
+// Size of sockaddr_un::sun_path: the maximum length of a unix socket's path, including the terminating zero.
 constexpr size_t kMaxUnixPath = 108;
 
 absl::Status bad_address(absl::string_view text, absl::string_view why) {

@@ -13,7 +13,7 @@
 namespace locus::server {
 namespace {
 
-// Longer values are cut: a caller chooses some of them.
+// Maximum bytes of a value. Longer values are cut, because callers choose some of them.
 constexpr size_t kMaxValue = 1024;
 
 std::atomic<LogFormat> log_format{LogFormat::kText};
@@ -43,7 +43,7 @@ spdlog::logger& logger() {
   return *instance;
 }
 
-// Both formats quote alike: what JSON needs escaped would also break a line of text.
+// Appends `text` with JSON escapes. Both formats use them, because the same characters would break a line of text.
 void append_escaped(std::string& out, absl::string_view text) {
   constexpr absl::string_view kHex = "0123456789abcdef";
   for (const char c : text.substr(0, kMaxValue)) {

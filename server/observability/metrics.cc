@@ -40,10 +40,10 @@ CallMetrics::Stripe& CallMetrics::stripe() {
 
 void CallMetrics::record_call(Rpc rpc, absl::StatusCode code, uint64_t nanoseconds) {
   Stripe& mine = stripe();
-  const auto number = static_cast<size_t>(code);
-  // Codes that nobody knows yet count as UNKNOWN.
-  const size_t known = number < kStatusCodes ? number : static_cast<size_t>(absl::StatusCode::kUnknown);
-  mine.codes[static_cast<size_t>(rpc)][known].fetch_add(1, kRelaxed);
+  const auto value = static_cast<size_t>(code);
+  // Count codes outside the known range as UNKNOWN.
+  const size_t index = value < kStatusCodes ? value : static_cast<size_t>(absl::StatusCode::kUnknown);
+  mine.codes[static_cast<size_t>(rpc)][index].fetch_add(1, kRelaxed);
   mine.calls[static_cast<size_t>(rpc)].record(nanoseconds);
 }
 

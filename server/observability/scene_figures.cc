@@ -52,7 +52,7 @@ std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& sc
     if (labelled_.contains(scene.name)) present.insert(scene.name);
   labelled_ = std::move(present);
   for (const SceneFigures& scene : scenes)
-    if (labelled_.size() < most_) labelled_.insert(scene.name);
+    if (labelled_.size() < max_) labelled_.insert(scene.name);
   std::vector<SceneFigures> shown;
   SceneFigures other;
   for (const SceneFigures& scene : scenes) {
