@@ -1,4 +1,4 @@
-// Watchers of the standard health service: what they are told, and when.
+// Watchers of the standard health service: the states they receive, and when.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -13,7 +13,7 @@ namespace {
 
 using google::protobuf::Empty;
 
-// HealthCheckResponse.status.
+// Values of HealthCheckResponse.status.
 enum Health : uint64_t { kNothing = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
 class Watcher {
@@ -27,7 +27,7 @@ class Watcher {
     reader_.reset(grpc::internal::ClientReaderFactory<Empty>::Create(channel.get(), method, &context_, request));
   }
 
-  // What comes next; kNothing at the end.
+  // Returns the next state; kNothing at the end of the stream.
   uint64_t next() {
     Empty response;
     if (!reader_->Read(&response)) return kNothing;
@@ -42,7 +42,7 @@ class Watcher {
   std::unique_ptr<grpc::ClientReader<Empty>> reader_;
 };
 
-TEST(HealthTest, AWatcherIsToldAtOnceAndWhenTheServerDrains) {
+TEST(HealthTest, AWatcherIsNotifiedAtOnceAndWhenTheServerDrains) {
   RunningServer running;
   Watcher watcher(running.stubs().channel, "");
   EXPECT_EQ(watcher.next(), kServing);
@@ -54,7 +54,7 @@ TEST(HealthTest, AWatcherIsToldAtOnceAndWhenTheServerDrains) {
   EXPECT_EQ(watcher.end().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
-TEST(HealthTest, AServiceThatIsNotThereIsUnknownToItsWatcher) {
+TEST(HealthTest, AnUnknownServiceIsReportedAsUnknown) {
   RunningServer running;
   Watcher watcher(running.stubs().channel, "no.such.Service");
   EXPECT_EQ(watcher.next(), kServiceUnknown);
@@ -62,7 +62,7 @@ TEST(HealthTest, AServiceThatIsNotThereIsUnknownToItsWatcher) {
   EXPECT_EQ(watcher.end().error_code(), grpc::StatusCode::CANCELLED);
 }
 
-TEST(HealthTest, OneWatcherTooManyIsRefusedAndThereIsRoomAgainWhenOneLeaves) {
+TEST(HealthTest, WatchersBeyondTheMaximumAreRefusedUntilOneEnds) {
   RunningServer running;
   std::vector<std::unique_ptr<Watcher>> watchers;
   for (uint32_t i = 0; i < server::kMaxHealthWatchers; ++i) {
@@ -75,7 +75,7 @@ TEST(HealthTest, OneWatcherTooManyIsRefusedAndThereIsRoomAgainWhenOneLeaves) {
   EXPECT_EQ(error.limit(), "health_watchers");
   watchers.back()->cancel();
   EXPECT_FALSE(watchers.back()->end().ok());
-  // Its thread notices soon.
+  // The watcher's thread notices the cancellation within 100 ms.
   uint64_t told = kNothing;
   for (int tries = 0; told == kNothing && tries < 600; ++tries) {
     Watcher next(running.stubs().channel, "");

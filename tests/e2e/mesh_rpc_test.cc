@@ -35,7 +35,7 @@ class MeshRpcTest : public RpcTest {
     return call(*stubs().scenes, &v1::SceneService::Stub::DeleteMesh, request, &response);
   }
 
-  // After any refused upload.
+  // Expects the state after a refused upload.
   void expect_nothing_kept() { EXPECT_TRUE(list().empty()); }
 };
 
@@ -82,7 +82,7 @@ TEST_F(MeshRpcTest, WithoutAHashTheServerComputesIt) {
   EXPECT_EQ(response.mesh().sha256(), hash_of({}));
 }
 
-TEST_F(MeshRpcTest, KnownBytesNeedNotBeSentAgain) {
+TEST_F(MeshRpcTest, AMeshWithAKnownHashNeedsNoColumns) {
   ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   v1::UploadMeshRequest request = whole_mesh("other");
   request.set_sha256(hash_of({}));
@@ -93,7 +93,7 @@ TEST_F(MeshRpcTest, KnownBytesNeedNotBeSentAgain) {
   v1::UploadMeshResponse response;
   const auto writer = stubs().scenes->UploadMesh(&context, &response);
   ASSERT_TRUE(writer->Write(request));
-  // Answered though the caller has not said that it is done.
+  // The call is answered although the caller has not closed its side.
   const grpc::Status status = writer->Finish();
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_TRUE(response.already_known());
@@ -102,7 +102,7 @@ TEST_F(MeshRpcTest, KnownBytesNeedNotBeSentAgain) {
   EXPECT_EQ(list().size(), 2u);
 }
 
-TEST_F(MeshRpcTest, UploadingTheSameAgainIsFineAndOtherBytesUnderTheNameAreNot) {
+TEST_F(MeshRpcTest, ANameAcceptsTheSameBytesAgainAndRefusesOthers) {
   ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   v1::UploadMeshResponse response;
   ASSERT_TRUE(upload({whole_mesh("cube")}, &response).ok());
@@ -160,7 +160,7 @@ TEST_F(MeshRpcTest, MoreOrFewerNumbersThanAnnouncedAreRefused) {
   expect_nothing_kept();
 }
 
-TEST_F(MeshRpcTest, WrongVerticesAndIndicesAreNamedWithTheirNumber) {
+TEST_F(MeshRpcTest, WrongVerticesAndIndicesAreNamedWithTheirIndex) {
   CubeMesh mesh;
   mesh.vertices[7] = std::numeric_limits<float>::quiet_NaN();
   expect_refused(upload({whole_mesh("cube", mesh)}),

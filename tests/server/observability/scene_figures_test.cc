@@ -30,13 +30,13 @@ std::vector<std::string> names_of(const std::vector<SceneFigures>& scenes) {
   return names;
 }
 
-TEST(SceneFiguresTest, FewScenesAllHaveTheirLabel) {
+TEST(SceneFiguresTest, UpToTheMaximumEverySceneHasALabel) {
   SceneLabels labels(3);
   EXPECT_THAT(names_of(labels.label(scenes_named({"a", "b", "c"}))), ElementsAre("a", "b", "c"));
   EXPECT_THAT(names_of(labels.label({})), ElementsAre());
 }
 
-TEST(SceneFiguresTest, TheRestIsAddedUp) {
+TEST(SceneFiguresTest, ScenesBeyondTheMaximumAreSummed) {
   SceneLabels labels(2);
   const std::vector<SceneFigures> shown = labels.label(scenes_named({"a", "b", "c", "d", "e"}));
   EXPECT_THAT(names_of(shown), ElementsAre("a", "b", "_other"));
