@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 #include "server/config/server_parser.h"
 
 namespace locus::server {
@@ -45,6 +46,7 @@ struct Given {
 Given read_flags(const std::vector<std::string>& arguments, const Environment& environment) {
   ServerConfig ignored;
   Given given;
+  LOCUS_DCHECK(read_invocation(arguments, environment).config.has_value());
   CLI::App app;
   build_parser(app, ignored);
   app.set_config();  // do not read the file

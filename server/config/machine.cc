@@ -14,6 +14,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 namespace {
@@ -109,6 +110,7 @@ Machine read_machine() {
   const CgroupLimits limits = read_cgroup_limits("");
   machine.cores = std::min(machine.cores, limits.cores.value_or(machine.cores));
   machine.memory_bytes = std::min(machine.memory_bytes, limits.memory_bytes.value_or(machine.memory_bytes));
+  LOCUS_DCHECK_LE(1u, machine.cores);
   return machine;
 }
 

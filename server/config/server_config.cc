@@ -11,6 +11,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/config/listen_address.h"
 #include "server/config/machine.h"
@@ -54,6 +55,7 @@ std::string name_of(const std::map<std::string, T>& names, T value) {
 
 // Returns whether `text` is 0 or in min .. max. CLI11 has already converted a size such as 16MiB to a plain number.
 bool is_size(const std::string& text, uint64_t min, uint64_t max) {
+  LOCUS_DCHECK_LE(min, max);
   uint64_t bytes = 0;
   return absl::SimpleAtoi(text, &bytes) && (bytes == 0 || (bytes >= min && bytes <= max));
 }
@@ -191,6 +193,8 @@ void follow_machine(ServerConfig& config) {
   const Machine machine = read_machine();
   if (config.threads == 0) config.threads = std::min(machine.cores, limits::kMaxThreads);
   if (config.memory_limit == 0) config.memory_limit = machine.memory_bytes / 4 * 3;
+  LOCUS_DCHECK_LE(1u, config.threads);
+  LOCUS_DCHECK_LE(config.threads, limits::kMaxThreads);
 }
 
 absl::Status reachable_from_outside(absl::string_view address) {

@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "core/base/check.h"
 #include "server/config/observability_limits.h"
 #include "server/observability/log.h"
 
@@ -92,6 +93,7 @@ HttpServer::HttpServer(Pages pages) : pages_(std::move(pages)), context_(std::ma
 HttpServer::~HttpServer() = default;
 
 absl::StatusOr<std::unique_ptr<HttpServer>> HttpServer::start(const ListenAddress& address, Pages pages) {
+  LOCUS_DCHECK(address.kind == ListenAddress::Kind::kTcp);
   std::unique_ptr<HttpServer> server(new HttpServer(std::move(pages)));
   const std::vector<std::pair<const char*, std::string>> settings = {
       {"listening_ports", to_string(address, address.port)},

@@ -13,6 +13,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/check.h"
+
 namespace locus::server {
 
 inline constexpr uint32_t kLowestOctave = 10;   // 2^10 ns, a microsecond
@@ -23,6 +25,7 @@ inline constexpr size_t kLatencyBounds = 2 * (kHighestOctave - kLowestOctave) + 
 // Returns the upper bound of a range, in nanoseconds: 2^k, 1.5 * 2^k, 2^(k+1) ... Precondition: `range` <
 // kLatencyBounds.
 constexpr uint64_t latency_bound(size_t range) {
+  LOCUS_DCHECK_LT(range, kLatencyBounds);
   const uint64_t octave = uint64_t{1} << (kLowestOctave + range / 2);
   return range % 2 == 0 ? octave : octave + octave / 2;
 }

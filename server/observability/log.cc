@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 namespace {
@@ -107,7 +108,10 @@ void log(LogLevel level, absl::string_view message, std::initializer_list<LogFie
 
 LogScope::LogScope(TraceContext trace) : trace_(std::move(trace)), outer_(current_trace) { current_trace = &trace_; }
 
-LogScope::~LogScope() { current_trace = outer_; }
+LogScope::~LogScope() {
+  LOCUS_DCHECK(current_trace == &trace_);  // scopes of a thread end in reverse order
+  current_trace = outer_;
+}
 
 TraceContext LogScope::current() { return current_trace == nullptr ? TraceContext() : *current_trace; }
 

@@ -44,6 +44,8 @@ class SceneLabels {
   std::vector<SceneFigures> label(const std::vector<SceneFigures>& scenes);
 
  private:
+  void check_invariants() const;
+
   const size_t max_;
   std::set<std::string> labelled_;
 };

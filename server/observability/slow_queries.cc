@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "server/config/observability_limits.h"
 #include "server/observability/log.h"
 
@@ -22,6 +23,7 @@ void SlowQueries::record(const SlowQuery& query, Time now) {
       return;
     }
     ++lines_;
+    LOCUS_DCHECK_LE(lines_, kMaxSlowQueryLines);
     left_out = std::exchange(left_out_, 0);
   }
   constexpr uint64_t kNanosecondsAMs = 1'000'000;

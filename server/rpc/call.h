@@ -73,9 +73,9 @@ absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& nam
 // DRAINING).
 absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
 
-// Waits until the readers of the scene whose snapshots are revoked have released them; revokes by force those that take
-// longer than a second. Polls `stop` every 50 ms and returns its status if that is not OK; at the call's deadline,
-// returns the scene's own status, which says what the readers hold.
+// Waits until the readers whose snapshots of the scene are revoked have released them. Calls
+// Scene::revoke_overdue_readers() if that takes longer than a second. Polls `stop` every 50 ms and returns its status
+// if that is not OK; at the call's deadline, returns the scene's own status, which names the limit pinned_bytes.
 absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
 
 // Returns UNAVAILABLE while the server recovers its scenes from the disk, or drains.

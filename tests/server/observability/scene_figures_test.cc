@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "server/config/observability_limits.h"
 
@@ -56,6 +58,7 @@ TEST(SceneFiguresTest, ASceneKeepsItsLabelUntilItIsDeleted) {
 TEST(SceneFiguresTest, AThousandScenesMakeNoMoreLabelsThanTheLimit) {
   std::vector<std::string> names;
   for (int i = 0; i < 1000; ++i) names.push_back(absl::StrCat("scene-", i));
+  std::sort(names.begin(), names.end());
   SceneLabels labels(kMaxLabelledScenes);
   MetricPage page;
   add_scene_figures(labels.label(scenes_named(names)), page);
