@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs the Debian packages that locus needs, as far as they are missing. Safe to run again: with everything there it
-# asks nothing of the network and needs no rights.
+# Installs the Debian packages that locus needs and that are missing. Safe to run again: if nothing is missing, it needs
+# neither network nor root rights.
 # shellcheck disable=SC2086  # lists of package names are meant to be split
 set -eu
 
@@ -9,38 +9,38 @@ usage() {
 usage: deploy/packages.sh [--list|--check] SET...
 
 sets:
-  build      what configuring and building locusd and locus needs
-  python     what building and using the Python package needs
-  test       what tests/run.sh needs on top of build
+  build      packages for configuring and building locusd and locus
+  python     packages for building and using the Python package
+  test       packages that tests/run.sh needs in addition to build
   bench      the libraries and servers that build/release/bin/locus-bench compares with
   clang      the compiler of the asan preset and its sanitizers
-  lint       what tests/run.sh --long needs on top of these
-  container  what tests/container.sh needs to build and run the image without a registry or a daemon
-  runtime    what locusd and locus need to run once they are built; the image has nothing else
+  lint       packages that tests/run.sh --long needs in addition to these
+  container  packages that tests/container.sh needs to build and run the image without a registry or a daemon
+  runtime    libraries that locusd and locus need at run time; the image has nothing else
 
   --list    print the names of the packages and do nothing
   --check   print the names of the missing packages; exit 1 if there is one
 TEXT
 }
 
-# The compiler and what find_package and pkg-config look for.
+# The compiler and the libraries that find_package and pkg-config look for.
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev
   prometheus-cpp-dev libcivetweb-dev libcurl4-openssl-dev librocksdb-dev libxxhash-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
-# ccache keeps what was compiled for the next build; binutils gives nm to the house test; prometheus-client and yaml read
-# what is made for Prometheus; zsh and fish run the completions; groff and mandoc read the manual; haproxy stands between
-# a client and the daemon.
+# ccache speeds up later builds; binutils provides nm for tests/house; prometheus-client and yaml read the metrics, alerts
+# and dashboards; zsh and fish run the completions; groff and mandoc format the manual; haproxy is the proxy between a
+# client and the daemon.
 test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutils python3-numpy
   python3-prometheus-client python3-yaml zsh fish mandoc groff-base haproxy"
-# redis-tools holds the server too, without the service that redis-server would start.
+# redis-tools contains the server too, without the service that redis-server would start.
 bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev libnanoflann-dev redis-tools"
 # The compiler of the asan preset, and the libraries of its sanitizers.
 clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"
 # systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
-# The libraries that the programs name themselves; these bring their own.
+# The libraries that the programs link directly; their dependencies follow.
 runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6
   libprometheus-cpp-core1.0 libcivetweb1 libcurl4 librocksdb7.8 libxxhash0"
 

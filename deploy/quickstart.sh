@@ -3,10 +3,10 @@
 #
 #   ./deploy/quickstart.sh [--seconds N] [--objects N] [--keep]
 #
-# Installs what is missing from Debian (as root or with sudo), builds Release into build/release, fetches a level, starts
-# locusd on a free loopback port, and runs `locus demo` against it: moves objects while clients ask, and compares the
-# answers with brute force. Then takes a picture of it all, build/quickstart.png. Exits 1 on any difference. --keep leaves
-# the daemon running.
+# Installs missing Debian packages (as root or with sudo), builds Release into build/release, fetches a level, starts
+# locusd on a free loopback port, and runs `locus demo` against it: moves objects while clients query, and compares the
+# answers with brute force. Then renders the scene to build/quickstart.png. Exits 1 on any difference. --keep leaves the
+# daemon running.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -62,7 +62,7 @@ download_level() {
   return $status
 }
 
-# A machine that never asked for Debian's lists does not know the package: ask once.
+# Updates Debian's package lists once; without them a fresh machine does not know the package.
 update_lists() {
   local as_root=()
   [ "$(id -u)" = 0 ] || as_root=(sudo)
@@ -126,7 +126,7 @@ echo "the level with its moving objects, by four rays a pixel: build/quickstart.
 
 cat << TEXT
 
-All answers were as they must be. Try next:
+All answers were correct. Try next:
   $build/bin/locusd                                  start a daemon on 127.0.0.1:7575
   $build/bin/locus scene create arena                make a scene
   $build/bin/locus import LEVEL --scene arena        put your own level in it (OBJ, PLY, STL, glTF, BSP, PK3)
@@ -136,5 +136,5 @@ TEXT
 if [ "$keep" = yes ]; then
   kill -TERM "${pids[1]}" && wait "${pids[1]}" || true
   trap - EXIT
-  echo "locusd goes on at $main with scene 'demo'; stop it with: kill ${pids[0]}"
+  echo "locusd still runs at $main with scene 'demo'; stop it with: kill ${pids[0]}"
 fi

@@ -1,4 +1,5 @@
-// locusd: reads its options, serves, and on SIGTERM or SIGINT drains and ends.
+// locusd: reads its options and serves until SIGTERM or SIGINT, then drains and ends. `locusd check` and `locusd
+// repair` work on a data directory instead.
 
 #include <malloc.h>
 #include <pthread.h>
@@ -29,17 +30,18 @@
 namespace locus::server {
 namespace {
 
+// Exit code after a second signal.
 constexpr int kEndedAtOnce = 130;
 
-// Messages of megabytes come and go all the time. By default glibc gives their memory back to the kernel each time,
-// which halves throughput. Where memory is short, less is kept.
+// Makes glibc keep freed memory. By default it returns the memory of large messages to the kernel each time, which
+// halves throughput. Keeps at most 512 MiB, or an eighth of the memory limit if that is less.
 void keep_freed_memory(uint64_t memory_limit) {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, static_cast<int>(std::min(uint64_t{512} << 20, memory_limit / 8)));
   mallopt(M_TOP_PAD, 16 << 20);
 }
 
-// A connection is a file: as many as the system lets this process have.
+// Raises the limit on open files as far as the system permits, because each connection is a file.
 void allow_many_files() {
   rlimit limit;
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
@@ -54,23 +56,26 @@ int wait_for_signal(const sigset_t& signals) {
   return signal;
 }
 
-// Hears of signals from before the server starts, which may take a while, and for good: never destroyed.
+// Thread that waits for SIGTERM and SIGINT. It starts before the server, whose start may take a while, and is never
+// destroyed. A second signal ends the process at once.
 class EndingSignals {
  public:
-  static EndingSignals& hear() {
+  static EndingSignals& listen() {
     static EndingSignals* const signals = new EndingSignals;
     return *signals;
   }
 
-  const std::atomic<bool>& came() const { return came_; }
-  // The first one.
+  // Returns a flag that becomes true with the first signal.
+  const std::atomic<bool>& received() const { return received_; }
+  // Waits for the first signal and returns its number.
   int wait() {
     first_.wait();
     return signal_;
   }
 
  private:
-  // Before any other thread starts, so that all of them leave these signals to this one.
+  // Blocks the signals in the calling thread. It must run before any other thread starts, so that all threads inherit
+  // the mask and only this one receives the signals.
   EndingSignals() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGTERM);
@@ -78,7 +83,7 @@ class EndingSignals {
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
     std::thread([this] {
       signal_ = wait_for_signal(signals_);
-      came_.store(true);
+      received_.store(true);
       first_.post();
       wait_for_signal(signals_);
       std::_Exit(kEndedAtOnce);
@@ -87,11 +92,12 @@ class EndingSignals {
 
   sigset_t signals_;
   int signal_ = 0;
-  std::atomic<bool> came_{false};
+  std::atomic<bool> received_{false};
   Semaphore first_;
 };
 
-// Whole or not at all: a reader never sees half a number. Nothing where there is no path; says itself why it failed.
+// Writes the port to a file by renaming a temporary one, so that a reader never sees half a number. Does nothing if
+// `path` is empty. Logs the error and returns false if it fails.
 bool write_port_file(const std::string& path, uint16_t port) {
   if (path.empty()) return true;
   const std::string temporary = absl::StrCat(path, ".tmp");
@@ -117,10 +123,10 @@ void log_start(const Server& server, const ServerConfig& config) {
        {"receive_bytes", absl::StrCat(config.max_receive_bytes)},
        {"streams", absl::StrCat(config.max_streams)},
        {"storage", config.data_dir.empty() ? "memory only: scenes are lost at exit" : config.data_dir}});
-  if (config.insecure) log(LogLevel::kWarning, "insecure: nothing is encrypted and nobody is asked who they are");
+  if (config.insecure) log(LogLevel::kWarning, "insecure: connections are neither encrypted nor authenticated");
 }
 
-// Null where scenes are kept in memory only.
+// Opens the log of the data directory; returns null if scenes are kept in memory only.
 absl::StatusOr<std::unique_ptr<UpdateLog>> open_log(const ServerConfig& config) {
   if (config.data_dir.empty()) return nullptr;
   StorageOptions options;
@@ -130,24 +136,24 @@ absl::StatusOr<std::unique_ptr<UpdateLog>> open_log(const ServerConfig& config) 
 
 int run(const ServerConfig& config) {
   start_logging(config.log_level, config.log_format);
-  // A server that does not start says why itself; what gRPC has to say of it helps nobody.
+  // While the server starts, hide gRPC's errors: Server::start() reports why it failed in better words.
   capture_library_logs(LogLevel::kDebug);
   if (const absl::Status chosen = use_instruction_set(config.instruction_set); !chosen.ok()) {
     log(LogLevel::kError, chosen.message());
     return EXIT_FAILURE;
   }
-  EndingSignals& signals = EndingSignals::hear();
-  // Outlives the server, which writes to it to its last moment.
-  const absl::StatusOr<std::unique_ptr<UpdateLog>> kept = open_log(config);
-  if (!kept.ok()) {
-    log(LogLevel::kError, kept.status().message());
+  EndingSignals& signals = EndingSignals::listen();
+  // Declared before the server, which writes to it until its end.
+  const absl::StatusOr<std::unique_ptr<UpdateLog>> update_log = open_log(config);
+  if (!update_log.ok()) {
+    log(LogLevel::kError, update_log.status().message());
     return EXIT_FAILURE;
   }
-  const absl::StatusOr<std::unique_ptr<Server>> server = Server::start(config, kept->get(), signals.came());
+  const absl::StatusOr<std::unique_ptr<Server>> server = Server::start(config, update_log->get(), signals.received());
   if (!server.ok()) {
-    const bool told = signals.came().load() && absl::IsCancelled(server.status());
-    log(told ? LogLevel::kInfo : LogLevel::kError, server.status().message());
-    return told ? EXIT_SUCCESS : EXIT_FAILURE;
+    const bool stopped = signals.received().load() && absl::IsCancelled(server.status());
+    log(stopped ? LogLevel::kInfo : LogLevel::kError, server.status().message());
+    return stopped ? EXIT_SUCCESS : EXIT_FAILURE;
   }
   if (!write_port_file(config.http_port_file, (*server)->http_port()) ||
       !write_port_file(config.port_file, (*server)->port()))
@@ -171,7 +177,8 @@ int print(const absl::StatusOr<Report>& report) {
   return EXIT_SUCCESS;
 }
 
-// check: 0 where all is sound. repair: 0 where the directory can be used afterwards.
+// Runs `locusd check` or `locusd repair` and returns the exit code: 0 if check finds no damage, or if the directory can
+// be used after the repair.
 int maintain(const Maintenance& maintenance) {
   StorageOptions options;
   options.path = maintenance.directory;

@@ -1,5 +1,5 @@
-// Manual pages from a parser's words: one for a program and one for each of its commands. What a parser does not know,
-// exit statuses and variables, comes along as a Manual. For write_manual.cc.
+// Generates manual pages from a parser's texts: one for a program and one for each of its commands. Exit statuses and
+// environment variables, which the parser does not have, are given as a Manual. For write_manual.cc.
 #ifndef LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 #define LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 
@@ -11,16 +11,16 @@
 
 namespace locus::manual {
 
-// A word and what there is to say of it.
+// Pairs of a term and its explanation.
 using Explained = std::vector<std::pair<std::string, std::string>>;
 
-// What all pages of one program share.
+// Properties that all pages of a program share.
 struct Manual {
   std::string section;  // "1" for programs, "8" for daemons
   std::string version;
   Explained exit_statuses = {};
   Explained variables = {};
-  std::vector<std::string> see_also = {};  // names of pages with their sections: "locusd(8)"
+  std::vector<std::string> see_also = {};  // other pages with their sections, such as "locusd(8)"
 };
 
 struct Page {
@@ -28,7 +28,7 @@ struct Page {
   std::string roff;
 };
 
-// The page of the program and of every command below it, the program's first.
+// Returns the pages of the program and of every command below it, the program's first.
 std::vector<Page> manual_pages(const cli::CommandWords& program, const Manual& manual);
 
 }  // namespace locus::manual

@@ -26,7 +26,7 @@ std::vector<Page> pages_of_locus() {
                         {"4", "The server denied it."},
                         {"5", "The scene, mesh, object or file is not there."}},
       .variables = {{"LOCUS_ADDRESS", "Where locusd listens, if --address is not given."},
-                    {"LOCUS_SCENE", "The scene of commands that are given none."}},
+                    {"LOCUS_SCENE", "The scene of commands that do not name one."}},
       .see_also = {"locusd(8)"},
   };
   return manual_pages(cli::words_of(app), manual);
@@ -42,7 +42,7 @@ std::vector<Page> pages_of_locusd() {
   Manual manual = {
       .section = "8",
       .version = server::kVersion,
-      .exit_statuses = {{"0", "It drained and ended as it was told to, or printed its help or version."},
+      .exit_statuses = {{"0", "It drained and ended after a signal, or printed its help or version."},
                         {"1", "It could not serve, or the directory is not sound; standard error says why."},
                         {"2", "Its options, environment or file are wrong."},
                         {"130", "A second signal ended it at once."}},

@@ -1,5 +1,5 @@
-// The pages of the two programs that are installed. The only place that sees the parsers of both: neither program
-// includes anything of the other.
+// The manual pages of the two installed programs. The only file that includes the parsers of both: neither program
+// includes code of the other.
 #ifndef LOCUS_DEPLOY_MANUAL_PROGRAMS_H_
 #define LOCUS_DEPLOY_MANUAL_PROGRAMS_H_
 
@@ -9,10 +9,10 @@
 
 namespace locus::manual {
 
-// locus(1) and a page for each command.
+// Returns locus(1) and a page for each of its commands.
 std::vector<Page> pages_of_locus();
 
-// locusd(8).
+// Returns locusd(8) and a page for each of its commands.
 std::vector<Page> pages_of_locusd();
 
 }  // namespace locus::manual

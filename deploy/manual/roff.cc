@@ -12,7 +12,7 @@ std::string escaped(const std::string& text) {
   std::string roff;
   bool line_begins = true;
   for (const char c : text) {
-    // A line that begins with one of these is a command.
+    // roff takes a line that begins with one of these characters as a command.
     if (line_begins && (c == '.' || c == '\'')) absl::StrAppend(&roff, "\\&");
     switch (c) {
       case '\\':
@@ -59,7 +59,7 @@ RoffPage& RoffPage::heading(const std::string& name) {
 
 namespace {
 
-// Running text, whose long lists without blanks may go on in the next line after a comma. Hyphenation is off.
+// Returns escaped running text in which long words may break after a comma. Hyphenation is off.
 std::string running(const std::string& line) {
   constexpr size_t kLongWord = 30;
   std::vector<std::string> words = absl::StrSplit(escaped(line), ' ');

@@ -9,12 +9,13 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 #include "server/config/server_parser.h"
 
 namespace locus::server {
 namespace {
 
-// The lines of the file that set the option, as 3 or 3,7; empty where none does.
+// Returns the numbers of the lines of the file that set the option, such as "3" or "3,7"; empty if there are none.
 std::string lines_that_set(const std::string& path, const std::string& name) {
   std::ifstream file(path);
   std::string lines;
@@ -26,7 +27,7 @@ std::string lines_that_set(const std::string& path, const std::string& name) {
   return lines;
 }
 
-// A parser over the options in use shows them as if they were its defaults.
+// Returns the option's value as text. The parser was built over the options in use, so it shows them as its defaults.
 std::string value_of(const CLI::Option& option, const ServerConfig& config) {
   if (option.get_expected_max() == 0) return config.insecure ? "true" : "false";  // the only flag without a value
   const std::string text = option.get_default_str();
@@ -35,19 +36,20 @@ std::string value_of(const CLI::Option& option, const ServerConfig& config) {
   return text;
 }
 
-// What flags alone set, and the file that they or the environment name.
+// Options that are set by flags, and the file that a flag or the environment names.
 struct Given {
   std::vector<std::string> flags;
   std::string file;
 };
 
-// `arguments` have been read without a mistake.
+// Parses the flags only. Precondition: read_invocation() accepts `arguments`.
 Given read_flags(const std::vector<std::string>& arguments, const Environment& environment) {
   ServerConfig ignored;
   Given given;
+  LOCUS_DCHECK(read_invocation(arguments, environment).config.has_value());
   CLI::App app;
   build_parser(app, ignored);
-  app.set_config();  // the file is no matter of flags
+  app.set_config();  // do not read the file
   app.add_option("--config", given.file);
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   app.parse(std::move(reversed));

@@ -1,5 +1,5 @@
-// Which options the daemon would run with, and where each value comes from, without running it: for people who ask why
-// a daemon does what it does. Function without state.
+// Lists the options that the daemon would run with, and the origin of each value, without running it. For operators who
+// ask why a daemon behaves as it does. Functions without state; any thread.
 #ifndef LOCUS_SERVER_CONFIG_CONFIG_ORIGINS_H_
 #define LOCUS_SERVER_CONFIG_CONFIG_ORIGINS_H_
 
@@ -12,18 +12,18 @@
 namespace locus::server {
 
 enum class Origin : uint8_t { kFlag, kEnvironment, kFile, kDefault };
-// "flag", "environment", "file" or "default".
+// Returns "flag", "environment", "file" or "default".
 const char* origin_name(Origin origin);
 
 struct ConfigValue {
-  std::string name;   // of the option, without dashes
-  std::string value;  // as used: where the default follows the machine, what it comes to here
+  std::string name;   // name of the option, without dashes
+  std::string value;  // value in use, also for defaults that are computed from the machine
   Origin origin = Origin::kDefault;
-  std::string place;  // the flag, the variable, path:line, or empty
+  std::string place;  // the flag, the variable, path:line, or empty for a default
 };
 
-// Every option, in the order of the help. `arguments` as read_invocation() takes them; INVALID_ARGUMENT with the text
-// that the daemon would end with.
+// Returns every option, in the order of the help. `arguments` are as for read_invocation(). Returns INVALID_ARGUMENT
+// with the text that the daemon would print, if it would refuse to run.
 absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::string>& arguments,
                                                         const Environment& environment);
 

@@ -7,11 +7,12 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 namespace {
 
-// What the kernel takes for the path of a unix socket, its ending zero included.
+// Size of sockaddr_un::sun_path: the maximum length of a unix socket's path, including the terminating zero.
 constexpr size_t kMaxUnixPath = 108;
 
 absl::Status bad_address(absl::string_view text, absl::string_view why) {
@@ -61,6 +62,7 @@ absl::StatusOr<ListenAddress> parse_listen_address(absl::string_view text) {
 }
 
 std::string to_string(const ListenAddress& address, uint16_t port) {
+  LOCUS_DCHECK_EQ(address.path.empty(), address.kind == ListenAddress::Kind::kTcp);
   if (address.kind == ListenAddress::Kind::kUnix) return absl::StrCat("unix:", address.path);
   if (address.host.find(':') != std::string::npos) return absl::StrCat("[", address.host, "]:", port);
   return absl::StrCat(address.host, ":", port);

@@ -14,15 +14,16 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 namespace {
 
 constexpr const char* kGroups = "/sys/fs/cgroup";
-// More levels than any manager of groups nests.
+// Maximum depth of nested groups; deeper ones are not read.
 constexpr int kMaxDepth = 64;
 
-// The words of a file's first line; none if it cannot be read.
+// Returns the words of a file's first line; none if it cannot be read.
 std::vector<std::string> first_line(const std::string& path) {
   std::string line;
   std::ifstream file(path);
@@ -47,14 +48,14 @@ std::optional<uint32_t> cores_of(std::optional<uint64_t> quota, std::optional<ui
   return static_cast<uint32_t>(std::min(cores, 65536.0));
 }
 
-// `see` for the folder of the group and of each group above it, the topmost last.
-void climb(const std::string& top, std::string group, const std::function<void(const std::string&)>& see) {
-  if (absl::StrContains(group, "..")) group.clear();  // outside of what this process sees
+// Calls `visit` with the folder of the group and of each group above it, the topmost last.
+void climb(const std::string& top, std::string group, const std::function<void(const std::string&)>& visit) {
+  if (absl::StrContains(group, "..")) group.clear();  // outside of the file system that this process sees
   for (int depth = 0; depth < kMaxDepth && group.size() > 1; ++depth) {
-    see(absl::StrCat(top, group));
+    visit(absl::StrCat(top, group));
     group.resize(std::min(group.find_last_of('/'), group.size() - 1));
   }
-  see(top);
+  visit(top);
 }
 
 void read_version_2(const std::string& top, const std::string& group, CgroupLimits& limits) {
@@ -109,6 +110,7 @@ Machine read_machine() {
   const CgroupLimits limits = read_cgroup_limits("");
   machine.cores = std::min(machine.cores, limits.cores.value_or(machine.cores));
   machine.memory_bytes = std::min(machine.memory_bytes, limits.memory_bytes.value_or(machine.memory_bytes));
+  LOCUS_DCHECK_LE(1u, machine.cores);
   return machine;
 }
 

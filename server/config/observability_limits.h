@@ -1,5 +1,4 @@
-// The maxima of what the daemon tells about itself: metrics, health pages and logs. `locus limits` lists those that
-// somebody may meet. Plain constants.
+// Maxima of metrics, health pages and logs. `locus limits` lists those that a user can reach. Plain constants.
 #ifndef LOCUS_SERVER_CONFIG_OBSERVABILITY_LIMITS_H_
 #define LOCUS_SERVER_CONFIG_OBSERVABILITY_LIMITS_H_
 
@@ -8,16 +7,16 @@
 
 namespace locus::server {
 
-inline constexpr size_t kMaxLabelledScenes = 100;       // with figures of their own in /metrics, the rest in one sum
-inline constexpr size_t kMaxRefusalNames = 64;          // counted apart in /metrics
-inline constexpr uint32_t kHttpThreads = 2;             // that answer, one connection each
-inline constexpr uint32_t kMaxHttpWaiting = 16;         // connections that wait for one of them
+inline constexpr size_t kMaxLabelledScenes = 100;       // scenes with their own label in /metrics; the rest is one sum
+inline constexpr size_t kMaxRefusalNames = 64;          // pairs of reason and limit that /metrics counts separately
+inline constexpr uint32_t kHttpThreads = 2;             // threads that answer, one connection each
+inline constexpr uint32_t kMaxHttpWaiting = 16;         // connections that wait for such a thread
 inline constexpr uint32_t kMaxHttpRequestBytes = 8192;  // request line and headers
-inline constexpr uint32_t kHttpTimeoutMs = 2000;        // for a request to come, and for its answer to be taken
+inline constexpr uint32_t kHttpTimeoutMs = 2000;        // for reading a request, and for writing its answer
 inline constexpr size_t kMaxRequestIdLength = 64;       // characters of a caller's x-request-id
-inline constexpr uint32_t kMaxHealthWatchers = 32;      // each keeps a thread
-inline constexpr uint32_t kMaxSlowQueryMs = 3'600'000;  // what --slow-query-ms may be
-inline constexpr uint32_t kMaxSlowQueryLines = 10;      // logged a second, the rest are counted
+inline constexpr uint32_t kMaxHealthWatchers = 32;      // each occupies a thread
+inline constexpr uint32_t kMaxSlowQueryMs = 3'600'000;  // maximum of --slow-query-ms
+inline constexpr uint32_t kMaxSlowQueryLines = 10;      // lines a second; the rest is only counted
 
 }  // namespace locus::server
 

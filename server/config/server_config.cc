@@ -11,6 +11,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/config/listen_address.h"
 #include "server/config/machine.h"
@@ -52,10 +53,11 @@ std::string name_of(const std::map<std::string, T>& names, T value) {
   return "";
 }
 
-// CLI11 has made a plain number of the size by now.
-bool is_size(const std::string& text, uint64_t least, uint64_t most) {
+// Returns whether `text` is 0 or in min .. max. CLI11 has already converted a size such as 16MiB to a plain number.
+bool is_size(const std::string& text, uint64_t min, uint64_t max) {
+  LOCUS_DCHECK_LE(min, max);
   uint64_t bytes = 0;
-  return absl::SimpleAtoi(text, &bytes) && (bytes == 0 || (bytes >= least && bytes <= most));
+  return absl::SimpleAtoi(text, &bytes) && (bytes == 0 || (bytes >= min && bytes <= max));
 }
 
 std::string check_memory(const std::string& text) {
@@ -75,7 +77,7 @@ std::string check_snapshot_after(const std::string& text) {
   return good ? "" : absl::StrCat(text, " bytes is not in 64KiB .. 1PiB");
 }
 
-// The options as CLI11 sees them, writing to `config`. CLI11 keeps pointers into it.
+// Adds all options to the parser, which keeps pointers into `config` and writes the parsed values there.
 void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--listen", config.listen, "Address to listen on: host:port, [v6]:port or unix:/path; repeatable")
       ->delimiter(',')
@@ -92,7 +94,7 @@ void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--data-dir", config.data_dir, "Directory that scenes are kept in; empty = memory only")
       ->capture_default_str();
   app.add_option("--snapshot-after", config.snapshot_after,
-                 "Log of a scene after which a snapshot takes its place, such as 16MiB")
+                 "Size of a scene's log after which a snapshot replaces it, such as 16MiB")
       ->transform(CLI::AsSizeValue(false).description("SIZE"))
       ->check(CLI::Validator(check_snapshot_after, ""))
       ->capture_default_str();
@@ -102,7 +104,7 @@ void add_options(CLI::App& app, ServerConfig& config) {
   const std::map<std::string, BatchPriority> priorities = {{"nice", BatchPriority::kNice},
                                                            {"idle", BatchPriority::kIdle}};
   app.add_option("--batch-priority", config.batch_priority,
-                 "Of threads on large batches: nice, 10 below all others, or idle, only on idle cores")
+                 "Priority of threads on large batches: nice, 10 below all others, or idle, only on idle cores")
       ->transform(CLI::CheckedTransformer(priorities).description(""))
       ->default_str(name_of(priorities, config.batch_priority));
   app.add_option("--instruction-set", config.instruction_set,
@@ -127,10 +129,10 @@ void add_options(CLI::App& app, ServerConfig& config) {
     app.add_option(name, value, what)->check(CLI::Range(1u, value))->capture_default_str();
   };
   add_limit("--max-receive-bytes", config.max_receive_bytes, "Largest message that is received");
-  add_limit("--max-scenes", config.max_scenes, "Most scenes");
-  add_limit("--max-meshes", config.max_meshes, "Most meshes");
-  add_limit("--max-streams", config.max_streams, "Most open update and query streams");
-  add_limit("--max-calls", config.max_calls, "Most calls in work at once, streams apart");
+  add_limit("--max-scenes", config.max_scenes, "Maximum number of scenes");
+  add_limit("--max-meshes", config.max_meshes, "Maximum number of meshes");
+  add_limit("--max-streams", config.max_streams, "Maximum number of open update and query streams");
+  add_limit("--max-calls", config.max_calls, "Maximum number of calls at once, without streams");
   app.add_option("--memory-limit", config.memory_limit,
                  "Memory to hold before more is refused, such as 512MiB; 0 = 3/4 of what there is")
       ->transform(CLI::AsSizeValue(false).description("SIZE"))
@@ -155,14 +157,15 @@ void describe(CLI::App& app) {
   app.allow_config_extras(CLI::config_extras_mode::error);
 }
 
-// CLI11 takes its arguments last first.
+// Parses the arguments, which CLI11 expects in reverse order.
 void parse(CLI::App& app, std::vector<std::string> arguments) {
   std::reverse(arguments.begin(), arguments.end());
   app.parse(std::move(arguments));
 }
 
-// CLI11 lets a file win over the environment. So a first pass over the flags alone finds the options that no flag sets,
-// and those that the environment sets are added as flags; the file then fills what is still open.
+// Returns the arguments with options of the environment added as flags. In CLI11 a file wins over the environment; here
+// the environment must win. So this parses the flags alone, and adds every option that no flag sets but the environment
+// does; the file then only sets the remaining ones.
 std::vector<std::string> with_environment(const std::vector<std::string>& arguments, const Environment& environment) {
   ServerConfig ignored;
   std::string ignored_file;
@@ -185,11 +188,13 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
   return all;
 }
 
-// What the machine decides where the operator does not.
+// Sets the options that the operator left at 0 according to the machine.
 void follow_machine(ServerConfig& config) {
   const Machine machine = read_machine();
   if (config.threads == 0) config.threads = std::min(machine.cores, limits::kMaxThreads);
   if (config.memory_limit == 0) config.memory_limit = machine.memory_bytes / 4 * 3;
+  LOCUS_DCHECK_LE(1u, config.threads);
+  LOCUS_DCHECK_LE(config.threads, limits::kMaxThreads);
 }
 
 absl::Status reachable_from_outside(absl::string_view address) {
@@ -221,7 +226,7 @@ Invocation mistake(absl::string_view message) {
   return invocation;
 }
 
-// May throw CLI11's errors.
+// Parses and checks the command line. May throw CLI11's errors.
 Invocation parse_all(const std::vector<std::string>& arguments, const Environment& environment) {
   Invocation invocation;
   ServerConfig config;
@@ -246,7 +251,7 @@ Invocation help(const std::vector<std::string>& arguments) {
   build_parser(app, config);
   Invocation invocation;
   add_maintenance(app, invocation.maintenance);
-  // Of the command that is named, if one is.
+  // Show the help of the named command, if there is one.
   const CLI::App* asked = &app;
   for (const CLI::App* command : app.get_subcommands({}))
     if (std::find(arguments.begin(), arguments.end(), command->get_name()) != arguments.end()) asked = command;

@@ -1,5 +1,5 @@
-// The parser of locusd's command line and of its file: for server_config.cc, which reads with it, and for the manual,
-// which is written from it. Not for the rest of the server, which sees a ServerConfig only.
+// The parser of locusd's command line and file: for server_config.cc, which parses with it, and for the manual, which
+// is generated from it. The rest of the server only sees a ServerConfig. Functions without state.
 #ifndef LOCUS_SERVER_CONFIG_SERVER_PARSER_H_
 #define LOCUS_SERVER_CONFIG_SERVER_PARSER_H_
 
@@ -11,17 +11,17 @@
 
 namespace locus::server {
 
-// Adds name, help, every option and the file of --config to `app`, which keeps pointers into `config`. The environment
-// is no matter of the parser: see environment_variable().
+// Adds name, help, every option and the file of --config to `app`, which keeps pointers into `config`. The parser does
+// not read the environment: see environment_variable().
 void build_parser(CLI::App& app, ServerConfig& config);
 
-// Adds the commands `check` and `repair`. The one that is chosen is in `chosen` once a line is parsed.
+// Adds the commands `check` and `repair`. Parsing a line with one of them sets `chosen`, which must outlive `app`.
 void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen);
 
-// Whether an empty variable sets the option, to nothing, rather than being as good as none.
+// Returns whether an empty environment variable sets the option to the empty string. For other options it is ignored.
 bool may_be_empty(const std::string& option);
 
-// The variable that sets an option: "drain-grace-s" is set by LOCUS_DRAIN_GRACE_S.
+// Returns the environment variable of an option: "drain-grace-s" is set by LOCUS_DRAIN_GRACE_S.
 std::string environment_variable(const std::string& option);
 
 }  // namespace locus::server

@@ -1,4 +1,4 @@
-// The server's version: what `locusd --version` prints and GetServer answers. The build takes it from the project.
+// The server's version, printed by `locusd --version` and returned by GetServer. The build sets it from the project.
 #ifndef LOCUS_SERVER_CONFIG_VERSION_H_
 #define LOCUS_SERVER_CONFIG_VERSION_H_
 

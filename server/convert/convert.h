@@ -1,6 +1,6 @@
-// The only way between the protocol's messages and the core's types. Columns are borrowed: what comes out points into
-// the message, which must outlive it. Checks what only the protocol can get wrong (enum numbers, fields that exclude
-// each other, kinds that are not served); lengths and values are the core's to check.
+// The only conversions between the protocol's messages and the core's types. Columns are borrowed: the results point
+// into the message, which must outlive them. Refuses errors that only a protocol message can have (unknown enum
+// numbers, fields that exclude each other, kinds that are not served); the core checks lengths and values.
 //
 // Pure functions. Errors name the field as the protocol spells it.
 #ifndef LOCUS_SERVER_CONVERT_CONVERT_H_
@@ -21,6 +21,7 @@
 
 namespace locus::server {
 
+// Returns a view of a repeated field; no copy.
 template <class Repeated>
 auto span_of(const Repeated& column) {
   return absl::MakeConstSpan(column.data(), static_cast<size_t>(column.size()));
@@ -29,17 +30,18 @@ auto span_of(const Repeated& column) {
 Vec3d to_vec(const v1::Vec3d& vec);
 v1::Vec3d to_proto(const Vec3d& vec);
 
-// Both fields 0 and a revision set to 0 are as the schema says: the latest, unchecked.
+// Converts a view. As the schema defines, revision 0 means the latest revision, and epoch 0 means any epoch.
 View to_view(const v1::View& view);
 
-// Also refuses more lists than a batch may have, before anything is allocated for them.
+// Converts a batch of updates. Refuses more lists than limits::kMaxUpdateLists before anything is allocated for them.
 absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch);
 v1::UpdateAck to_proto(const UpdateAck& ack);
 
+// Converts a batch of queries. Refuses more blocks than limits::kMaxBlocks before anything is allocated for them.
 absl::StatusOr<QueryBatch> to_queries(const v1::QueryBatch& batch);
 v1::Work to_proto(const Work& work, uint64_t nanoseconds);
 
-// Without `static_from`, which the registry looks up.
+// Converts the specification of a scene, except `static_from`, which the registry resolves.
 absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec);
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
 v1::Scene to_proto(const Scene& scene);

@@ -9,7 +9,7 @@
 namespace locus::server {
 namespace {
 
-// The core's value for each number of a protocol enum; number 0 is the default.
+// Tables from the number of a protocol enum to the core's value; number 0 is the default.
 constexpr std::array kSources = {Source::kBoth, Source::kBoth, Source::kStatic, Source::kDynamic};
 constexpr std::array kPrecisions = {Precision::kExact, Precision::kExact, Precision::kConservative};
 constexpr std::array kRayModes = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};

@@ -7,7 +7,7 @@
 namespace locus::server {
 namespace {
 
-// Bounds of everything at one revision. Touches every object, so it is for descriptions only.
+// Returns the bounds of all objects and instances at one revision. O(objects), so it is for descriptions only.
 Aabbd bounds_of_all(const SceneSnapshot& snapshot) {
   Aabbd bounds = snapshot.statics->tree().bounds();
   snapshot.objects.for_each([&bounds](const Object& object) { bounds = merge(bounds, bounds_of(object.shape)); });

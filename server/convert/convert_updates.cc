@@ -10,7 +10,7 @@ absl::Status malformed(absl::string_view field, absl::string_view message) {
   return refuse_argument(Reason::kMalformed, field, {}, message);
 }
 
-// Exactly one of the two ways to give positions; with no ids, none is fine too.
+// Checks that exactly one of the two columns of positions is given; without ids, neither is needed.
 template <class Message>
 absl::Status check_positions(const Message& message, const std::string& field) {
   const bool relative = !message.positions().empty();

@@ -3,7 +3,7 @@
 namespace locus::server {
 namespace {
 
-// Room that is written by somebody else before it is read.
+// Appends `entries` entries to the column and returns a pointer to the first. The caller must write all of them.
 template <class T>
 T* grow(google::protobuf::RepeatedField<T>& column, size_t entries) {
   const int before = column.size();
@@ -12,7 +12,7 @@ T* grow(google::protobuf::RepeatedField<T>& column, size_t entries) {
   return column.mutable_data() + before;
 }
 
-// The fields of the protocol that the arrays of kColumnArrays are, in that order.
+// Accessors of the protocol's fields for the arrays of kColumnArrays, in that order.
 constexpr auto kFields = std::make_tuple([](v1::BlockResult& to) { return to.mutable_t(); },          //
                                          [](v1::BlockResult& to) { return to.mutable_ids(); },        //
                                          [](v1::BlockResult& to) { return to.mutable_triangles(); },  //
@@ -27,9 +27,9 @@ constexpr auto kFields = std::make_tuple([](v1::BlockResult& to) { return to.mut
 static_assert(std::tuple_size_v<decltype(kFields)> == std::tuple_size_v<decltype(kColumnArrays)>);
 
 // Calls visit(array, field) for each array of a result and its field of the protocol.
-template <class Visit, size_t... kNumbers>
-void for_each_field(const Visit& visit, std::index_sequence<kNumbers...>) {
-  (visit(std::get<kNumbers>(kColumnArrays), std::get<kNumbers>(kFields)), ...);
+template <class Visit, size_t... kIndices>
+void for_each_field(const Visit& visit, std::index_sequence<kIndices...>) {
+  (visit(std::get<kIndices>(kColumnArrays), std::get<kIndices>(kFields)), ...);
 }
 template <class Visit>
 void for_each_field(const Visit& visit) {
@@ -39,7 +39,7 @@ void for_each_field(const Visit& visit) {
 }  // namespace
 
 ResultColumns::ResultColumns(v1::QueryResult& result, size_t blocks) : result_(result) {
-  // Cleared blocks are used again by add_blocks().
+  // Protobuf keeps cleared blocks, and add_blocks() reuses them.
   result.clear_blocks();
   for (size_t i = 0; i < blocks; ++i) result.add_blocks();
 }

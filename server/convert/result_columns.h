@@ -1,5 +1,5 @@
-// A query batch's answer written straight into the columns of its reply: memory is made once and no number is moved
-// again.
+// Sink that writes the answer of a query batch directly into the columns of its reply: each column is allocated once,
+// and no value is copied again. For one thread at a time.
 #ifndef LOCUS_SERVER_CONVERT_RESULT_COLUMNS_H_
 #define LOCUS_SERVER_CONVERT_RESULT_COLUMNS_H_
 
@@ -10,8 +10,8 @@ namespace locus::server {
 
 class ResultColumns final : public AnswerSink {
  public:
-  // `result` is borrowed; it gets `blocks` blocks, which replace what it has. Columns of blocks that it had before keep
-  // their memory.
+  // Replaces the blocks of `result`, which is borrowed, by `blocks` empty ones. Their columns reuse the memory of the
+  // previous blocks.
   ResultColumns(v1::QueryResult& result, size_t blocks);
 
   RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) override;
@@ -22,7 +22,7 @@ class ResultColumns final : public AnswerSink {
   uint32_t* add_clamped(size_t block, size_t queries) override;
 
  private:
-  v1::BlockResult& block(size_t number) { return *result_.mutable_blocks(static_cast<int>(number)); }
+  v1::BlockResult& block(size_t index) { return *result_.mutable_blocks(static_cast<int>(index)); }
 
   v1::QueryResult& result_;
 };

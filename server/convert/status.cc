@@ -7,7 +7,7 @@
 namespace locus::server {
 namespace {
 
-// gRPC metadata is refused by peers beyond 8 KiB in all; the message is in it three times.
+// Maximum bytes of a text. Peers refuse metadata of more than 8 KiB in total, and it contains the message three times.
 constexpr size_t kMaxText = 1024;
 constexpr uint32_t kDrainRetryMs = 1000;
 constexpr uint32_t kRecoveryRetryMs = 200;
@@ -19,7 +19,7 @@ static_assert(static_cast<int>(Reason::kMalformed) == v1::REASON_MALFORMED);
 static_assert(static_cast<int>(Reason::kNotServed) == v1::REASON_NOT_SERVED);
 static_assert(static_cast<int>(Reason::kNotFinite) == v1::REASON_NOT_FINITE);
 
-// At most kMaxText bytes that end with a whole UTF-8 character.
+// Returns at most kMaxText bytes of `text`, cut between UTF-8 characters.
 std::string cut(absl::string_view text) {
   if (text.size() <= kMaxText) return std::string(text);
   size_t end = kMaxText;

@@ -1,5 +1,5 @@
-// The only map between the house's errors (absl::Status with a Refusal) and the protocol's (grpc::Status with a
-// locus.v1.Error in its details). Pure functions.
+// The only conversion from the server's errors (absl::Status with a Refusal) to the protocol's (grpc::Status with a
+// locus.v1.Error in its details), and the errors that the server itself returns. Pure functions.
 #ifndef LOCUS_SERVER_CONVERT_STATUS_H_
 #define LOCUS_SERVER_CONVERT_STATUS_H_
 
@@ -12,23 +12,23 @@
 
 namespace locus::server {
 
-// What a refused message of a stream is answered with. `status` is not OK. Texts that a caller could blow up are cut
-// to what fits into metadata.
+// Returns the error that answers a refused message of a stream. `status` must not be OK. Texts, which can contain text
+// of the caller, are cut to 1,024 bytes, so that they fit into metadata.
 v1::Error to_error(const absl::Status& status);
 
-// What a refused call ends with: the details hold a locus.v1.Status with one Error. OK stays OK.
+// Returns the status of a refused call, with details that hold a locus.v1.Status with one Error; OK for OK.
 grpc::Status to_grpc(const absl::Status& status);
 
-// UNIMPLEMENTED, REASON_NOT_SERVED: `field` is in the schema, but this build does not serve it.
+// Returns UNIMPLEMENTED, REASON_NOT_SERVED: `field` is in the schema, but this build does not serve it.
 absl::Status not_served(absl::string_view field);
 
-// INVALID_ARGUMENT, REASON_MALFORMED for a number that an enum of the schema does not have.
+// Returns INVALID_ARGUMENT, REASON_MALFORMED for a number that is not a value of the schema's enum.
 absl::Status unknown_enum(absl::string_view field, int number);
 
-// UNAVAILABLE, REASON_DRAINING.
+// Returns UNAVAILABLE, REASON_DRAINING, with a time to retry.
 absl::Status draining();
 
-// UNAVAILABLE, REASON_RECOVERING.
+// Returns UNAVAILABLE, REASON_RECOVERING, with a time to retry.
 absl::Status recovering();
 
 }  // namespace locus::server

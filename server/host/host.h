@@ -1,5 +1,5 @@
-// What all services of one server share: the scenes, the threads, and the way from serving to ended. Members are safe
-// to use from any thread by themselves.
+// The state that all services of one server share: scenes, thread pools, limits, metrics and the drain. The members are
+// thread-safe on their own; their order is the order of construction, so threads end before the scenes they use.
 #ifndef LOCUS_SERVER_HOST_HOST_H_
 #define LOCUS_SERVER_HOST_HOST_H_
 
@@ -50,7 +50,7 @@ struct Host {
     options.clock = &thread_nanoseconds;
     return options;
   }
-  // Threads that wait for a disk need no cores, and one sync serves all of them.
+  // With a log, more threads than cores pay off: they wait for the disk, and one sync serves all that wait.
   static UpdateQueueOptions queue_options(const ServerConfig& config, const UpdateLog* log) {
     UpdateQueueOptions options;
     options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
@@ -70,12 +70,12 @@ struct Host {
   UpdateQueue updates;
   Snapshotter snapshots{registry, log, snapshotter_options(config)};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
-  AdmissionLimiter calls;    // in work, streams apart
-  AdmissionLimiter streams;  // open
+  AdmissionLimiter calls;    // running calls, except streams
+  AdmissionLimiter streams;  // open streams
   AdmissionLimiter health_watchers{kMaxHealthWatchers};
   AdmissionLimiter backups{limits::kMaxBackups};
   Drain drain;
-  std::atomic<bool> recovering{false};  // what the log keeps is being read back
+  std::atomic<bool> recovering{false};  // the scenes of the log are being recovered
 };
 
 }  // namespace locus::server

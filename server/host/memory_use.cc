@@ -11,17 +11,17 @@
 namespace locus::server {
 namespace {
 
-// An object that is inserted or moved copies its cell and its way through the tree of ids.
+// Inserting or moving an object copies its cell and its path in the tree of ids.
 constexpr uint64_t kBytesAnItem = 700;
 constexpr uint64_t kBytesABatch = 16384;
-// Columns grow by doubling while they come, ...
+// Peak memory of the columns, as a multiple of their size: they grow by doubling while they arrive.
 constexpr uint64_t kUploadTimesColumns = 3;
-// ... then there are their copy by triangle, what building takes, the tree, and what is kept beside it.
+// Bytes a triangle for the build: the copy ordered by triangle, temporary memory, the tree and its additional data.
 constexpr uint64_t kBytesATriangle = 180;
 constexpr uint64_t kBytesAnInstance = 1024;
 
 uint64_t resident_bytes() {
-  // Pages: of the whole address space, and those of it that are in memory.
+  // Both in pages: the whole address space, and the part of it that is in memory.
   uint64_t mapped = 0;
   uint64_t resident = 0;
   std::ifstream("/proc/self/statm") >> mapped >> resident;
@@ -57,7 +57,7 @@ uint64_t upload_cost(uint32_t vertices, uint32_t triangles) {
 
 uint64_t change_cost(const StaticSet& statics, const StaticChange& change) {
   uint64_t placed = 0;
-  for (const PlacementColumns& place : change.place) placed += place.count();
+  for (const PlacementColumns& placement : change.place) placed += placement.count();
   return placed == 0 ? 0 : (statics.size() + placed) * kBytesAnInstance;
 }
 

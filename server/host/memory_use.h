@@ -1,8 +1,8 @@
-// What work costs in memory, and what the process holds: the numbers behind the limit memory_bytes. Costs are those of
-// the peak, measured on this version and rounded up; they need not be exact, since the process itself is measured again
-// and again.
+// Estimates of the memory that a piece of work needs, and a measurement of the process's memory, for the limit
+// memory_bytes. Estimates are peaks, measured on this version and rounded up. They need not be exact, because the
+// process itself is measured repeatedly.
 //
-// Threads: everything may be called from any thread.
+// Threads: every function may be called from any thread.
 #ifndef LOCUS_SERVER_HOST_MEMORY_USE_H_
 #define LOCUS_SERVER_HOST_MEMORY_USE_H_
 
@@ -15,21 +15,22 @@
 
 namespace locus::server {
 
-// The process's resident memory. Gives back the revisions that scenes keep besides their latest, and what the allocator
-// keeps of freed memory. `registry` must outlive it.
+// Returns a meter of the process's resident memory. Its second function frees memory: the revisions that scenes keep
+// besides their latest, and freed memory that the allocator retains. `registry` must outlive the meter.
 MemoryBudget::Meter process_memory(const Registry& registry);
 
+// Memory that applying a batch needs, and whether the batch may be refused for it.
 struct UpdateCost {
   uint64_t bytes = 0;
   bool inserts = false;
 };
-// Before the batch's form is checked: any length of its lists is fine.
+// Returns the cost of a batch whose form is not checked yet: its lists may have any length.
 UpdateCost cost_of(const UpdateBatch& batch);
 
-// From the first column to the built tree.
+// Returns the peak bytes of an upload, from its first column to the built tree.
 uint64_t upload_cost(uint32_t vertices, uint32_t triangles);
 
-// Of the set that `change` makes from `statics`. Nothing for a change that places nothing.
+// Returns the bytes of the set that results from applying `change` to `statics`; 0 for a change without placements.
 uint64_t change_cost(const StaticSet& statics, const StaticChange& change);
 
 }  // namespace locus::server

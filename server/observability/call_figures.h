@@ -1,4 +1,4 @@
-// What was counted about calls, as metrics. Functions without state.
+// Converts the counters of calls to metrics. Function without state.
 #ifndef LOCUS_SERVER_OBSERVABILITY_CALL_FIGURES_H_
 #define LOCUS_SERVER_OBSERVABILITY_CALL_FIGURES_H_
 
@@ -7,8 +7,8 @@
 
 namespace locus::server {
 
-// Each name once. An rpc that was never called has its count of OK, 0, and nothing else, so that rates start at 0 and a
-// page stays short.
+// Adds all call metrics to the page, each name once. An rpc that was never called has its count of OK, 0, and nothing
+// else, so that rates start at 0 and the page stays short.
 void add_call_figures(const MetricCounts& counts, MetricPage& page);
 
 }  // namespace locus::server

@@ -10,13 +10,14 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "core/base/check.h"
 #include "server/config/observability_limits.h"
 #include "server/observability/log.h"
 
 namespace locus::server {
 namespace {
 
-// Once a process; civetweb counts.
+// Initialises civetweb, which counts its users in the process.
 class Library {
  public:
   Library() { mg_init_library(MG_FEATURES_DEFAULT); }
@@ -38,7 +39,7 @@ HttpReply reply_to(const mg_request_info& request, const HttpServer::Pages& page
   return reply;
 }
 
-// Every request ends here, whatever its path: civetweb itself serves nothing.
+// Answers every request, whatever its path, so that civetweb itself serves nothing.
 int answer(mg_connection* connection) {
   const mg_request_info& request = *mg_get_request_info(connection);
   const HttpReply reply = reply_to(request, *static_cast<const HttpServer::Pages*>(request.user_data));
@@ -66,13 +67,14 @@ struct HttpServer::Context {
     if (running != nullptr) stop();
   }
 
-  // civetweb looks every two seconds whether it should end, and whenever somebody connects.
+  // Ends civetweb's threads. They check for the end every two seconds and at each connection, so this connects until
+  // they have ended.
   void stop() {
     const std::future<void> stopped = std::async(std::launch::async, mg_stop, running);
     while (stopped.wait_for(std::chrono::milliseconds(5)) != std::future_status::ready) {
       std::array<char, 64> error{};
-      mg_connection* knock = mg_connect_client(host.c_str(), port, 0, error.data(), error.size());
-      if (knock != nullptr) mg_close_connection(knock);
+      mg_connection* connection = mg_connect_client(host.c_str(), port, 0, error.data(), error.size());
+      if (connection != nullptr) mg_close_connection(connection);
     }
   }
 
@@ -91,6 +93,7 @@ HttpServer::HttpServer(Pages pages) : pages_(std::move(pages)), context_(std::ma
 HttpServer::~HttpServer() = default;
 
 absl::StatusOr<std::unique_ptr<HttpServer>> HttpServer::start(const ListenAddress& address, Pages pages) {
+  LOCUS_DCHECK(address.kind == ListenAddress::Kind::kTcp);
   std::unique_ptr<HttpServer> server(new HttpServer(std::move(pages)));
   const std::vector<std::pair<const char*, std::string>> settings = {
       {"listening_ports", to_string(address, address.port)},
@@ -107,7 +110,7 @@ absl::StatusOr<std::unique_ptr<HttpServer>> HttpServer::start(const ListenAddres
   std::array<char, 256> text{};
   unsigned code = 0;
   mg_error_data error{&code, text.data(), text.size()};
-  // civetweb hands the pages back as they are; they are only read.
+  // civetweb takes a pointer to non-const user data; answer() only reads it.
   mg_init_data init{&server->context_->callbacks, const_cast<Pages*>(&server->pages_), options.data()};
   server->context_->running = mg_start2(&init, &error);
   if (server->context_->running == nullptr) return absl::UnavailableError(text.data());

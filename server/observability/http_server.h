@@ -1,11 +1,11 @@
-// The daemon's HTTP port: a fixed set of pages without parameters, for scrapers and probes. The only place that knows
-// civetweb, of which nothing is used but the reading of requests: no file, form, script or socket upgrade is served.
+// The daemon's HTTP port: a fixed set of pages without parameters, for scrapers and probes. The only place that
+// includes civetweb, which is used for parsing requests only: no file, form, script or socket upgrade is served.
 //
-// Bounded: observability_limits.h says how many connections are answered and wait, how long a request may be and how
-// long it may take; a connection carries one request. Only GET and HEAD are answered, other methods with 405 and other
-// paths with 404.
+// Bounded: observability_limits.h has the maximum number of connections that are answered and that wait, the maximum
+// size of a request and its timeout; a connection carries one request. Only GET and HEAD are served; other methods are
+// answered with 405 and other paths with 404.
 //
-// Threads: pages are made on threads of the server's own, several at once.
+// Threads: the page functions are called on threads of the HTTP server, several at once.
 #ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 #define LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 
@@ -28,17 +28,17 @@ struct HttpReply {
 
 class HttpServer {
  public:
-  // By path, such as "/metrics".
+  // Functions that make the pages, by path, such as "/metrics".
   using Pages = std::map<std::string, std::function<HttpReply()>>;
 
-  // Serves from now on. `address` is a TCP one. UNAVAILABLE where it cannot be listened on.
+  // Starts serving. `address` must be a TCP address. Returns UNAVAILABLE if it cannot be listened on.
   static absl::StatusOr<std::unique_ptr<HttpServer>> start(const ListenAddress& address, Pages pages);
-  // Ends at once; waits for pages in work.
+  // Ends the server at once, after waiting for pages that are being made.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  // The one in use where the address asked for any.
+  // Returns the bound port, also if the address asked for any.
   uint16_t port() const { return port_; }
 
  private:

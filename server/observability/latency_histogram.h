@@ -1,5 +1,5 @@
-// How many of many durations fell into which range: two ranges for each power of two nanoseconds, from a microsecond to
-// 17 seconds, so that a quantile read from them is off by less than half of itself.
+// Histogram of durations: two ranges for each power of two nanoseconds, from a microsecond to 17 seconds, so that the
+// relative error of a quantile read from it is below one half.
 //
 // Threads: record() from any thread, at the cost of two relaxed additions, without a lock or an allocation; add_to()
 // from any thread at any time.
@@ -13,29 +13,33 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/check.h"
+
 namespace locus::server {
 
 inline constexpr uint32_t kLowestOctave = 10;   // 2^10 ns, a microsecond
 inline constexpr uint32_t kHighestOctave = 34;  // 2^34 ns, 17 s
-// Ranges with an upper bound, and one without.
+// Number of ranges that have an upper bound. One more range has none.
 inline constexpr size_t kLatencyBounds = 2 * (kHighestOctave - kLowestOctave) + 1;
 
-// The highest duration of a range, in nanoseconds: 2^k, 1.5 * 2^k, 2^(k+1) ... `range` < kLatencyBounds.
+// Returns the upper bound of a range, in nanoseconds: 2^k, 1.5 * 2^k, 2^(k+1) ... Precondition: `range` <
+// kLatencyBounds.
 constexpr uint64_t latency_bound(size_t range) {
+  LOCUS_DCHECK_LT(range, kLatencyBounds);
   const uint64_t octave = uint64_t{1} << (kLowestOctave + range / 2);
   return range % 2 == 0 ? octave : octave + octave / 2;
 }
 
-// The range of a duration: latency_bound() of it is the lowest that is not below; kLatencyBounds beyond the highest.
+// Returns the range of a duration: the first whose latency_bound() is not below it, or kLatencyBounds if there is none.
 constexpr size_t latency_range(uint64_t nanoseconds) {
   if (nanoseconds <= latency_bound(0)) return 0;
-  const uint64_t below = nanoseconds - 1;  // since a bound belongs to the range below it
+  const uint64_t below = nanoseconds - 1;  // because a bound belongs to the range below it
   const auto octave = static_cast<uint32_t>(std::bit_width(below)) - 1;
   const size_t half = below >> (octave - 1) & 1;
   return std::min<size_t>(kLatencyBounds, 2 * (octave - kLowestOctave) + half + 1);
 }
 
-// Durations summed up, at one moment.
+// Counts of a histogram, or sums of several, read at one moment.
 struct LatencyCounts {
   std::array<uint64_t, kLatencyBounds + 1> ranges{};
   uint64_t nanoseconds = 0;

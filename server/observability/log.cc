@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 namespace {
 
-// Longer values are cut: a caller chooses some of them.
+// Maximum bytes of a value. Longer values are cut, because callers choose some of them.
 constexpr size_t kMaxValue = 1024;
 
 std::atomic<LogFormat> log_format{LogFormat::kText};
@@ -43,7 +44,7 @@ spdlog::logger& logger() {
   return *instance;
 }
 
-// Both formats quote alike: what JSON needs escaped would also break a line of text.
+// Appends `text` with JSON escapes. Both formats use them, because the same characters would break a line of text.
 void append_escaped(std::string& out, absl::string_view text) {
   constexpr absl::string_view kHex = "0123456789abcdef";
   for (const char c : text.substr(0, kMaxValue)) {
@@ -107,7 +108,10 @@ void log(LogLevel level, absl::string_view message, std::initializer_list<LogFie
 
 LogScope::LogScope(TraceContext trace) : trace_(std::move(trace)), outer_(current_trace) { current_trace = &trace_; }
 
-LogScope::~LogScope() { current_trace = outer_; }
+LogScope::~LogScope() {
+  LOCUS_DCHECK(current_trace == &trace_);  // scopes of a thread end in reverse order
+  current_trace = outer_;
+}
 
 TraceContext LogScope::current() { return current_trace == nullptr ? TraceContext() : *current_trace; }
 

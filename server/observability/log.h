@@ -1,7 +1,7 @@
-// What the daemon says on standard error: one line an event, for people or as JSON. The only place that knows the
-// logging library.
+// The daemon's log on standard error: one line an event, as text or JSON. The only place that includes the logging
+// library.
 //
-// Threads: start_logging() once, before anything is logged; the rest from any thread. A line is written whole.
+// Threads: start_logging() once, before anything is logged; all else from any thread. Lines are written atomically.
 #ifndef LOCUS_SERVER_OBSERVABILITY_LOG_H_
 #define LOCUS_SERVER_OBSERVABILITY_LOG_H_
 
@@ -20,17 +20,18 @@ struct LogField {
   std::string value;
 };
 
-// Without it everything from `warning` on is written as text.
+// Sets level and format. Before it is called, events from `warning` on are written as text.
 void start_logging(LogLevel level, LogFormat format);
 
+// Returns whether events of this level are written.
 bool logs(LogLevel level);
 
-// `message` says what happened and is the same for every event of a kind; `fields` say to what. Control characters,
-// which may come from callers, are escaped.
+// Writes an event. `message` names the kind of event and is a constant text; `fields` hold the details. Control
+// characters, which may come from callers, are escaped, and values longer than 1,024 bytes are cut.
 void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields = {});
 
-// Names the call that this thread works on: while it lives, every line the thread logs has the fields request_id and,
-// where there is one, traceparent. Scopes may be nested; the innermost counts.
+// Names the call that this thread is working on: while the scope lives, every line that the thread logs has the fields
+// request_id and, if there is one, traceparent. Scopes may be nested; the innermost one is used.
 class LogScope {
  public:
   explicit LogScope(TraceContext trace);
@@ -38,7 +39,7 @@ class LogScope {
   LogScope(const LogScope&) = delete;
   LogScope& operator=(const LogScope&) = delete;
 
-  // Of the innermost scope of this thread; empty without one. For work that another thread goes on with.
+  // Returns the ids of this thread's innermost scope; empty without a scope. For passing them to another thread.
   static TraceContext current();
 
  private:

@@ -41,6 +41,7 @@ MetricPage::~MetricPage() = default;
 
 void MetricPage::begin(const std::string& name, const std::string& help, MetricKind kind) {
   for (const prometheus::MetricFamily& other : families_->all) LOCUS_CHECK(other.name != name);
+  LOCUS_DCHECK(!help.empty());
   families_->all.push_back({name, help, type_of(kind), {}});
 }
 

@@ -1,7 +1,7 @@
-// A page of metrics as it is put together for one scrape, and its text in Prometheus's exposition format. The only
-// place that knows prometheus-cpp, which writes the format and escapes what stands in it. Not thread-safe.
+// A page of metrics for one scrape, and its text in Prometheus's exposition format. The only place that includes
+// prometheus-cpp, which writes the format and escapes values. Not thread-safe.
 //
-// Invariant: a name is begun once, and every name says in HELP what it counts, in which unit.
+// Invariant: each metric name is begun once, and has a HELP text with its meaning and unit.
 #ifndef LOCUS_SERVER_OBSERVABILITY_METRIC_PAGE_H_
 #define LOCUS_SERVER_OBSERVABILITY_METRIC_PAGE_H_
 
@@ -16,12 +16,12 @@ namespace locus::server {
 
 enum class MetricKind : uint8_t { kCounter, kGauge, kHistogram };
 
-// Names are ours; values may be anything.
+// Pairs of a label's name, a constant of this program, and its value, which may be any text.
 using MetricLabels = std::vector<std::pair<std::string, std::string>>;
 
 class MetricPage {
  public:
-  // What the HTTP reply calls this text.
+  // Content type of text() in an HTTP reply.
   static constexpr const char* kContentType = "text/plain; version=0.0.4; charset=utf-8";
 
   MetricPage();
@@ -29,14 +29,14 @@ class MetricPage {
   MetricPage(const MetricPage&) = delete;
   MetricPage& operator=(const MetricPage&) = delete;
 
-  // What is added from here on belongs to `name`.
+  // Begins the metric `name`; later add() calls belong to it. Precondition: `name` was not begun before.
   void begin(const std::string& name, const std::string& help, MetricKind kind);
-  // To a counter or gauge.
+  // Adds a sample to the current metric, which must be a counter or gauge.
   void add(const MetricLabels& labels, double value);
-  // To a histogram, in seconds.
+  // Adds the counts, converted to seconds, to the current metric, which must be a histogram.
   void add(const MetricLabels& labels, const LatencyCounts& counts);
 
-  // A counter or gauge without labels.
+  // Adds a counter or gauge with one sample without labels.
   void add_one(const std::string& name, const std::string& help, MetricKind kind, double value);
 
   std::string text() const;

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 #include "server/config/observability_limits.h"
 
@@ -24,11 +25,13 @@ absl::string_view rpc_name(Rpc rpc) {
       "GetServer",    "Backup",        "CreateScene", "GetScene",     "ListScenes",      "DeleteScene",
       "UploadMesh",   "ListMeshes",    "DeleteMesh",  "DownloadMesh", "ChangeInstances", "DumpScene",
       "ApplyUpdates", "StreamUpdates", "Query",       "StreamQueries"};
+  LOCUS_DCHECK_LT(static_cast<size_t>(rpc), kRpcs);
   return kNames[static_cast<size_t>(rpc)];
 }
 
 absl::string_view query_kind_name(QueryKind kind) {
   static constexpr std::array<absl::string_view, kQueryKinds> kNames = {"ray", "ball", "box", "lookup", "nearest"};
+  LOCUS_DCHECK_LT(static_cast<size_t>(kind), kQueryKinds);
   return kNames[static_cast<size_t>(kind)];
 }
 
@@ -39,15 +42,17 @@ CallMetrics::Stripe& CallMetrics::stripe() {
 }
 
 void CallMetrics::record_call(Rpc rpc, absl::StatusCode code, uint64_t nanoseconds) {
+  LOCUS_DCHECK_LT(static_cast<size_t>(rpc), kRpcs);
   Stripe& mine = stripe();
-  const auto number = static_cast<size_t>(code);
-  // Codes that nobody knows yet count as UNKNOWN.
-  const size_t known = number < kStatusCodes ? number : static_cast<size_t>(absl::StatusCode::kUnknown);
-  mine.codes[static_cast<size_t>(rpc)][known].fetch_add(1, kRelaxed);
+  const auto value = static_cast<size_t>(code);
+  // Count codes outside the known range as UNKNOWN.
+  const size_t index = value < kStatusCodes ? value : static_cast<size_t>(absl::StatusCode::kUnknown);
+  mine.codes[static_cast<size_t>(rpc)][index].fetch_add(1, kRelaxed);
   mine.calls[static_cast<size_t>(rpc)].record(nanoseconds);
 }
 
 void CallMetrics::record_block(QueryKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work) {
+  LOCUS_DCHECK_LT(static_cast<size_t>(kind), kQueryKinds);
   QueryStripe& mine = stripe().queries[static_cast<size_t>(kind)];
   mine.queries.fetch_add(queries, kRelaxed);
   mine.nodes.fetch_add(work.nodes, kRelaxed);
@@ -67,11 +72,13 @@ void CallMetrics::record_mesh_build(uint64_t nanoseconds) { mesh_builds_.record(
 void CallMetrics::record_instance_change(uint64_t nanoseconds) { instance_changes_.record(nanoseconds); }
 
 void CallMetrics::record_refusal(const absl::Status& status) {
+  LOCUS_DCHECK(!status.ok());
   RefusalName name = name_of(status);
   const MutexLock lock(mutex_);
   const bool room = refusals_.size() < kMaxRefusalNames || refusals_.contains(name);
   if (!room) name = {kOther, kOther};
   ++refusals_[std::move(name)];
+  LOCUS_DCHECK_LE(refusals_.size(), kMaxRefusalNames + 1);  // and "_other"
 }
 
 MetricCounts CallMetrics::read() const {

@@ -1,15 +1,15 @@
-// What the daemon counts about its calls while it works, for /metrics. This is the interface for whoever serves calls:
+// Counters of the daemon's calls, for /metrics. Code that serves calls must record:
 //
-// - every unary call, when its answer is known, and every message of a stream, when its answer is written:
-//   record_call(rpc, code, nanoseconds since it arrived); serve() does it for all calls that go through it;
-// - every block of queries that was answered: record_block();
-// - every batch of updates that was published: record_update();
+// - every unary call when its answer is known, and every message of a stream when its answer is known:
+//   record_call(rpc, code, nanoseconds since it arrived); serve() and HotCall do it for their calls;
+// - every answered block of queries: record_block();
+// - every published batch of updates: record_update();
 // - every refused call or message: record_refusal();
-// - every stream: an OpenStream for as long as it is open.
+// - every stream: an OpenStream while it is open.
 //
-// Threads: everything may be called from any thread. Recording takes no lock and allocates nothing, record_refusal()
-// apart; counters are split over stripes, so that threads seldom share a cache line. read() sums the stripes up while
-// others go on counting: each number is right, two of them may be of slightly different moments.
+// Threads: every member may be called from any thread. Recording takes no lock and allocates nothing, except in
+// record_refusal(). Counters are split into stripes, so that threads rarely share a cache line. read() adds the stripes
+// while other threads count: each number is correct, but two numbers may be of slightly different moments.
 #ifndef LOCUS_SERVER_OBSERVABILITY_METRICS_H_
 #define LOCUS_SERVER_OBSERVABILITY_METRICS_H_
 
@@ -48,13 +48,13 @@ enum class Rpc : uint8_t {
   kStreamQueries,
 };
 inline constexpr size_t kRpcs = 16;
-// As the protocol calls it: "StreamQueries".
+// Returns the rpc's name in the protocol, such as "StreamQueries".
 absl::string_view rpc_name(Rpc rpc);
 
-// In the order of QueryBlock::kind: static_cast<QueryKind>(block.kind.index()).
+// Kinds of queries, in the order of the alternatives of QueryBlock::kind: static_cast<QueryKind>(block.kind.index()).
 enum class QueryKind : uint8_t { kRay, kBall, kBox, kLookup, kNearest };
 inline constexpr size_t kQueryKinds = 5;
-// "ray", "ball", ...
+// Returns the kind's name: "ray", "ball", ...
 absl::string_view query_kind_name(QueryKind kind);
 
 inline constexpr size_t kStatusCodes = 17;  // OK to UNAUTHENTICATED
@@ -62,16 +62,16 @@ inline constexpr size_t kStatusCodes = 17;  // OK to UNAUTHENTICATED
 struct RpcCounts {
   std::array<uint64_t, kStatusCodes> codes{};
   LatencyCounts latency;
-  uint64_t open = 0;  // streams
+  uint64_t open = 0;  // number of open streams
 };
 
 struct QueryCounts {
   uint64_t queries = 0;
   Work work;
-  LatencyCounts latency;  // of blocks
+  LatencyCounts latency;  // processor time a block
 };
 
-// A refusal's reason and the limit it names; either may be empty.
+// Reason of a refusal and the limit that it names; the limit may be empty.
 using RefusalName = std::pair<std::string, std::string>;
 
 struct MetricCounts {
@@ -86,18 +86,18 @@ struct MetricCounts {
 
 class CallMetrics {
  public:
-  // From the arrival of a call or message to its answer.
+  // Records a call or message. `nanoseconds` are from its arrival to its answer.
   void record_call(Rpc rpc, absl::StatusCode code, uint64_t nanoseconds);
-  // `nanoseconds` of processor time, all threads together.
+  // Records a block of queries. `nanoseconds` are processor time of all threads together.
   void record_block(QueryKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work);
-  // From the arrival of a batch to the publication of its revision.
+  // Records a batch of updates. `nanoseconds` are from its arrival to the publication of its revision.
   void record_update(uint64_t items, uint64_t nanoseconds);
-  // Of a mesh's tree.
+  // Records how long building a mesh's tree took.
   void record_mesh_build(uint64_t nanoseconds);
-  // From the request to the publication of its revision.
+  // Records a change of instances. `nanoseconds` are from the request to the publication of its revision.
   void record_instance_change(uint64_t nanoseconds);
-  // Of a status that is not OK: under the reason that it carries, or else under the name of its code. At most
-  // kMaxRefusalNames names are kept apart, the rest are counted as "_other". Takes a lock for a moment.
+  // Records a status that is not OK, under its reason, or under the name of its code if it has no reason. At most
+  // kMaxRefusalNames names are counted separately, the rest as "_other". Takes a lock briefly.
   void record_refusal(const absl::Status& status) LOCUS_EXCLUDES(mutex_);
 
   MetricCounts read() const LOCUS_EXCLUDES(mutex_);
@@ -133,7 +133,7 @@ class CallMetrics {
   std::map<RefusalName, uint64_t> refusals_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Counts a stream as open for as long as it lives. Must not outlive the metrics.
+// Counts a stream as open during its lifetime. Must not outlive the metrics.
 class OpenStream {
  public:
   OpenStream(CallMetrics& metrics, Rpc rpc) : open_(metrics.open_streams_[static_cast<size_t>(rpc)]) {

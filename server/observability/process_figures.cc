@@ -19,7 +19,7 @@
 namespace locus::server {
 namespace {
 
-// Where connections that count end on this side.
+// Local ends of the connections that are counted: TCP ports and paths of unix sockets.
 struct Ends {
   std::set<uint16_t> ports;
   std::set<std::string> paths;
@@ -39,7 +39,7 @@ Ends ends_of(const std::vector<std::string>& addresses) {
   return ends;
 }
 
-// A socket that somebody is connected to, which the listening one is not.
+// Returns whether `fd` is a connected socket at one of the ends; a listening socket is not connected.
 bool is_connection(int fd, const Ends& ends) {
   sockaddr_storage name{};
   socklen_t length = sizeof name;
@@ -57,7 +57,7 @@ bool is_connection(int fd, const Ends& ends) {
   return ours && getpeername(fd, reinterpret_cast<sockaddr*>(&peer), &peer_length) == 0;
 }
 
-void look_at_files(const Ends& ends, ProcessFigures& process) {
+void count_files(const Ends& ends, ProcessFigures& process) {
   const std::unique_ptr<DIR, int (*)(DIR*)> folder(opendir("/proc/self/fd"), closedir);
   if (folder == nullptr) return;
   while (const dirent* entry = readdir(folder.get())) {
@@ -79,7 +79,8 @@ uint64_t resident_bytes() {
   return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
-// Of /proc/self/stat, where the process's name may hold spaces and brackets, but no bracket follows it.
+// Returns the fields of /proc/self/stat after the process's name. The name may contain spaces and brackets, but no
+// bracket follows it.
 std::vector<std::string> fields_after_name() {
   std::string line;
   std::getline(std::ifstream("/proc/self/stat"), line);
@@ -88,7 +89,7 @@ std::vector<std::string> fields_after_name() {
   return absl::StrSplit(line.substr(end + 2), ' ');
 }
 
-// The machine's start, in seconds since 1970.
+// Returns the time of the machine's start, in seconds since 1970.
 double boot_seconds() {
   timespec since_boot{};
   timespec now{};
@@ -106,7 +107,7 @@ double number_at(const std::vector<std::string>& fields, size_t at) {
 }  // namespace
 
 ProcessFigures read_process(const std::vector<std::string>& addresses) {
-  // Counted from the field after the name, which is the third of all: proc(5).
+  // Indices counted from the field after the name, which is field 3 in proc(5).
   constexpr size_t kThreads = 17;
   constexpr size_t kStart = 19;
   ProcessFigures process;
@@ -118,7 +119,7 @@ ProcessFigures read_process(const std::vector<std::string>& addresses) {
   process.threads = static_cast<uint64_t>(number_at(fields, kThreads));
   process.start_seconds = boot_seconds() + number_at(fields, kStart) / static_cast<double>(sysconf(_SC_CLK_TCK));
   process.resident_bytes = resident_bytes();
-  look_at_files(ends_of(addresses), process);
+  count_files(ends_of(addresses), process);
   return process;
 }
 

@@ -1,5 +1,5 @@
-// What the system says about this process, for /metrics: the figures that Prometheus's client libraries have in common.
-// Read when asked; functions without state, for any thread.
+// Measurements of this process, read from the system for /metrics: those that Prometheus's client libraries have in
+// common, and the open connections. Functions without state; any thread.
 #ifndef LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
 #define LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
 
@@ -17,14 +17,15 @@ struct ProcessFigures {
   uint64_t threads = 0;
   uint64_t open_files = 0;
   uint64_t max_files = 0;
-  uint64_t connections = 0;  // that others opened to the addresses asked about
+  uint64_t connections = 0;  // connections that clients opened to the given addresses
   double start_seconds = 0;  // since 1970
 };
 
-// `addresses` as parse_listen_address() reads them; others are passed over. What cannot be read is 0. O(open files),
-// two system calls each.
+// Reads all figures. `addresses` are texts for parse_listen_address(); invalid ones are ignored. A figure that cannot
+// be read is 0. O(open files), two system calls each.
 ProcessFigures read_process(const std::vector<std::string>& addresses);
 
+// Adds the figures to the page.
 void add_process_figures(const ProcessFigures& process, MetricPage& page);
 
 }  // namespace locus::server

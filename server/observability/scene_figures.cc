@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace locus::server {
 namespace {
 
@@ -44,15 +46,18 @@ constexpr Figure kFigures[] = {
      &SceneFigures::pending_changes},
 };
 
+bool named_before(const SceneFigures& a, const SceneFigures& b) { return a.name < b.name; }
+
 }  // namespace
 
 std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& scenes) {
+  LOCUS_DCHECK(std::is_sorted(scenes.begin(), scenes.end(), named_before));
   std::set<std::string> present;
   for (const SceneFigures& scene : scenes)
     if (labelled_.contains(scene.name)) present.insert(scene.name);
   labelled_ = std::move(present);
   for (const SceneFigures& scene : scenes)
-    if (labelled_.size() < most_) labelled_.insert(scene.name);
+    if (labelled_.size() < max_) labelled_.insert(scene.name);
   std::vector<SceneFigures> shown;
   SceneFigures other;
   for (const SceneFigures& scene : scenes) {
@@ -64,7 +69,16 @@ std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& sc
     }
   }
   if (!other.name.empty()) shown.push_back(other);
+  LOCUS_DCHECK_LE(shown.size(), max_ + 1);  // and the sum of the others
+  check_invariants();
   return shown;
+}
+
+void SceneLabels::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(labelled_.size(), max_);
+    LOCUS_DCHECK(!labelled_.contains(kOther));
+  }
 }
 
 void add_scene_figures(const std::vector<SceneFigures>& scenes, MetricPage& page) {

@@ -1,6 +1,6 @@
-// What a scrape finds in each scene, as metrics with a label of the scene's name. The number of labels is bounded,
-// since scrapers keep every one they have seen: kMaxLabelledScenes scenes have their own, the others are added up under
-// "_other", which is no name that a scene can have.
+// Metrics of each scene, labelled with the scene's name. The number of labels is bounded, because scrapers keep every
+// label they have seen: kMaxLabelledScenes scenes have their own label, and the others are summed under "_other", which
+// is not a valid name of a scene.
 //
 // Threads: SceneLabels is for one thread at a time.
 #ifndef LOCUS_SERVER_OBSERVABILITY_SCENE_FIGURES_H_
@@ -16,6 +16,7 @@
 
 namespace locus::server {
 
+// Figures of one scene, or the sum of several.
 struct SceneFigures {
   std::string name;
   uint64_t revision = 0;
@@ -30,24 +31,26 @@ struct SceneFigures {
   uint64_t pending_changes = 0;
 };
 
-// Which scenes have a label. A scene that has one keeps it until it is deleted, so that its series goes on; a free one
-// goes to the first in order of names.
+// The set of scenes that have a label. Invariant: at most `max` scenes. A scene keeps its label until it is deleted, so
+// that its time series continues; a free label goes to the first scene in order of names.
 class SceneLabels {
  public:
   static constexpr const char* kOther = "_other";
 
-  explicit SceneLabels(size_t most) : most_(most) {}
+  explicit SceneLabels(size_t max) : max_(max) {}
 
-  // Gives the scenes with labels as they are, then the sum of the others if there are any, named kOther. `scenes` is
-  // all there are, each once, in order of names.
+  // Updates the labels and returns the figures of the labelled scenes, then the sum of the others, named kOther, if
+  // there are any. `scenes` must be all scenes, each once, in order of names.
   std::vector<SceneFigures> label(const std::vector<SceneFigures>& scenes);
 
  private:
-  const size_t most_;
+  void check_invariants() const;
+
+  const size_t max_;
   std::set<std::string> labelled_;
 };
 
-// `scenes` as they came from SceneLabels.
+// Adds the figures to the page. `scenes` is a result of SceneLabels::label().
 void add_scene_figures(const std::vector<SceneFigures>& scenes, MetricPage& page);
 
 }  // namespace locus::server

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "server/config/observability_limits.h"
 #include "server/observability/log.h"
 
@@ -22,17 +23,18 @@ void SlowQueries::record(const SlowQuery& query, Time now) {
       return;
     }
     ++lines_;
+    LOCUS_DCHECK_LE(lines_, kMaxSlowQueryLines);
     left_out = std::exchange(left_out_, 0);
   }
-  constexpr uint64_t kAMillisecond = 1'000'000;
+  constexpr uint64_t kNanosecondsAMs = 1'000'000;
   log(LogLevel::kWarning, "slow queries",
       {{"rpc", std::string(query.rpc)},
        {"scene", query.scene},
        {"revision", absl::StrCat(query.revision)},
        {"kinds", query.kinds},
        {"queries", absl::StrCat(query.queries)},
-       {"ms", absl::StrCat(query.nanoseconds / kAMillisecond)},
-       {"work_ms", absl::StrCat(query.work_nanoseconds / kAMillisecond)},
+       {"ms", absl::StrCat(query.nanoseconds / kNanosecondsAMs)},
+       {"work_ms", absl::StrCat(query.work_nanoseconds / kNanosecondsAMs)},
        {"nodes", absl::StrCat(query.work.nodes)},
        {"cells", absl::StrCat(query.work.cells)},
        {"tests", absl::StrCat(query.work.tests)},

@@ -1,5 +1,5 @@
-// The line that is logged for a batch of queries that took long, and how often: at most kMaxSlowQueryLines a second,
-// since a slow server is the last that should write more. Those left out are counted, and the next line says how many.
+// Log lines for slow query batches: at most kMaxSlowQueryLines a second, so that logging does not slow an overloaded
+// server further. Omitted lines are counted, and the next line has their number.
 //
 // Threads: every member may be called from any thread. is_slow() is one comparison.
 #ifndef LOCUS_SERVER_OBSERVABILITY_SLOW_QUERIES_H_
@@ -20,11 +20,11 @@ namespace locus::server {
 struct SlowQuery {
   absl::string_view rpc;
   std::string scene;
-  std::string kinds;  // of the blocks, such as ray,ball
+  std::string kinds;  // kinds of the blocks, such as ray,ball
   uint64_t revision = 0;
   uint64_t queries = 0;
-  uint64_t nanoseconds = 0;       // from the batch's turn to its answer
-  uint64_t work_nanoseconds = 0;  // of processor time, all threads together
+  uint64_t nanoseconds = 0;       // elapsed time from when the revision was available to the answer
+  uint64_t work_nanoseconds = 0;  // processor time of all threads together
   Work work;
 };
 
@@ -32,13 +32,13 @@ class SlowQueries {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  // 0 = none is slow.
+  // Sets the threshold; 0 = no batch is slow.
   explicit SlowQueries(uint32_t milliseconds)
       : nanoseconds_(milliseconds == 0 ? std::numeric_limits<uint64_t>::max() : uint64_t{milliseconds} * 1'000'000) {}
 
   bool is_slow(uint64_t nanoseconds) const { return nanoseconds >= nanoseconds_; }
 
-  // Counts it, and logs a warning unless there were too many within a second of `now`.
+  // Counts the batch, and logs a warning unless kMaxSlowQueryLines were logged within the current second.
   void record(const SlowQuery& query, Time now) LOCUS_EXCLUDES(mutex_);
 
   uint64_t count() const { return count_.load(); }
@@ -47,7 +47,7 @@ class SlowQueries {
   const uint64_t nanoseconds_;
   std::atomic<uint64_t> count_{0};
   Mutex mutex_;
-  Time second_ LOCUS_GUARDED_BY(mutex_){};  // when the second began that lines are counted in
+  Time second_ LOCUS_GUARDED_BY(mutex_){};  // begin of the second in which `lines_` are counted
   uint32_t lines_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t left_out_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

@@ -57,7 +57,7 @@ uint64_t next_request_number() {
 
 std::string request_id_of(uint64_t number) {
   static const uint64_t kSeed = random_seed();
-  // A bijection that spreads neighbours: numbers never meet. Source: Steele et al., "Fast splittable pseudorandom
+  // A bijection, so that different numbers have different ids. Source: Steele et al., "Fast splittable pseudorandom
   // number generators" (2014).
   uint64_t z = kSeed + number * 0x9e3779b97f4a7c15;
   z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;

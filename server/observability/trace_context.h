@@ -1,8 +1,7 @@
-// By which names a call is known in logs: the request id, of its caller or else made here, and the caller's
-// traceparent. Both come from whoever calls, so they are checked, and what is not of their form is as if it had not
-// come.
+// Ids that name a call in logs: the request id, from the caller or generated here, and the caller's traceparent. Both
+// are untrusted input: they are validated, and an invalid id is treated as missing.
 //
-// Source: W3C Recommendation "Trace Context" (2021), section 3.2.
+// Source: W3C Recommendation "Trace Context" (2021), section 3.2. Functions without state, for any thread.
 #ifndef LOCUS_SERVER_OBSERVABILITY_TRACE_CONTEXT_H_
 #define LOCUS_SERVER_OBSERVABILITY_TRACE_CONTEXT_H_
 
@@ -15,20 +14,21 @@ namespace locus::server {
 
 struct TraceContext {
   std::string request_id;
-  std::string traceparent;  // empty = none came
+  std::string traceparent;  // empty = the caller sent none
 };
 
-// 1 to kMaxRequestIdLength letters, digits and . _ -
+// Returns whether `text` has 1 to kMaxRequestIdLength letters, digits and the characters . _ -
 bool is_request_id(absl::string_view text);
 
-// version-trace-parent-flags in lower-case hexadecimal; not version ff, nor a trace or parent of zeros. A version after
-// 00 may be followed by more, behind a hyphen, up to 128 characters.
+// Returns whether `text` is version-trace-parent-flags in lower-case hexadecimal, with a version other than ff and a
+// trace and parent other than zeros. Versions above 00 may have more after a hyphen, up to 128 characters in total.
 bool is_traceparent(absl::string_view text);
 
-// A number that no call of this process had before. Any thread, a few nanoseconds.
+// Returns a number that is unique in this process. A few nanoseconds.
 uint64_t next_request_number();
 
-// 16 hexadecimal digits, which differ between processes too, with all but certainty.
+// Returns the number as 16 hexadecimal digits that are unique in this process and, because they include a random seed,
+// almost certainly different from those of other processes.
 std::string request_id_of(uint64_t number);
 
 }  // namespace locus::server

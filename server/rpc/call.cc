@@ -16,9 +16,9 @@ using std::chrono::system_clock;
 
 constexpr const char* kSceneMetadata = "x-scene";
 constexpr uint32_t kBusyRetryMs = 100;
-// How late who waits notices that nobody needs it any more.
+// A waiting thread checks this often whether its call has ended.
 constexpr milliseconds kWaitSlice{50};
-// How long readers that were told to end may take for that.
+// Time that readers have to release a revoked snapshot.
 constexpr milliseconds kReadersMayTake{1000};
 constexpr std::chrono::hours kNoDeadline{24 * 365};
 
@@ -30,9 +30,9 @@ SteadyTime to_steady(system_clock::time_point deadline) {
 
 }  // namespace
 
-uint64_t nanoseconds_since(SteadyTime moment) {
+uint64_t nanoseconds_since(SteadyTime start) {
   return static_cast<uint64_t>(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - moment).count());
+      std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start).count());
 }
 
 Caller::Caller(const Host& host, const grpc::ServerContextBase& context, const std::atomic<bool>* gone)
@@ -40,11 +40,11 @@ Caller::Caller(const Host& host, const grpc::ServerContextBase& context, const s
 
 TraceContext Caller::trace() const {
   const auto& metadata = context_.client_metadata();
-  const auto checked = [&metadata](const char* name, bool (*good)(absl::string_view)) {
+  const auto checked = [&metadata](const char* name, bool (*is_valid)(absl::string_view)) {
     const auto entry = metadata.find(name);
     if (entry == metadata.end()) return std::string();
     std::string value(entry->second.data(), entry->second.size());
-    return good(value) ? value : std::string();
+    return is_valid(value) ? value : std::string();
   };
   TraceContext trace{checked(kRequestIdMetadata, is_request_id), checked("traceparent", is_traceparent)};
   if (trace.request_id.empty()) trace.request_id = request_id_of(number_);
@@ -60,9 +60,9 @@ absl::Status Caller::stop() const {
 
 SteadyTime Caller::wait_until(bool stream) const {
   const SteadyTime now = steady_clock::now();
-  const SteadyTime usual = now + milliseconds(limits::kDefaultWaitMs);
+  const SteadyTime default_end = now + milliseconds(limits::kDefaultWaitMs);
   const bool without_deadline = deadline_ - now > kNoDeadline / 2;
-  return stream || without_deadline ? std::min(usual, deadline_) : deadline_;
+  return stream || without_deadline ? std::min(default_end, deadline_) : deadline_;
 }
 
 absl::Status Caller::check_scene(const std::string& scene) const {
@@ -114,9 +114,9 @@ grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
   const Caller caller(host, context);
   const LogScope scope(caller.trace());
   context.AddTrailingMetadata(kRequestIdMetadata, LogScope::current().request_id);
-  const AdmissionLimiter::Permit pass = host.calls.enter();
+  const AdmissionLimiter::Permit permit = host.calls.enter();
   absl::Status status;
-  if (!pass) {
+  if (!permit) {
     status = refuse_full("", "calls", host.calls.max(), host.calls.max() + 1.0, kBusyRetryMs);
   } else if (absl::Status closed = check_serving(host); !closed.ok() && while_closed == WhileClosed::kRefuse) {
     status = std::move(closed);

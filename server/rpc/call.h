@@ -1,7 +1,8 @@
-// One call as the services see it: who calls, for how long, and whether it should still be answered. serve() is the
-// frame around every call that is not a stream: admission, whether the server serves, the error map and the log.
+// One call as the services see it: its metadata, its deadline, and whether it still wants an answer. serve() is the
+// frame around every call on gRPC's synchronous threads: it admits the call, checks that the server is serving, maps
+// the error, counts and logs.
 //
-// Threads: a Caller may be asked from any thread for as long as the call lasts.
+// Threads: a Caller may be used from any thread while the call lasts, except trace().
 #ifndef LOCUS_SERVER_RPC_CALL_H_
 #define LOCUS_SERVER_RPC_CALL_H_
 
@@ -21,31 +22,34 @@ namespace locus::server {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
-// Of the steady clock, up to now.
-uint64_t nanoseconds_since(SteadyTime moment);
+// Returns the nanoseconds from `start` to now on the steady clock.
+uint64_t nanoseconds_since(SteadyTime start);
 
+// The caller's side of one call. Refers to `context`, which must outlive it.
 class Caller {
  public:
-  // `gone`, where given, says whether the caller gave up; of calls on completion queues, `context` does not.
+  // `gone`, if not null, becomes true when the caller gives up. Calls on completion queues must pass it, because their
+  // `context` may not be asked whether it is cancelled.
   Caller(const Host& host, const grpc::ServerContextBase& context, const std::atomic<bool>* gone = nullptr);
 
-  // OK while the call should go on; else CANCELLED, DEADLINE_EXCEEDED, or DRAINING once the grace is used up.
+  // Returns OK while the call should continue; otherwise CANCELLED, DEADLINE_EXCEEDED, or UNAVAILABLE (DRAINING) when
+  // the drain's grace period has passed.
   absl::Status stop() const;
 
-  // Far in the future for a call without a deadline.
+  // Returns the call's deadline; a year from now for a call without one.
   SteadyTime deadline() const { return deadline_; }
-  // How long this call may wait for a revision: until its deadline, or limits::kDefaultWaitMs for a call without one.
-  // On a stream that is the most for each message.
+  // Returns until when this call may wait for a revision: its deadline, or limits::kDefaultWaitMs from now for a call
+  // without one. Each message of a stream waits for at most limits::kDefaultWaitMs.
   SteadyTime wait_until(bool stream) const;
 
-  // MALFORMED where the metadata `x-scene` is there and names another scene.
+  // Returns INVALID_ARGUMENT (MALFORMED) if the metadata `x-scene` is present and names another scene.
   absl::Status check_scene(const std::string& scene) const;
 
-  // Ends the call at once, CANCELLED, whatever it waits for.
+  // Cancels the call at once, even while it is blocked in a read or write.
   void cancel() const { context_.TryCancel(); }
 
-  // How logs call this call: by the caller's metadata x-request-id and traceparent where they are of their form, or by
-  // an id of its own. Unlike the rest on the call's own thread only.
+  // Returns the ids that name this call in logs: the caller's metadata x-request-id and traceparent if they are valid,
+  // otherwise a generated request id. Call it on the call's own thread only.
   TraceContext trace() const;
 
   const Host& host() const { return host_; }
@@ -58,34 +62,38 @@ class Caller {
   const uint64_t number_ = next_request_number();
 };
 
-// The metadata that brings a request id and takes it back to whoever called.
+// Metadata key of the request id, in the caller's metadata and in the trailing metadata of the reply.
 inline constexpr const char* kRequestIdMetadata = "x-request-id";
 
-// The name and x-scene checks of a call about one scene, and the scene.
+// Checks the scene's name and the metadata x-scene, then returns the scene. Errors name `field`.
 absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field);
 
-// A hold on the snapshot that `view` names, waited for until `until`. Wakes up at once when it is published or the
-// scene is deleted, and within a moment when the call ends or the server drains: then UNAVAILABLE, DRAINING.
+// Pins the snapshot that `view` names, after waiting for it until `until` at most. Wakes up at once when the revision
+// is published or the scene is deleted, and within 50 ms when the call ends or the server drains (then UNAVAILABLE,
+// DRAINING).
 absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
 
-// Waits while readers of the scene that were told to end have not; those that stay for long are cut off. Asks `stop`
-// now and then, and ends with its status where that is not OK, or, at the call's deadline, with what it waited for.
+// Waits until the readers whose snapshots of the scene are revoked have released them. Calls
+// Scene::revoke_overdue_readers() if that takes longer than a second. Polls `stop` every 50 ms and returns its status
+// if that is not OK; at the call's deadline, returns the scene's own status, which names the limit pinned_bytes.
 absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
 
-// UNAVAILABLE while the server reads back what it keeps, or drains.
+// Returns UNAVAILABLE while the server recovers its scenes from the disk, or drains.
 absl::Status check_serving(const Host& host);
+// Treatment of a call that arrives while check_serving() fails.
 enum class WhileClosed { kRefuse, kServe };
 
-// Runs `body`, turns what it returns into the call's status, and counts the call. Its lines in the log have its request
-// id, which also goes back to the caller at the end.
+// Runs `body`, converts its status to the call's status, and counts the call. Log lines of the call carry its request
+// id, which is also returned to the caller in the trailing metadata.
 grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
                    const std::function<absl::Status(const Caller&)>& body,
                    WhileClosed while_closed = WhileClosed::kRefuse);
 
-// Which refusals of a message are the stream's own end: the caller's end of the call, and the server's.
+// Returns whether the status of a refused message ends the whole stream: because the caller ended the call, or because
+// the server drains.
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
-// Counts a call or a message of a stream that was answered with `status`, and logs a line at debug where that is a
+// Counts a call, or one message of a stream, that was answered with `status`. Logs a line at debug level if that is a
 // refusal.
 void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived);
 

@@ -1,5 +1,5 @@
-// What the work on one message sees of the call it belongs to. The work begins on the call's IO loop and says there,
-// once, that it is over; in between it may be anywhere.
+// The call of a message, as seen by the work on that message. The work begins on the call's IO loop and must call
+// answered() there exactly once; in between it may run on any thread.
 #ifndef LOCUS_SERVER_RPC_CALL_SLOT_H_
 #define LOCUS_SERVER_RPC_CALL_SLOT_H_
 
@@ -12,6 +12,8 @@
 
 namespace locus::server {
 
+// A message's place in its call. See HotCall::Slot, the only implementation; this interface keeps the work on a message
+// independent of the templates of hot_call.h.
 class CallSlot {
  public:
   explicit CallSlot(Host& host) : host_(host) {}
@@ -20,19 +22,20 @@ class CallSlot {
 
   Host& host() const { return host_; }
 
-  // While a message is in work.
+  // Returns the caller. Valid while a message is being processed.
   virtual const Caller& caller() const = 0;
   virtual IoLoop& io() const = 0;
-  // The same for all calls of a connection, and, as far as can be told, of no other.
+  // Returns an id of the client, for fair shares: equal for all calls of one connection, and different for other
+  // connections as far as gRPC tells them apart.
   virtual uint64_t client() const = 0;
-  // Whether the call goes on after this message.
+  // Returns whether the call is a stream.
   virtual bool stream() const = 0;
 
-  // On the IO loop: the call reads no further message until this one is answered.
+  // Stops the call from reading further messages until this one is answered. Call it on the IO loop.
   virtual void hold() = 0;
 
-  // On the IO loop only, once a message. OK: the response is filled in. The slot may serve another message before
-  // this returns.
+  // Ends the work on the message. Call it on the IO loop only, once a message. If `status` is OK, the response must be
+  // filled in. The slot may already serve another message when this returns.
   virtual void answered(absl::Status status) = 0;
 
  protected:

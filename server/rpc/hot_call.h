@@ -1,16 +1,17 @@
-// The calls that come by the thousand, unary or streams, as one state machine on completion queues. A Method says what
-// is asked and how it is answered; everything that gRPC demands of a call is here, once.
+// The state machine of the frequent calls (queries and updates, unary or streams) on a completion queue. A Method names
+// the types of a call and starts the work on its messages; the protocol with gRPC is here, once for all of them.
 //
-// Lifetime. A call belongs to its IO loop; only there is it touched, so it has no locks. It waits for a caller, and
-// from accepted() on lives until three things are true: its status was sent (finished_), gRPC has said that the call is
-// over (gone_), and nothing is out: no read, no write, no message in work. Then, at the end of advance(), it deletes
-// itself. Work on a message may be anywhere, but comes back to the IO loop exactly once, by answered(); when the
-// caller is gone or the server drains, give_up() asks it to do so soon. Slots hold a message, its answer and the work
-// on it; they outlive calls and are used again and again, so that steady traffic allocates no columns.
+// Lifetime: a call belongs to its IO loop and is used only there, so it has no locks. It waits for a caller, and lives
+// from accepted() until three conditions hold: its status was sent (finished_), gRPC has reported the end of the call
+// (gone_), and no read, no write and no message is pending. Then it deletes itself at the end of advance(). Work on a
+// message may run on any thread, but returns to the IO loop exactly once, through answered(); when the caller has gone
+// or the server drains, give_up() asks the work to answer soon. A Slot holds a message, its answer and the work on it;
+// slots outlive calls and are reused, so that steady traffic allocates no columns.
 //
-// A stream has at most kSlots messages in work or waiting to be taken by the caller, and reads on when one has been:
-// that is all the memory that a caller who does not read can take. Reads, one write and the work on several messages
-// are under way at once; answers go out as they come, or in the order of the messages where Method::kInOrder.
+// A stream has at most kSlots messages that are being processed or wait to be written. It reads the next one when an
+// answer was written. This bounds the memory that a caller who does not read can use. Reads, one write and the work on
+// several messages proceed concurrently; answers are written as they complete, or in the order of the messages if
+// Method::kInOrder.
 #ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
 #define LOCUS_SERVER_RPC_HOT_CALL_H_
 
@@ -44,17 +45,17 @@ namespace locus::server {
 template <class Method>
 class HotCall;
 
-// Waits for calls of one rpc on one IO loop, and keeps what they use again. Outlives the loop's calls.
+// Accepts the calls of one rpc on one IO loop, and keeps their slots for reuse. Outlives the loop's calls.
 //
-// What a Method is: the types Request, Response and Work; kRpc, kStream, kInOrder; listen(), which asks gRPC for the
-// next call; and begin(), which has the work on a message begun. A Work is built from a CallSlot and has give_up():
-// where it has not answered, it is to do so soon.
+// A Method has the types Request, Response and Work; the constants kRpc, kStream and kInOrder; listen(), which requests
+// the next call from gRPC; and begin(), which begins the work on a message. A Work is constructed from a CallSlot and
+// has give_up(), which asks it to answer soon if it has not answered yet.
 template <class Method>
 class Listener {
  public:
   Listener(Host& host, const Method& rpc, IoLoop& io) : host_(host), rpc_(rpc), io_(io) {}
 
-  // Once, after the server started and before the IO threads did.
+  // Requests the first calls from gRPC. Call it once, after the server and before the IO threads have started.
   void listen() {
     for (int i = 0; i < kWaiting; ++i) HotCall<Method>::listen(*this);
   }
@@ -63,8 +64,8 @@ class Listener {
   friend class HotCall<Method>;
   using Slot = typename HotCall<Method>::Slot;
 
-  static constexpr int kWaiting = 4;         // calls that gRPC can begin at once
-  static constexpr size_t kSpareSlots = 16;  // kept for later messages
+  static constexpr int kWaiting = 4;         // calls that gRPC can accept at once
+  static constexpr size_t kSpareSlots = 16;  // maximum number of slots kept for later messages
 
   std::unique_ptr<Slot> take_slot() {
     if (spare_.empty()) return std::make_unique<Slot>(host_);
@@ -82,13 +83,14 @@ class Listener {
   std::vector<std::unique_ptr<Slot>> spare_;
 };
 
+// One call of `Method`: waiting to be accepted, or accepted and not yet over.
 template <class Method>
 class HotCall final : private IoLoop::ActiveCall {
  public:
   using Request = typename Method::Request;
   using Response = typename Method::Response;
 
-  // A message of a call, from its arrival until its answer is on its way.
+  // A message of a call, from its arrival until its answer is written.
   class Slot final : public CallSlot {
    public:
     explicit Slot(Host& host) : CallSlot(host), work_(*this) {}
@@ -100,8 +102,8 @@ class HotCall final : private IoLoop::ActiveCall {
     void hold() override { holds_ = true; }
     void answered(absl::Status status) override { call_->answered(*this, std::move(status)); }
 
-    // Whether what it keeps of its past messages is little enough. Looks closely now and then only, which takes a
-    // while.
+    // Returns whether the memory kept for reuse is at most kMaxKept. Measures it only once every kLookEvery bytes of
+    // messages, because measuring is slow.
     bool fit_to_keep() {
       if (bytes_since_look_ < kLookEvery) return true;
       bytes_since_look_ = 0;
@@ -118,7 +120,7 @@ class HotCall final : private IoLoop::ActiveCall {
     Response response_;
     typename Method::Work work_;
     bool answered_ = false;
-    bool holds_ = false;  // the call from reading on
+    bool holds_ = false;  // stops the call from reading the next message
     SteadyTime arrived_;
     size_t bytes_since_look_ = 0;
   };
@@ -151,14 +153,16 @@ class HotCall final : private IoLoop::ActiveCall {
       listener_.io_.release();
   }
 
-  // Everything that happens to a call goes through here. What follows from it is decided once, when it has happened.
-  template <class Happening>
-  void act(const Happening& happening) {
+  // Handles one event of the call: changes the state by `change`, then calls advance() once, when the outermost change
+  // has returned (work that answers at once nests). May delete the call.
+  template <class Change>
+  void act(const Change& change) {
     ++acting_;
-    happening();
+    change();
     if (--acting_ == 0) advance();
   }
 
+  // Starts every operation that the state now allows, and deletes the call when nothing is pending any more.
   void advance() {
     if (!finishing_) {
       if (stopping_) drop_answers();
@@ -170,7 +174,7 @@ class HotCall final : private IoLoop::ActiveCall {
   }
 
   void accepted(bool ok) {
-    if (!ok) {  // the server has ended, and gone_tag_ will not come
+    if (!ok) {  // the server has ended; gRPC will not deliver gone_tag_
       delete this;
       return;
     }
@@ -190,10 +194,10 @@ class HotCall final : private IoLoop::ActiveCall {
 
   absl::Status admit() {
     Host& host = listener_.host_;
-    AdmissionLimiter& gate = Method::kStream ? host.streams : host.calls;
-    pass_ = gate.enter();
-    if (!pass_)
-      return refuse_full("", Method::kStream ? "streams" : "calls", gate.max(), gate.max() + 1.0, kRetryAfterMs);
+    AdmissionLimiter& limiter = Method::kStream ? host.streams : host.calls;
+    permit_ = limiter.enter();
+    if (!permit_)
+      return refuse_full("", Method::kStream ? "streams" : "calls", limiter.max(), limiter.max() + 1.0, kRetryAfterMs);
     RETURN_IF_ERROR(check_serving(host));
     if (Method::kStream) open_.emplace(host.metrics, Method::kRpc);
     return absl::OkStatus();
@@ -212,7 +216,7 @@ class HotCall final : private IoLoop::ActiveCall {
   void read(bool ok) {
     act([this, ok] {
       reading_ = false;
-      if (no_more_) return;  // too late to be answered
+      if (no_more_) return;  // arrived after the last message that is answered
       if (!ok) {
         no_more_ = true;
         return;
@@ -240,7 +244,7 @@ class HotCall final : private IoLoop::ActiveCall {
 
   void begin(Slot& slot) {
     if constexpr (Method::kStream) {
-      read_next();  // the next message may arrive while this one is in work
+      read_next();  // the next message may arrive while this one is processed
       slot.response_.set_sequence(slot.request_.sequence());
       if (absl::Status status = scene_.check(slot.request_.scene()); !status.ok()) return slot.answered(status);
       listener_.rpc_.begin(slot.work_, scene_.scene(), slot.request_, slot.response_);
@@ -265,7 +269,7 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Whether nothing remains to be done but to send the status, of a unary call with its answer.
+  // Returns whether only the status remains to be sent; a unary call sends its answer together with it.
   bool all_done() const { return slots_.empty() || (!Method::kStream && slots_.front()->answered_); }
 
   void write_next() {
@@ -291,31 +295,31 @@ class HotCall final : private IoLoop::ActiveCall {
     bool own = false;
     outgoing_.Clear();
     const grpc::Status status = grpc::SerializationTraits<Response>::Serialize(slot.response_, &outgoing_, &own);
-    LOCUS_CHECK(status.ok());  // replies are far below what a message can be
+    LOCUS_CHECK(status.ok());  // replies are far below the maximum size of a message
     slot.bytes_since_look_ += outgoing_.Length();
   }
 
   void release(Slot& slot) {
-    const auto place =
+    const auto position =
         std::find_if(slots_.begin(), slots_.end(), [&](const auto& entry) { return entry.get() == &slot; });
-    std::unique_ptr<Slot> owned = std::move(*place);
-    slots_.erase(place);
+    std::unique_ptr<Slot> owned = std::move(*position);
+    slots_.erase(position);
     listener_.give_back(std::move(owned));
   }
 
-  // What is no answer to a message ends the call.
+  // Ends the call with an error that is not the answer to a message.
   void refuse(absl::Status status) {
     record_answer(listener_.host_.metrics, *caller_, Method::kRpc, status, arrived_);
     end(std::move(status));
   }
 
-  // Nothing more is read; what was is answered, then the call ends with `status`.
+  // Stops reading. Messages that were read are still answered; then the call ends with `status`.
   void end(absl::Status status) {
     no_more_ = true;
     end_status_ = std::move(status);
   }
 
-  // The same, but nobody waits for answers any more.
+  // Stops reading and drops all answers, because the caller no longer waits for them.
   void stop(absl::Status status) {
     if (stopping_) return;
     end(std::move(status));
@@ -336,9 +340,9 @@ class HotCall final : private IoLoop::ActiveCall {
 
   void finish() {
     finishing_ = true;
-    // A caller who has its answer may call again at once, and must find room.
-    pass_ = AdmissionLimiter::Permit();
-    // Who failed may ask what happened; to all others it would only cost bytes.
+    // Release the permit first: a caller that has its answer may call again at once, and must be admitted.
+    permit_ = AdmissionLimiter::Permit();
+    // Only failed calls return the request id, for questions about the failure; for others it would only cost bytes.
     if (!end_status_.ok()) context_.AddTrailingMetadata(kRequestIdMetadata, caller_->trace().request_id);
     if constexpr (Method::kStream) {
       wire_.Finish(to_grpc(end_status_), &finished_tag_);
@@ -357,7 +361,8 @@ class HotCall final : private IoLoop::ActiveCall {
     act([this] { finished_ = true; });
   }
 
-  // gRPC says that the call is over; before finish() that means that the caller gave up or its deadline passed.
+  // Handles gRPC's report that the call is over. Before finish() it means that the caller gave up or that the deadline
+  // passed.
   void gone(bool) {
     act([this] {
       gone_ = true;
@@ -372,7 +377,8 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Connections of a unix socket cannot be told apart: there each stream counts by itself.
+  // Returns an id of the connection. Connections to a unix socket all have the same peer name, so each stream over one
+  // counts as a client of its own.
   uint64_t client() {
     if (!client_) {
       const std::string peer = context_.peer();
@@ -385,8 +391,8 @@ class HotCall final : private IoLoop::ActiveCall {
   Listener<Method>& listener_;
   grpc::ServerContext context_;
   Wire wire_{&context_};
-  Bytes incoming_;  // gRPC's while reading_
-  Bytes outgoing_;  // gRPC's while writing_
+  Bytes incoming_;  // owned by gRPC while reading_
+  Bytes outgoing_;  // owned by gRPC while writing_
   Tag accepted_tag_{*this, &HotCall::accepted};
   Tag read_tag_{*this, &HotCall::read};
   Tag written_tag_{*this, &HotCall::written};
@@ -394,23 +400,23 @@ class HotCall final : private IoLoop::ActiveCall {
   Tag gone_tag_{*this, &HotCall::gone};
 
   std::optional<IoLoop::ActiveCalls::iterator> active_call_;
-  std::atomic<bool> stopped_{false};  // for work on other threads: nobody waits for it
+  std::atomic<bool> stopped_{false};  // tells work on other threads that the caller no longer waits for answers
   SteadyTime arrived_;
   std::optional<OpenStream> open_;
   std::optional<Caller> caller_;
   std::optional<uint64_t> client_;
-  AdmissionLimiter::Permit pass_;
+  AdmissionLimiter::Permit permit_;
   SceneBinding scene_;
-  Slots slots_;  // in the order of arrival
-  Slot* writing_ = nullptr;
-  absl::Status end_status_;
-  int acting_ = 0;
-  bool reading_ = false;
-  bool no_more_ = false;    // messages are taken
-  bool stopping_ = false;   // answers are dropped
-  bool finishing_ = false;  // the status is on its way
-  bool finished_ = false;
-  bool gone_ = false;
+  Slots slots_;              // in the order of arrival
+  Slot* writing_ = nullptr;  // slot whose answer is being written
+  absl::Status end_status_;  // status that the call ends with
+  int acting_ = 0;           // nesting depth of act()
+  bool reading_ = false;     // a read is pending
+  bool no_more_ = false;     // no further message is accepted
+  bool stopping_ = false;    // answers are dropped
+  bool finishing_ = false;   // the status is being sent
+  bool finished_ = false;    // the status was sent
+  bool gone_ = false;        // gRPC has reported the end of the call
 };
 
 }  // namespace locus::server

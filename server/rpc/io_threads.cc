@@ -18,15 +18,16 @@ constexpr uint32_t kMaxThreads = 16;
 
 }  // namespace
 
+// The waker's thread: on request it sets an alarm, which makes a loop's completion queue return.
 class IoWaker {
  public:
   void watch(IoLoop& loop) { loops_.push_back(&loop); }
   void start() {
     thread_ = std::thread([this] { run(); });
   }
-  // From any thread.
+  // Wakes the loops that have asked for it. Safe to call from any thread; takes no lock.
   void wake() { calls_.post(); }
-  // Afterwards no alarm is set any more.
+  // Ends the thread. No alarm is set afterwards.
   void stop() {
     over_.store(true);
     wake();
@@ -37,12 +38,13 @@ class IoWaker {
   void run() {
     while (!over_.load()) {
       calls_.wait();
-      for (IoLoop* loop : loops_) tell(*loop);
+      for (IoLoop* loop : loops_) set_alarm(*loop);
     }
   }
 
-  // An alarm on its way is enough: whoever gets it looks for what was posted afterwards.
-  static void tell(IoLoop& loop) {
+  // Sets the loop's alarm unless one is pending already: the thread that receives the alarm also handles tags that were
+  // posted after it was set.
+  static void set_alarm(IoLoop& loop) {
     if (!loop.wanted_.exchange(false) || loop.alarm_set_.exchange(true)) return;
     loop.alarm_.Set(loop.queue_.get(), gpr_inf_past(GPR_CLOCK_MONOTONIC), &loop.woken_);
   }
@@ -57,8 +59,8 @@ IoLoop::IoLoop(std::unique_ptr<grpc::ServerCompletionQueue> queue, IoWaker& wake
     : EventLoop(static_cast<EventSource&>(*this)), queue_(std::move(queue)), waker_(waker) {}
 
 EventSource::Next IoLoop::next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok) {
-  void* which = nullptr;
-  switch (queue_->AsyncNext(&which, ok, system_clock::now() + wait)) {
+  void* received = nullptr;
+  switch (queue_->AsyncNext(&received, ok, system_clock::now() + wait)) {
     case grpc::CompletionQueue::SHUTDOWN:
       return Next::kEnd;
     case grpc::CompletionQueue::TIMEOUT:
@@ -66,7 +68,7 @@ EventSource::Next IoLoop::next(std::chrono::steady_clock::duration wait, EventTa
     case grpc::CompletionQueue::GOT_EVENT:
       break;
   }
-  *tag = static_cast<EventTag*>(which);
+  *tag = static_cast<EventTag*>(received);
   return Next::kEvent;
 }
 
@@ -95,7 +97,7 @@ void IoLoop::wait_until_empty(bool running) {
       turn();
 }
 
-// Residents may leave while they are told.
+// Advances the iterator before each call, because drain() may remove the call from the list.
 void IoLoop::drain_active_calls(bool) {
   for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();) (*active_call++)->drain();
 }
@@ -136,7 +138,7 @@ void IoThreads::stop() {
   waker_->stop();
   for (const auto& loop : loops_) loop->queue_->Shutdown();
   for (std::thread& thread : running_) thread.join();
-  // Queues that nobody served are emptied all the same, as gRPC asks.
+  // gRPC requires that completion queues are drained, even if no thread ever served them.
   for (const auto& loop : loops_)
     while (running_.empty() && loop->turn()) {
     }

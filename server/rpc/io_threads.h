@@ -1,10 +1,10 @@
-// Loops with a completion queue each, on which calls live, and the threads that serve them. A call lives on one loop:
-// whatever happens to it happens under that loop's lock, so calls need no locks of their own. Short work may be done
-// there, longer work is set aside; nothing may wait.
+// IO loops with one completion queue each, on which the frequent calls live, and the threads that serve them. A call
+// lives on one loop and is only changed under that loop's lock, so it needs no lock of its own. Handlers may do short
+// work; they defer longer work, and never block.
 //
-// A loop has one thread at a time that waits in gRPC: of several, gRPC would have each wake the next for every event.
-// Threads: as of server/scheduling/event_loop.h. Posting calls no gRPC; a thread of its own, the waker, tells gRPC
-// where a loop has to be woken. Lifetime: stop() comes after the server's end and waits for the last call.
+// One thread of a loop at a time waits in gRPC: if several did, gRPC would make each wake the next for every event.
+// Threads: as in server/scheduling/event_loop.h. post() does not call gRPC; a separate thread, the waker, sets a gRPC
+// alarm if a sleeping loop must be woken. Lifetime: call stop() after the server has ended; it waits for the last call.
 #ifndef LOCUS_SERVER_RPC_IO_THREADS_H_
 #define LOCUS_SERVER_RPC_IO_THREADS_H_
 
@@ -23,15 +23,16 @@
 
 namespace locus::server {
 
-// Wakes loops that sleep in gRPC, on behalf of those who may not call it.
+// Thread that wakes loops which sleep in gRPC, for threads that must not call gRPC themselves.
 class IoWaker;
 
+// One event loop over one completion queue, with the list of its calls.
 class IoLoop final : private EventSource, public EventLoop {
  public:
-  // A call that lives here.
+  // A call that lives on this loop.
   class ActiveCall {
    public:
-    // The server drains.
+    // Called on the loop when the server begins to drain.
     virtual void drain() = 0;
 
    protected:
@@ -43,15 +44,17 @@ class IoLoop final : private EventSource, public EventLoop {
 
   grpc::ServerCompletionQueue* queue() { return queue_.get(); }
 
-  // A call that gRPC may begin here: expected until it enters, or until gRPC says that it will not come.
+  // Counts a call that was requested from gRPC, until leave() or release() ends it. release() is for a call that gRPC
+  // reports as never accepted.
   void acquire() { expected_or_active_.fetch_add(1); }
   void release();
+  // Adds an accepted call to the list, or removes it at its end. For handlers.
   ActiveCalls::iterator enter(ActiveCall& call) { return active_calls_.insert(active_calls_.end(), &call); }
   void leave(ActiveCalls::iterator call);
 
-  // Whether no call lives here. For handlers.
+  // Returns whether no accepted call lives on this loop. For handlers.
   bool idle() const { return active_calls_.empty(); }
-  // Whether none does and none can come any more. From any thread.
+  // Returns whether there is no accepted call and none is expected any more. Safe to call from any thread.
   bool empty() const { return expected_or_active_.load() == 0; }
 
  private:
@@ -61,30 +64,32 @@ class IoLoop final : private EventSource, public EventLoop {
   Next next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok) override;
   void interrupt() override;
 
-  // By threads that are `running`, or by taking turns here.
+  // Blocks until empty(). If no threads are `running`, takes the loop's turns on the calling thread.
   void wait_until_empty(bool running);
   void woken(bool ok);
   void drain_active_calls(bool ok);
 
   const std::unique_ptr<grpc::ServerCompletionQueue> queue_;
   IoWaker& waker_;
-  std::atomic<bool> wanted_{false};  // to be woken
-  std::atomic<bool> alarm_set_{false};
-  std::atomic<uint32_t> expected_or_active_{0};
-  grpc::Alarm alarm_;  // the waker's
+  std::atomic<bool> wanted_{false};              // the loop must be woken
+  std::atomic<bool> alarm_set_{false};           // an alarm is pending
+  std::atomic<uint32_t> expected_or_active_{0};  // calls requested from gRPC or accepted
+  grpc::Alarm alarm_;                            // used by the waker only
   MemberTag<IoLoop> woken_{*this, &IoLoop::woken};
   MemberTag<IoLoop> drain_{*this, &IoLoop::drain_active_calls};
   ActiveCalls active_calls_;
 };
 
+// The IO loops of a server and their threads.
 class IoThreads {
  public:
-  // Threads in all, for so many cores: two, or half of them where that is more; one on a single core.
+  // Returns the number of threads for a machine with `cores` cores: 1 for one core, otherwise half the cores, clamped
+  // to 2 .. 16.
   static uint32_t count_for(uint32_t cores);
   static constexpr uint32_t kThreadsOfALoop = 2;
 
-  // `count` threads for one loop, or for each loop kThreadsOfALoop. Before `builder` starts the server; threads run
-  // from start() on.
+  // Creates the loops for `count` threads, kThreadsOfALoop threads each, at least one loop. Call it before `builder`
+  // starts the server. The threads run from start() on.
   IoThreads(grpc::ServerBuilder& builder, uint32_t count);
   ~IoThreads();
   IoThreads(const IoThreads&) = delete;
@@ -94,10 +99,10 @@ class IoThreads {
   IoLoop& loop(size_t i) { return *loops_[i]; }
 
   void start();
-  // Tells every call, now and later, that the server drains. Once, from any thread.
+  // Calls drain() of every active call, on its loop. Call it once, from any thread.
   void drain();
-  // Waits until every call has left, those included that came just before the server's end, then ends the threads. The
-  // server is shut down already.
+  // Waits until every call has left, including calls accepted just before the server's end, then ends the threads. The
+  // server must be shut down already.
   void stop();
 
  private:

@@ -1,4 +1,4 @@
-// What gRPC and protobuf themselves have to say, in the daemon's own log.
+// Redirects the messages of gRPC and protobuf to the daemon's log.
 #ifndef LOCUS_SERVER_RPC_LIBRARY_LOGS_H_
 #define LOCUS_SERVER_RPC_LIBRARY_LOGS_H_
 
@@ -6,8 +6,8 @@
 
 namespace locus::server {
 
-// gRPC's errors at `errors`, all else at debug, since any caller can cause it. For the whole process; may be called
-// again, from any thread.
+// Logs gRPC's errors at level `errors` and all other messages at debug, because any caller can cause them. Applies to
+// the whole process. May be called again, from any thread.
 void capture_library_logs(LogLevel errors);
 
 }  // namespace locus::server

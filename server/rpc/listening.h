@@ -1,5 +1,5 @@
-// Why a server cannot listen somewhere, found out before and after gRPC tries: gRPC itself only says that it failed,
-// and takes a unix socket away from a server that is using it.
+// Finds out why a server cannot listen on an address, before and after gRPC tries: gRPC itself only reports failure,
+// and replaces a unix socket that another server is using. Functions without state; any thread.
 #ifndef LOCUS_SERVER_RPC_LISTENING_H_
 #define LOCUS_SERVER_RPC_LISTENING_H_
 
@@ -10,10 +10,10 @@
 
 namespace locus::server {
 
-// ALREADY_EXISTS when another process answers at this unix socket. OK for every TCP address.
+// Returns ALREADY_EXISTS if another process accepts connections on this unix socket; OK for every TCP address.
 absl::Status check_free(const ListenAddress& address);
 
-// What the system says when asked to listen there, for people.
+// Tries to bind to the address and returns the system's reason for the failure, as text for people.
 std::string why_not(const ListenAddress& address);
 
 }  // namespace locus::server

@@ -1,4 +1,5 @@
-// The scene that a stream serves: named by its first message, and by every later one that names any.
+// The scene that a stream serves. Its first message must name it; later messages may leave the name out. For one
+// thread at a time: the stream's IO loop.
 #ifndef LOCUS_SERVER_RPC_SCENE_BINDING_H_
 #define LOCUS_SERVER_RPC_SCENE_BINDING_H_
 
@@ -11,9 +12,10 @@
 
 namespace locus::server {
 
+// Invariant: the scene never changes once it is set.
 class SceneBinding {
  public:
-  // For every message. What this refuses, of the first one only, ends the stream.
+  // Sets the scene from the first message; later calls do nothing. Call it for every message. An error ends the stream.
   absl::Status bind(const Caller& caller, const std::string& scene) {
     if (!scene_.empty()) return absl::OkStatus();
     RETURN_IF_ERROR(check_scene_name(scene, "scene"));
@@ -21,7 +23,8 @@ class SceneBinding {
     scene_ = scene;
     return absl::OkStatus();
   }
-  // For every message, after that. What it refuses is an answer.
+  // Refuses a message that names another scene. Call it for every message, after bind(). An error is the answer to this
+  // message only.
   absl::Status check(const std::string& scene) const {
     if (scene.empty() || scene == scene_) return absl::OkStatus();
     return refuse_argument(Reason::kMalformed, "scene", {},

@@ -31,14 +31,14 @@ namespace fs = std::filesystem;
 
 constexpr uint32_t kBusyRetryMs = 5000;
 constexpr size_t kSha256Bytes = 32;
-// Within kBackupDirectory, so that whatever the log leaves beside its copy goes with it.
+// Directory inside kBackupDirectory, so that files that the log leaves beside its copy are removed with it.
 constexpr const char* kCopy = "copy";
 
-// Takes a piece; false ends the backup.
+// Writes a piece to the caller; returns false to end the backup.
 using TakePiece = std::function<bool(const v1::BackupResponse&)>;
 
 struct File {
-  std::string path;  // within the copy
+  std::string path;  // relative to the copy
   uint64_t bytes = 0;
 };
 
@@ -49,7 +49,8 @@ absl::Status unreadable(absl::string_view path, absl::string_view why) {
                                           "; look after the server's disk, and ask `locusd check` about its data"));
 }
 
-// How the disk failed to take something.
+// Returns the status for a directory that could not be created: RESOURCE_EXHAUSTED if the disk is full, otherwise
+// UNAVAILABLE.
 absl::Status not_made(const fs::path& path, const std::error_code& why) {
   const bool full = why == std::errc::no_space_on_device;
   return absl::Status(full ? absl::StatusCode::kResourceExhausted : absl::StatusCode::kUnavailable,
@@ -57,7 +58,7 @@ absl::Status not_made(const fs::path& path, const std::error_code& why) {
                                    full ? "; free some of the server's disk" : "; look after the server's disk"));
 }
 
-// Removes the directory, and says so in the log where it cannot be.
+// Removes the directory. Logs a warning if that fails.
 void remove_tree(const fs::path& directory) {
   std::error_code why;
   fs::remove_all(directory, why);
@@ -66,7 +67,7 @@ void remove_tree(const fs::path& directory) {
       {{"path", directory.string()}, {"text", why.message()}, {"hint", "remove it by hand"}});
 }
 
-// An empty directory for as long as it lives.
+// A directory that is empty after make() and removed by the destructor.
 class Directory {
  public:
   explicit Directory(fs::path path) : path_(std::move(path)) {}
@@ -84,7 +85,7 @@ class Directory {
   const fs::path path_;
 };
 
-// Every file below `copy`, ascending by path.
+// Returns every file below `copy`, in ascending order of paths.
 absl::StatusOr<std::vector<File>> list_files(const fs::path& copy) {
   std::vector<File> files;
   std::error_code why;
@@ -116,7 +117,7 @@ class OpenFile {
 
   bool is_open() const { return descriptor_ >= 0; }
 
-  // Fewer than asked for only at the file's end; -1 sets errno.
+  // Returns the number of bytes read, which is less than `bytes` only at the end of the file; -1 and errno on error.
   ssize_t read(char* to, size_t bytes) const {
     size_t done = 0;
     while (done < bytes) {
@@ -133,7 +134,7 @@ class OpenFile {
   const int descriptor_;
 };
 
-// Sends as many bytes as the file was listed with. False where `take` ended it.
+// Sends exactly the number of bytes that the file was listed with. Returns false if `take` ended the backup.
 absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const TakePiece& take) {
   const OpenFile from(copy / file.path);
   if (!from.is_open()) return unreadable(file.path, std::strerror(errno));
@@ -193,8 +194,8 @@ void remove_leftover_backup(const Host& host) { remove_tree(directory_of(host));
 
 absl::Status back_up(Host& host, const Caller& caller, grpc::ServerWriter<v1::BackupResponse>& writer) {
   if (!can_back_up(host)) return no_data_directory();
-  const AdmissionLimiter::Permit pass = host.backups.enter();
-  if (!pass) return refuse_full("", "backups", host.backups.max(), host.backups.max() + 1.0, kBusyRetryMs);
+  const AdmissionLimiter::Permit permit = host.backups.enter();
+  if (!permit) return refuse_full("", "backups", host.backups.max(), host.backups.max() + 1.0, kBusyRetryMs);
   const fs::path path = directory_of(host);
   const Directory directory(path);
   RETURN_IF_ERROR(directory.make());

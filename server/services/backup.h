@@ -1,6 +1,6 @@
-// Backup: everything in the data directory as it is at one moment, streamed file after file. The log makes the copy
-// under the data directory (hard links: milliseconds), a thread that stands below those who answer reads it out, and it
-// is removed however the call ends.
+// Backup: streams a consistent copy of the data directory, file after file. The log makes the copy inside the data
+// directory (hard links, milliseconds), a thread of low priority reads it, and the copy is removed however the call
+// ends. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_BACKUP_H_
 #define LOCUS_SERVER_SERVICES_BACKUP_H_
 
@@ -14,16 +14,18 @@
 namespace locus::server {
 
 inline constexpr const char* kBackupFeature = "backup";
-// Within the data directory, while a backup is under way.
+// Directory of the copy inside the data directory, while a backup is running.
 inline constexpr const char* kBackupDirectory = "backup.partial";
 
-// Whether there is a data directory to copy.
+// Returns whether there is a data directory to copy.
 bool can_back_up(const Host& host);
 
-// What a process that ended in the middle of a backup left behind, which keeps old files from being freed. Before the
-// first call.
+// Removes the copy that a killed process left behind; its hard links would keep old files from being freed. Call it
+// before the first call is served.
 void remove_leftover_backup(const Host& host);
 
+// Serves one Backup call. Errors: RESOURCE_EXHAUSTED while another backup runs or if the disk is full, UNIMPLEMENTED
+// without a data directory, DATA_LOSS if a file of the copy cannot be read.
 absl::Status back_up(Host& host, const Caller& caller, grpc::ServerWriter<v1::BackupResponse>& writer);
 
 }  // namespace locus::server

@@ -1,4 +1,4 @@
-// Epochs of scenes: what names one unbroken count of revisions.
+// Epochs of scenes. An epoch is a random number that names one unbroken count of revisions.
 #ifndef LOCUS_SERVER_SERVICES_EPOCHS_H_
 #define LOCUS_SERVER_SERVICES_EPOCHS_H_
 
@@ -6,7 +6,8 @@
 
 namespace locus::server {
 
-// Never 0, and with all but certainty never the same twice, in this run of the server or another. Any thread.
+// Returns a random number that is not 0: 64 bits of std::random_device, so equal epochs are practically impossible,
+// also between runs of the server. Any thread.
 uint64_t new_epoch();
 
 }  // namespace locus::server

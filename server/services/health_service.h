@@ -1,10 +1,10 @@
-// The standard health service, grpc.health.v1.Health: whether this server, or one of its services, serves. For load
-// balancers, orchestrators and `locus health`.
+// The standard health service, grpc.health.v1.Health: reports whether the server, or one of its services, is serving.
+// For load balancers, orchestrators and `locus health`.
 //
-// gRPC's own is not used: it brings completion queues of its own, whose threads then read from every connection and
-// hand what came to the IO threads, at the price of a wake-up a message.
-// Threads: every member may be called from any thread. A watcher keeps a thread of the server; there may be
-// kMaxHealthWatchers.
+// gRPC's own implementation is not used: it adds completion queues whose threads then read from every connection and
+// pass the messages on to the IO threads, which costs a wake-up a message.
+// Threads: every member may be called from any thread. Each watcher occupies a thread of the server; at most
+// kMaxHealthWatchers are admitted.
 #ifndef LOCUS_SERVER_SERVICES_HEALTH_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_HEALTH_SERVICE_H_
 
@@ -37,7 +37,7 @@ class HealthService final : public grpc::health::v1::Health::Service {
   static Response::ServingStatus status_of(State state);
   void set(State state) LOCUS_EXCLUDES(mutex_);
   State state() const LOCUS_EXCLUDES(mutex_);
-  // Waits until the state differs from `known` or the call is cancelled; returns the state.
+  // Blocks until the state differs from `known` or the call of `context` is cancelled, and returns the state.
   State wait(const grpc::ServerContext& context, State known) LOCUS_EXCLUDES(mutex_);
 
   Host& host_;

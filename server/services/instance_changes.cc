@@ -13,10 +13,10 @@
 namespace locus::server {
 namespace {
 
-// How late a waiting call notices that its caller is gone.
+// A waiting call checks this often whether its caller has gone.
 constexpr std::chrono::milliseconds kWaitSlice{50};
 
-// What a background change hands to the call that waits for it, if that still does.
+// Result of a background change, handed to the call that waits for it. The call may have ended before.
 class Outcome {
  public:
   void set(absl::StatusOr<InstanceChange> change) LOCUS_EXCLUDES(mutex_) {
@@ -25,7 +25,7 @@ class Outcome {
     known_.notify_all();
   }
 
-  // The change's result, or why the caller stopped waiting; the change goes on then.
+  // Returns the result of the change, or the status that ended the call. In the latter case the change continues.
   absl::StatusOr<InstanceChange> wait(const Caller& caller) LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     while (!change_) {
@@ -41,39 +41,40 @@ class Outcome {
   std::optional<absl::StatusOr<InstanceChange>> change_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// A request with the memory its columns point to.
+// A change together with the message that its columns point into.
 struct OwnedChange {
   v1::ChangeInstancesRequest request;
   StaticChange change;
 };
 
-size_t placement_count(const v1::Placement& place) {
-  return static_cast<size_t>(place.ids().empty() ? place.translations_size() / 3 : place.ids_size());
+size_t placement_count(const v1::Placement& placement) {
+  return static_cast<size_t>(placement.ids().empty() ? placement.translations_size() / 3 : placement.ids_size());
 }
 
-absl::StatusOr<PlacementColumns> to_placement(const Registry& registry, const v1::Placement& place,
+absl::StatusOr<PlacementColumns> to_placement(const Registry& registry, const v1::Placement& placement,
                                               const std::string& field) {
-  RETURN_IF_ERROR(check_mesh_name(place.mesh(), field + ".mesh"));
-  ASSIGN_OR_RETURN(MeshPtr mesh, registry.find_mesh(place.mesh(), field + ".mesh"));
+  RETURN_IF_ERROR(check_mesh_name(placement.mesh(), field + ".mesh"));
+  ASSIGN_OR_RETURN(MeshPtr mesh, registry.find_mesh(placement.mesh(), field + ".mesh"));
   PlacementColumns columns;
   columns.mesh = std::move(mesh);
-  columns.ids = span_of(place.ids());
-  columns.translations = span_of(place.translations());
-  columns.rotations = span_of(place.rotations());
-  columns.scales = span_of(place.scales());
-  columns.layers = span_of(place.layers());
-  columns.groups = span_of(place.groups());
-  columns.tags = span_of(place.tags());
+  columns.ids = span_of(placement.ids());
+  columns.translations = span_of(placement.translations());
+  columns.rotations = span_of(placement.rotations());
+  columns.scales = span_of(placement.scales());
+  columns.layers = span_of(placement.layers());
+  columns.groups = span_of(placement.groups());
+  columns.tags = span_of(placement.tags());
   return columns;
 }
 
-// Who does not wait gets the chosen ids before the change is built, so they are chosen here: at random among 2^63.
+// Chooses ids for placements without ids. With no_wait the reply carries the ids before the change is built, so they
+// are drawn here: at random, 63 bits below kChosenIdBit.
 void choose_ids(v1::ChangeInstancesRequest& request) {
   std::random_device device;
-  for (v1::Placement& place : *request.mutable_place()) {
-    if (!place.ids().empty()) continue;
-    const size_t n = placement_count(place);
-    for (size_t i = 0; i < n; ++i) place.add_ids(kChosenIdBit | uint64_t{device()} << 32 | device());
+  for (v1::Placement& placement : *request.mutable_place()) {
+    if (!placement.ids().empty()) continue;
+    const size_t n = placement_count(placement);
+    for (size_t i = 0; i < n; ++i) placement.add_ids(kChosenIdBit | uint64_t{device()} << 32 | device());
   }
 }
 
@@ -85,26 +86,27 @@ absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registr
   owned->change.remove_ids = span_of(owned->request.remove_ids());
   owned->change.remove_groups = span_of(owned->request.remove_groups());
   for (int i = 0; i < owned->request.place_size(); ++i) {
-    ASSIGN_OR_RETURN(PlacementColumns place,
+    ASSIGN_OR_RETURN(PlacementColumns placement,
                      to_placement(registry, owned->request.place(i), absl::StrCat("place[", i, "]")));
-    owned->change.place.push_back(std::move(place));
+    owned->change.place.push_back(std::move(placement));
   }
   return owned;
 }
 
-// All that can be said of placements before the changes that wait ahead of them are made.
+// Checks the placements of a change as far as possible before the changes queued ahead of it are applied: applies them
+// to an empty set.
 absl::Status check_placements(const StaticChange& change) {
-  StaticChange alone;
-  alone.place = change.place;
+  StaticChange placements_only;
+  placements_only.place = change.place;
   return StaticSet::empty()
       ->apply(
-          alone, [](Id) { return false; }, 0)
+          placements_only, [](Id) { return false; }, 0)
       .status();
 }
 
 using SharedClaim = std::shared_ptr<const MemoryBudget::Claim>;
 
-// Room for the next set of instances while it is built. Removing is never refused.
+// Claims memory for the next set of instances while it is built. A change that only removes is never refused.
 absl::StatusOr<SharedClaim> make_room(Host& host, const Scene& scene, const StaticChange& change) {
   const uint64_t cost = change_cost(*scene.latest()->statics, change);
   if (cost == 0) return nullptr;
@@ -112,7 +114,7 @@ absl::StatusOr<SharedClaim> make_room(Host& host, const Scene& scene, const Stat
   return std::make_shared<const MemoryBudget::Claim>(std::move(claim));
 }
 
-void log_change(const Scene& scene, uint64_t number, const absl::StatusOr<InstanceChange>& change) {
+void log_failure(const Scene& scene, uint64_t number, const absl::StatusOr<InstanceChange>& change) {
   if (change.ok()) return;
   log(LogLevel::kInfo, "change of instances failed",
       {{"scene", scene.name()}, {"change", absl::StrCat(number)}, {"text", std::string(change.status().message())}});
@@ -136,17 +138,18 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
       host.changes.submit(epoch, [&host, arrived = SteadyTime::clock::now(), scene = *scene, owned = *owned, outcome,
                                   room = *room, trace = LogScope::current()](uint64_t change_number) {
         const LogScope scope(trace);
-        // Whoever asked may be gone by now; readers end in any case.
+        // Wait without a deadline: the caller may have gone, and readers release their snapshots in any case.
         (void)wait_for_readers(*scene, [] { return absl::OkStatus(); });
         absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
         if (change.ok()) host.metrics.record_instance_change(nanoseconds_since(arrived));
-        log_change(*scene, change_number, change);
+        log_failure(*scene, change_number, change);
         outcome->set(std::move(change));
       }));
   response->set_change(number);
   response->set_epoch(epoch);
   if (request.no_wait()) {
-    for (const v1::Placement& place : (*owned)->request.place()) response->mutable_ids()->MergeFrom(place.ids());
+    for (const v1::Placement& placement : (*owned)->request.place())
+      response->mutable_ids()->MergeFrom(placement.ids());
     return absl::OkStatus();
   }
   ASSIGN_OR_RETURN(const InstanceChange change, outcome->wait(caller));
@@ -157,7 +160,7 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
 
 v1::Scene describe(const Host& host, const Scene& scene) {
   v1::Scene out = to_proto(scene);
-  // The queue's count includes the change that the scene itself is working on.
+  // The queue's count includes the change that the scene is building now.
   const uint32_t pending = std::max(out.pending_changes(), host.changes.pending(out.epoch()));
   out.set_pending_changes(pending);
   out.set_state(pending > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);

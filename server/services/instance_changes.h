@@ -1,5 +1,5 @@
-// ChangeInstances: changes of one scene run in the background, one after another in the order of their numbers; a
-// caller waits for its own or goes on at once.
+// ChangeInstances: the changes of a scene run in the background, one after another in the order of their numbers. A
+// caller waits for its change, or returns at once with its number. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_INSTANCE_CHANGES_H_
 #define LOCUS_SERVER_SERVICES_INSTANCE_CHANGES_H_
 
@@ -9,10 +9,11 @@
 
 namespace locus::server {
 
+// Serves one ChangeInstances call. Blocks until the change is published, unless the request says no_wait.
 absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
                               v1::ChangeInstancesResponse* response);
 
-// A scene with the changes that wait for it.
+// Returns the description of a scene, with the number of its pending changes. O(objects), for their bounds.
 v1::Scene describe(const Host& host, const Scene& scene);
 
 }  // namespace locus::server

@@ -12,19 +12,19 @@
 namespace locus::server {
 namespace {
 
-// What the tags and lengths of a piece's fields, and its description, may take.
+// Upper bound of the bytes of a piece's tags, lengths and description.
 constexpr size_t kFrameBytes = 1024;
 static_assert(limits::kMaxNameLength + sizeof(Sha256) + 64 < kFrameBytes);
 constexpr size_t kRoom = limits::kDefaultReplyBytes - kFrameBytes;
-// A vertex or a triangle: three numbers of four bytes.
+// Bytes of a vertex or a triangle: three numbers of four bytes.
 constexpr size_t kTripleBytes = 12;
-// A part's name, the triangle it begins at, and the tags and lengths of both and of the part.
+// Upper bound of the bytes of a part: its name, its first triangle, and the tags and lengths of both and of the part.
 constexpr size_t kMaxPartBytes = limits::kMaxLabelLength + 16;
 static_assert(kMaxPartBytes <= kRoom);
-// Indices that are unpacked before they go into a piece.
+// Number of indices that are unpacked at a time.
 constexpr uint64_t kIndicesAtOnce = 3 << 14;
 
-// Fills pieces and hands each over when it is full.
+// Fills pieces and passes each to `take` when it is full.
 class Pieces {
  public:
   Pieces(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) : take_(take) {
@@ -40,7 +40,7 @@ class Pieces {
     used_ += kMaxPartBytes;
   }
 
-  // Appends triples to the column that `mutable_column` returns of the piece in hand.
+  // Appends triples to the column of the current piece that `mutable_column` returns. Begins new pieces as needed.
   template <class T, class Column>
   void add(absl::Span<const T> numbers, Column mutable_column) {
     while (taken_ && !numbers.empty()) {
@@ -94,8 +94,8 @@ absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadM
                            grpc::ServerWriter<v1::DownloadMeshResponse>& writer) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
   ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.find_mesh(request.mesh(), "mesh"));
-  // The vertices are made anew.
-  ASSIGN_OR_RETURN(const MemoryBudget::Claim room,
+  // Claim memory for the vertices, which are unpacked into a copy.
+  ASSIGN_OR_RETURN(const MemoryBudget::Claim claim,
                    host.memory.claim("mesh", uint64_t{kTripleBytes} * mesh->vertex_count()));
   const uint32_t uses = host.registry.mesh_uses(mesh.get());
   const auto take = [&](const v1::DownloadMeshResponse& piece) { return caller.stop().ok() && writer.Write(piece); };

@@ -1,4 +1,5 @@
-// DownloadMesh: a mesh as it is stored, in pieces of bounded size, from which an equal mesh can be uploaded.
+// DownloadMesh: sends a mesh as it is stored, in pieces of bounded size, from which an equal mesh can be uploaded.
+// Functions without state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_MESH_DOWNLOAD_H_
 #define LOCUS_SERVER_SERVICES_MESH_DOWNLOAD_H_
 
@@ -13,14 +14,14 @@
 
 namespace locus::server {
 
-// Takes a piece; false ends the download.
+// Writes a piece to the caller; returns false to end the download.
 using TakeMeshPiece = std::function<bool(const v1::DownloadMeshResponse&)>;
 
-// The description, then parts, vertices and indices, each piece as full as it may be. At least one piece. False when
-// `take` ended it.
+// Sends the description, then parts, vertices and indices, as full pieces and at least one. Returns false if `take`
+// ended the download.
 bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take);
 
-// Holds the mesh until its last piece is sent, whoever deletes it meanwhile.
+// Serves one DownloadMesh call. Keeps the mesh alive until its last piece is sent, even if it is deleted meanwhile.
 absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
                            grpc::ServerWriter<v1::DownloadMeshResponse>& writer);
 

@@ -69,7 +69,7 @@ absl::Status check_length(size_t numbers, size_t announced, absl::string_view fi
                          absl::StrCat(numbers, " numbers came, ", announced, " were announced"));
 }
 
-// The registry's entry of a name, with its uses.
+// Returns the description of a mesh under `name`, with the number of its uses.
 v1::Mesh describe_mesh(const Registry& registry, const std::string& name, MeshPtr mesh) {
   const uint32_t uses = registry.mesh_uses(mesh.get());
   return to_proto(Registry::NamedMesh{name, std::move(mesh), uses});
@@ -84,7 +84,7 @@ absl::Status reuse(Host& host, const std::string& name, const std::vector<MeshPa
   return absl::OkStatus();
 }
 
-// What can be refused or answered before the bytes come. True when answered.
+// Refuses or answers the upload before its columns are read, if that is possible. Returns true if it is answered.
 absl::StatusOr<bool> answer_early(Host& host, const MeshUpload& upload, v1::UploadMeshResponse* response) {
   const absl::StatusOr<MeshPtr> named = host.registry.find_mesh(upload.name(), "mesh");
   const size_t meshes = host.registry.mesh_count();

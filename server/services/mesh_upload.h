@@ -1,5 +1,5 @@
-// UploadMesh: collects a mesh from the pieces of a stream, checks it against what was announced and against its hash,
-// builds its tree and registers it.
+// UploadMesh: collects a mesh from the pieces of a stream, checks it against the announced counts and hash, builds its
+// tree and registers it.
 #ifndef LOCUS_SERVER_SERVICES_MESH_UPLOAD_H_
 #define LOCUS_SERVER_SERVICES_MESH_UPLOAD_H_
 
@@ -15,19 +15,19 @@
 
 namespace locus::server {
 
-// SHA-256 of vertex count, triangle count, vertices and indices, as UploadMeshRequest.sha256 defines it. Lengths are
-// multiples of three.
+// Returns the SHA-256 of vertex count, triangle count, vertices and indices, as UploadMeshRequest.sha256 defines it.
+// The lengths must be multiples of three.
 Sha256 mesh_hash(absl::Span<const float> vertices, absl::Span<const uint32_t> indices);
 
-// A mesh that arrives in pieces. Never holds more than was announced.
+// A mesh that arrives in pieces. Invariant: it never holds more numbers than were announced. For one thread at a time.
 class MeshUpload {
  public:
   // Checks the first message's form and limits before anything is allocated.
   static absl::StatusOr<MeshUpload> begin(const v1::UploadMeshRequest& first);
 
-  // Appends the columns of a message, the first included.
+  // Appends the columns of a message, also of the first.
   absl::Status append(const v1::UploadMeshRequest& message);
-  // For messages after the first: these may hold nothing but columns.
+  // Appends a message after the first, which may only have columns.
   absl::Status append_later(const v1::UploadMeshRequest& message);
 
   const std::string& name() const { return name_; }
@@ -41,7 +41,7 @@ class MeshUpload {
     Sha256 sha256;
     TriangleMesh mesh;
   };
-  // All of it, checked. Empties the upload.
+  // Checks the mesh and returns it with its hash. Leaves the upload empty.
   absl::StatusOr<Complete> finish();
 
  private:
@@ -49,13 +49,14 @@ class MeshUpload {
 
   std::string name_;
   std::optional<Sha256> announced_;
-  size_t vertex_numbers_ = 0;  // announced, three a vertex
-  size_t index_numbers_ = 0;
+  size_t vertex_numbers_ = 0;  // announced length of the column `vertices`, three numbers a vertex
+  size_t index_numbers_ = 0;   // announced length of the column `indices`, three numbers a triangle
   std::vector<MeshPart> parts_;
   std::vector<float> vertices_;
   std::vector<uint32_t> indices_;
 };
 
+// Serves one UploadMesh call. Blocks for the caller's messages and for the build of the tree.
 absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1::UploadMeshRequest>& reader,
                          v1::UploadMeshResponse* response);
 

@@ -1,4 +1,5 @@
-// QueryService over the scenes of a host: one batch a call, or a stream of them. Both live on IO loops.
+// QueryService over the scenes of a host: Query takes one batch a call, StreamQueries a stream of them. Both live on IO
+// loops.
 #ifndef LOCUS_SERVER_SERVICES_QUERY_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_QUERY_SERVICE_H_
 
@@ -16,7 +17,8 @@ class QueryService final : public v1::QueryService::WithRawMethod_Query<
   explicit QueryService(Host& host);
   ~QueryService() override;
 
-  // Once, after the server started and before the IO threads do. They end before the service.
+  // Begins to accept calls. Call it once, after the server and before the IO threads have started. The threads must end
+  // before the service.
   void listen(IoThreads& threads);
 
  private:

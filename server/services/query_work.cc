@@ -17,7 +17,7 @@ using std::chrono::steady_clock;
 
 namespace {
 
-// Work that is not worth waking another thread for, which would watch for events meanwhile.
+// Work below this estimate keeps the lead of its IO loop: waking another thread to wait for events would cost more.
 constexpr uint64_t kShortNanoseconds = 30'000;
 
 }  // namespace
@@ -60,7 +60,8 @@ void QueryWork::look() {
   wait();
 }
 
-// Nobody may write any more. A stream's messages are answered even so, before the stream ends.
+// While the server drains no update is accepted, so the revision cannot come. A message of a stream then gets an answer
+// of its own, because the stream ends only after all its messages are answered.
 absl::Status QueryWork::no_longer() const {
   RETURN_IF_ERROR(slot_.caller().stop());
   if (!slot_.stream()) return draining();
@@ -68,13 +69,13 @@ absl::Status QueryWork::no_longer() const {
 }
 
 void QueryWork::wait() {
-  told_.store(false);
+  notified_.store(false);
   timer_ = slot_.io().at(until_, [this] {
     timer_.reset();
     if (end_wait()) look();
   });
   watch_.emplace(*scene_, view_.revision, [this, &io = slot_.io()] {
-    told_.store(true);
+    notified_.store(true);
     io.post(woken_);
   });
 }
@@ -83,7 +84,7 @@ bool QueryWork::end_wait() {
   if (timer_) slot_.io().cancel(*timer_);
   timer_.reset();
   watch_.reset();
-  return !told_.load();
+  return !notified_.load();
 }
 
 void QueryWork::woken(bool) {
@@ -101,10 +102,11 @@ void QueryWork::run() {
   started_ = steady_clock::now();
   RunOptions options;
   options.stop = [this] {
-    absl::Status told = pin_->status();
-    return told.ok() ? slot_.caller().stop() : told;
+    absl::Status revoked = pin_->status();
+    return revoked.ok() ? slot_.caller().stop() : revoked;
   };
-  // Not by the clock on the wall: what is learned from a thread that waits for a core would keep it waiting.
+  // Measure processor time, not elapsed time: a thread that waits for a core would learn estimates that are too high,
+  // and its later batches would be queued for nothing.
   options.work_clock = &thread_nanoseconds;
   options.clock = &steady_nanoseconds;
   columns_.emplace(*result_, batch_.blocks.size());
@@ -120,7 +122,7 @@ void QueryWork::run_deferred() { progress_ = slot_.host().scheduler.run_inline(*
 
 void QueryWork::on_deferred_done() {
   if (progress_ == Progress::kDone) return finished(true);
-  submit(slot_.host().scheduler.options().inline_nanoseconds);  // it has shown that it takes longer
+  submit(slot_.host().scheduler.options().inline_nanoseconds);  // it has used up that budget already
 }
 
 void QueryWork::submit(uint64_t nanoseconds) {
@@ -149,8 +151,8 @@ void QueryWork::learn(const QueryBlock& block, const QueryCost& cost) {
 }
 
 void QueryWork::explain() {
-  const QueryCost whole = run_->cost();
-  *result_->mutable_work() = to_proto(whole.work, whole.nanoseconds);
+  const QueryCost total = run_->cost();
+  *result_->mutable_work() = to_proto(total.work, total.nanoseconds);
   for (size_t i = 0; i < batch_.blocks.size(); ++i)
     *result_->mutable_blocks(static_cast<int>(i))->mutable_work() =
         to_proto(run_->cost(i).work, run_->cost(i).nanoseconds);

@@ -1,6 +1,35 @@
-// One query batch from message to columns: checks, the revision it asks for, its turn, the work, the answer. Nothing of
-// it waits on the IO loop: for a revision that is to come it is parked, the work is set aside, and what takes long goes
-// to the scheduler.
+// One query batch, from its message to the columns of its reply: conversion and checks, the revision that it asks for,
+// the queries, the answer. It never blocks the IO loop: while the revision is not published it is parked, short work is
+// deferred until the handler has returned, and long work goes to the query scheduler.
+//
+//   begin() --> read() --error------------------------------------------------> done
+//                 |
+//                 v      the revision may still be published, and no drain
+//               look() ------------------------------> PARKED --give_up()-----> done
+//                 |  ^                                    |
+//                 |  +--- timer, or woken() by the watch -+
+//                 +--error: epoch, range, deadline, deleted, draining ---------> done
+//                 | pinned
+//                 v
+//               run() --error of BatchRun::prepare() --------------------------> done
+//                 |  \ estimate >= inline_nanoseconds
+//                 |   \-----------------------+
+//                 v                           v
+//              DEFERRED --not finished--> submit() --queue is full ------------> done
+//                 |                           |
+//                 | finished                  v
+//                 |                        QUEUED --give_up(), withdrawn ------> done
+//                 |                           | all pool threads have left it
+//                 v                           v
+//              finished() <---- post ------ done()
+//                 |
+//                 +--> columns, metrics, or the error of the run --------------> done
+//
+// `done` in the drawing is answer(), which frees everything and calls CallSlot::answered() once. give_up() acts in
+// PARKED and QUEUED only: elsewhere the run checks Caller::stop() itself.
+//
+// Threads: all members run on the call's IO loop, except run_deferred() (a thread of the loop, without its lock), and
+// work() and done() (pool threads, work() on several at once).
 #ifndef LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 #define LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 
@@ -24,28 +53,30 @@ class QueryWork final : private QueryJob, private DeferredTask {
  public:
   explicit QueryWork(CallSlot& slot) : slot_(slot) {}
 
-  // `batch` and `result` stay until the slot is answered.
+  // Begins the work. `batch` and `result` are borrowed until the slot is answered.
   void begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result);
-  // Ends a wait; ends work that waits for its turn, where the caller is gone. Work under way sees that by itself.
+  // Asks for an answer soon: ends the wait for a revision, and withdraws a queued run if the caller has gone. A run
+  // that is being worked on notices that by itself.
   void give_up();
 
  private:
   absl::Status read(const std::string& scene, const v1::QueryBatch& batch);
   void answer(absl::Status status);
 
-  // Goes on with the revision that the view names, or waits for it.
+  // Pins the revision that the view names and runs, or parks until it is published.
   void look();
   void wait();
-  // True: woken() will not come. False: it is on its way.
+  // Removes timer and watch. Returns whether the wait is over; false if woken() is already posted and will run.
   bool end_wait();
   void woken(bool);
+  // Returns the status of a parked batch that is given up: its revision will not be published any more.
   absl::Status no_longer() const;
 
   void run();
-  // Where it is short.
+  // Works on the batch within the inline budget, without the loop's lock.
   void run_deferred() override;
   void on_deferred_done() override;
-  // Otherwise.
+  // Queues the batch, or what is left of it, at the scheduler with an estimate of its work.
   void submit(uint64_t nanoseconds);
   Progress work(uint64_t nanoseconds) override { return run_->work(nanoseconds); }
   void done() override;
@@ -61,18 +92,18 @@ class QueryWork final : private QueryJob, private DeferredTask {
   View view_;
   QueryBatch batch_;
   SteadyTime until_;
-  SteadyTime started_;  // its turn: after any wait for a revision
+  SteadyTime started_;  // begin of run(): after any wait for a revision
 
-  // While waiting.
+  // Used while parked.
   std::optional<IoLoop::Timers::iterator> timer_;
   std::optional<Scene::Watch> watch_;
-  std::atomic<bool> told_{false};  // woken() is on its way
+  std::atomic<bool> notified_{false};  // woken() is posted
   MemberTag<QueryWork> woken_{*this, &QueryWork::woken};
 
   std::optional<SnapshotPin> pin_;
   std::optional<ResultColumns> columns_;
   std::unique_ptr<BatchRun> run_;
-  Progress progress_ = Progress::kMore;  // of the work set aside
+  Progress progress_ = Progress::kMore;  // result of run_deferred()
   QueryScheduler::TicketPtr ticket_;
   MemberTag<QueryWork> finished_{*this, &QueryWork::finished};
 };

@@ -21,14 +21,14 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// Between two lines that say how far a long recovery is.
+// Interval between two log lines about the progress of a long recovery.
 constexpr std::chrono::seconds kReportEvery{5};
 
 std::string milliseconds_since(steady_clock::time_point start) {
   return absl::StrCat(std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now() - start).count());
 }
 
-// What callers are told of it, for as long as it is there.
+// Returns the error that calls about a damaged scene or mesh get until it is repaired or deleted.
 absl::Status damaged(const char* field, const absl::Status& damage) {
   Refusal refusal;
   refusal.reason = Reason::kDamaged;
@@ -38,6 +38,7 @@ absl::Status damaged(const char* field, const absl::Status& damage) {
   return refuse(absl::StatusCode::kDataLoss, absl::StrCat(damage.message(), advice), refusal);
 }
 
+// One run of recover_all(). The private members run on several threads of the pool.
 class Recovery {
  public:
   Recovery(Host& host, const std::atomic<bool>& stop) : host_(host), log_(*host.log), stop_(stop) {}
@@ -50,14 +51,14 @@ class Recovery {
     if (total_ == 0) return absl::OkStatus();
     log(LogLevel::kInfo, "recovering",
         {{"scenes", absl::StrCat(scenes.size())}, {"meshes", absl::StrCat(meshes.size())}});
-    // Each content is read once, and shared by its names.
+    // Meshes with equal content are recovered once, under their first name; the other names share the result.
     std::map<Sha256, std::vector<const StoredMesh*>> contents;
     for (const StoredMesh& mesh : meshes) contents[mesh.sha256].push_back(&mesh);
     std::vector<const std::vector<const StoredMesh*>*> lists;
     for (const auto& [sha256, names] : contents) lists.push_back(&names);
     host_.pool.parallel_for(lists.size(), [&](size_t i) { recover(*lists[i]); });
     host_.pool.parallel_for(scenes.size(), [&](size_t i) { recover(scenes[i]); });
-    if (stop_.load()) return absl::CancelledError("told to end while what is kept was read back");
+    if (stop_.load()) return absl::CancelledError("stopped before all scenes were recovered");
     const MutexLock lock(mutex_);
     if (failure_.ok())
       log(LogLevel::kInfo, "recovered",
@@ -66,13 +67,13 @@ class Recovery {
   }
 
  private:
-  bool goes_on() LOCUS_EXCLUDES(mutex_) {
+  bool continues() LOCUS_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     return failure_.ok() && !stop_.load();
   }
 
   void recover(const std::vector<const StoredMesh*>& names) {
-    if (!goes_on()) return;
+    if (!continues()) return;
     const steady_clock::time_point start = steady_clock::now();
     const absl::StatusOr<RecoveredMesh> mesh = recover_sound(*names.front());
     if (mesh.ok())
@@ -93,7 +94,7 @@ class Recovery {
   }
 
   void recover(const StoredScene& stored) {
-    if (!goes_on()) return;
+    if (!continues()) return;
     const steady_clock::time_point start = steady_clock::now();
     const absl::StatusOr<ScenePtr> scene = recover_sound(stored);
     if (scene.ok()) {
@@ -119,12 +120,12 @@ class Recovery {
     return recover_mesh(log_, stored, options);
   }
 
-  // Where acks did not wait for the disk, something acknowledged may be missing after a crash, and what was copied may
-  // have gone on where it came from: then it is another count of revisions.
+  // Recovers one scene. Starts a new epoch in two cases: acks did not wait for the disk and the last process crashed,
+  // so acknowledged updates may be missing; or the directory is a restored backup, so the original may have advanced.
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
     ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));
-    // What readers may hold is for this daemon's options to say, not for those of the one that made the scene.
+    // The limit on pinned memory is an option of this daemon, not of the daemon that created the scene.
     spec.pinned_bytes = host_.config.pinned_limit;
     stored.spec = encode_spec(spec);
     if (stored.copied || (spec.durability == Durability::kMemory && !log_.closed_in_order())) {
@@ -134,7 +135,7 @@ class Recovery {
     return recover_scene(log_, stored, find_restored_meshes(log_, host_.registry));
   }
 
-  // Whether it is damage; anything else ends the recovery.
+  // Logs the error and returns whether it is damage (DATA_LOSS). Any other error ends the recovery.
   bool take_damage(const char* kind, const std::string& name, const absl::Status& status) LOCUS_EXCLUDES(mutex_) {
     log(LogLevel::kError, status.message(), {{kind, name}});
     const MutexLock lock(mutex_);
@@ -146,6 +147,7 @@ class Recovery {
     return damage;
   }
 
+  // Counts a mesh or scene as recovered, and logs the progress every kReportEvery.
   void count() LOCUS_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     ++done_;
@@ -173,7 +175,7 @@ void log_snapshot(const Scene& scene, const absl::StatusOr<uint64_t>& bytes) {
          {"bytes", absl::StrCat(*bytes)},
          {"sequence", absl::StrCat(scene.log_position().snapshot_sequence)}});
   else
-    log(LogLevel::kWarning, "no snapshot could be written; the log goes on and grows",
+    log(LogLevel::kWarning, "no snapshot could be written; the log continues to grow",
         {{"scene", scene.name()}, {"why", std::string(bytes.status().message())}});
 }
 

@@ -1,5 +1,6 @@
-// Brings back what the log keeps when the server starts: meshes first, then the scenes that they are placed in, several
-// at a time. What is damaged is named and left out, all else is served. Logs how far it is.
+// Recovers meshes and scenes from the log when the server starts: meshes first, then the scenes that place them,
+// several at a time. Damaged meshes and scenes are registered as damaged and refused by name; all others are served.
+// Logs the progress.
 #ifndef LOCUS_SERVER_SERVICES_RECOVERY_H_
 #define LOCUS_SERVER_SERVICES_RECOVERY_H_
 
@@ -10,8 +11,9 @@
 
 namespace locus::server {
 
-// Before calls are served; `host` has a log and an empty registry. Damage is no error: the registry knows of it.
-// CANCELLED soon after `stop` is true; an error of the log that is no damage, such as a disk that cannot be read.
+// Fills the registry from the log. Call it before calls are served; `host` must have a log and an empty registry.
+// Damage is not an error: it is recorded in the registry. Returns CANCELLED soon after `stop` becomes true, or the
+// log's error if it is not DATA_LOSS, for example a disk that cannot be read. Blocks; uses the threads of host.pool.
 absl::Status recover_all(Host& host, const std::atomic<bool>& stop);
 
 }  // namespace locus::server

@@ -10,7 +10,8 @@
 namespace locus::server {
 namespace {
 
-// Things a piece. One thing takes at most its columns, the frame of a run of its own, and a mesh's name.
+// Objects and instances ("things") a piece. One thing takes at most the bytes of its columns, of the frame of a new
+// run, and of a mesh's name.
 constexpr size_t kThingsPerPiece = 16384;
 constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
@@ -61,7 +62,7 @@ void add_shape(const Shape& shape, v1::Insert* to) {
   }
 }
 
-// Fills pieces and hands each over when it is full.
+// Fills pieces and passes each to `take` when it is full. Neighbours of equal shape or mesh share a run of columns.
 class Dump {
  public:
   Dump(const SceneSnapshot& snapshot, const TakePiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
@@ -97,7 +98,7 @@ class Dump {
   }
 
  private:
-  // False once a piece was not taken.
+  // Passes on the piece if it is full, and counts a thing. Returns false once `take` has ended the dump.
   bool make_room() {
     if (taken_ && things_ == kThingsPerPiece) {
       taken_ = take_(piece_);
@@ -149,7 +150,7 @@ absl::Status dump_scene(const Caller& caller, const v1::DumpSceneRequest& reques
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
   ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(caller, request.scene(), "scene"));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
-  // Its caller may take what is written as slowly as it likes.
+  // A caller that reads slowly could hold the snapshot for any time, so revoking the pin cancels the call.
   snapshot.on_revoke([&caller] { caller.cancel(); });
   const auto take = [&](const v1::DumpSceneResponse& piece) {
     return snapshot.status().ok() && caller.stop().ok() && writer.Write(piece);

@@ -1,4 +1,5 @@
-// DumpScene: everything in a scene at one revision, in pieces of bounded size that can be sent back as they are.
+// DumpScene: sends all objects and instances of a scene at one revision, in pieces of bounded size. A piece has the
+// messages of inserts and placements, so that a client can send it back unchanged. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_SCENE_DUMP_H_
 #define LOCUS_SERVER_SERVICES_SCENE_DUMP_H_
 
@@ -13,10 +14,11 @@
 
 namespace locus::server {
 
-// Takes a piece; false ends the dump.
+// Writes a piece to the caller; returns false to end the dump.
 using TakePiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
-// Objects, then instances, each ascending by id. At least one piece. False when `take` ended it.
+// Sends objects, then instances, each in ascending order of ids, in at least one piece. Returns false if `take` ended
+// the dump.
 bool dump_snapshot(const SceneSnapshot& snapshot, const TakePiece& take);
 
 absl::Status dump_scene(const Caller& caller, const v1::DumpSceneRequest& request,

@@ -25,7 +25,7 @@ absl::StatusOr<size_t> read_page_size(uint32_t asked) {
   return asked == 0 ? limits::kMaxPageSize : asked;
 }
 
-// A token is the last name of the page before.
+// Checks a page token, which is the last name of the previous page.
 absl::Status check_page_token(const absl::Status& name_status) {
   if (name_status.ok()) return name_status;
   return refuse_argument(Reason::kMalformed, "page_token", {},
@@ -40,13 +40,15 @@ bool has_labels(const Scene& scene, const google::protobuf::Map<std::string, std
   return true;
 }
 
+// Entry of a page of scenes.
 struct Listed {
   std::string name;
-  ScenePtr scene;  // null for one that is damaged
+  ScenePtr scene;  // null for a damaged scene
   absl::Status damage;
 };
 
-// What labels they have is not known.
+// Returns the damaged scenes whose names follow `after`; none if the request filters by labels, because the labels of
+// damaged scenes are not known.
 std::vector<Listed> damaged_after(const Host& host, const std::string& after, const v1::ListScenesRequest& request) {
   std::vector<Listed> result;
   if (!request.labels().empty()) return result;
@@ -97,7 +99,7 @@ absl::Status list_meshes(const Host& host, const v1::ListMeshesRequest& request,
 absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteSceneRequest& request) {
   const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.name(), "name");
   absl::Status status = scene.status();
-  // One that is damaged can still be deleted.
+  // A damaged scene can still be deleted.
   if (status.ok() || absl::IsDataLoss(status)) status = host.registry.delete_scene(request.name());
   if (status.code() == absl::StatusCode::kNotFound && request.if_present()) return absl::OkStatus();
   if (!status.ok()) return status;

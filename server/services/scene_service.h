@@ -1,5 +1,5 @@
-// SceneService over a host: scenes, meshes, placed instances, dumps. Each rpc checks, calls the core and converts what
-// comes back; the longer ones live in files of their own.
+// SceneService over a host: scenes, meshes, instances, dumps. Each rpc checks its request, calls the core and converts
+// the result; the longer ones are in files of their own. Threads: gRPC's synchronous threads, several calls at once.
 #ifndef LOCUS_SERVER_SERVICES_SCENE_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_SCENE_SERVICE_H_
 
@@ -40,7 +40,7 @@ class SceneService final : public v1::SceneService::Service {
       LOCUS_EXCLUDES(create_mutex_);
 
   Host& host_;
-  Mutex create_mutex_;  // so that counting scenes and adding one are one step
+  Mutex create_mutex_;  // makes counting the scenes and adding one a single step
 };
 
 }  // namespace locus::server

@@ -1,8 +1,8 @@
-// The pages of the HTTP port: /metrics, put together from what was counted and from what the host holds at that moment,
-// /healthz for whether the process is alive, and /readyz for whether calls are served.
+// The pages of the HTTP port: /metrics, made of the counters and of the host's current state; /healthz, which reports
+// that the process is alive; /readyz, which reports whether calls are served.
 //
-// Threads: every member may be called from any thread; scrapes are made one at a time. A scrape asks every scene for
-// its status, as GetScene does: O(objects).
+// Threads: every member may be called from any thread; scrapes are serialised. A scrape reads the status of every
+// scene, as GetScene does: O(objects).
 #ifndef LOCUS_SERVER_SERVICES_SCRAPE_H_
 #define LOCUS_SERVER_SERVICES_SCRAPE_H_
 
@@ -20,13 +20,13 @@ namespace locus::server {
 
 class Scrape {
  public:
-  // `host` must outlive it.
+  // `host` must outlive the scrape.
   explicit Scrape(const Host& host) : host_(host) {}
 
-  // From here on calls are served, at `addresses`.
+  // Marks the server as ready. `addresses` are counted in locus_connections_open.
   void serving(std::vector<std::string> addresses) LOCUS_EXCLUDES(mutex_);
 
-  // They refer to this scrape.
+  // Returns the pages, which refer to this object.
   HttpServer::Pages pages();
 
   std::string metrics() LOCUS_EXCLUDES(mutex_);

@@ -32,17 +32,18 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 using std::chrono::system_clock;
 
-// gRPC's own threads, and calls that are being refused for want of room.
+// Threads for gRPC itself and for calls that are being refused because the limit is reached.
 constexpr int kSpareThreads = 64;
-// Of the memory limit, and never too little for a few of the largest messages.
+// gRPC's buffers may use this fraction (1/8) of the memory limit, and at least enough for a few of the largest
+// messages.
 constexpr uint64_t kNetworkShare = 8;
 constexpr size_t kMinNetworkBytes = size_t{256} << 20;
-// A caller whose machine is gone would otherwise keep its streams for ever.
+// Pings that detect callers whose machine has gone; otherwise their streams would stay open for ever.
 constexpr int kPingEveryMs = 30'000;
 constexpr int kPingAnswerMs = 10'000;
-// Callers may ping that often too, to notice when this server is gone.
+// Callers may ping this often, to detect that this server has gone.
 constexpr int kMinPingIntervalMs = 5'000;
-// For statuses on their way and for health watchers, once no call is in work.
+// Time for the last statuses to be sent and for health watchers to end, after all calls have finished.
 constexpr milliseconds kLastWords{500};
 
 absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& config) {
@@ -56,7 +57,7 @@ absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& co
   return addresses;
 }
 
-// Null where there is to be none, or the default address is taken.
+// Returns null if no HTTP port is wanted, or if the default address is in use.
 absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, Scrape& scrape) {
   if (config.http_listen.empty()) return nullptr;
   ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(config.http_listen));
@@ -69,7 +70,7 @@ absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& confi
   return nullptr;
 }
 
-// Before the first ServerBuilder of the process, once.
+// Registers server reflection, once a process. Call it before the first ServerBuilder is made.
 void enable_extras() {
   static const bool kDone = [] {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -82,7 +83,7 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   grpc::ResourceQuota quota("locusd");
   const int calls = static_cast<int>(config.max_calls);
   quota.SetMaxThreads(2 * calls + kSpareThreads);
-  // What connections hold of messages under way: who sends and never reads is cut off when it is used up.
+  // Bounds the memory of messages in transit. gRPC closes connections of callers that never read when it is used up.
   quota.Resize(std::max(kMinNetworkBytes, static_cast<size_t>(config.memory_limit / kNetworkShare)));
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
@@ -93,7 +94,7 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
-  // Two daemons on one port would share its calls at random; the second is to fail instead.
+  // Two daemons on one port would share its calls at random; make the second one fail instead.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
 }
 
@@ -113,7 +114,7 @@ struct Server::Parts {
     return {&health_service, &server_service, &scene_service, &update_service, &query_service};
   }
 
-  std::unique_ptr<IoThreads> io;  // ended with the server; what its calls had in work may still be on its way to it
+  std::unique_ptr<IoThreads> io;  // declared first: work that ends with `host` may still post to it
   Host host;
   Scrape scrape;
   HealthService health_service;
@@ -122,7 +123,7 @@ struct Server::Parts {
   UpdateService update_service;
   QueryService query_service;
   std::unique_ptr<grpc::Server> grpc;
-  std::unique_ptr<HttpServer> http;  // from before calls are served until none are
+  std::unique_ptr<HttpServer> http;  // runs from before the first call until after the last
   bool ended = false;
 };
 

@@ -1,7 +1,7 @@
-// The whole server behind its addresses: builds the services, listens, and ends in order. What main() runs, and what
-// tests run inside their own process.
+// The complete server: builds the services, listens on the addresses, and shuts down in order. Run by main(), and by
+// tests inside their own process.
 //
-// Threads: addresses() and port() from any thread; drain() once, from one.
+// Threads: addresses() and port() from any thread; drain() once, from one thread.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_H_
 #define LOCUS_SERVER_SERVICES_SERVER_H_
 
@@ -20,27 +20,27 @@ namespace locus::server {
 
 class Server {
  public:
-  // Listens on every address of `config` or on none: an error names the address and the reason. Scenes are kept in
-  // `log`, which outlives the server, or in memory only where there is none. What the log has is read back before this
-  // returns; meanwhile calls are answered with REASON_RECOVERING. CANCELLED soon after `stop` is true, if it is then
-  // still at that.
+  // Starts a server that listens on all addresses of `config`; otherwise returns an error that names the address and
+  // the reason. Scenes are stored in `log`, which must outlive the server, or in memory only if `log` is null. The
+  // scenes of the log are recovered before this returns; meanwhile calls are answered with REASON_RECOVERING. Returns
+  // CANCELLED soon after `stop` becomes true during recovery.
   static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config, UpdateLog* log = nullptr,
                                                        const std::atomic<bool>& stop = kNever);
 
-  // Ends without grace if drain() was not called.
+  // Drains without a grace period if drain() was not called.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  // As clients write them, bound ports filled in, in the order of the config.
+  // Returns the addresses as clients write them, with the bound ports, in the order of the config.
   const std::vector<std::string>& addresses() const { return addresses_; }
-  // Of the first TCP address; 0 without one.
+  // Returns the port of the first TCP address; 0 without one.
   uint16_t port() const { return port_; }
-  // Of the HTTP port; 0 without one.
+  // Returns the port of the HTTP pages; 0 without one.
   uint16_t http_port() const;
 
-  // Says NOT_SERVING, ends streams and new calls with REASON_DRAINING, lets calls in work finish within `grace`, cuts
-  // off the rest, and returns when nothing runs any more.
+  // Shuts down: health reports NOT_SERVING, streams and new calls end with REASON_DRAINING, running calls may finish
+  // within `grace` and are cancelled after it. Returns when no call runs any more.
   void drain(std::chrono::milliseconds grace);
 
  private:

@@ -24,7 +24,8 @@ struct NamedLimit {
   double used = 0;
 };
 
-// Batches that wait or are in work, and the work that they should be for all threads together.
+// Adds two limits of a queue: the number of batches that wait or run, and their estimated work in milliseconds, for all
+// threads together.
 void add_queue(const char* jobs_name, const char* work_name, const QueueLimit& limit, uint32_t threads, uint64_t jobs,
                uint64_t nanoseconds, std::vector<NamedLimit>& all) {
   constexpr double kNanosecondsAMs = 1e6;
@@ -41,7 +42,7 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
   add_queue("large_batches", "large_batch_work_ms", options.limits[1], threads, now.jobs[1], now.nanoseconds[1], all);
   add_queue("batches", "batch_work_ms", options.limit, threads, now.jobs[0] + now.jobs[1],
             now.nanoseconds[0] + now.nanoseconds[1], all);
-  // Of each scene; used by all together.
+  // The limits hold for each scene; the used values are the sums over all scenes.
   const UpdateQueueStats updates = host.updates.stats();
   all.push_back({"waiting_updates", static_cast<double>(host.updates.options().max_updates),
                  static_cast<double>(updates.updates)});
@@ -49,7 +50,7 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
                  static_cast<double>(updates.items)});
 }
 
-// Every limit under the name that refusals use.
+// Returns every limit under the name that refusals use, in ascending order.
 std::vector<NamedLimit> limits_of(const Host& host) {
   std::vector<NamedLimit> all = {
       {"backup_files", limits::kMaxBackupFiles},

@@ -1,4 +1,5 @@
-// ServerService: what this server is, what it serves, where its limits are; and a copy of what it has on its disk.
+// ServerService: version, features and limits of the server (GetServer), and a copy of its data directory (Backup).
+// Threads: gRPC's synchronous threads, several calls at once.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_SERVER_SERVICE_H_
 

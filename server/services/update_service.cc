@@ -29,7 +29,7 @@ struct ApplyUpdatesMethod {
   UpdateService* service;
 };
 
-// Answers in the order of the messages, as they are applied.
+// Writes answers in the order of the messages, which is the order in which they are applied.
 struct StreamUpdatesMethod {
   using Request = v1::StreamUpdatesRequest;
   using Response = v1::StreamUpdatesResponse;

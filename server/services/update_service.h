@@ -1,4 +1,5 @@
-// UpdateService over the scenes of a host: one batch a call, or a stream of them. Both live on IO loops.
+// UpdateService over the scenes of a host: ApplyUpdates takes one batch a call, StreamUpdates a stream of them. Both
+// live on IO loops.
 #ifndef LOCUS_SERVER_SERVICES_UPDATE_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_UPDATE_SERVICE_H_
 
@@ -16,7 +17,8 @@ class UpdateService final : public v1::UpdateService::WithRawMethod_ApplyUpdates
   explicit UpdateService(Host& host);
   ~UpdateService() override;
 
-  // Once, after the server started and before the IO threads do. They end before the service.
+  // Begins to accept calls. Call it once, after the server and before the IO threads have started. The threads must end
+  // before the service.
   void listen(IoThreads& threads);
 
  private:

@@ -1,4 +1,6 @@
-// One update batch from message to ack: checks, memory, its scene's mailbox.
+// One update batch, from its message to its ack: conversion, the memory budget, and the scene's update queue.
+//
+// Threads: members run on the call's IO loop, except stop() and done(), which the update queue calls on any thread.
 #ifndef LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
 #define LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
 
@@ -18,9 +20,9 @@ class UpdateWork final : private PendingUpdate {
  public:
   explicit UpdateWork(CallSlot& slot) : slot_(slot) {}
 
-  // `batch` and `ack` stay until the slot is answered.
+  // Begins the work. `batch` and `ack` are borrowed until the slot is answered.
   void begin(const std::string& scene, const v1::UpdateBatch& batch, v1::UpdateAck& ack);
-  // A batch that waits is asked about before it is applied; there is nothing to hurry.
+  // Does nothing: the update queue calls stop() before it applies a batch, and answers at once if that fails.
   void give_up() {}
 
  private:
@@ -35,7 +37,7 @@ class UpdateWork final : private PendingUpdate {
   UpdateBatch batch_;
   SteadyTime arrived_;
   v1::UpdateAck* ack_ = nullptr;
-  std::optional<MemoryBudget::Claim> room_;
+  std::optional<MemoryBudget::Claim> claim_;
   absl::StatusOr<UpdateAck> outcome_;
   MemberTag<UpdateWork> applied_{*this, &UpdateWork::applied};
 };

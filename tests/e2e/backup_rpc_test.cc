@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-// Far more than a connection holds under way, so that a server cannot send all of it to who does not read.
+// Far more than a connection buffers, so that a server cannot send all of it to a caller that does not read.
 constexpr size_t kLargeBytes = size_t{64} << 20;
 
 std::string bytes_of(size_t count) {
@@ -27,7 +27,7 @@ std::string bytes_of(size_t count) {
   return bytes;
 }
 
-// A server with a data directory, over a log that has nothing but backups.
+// A server with a data directory, over a fake log that only makes backups.
 class BackupRpcTest : public ::testing::Test {
  protected:
   BackupRpcTest() { log_.files = {{"CURRENT", "MANIFEST-1\n"}, {"empty", ""}, {"tables/000007.sst", "seven"}}; }
@@ -39,7 +39,7 @@ class BackupRpcTest : public ::testing::Test {
     return *running_;
   }
 
-  // All pieces, and how the call ended.
+  // Appends all pieces and returns the status of the call.
   static grpc::Status back_up(Stubs& stubs, std::vector<v1::BackupResponse>* pieces) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -48,7 +48,7 @@ class BackupRpcTest : public ::testing::Test {
     return reader->Finish();
   }
 
-  // Whatever calls are in work end first.
+  // Returns whether the data directory is empty, after the server has ended all calls.
   bool nothing_is_left() {
     running_->server().drain(kCallTimeout);
     return std::filesystem::is_empty(folder_.path());
@@ -59,7 +59,7 @@ class BackupRpcTest : public ::testing::Test {
   std::optional<RunningServer> running_;
 };
 
-TEST_F(BackupRpcTest, EveryFileComesWithItsPathItsSizeAndItsHash) {
+TEST_F(BackupRpcTest, EveryFileIsSentWithItsPathSizeAndHash) {
   std::vector<v1::BackupResponse> pieces;
   const grpc::Status status = back_up(start().stubs(), &pieces);
   ASSERT_TRUE(status.ok()) << status.error_message();
@@ -79,7 +79,7 @@ TEST_F(BackupRpcTest, EveryFileComesWithItsPathItsSizeAndItsHash) {
   EXPECT_TRUE(nothing_is_left());
 }
 
-TEST_F(BackupRpcTest, ALargeFileComesInPiecesOfAMebibyteOfWhichTheFirstNamesItAndTheLastEndsIt) {
+TEST_F(BackupRpcTest, ALargeFileIsSentInPiecesOfAMebibyte) {
   const std::string bytes = bytes_of(3 * limits::kBackupPieceBytes + 5);
   log_.files = {{"large", bytes}, {"round", bytes.substr(0, limits::kBackupPieceBytes)}};
   std::vector<v1::BackupResponse> pieces;
@@ -101,7 +101,7 @@ TEST_F(BackupRpcTest, ALargeFileComesInPiecesOfAMebibyteOfWhichTheFirstNamesItAn
   EXPECT_TRUE(pieces[5].has_end());
 }
 
-TEST_F(BackupRpcTest, TheFeatureIsListedOnlyWhereThereIsADataDirectory) {
+TEST_F(BackupRpcTest, TheFeatureIsListedOnlyWithADataDirectory) {
   const auto features_of = [](Stubs& stubs) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -114,7 +114,7 @@ TEST_F(BackupRpcTest, TheFeatureIsListedOnlyWhereThereIsADataDirectory) {
   EXPECT_THAT(features_of(memory_only.stubs()), Not(Contains("backup")));
 }
 
-TEST_F(BackupRpcTest, AServerWithoutADataDirectoryRefusesAndSaysWhatToDo) {
+TEST_F(BackupRpcTest, AServerWithoutADataDirectoryRefusesWithAdvice) {
   RunningServer memory_only;
   std::vector<v1::BackupResponse> pieces;
   const grpc::Status status = back_up(memory_only.stubs(), &pieces);
@@ -123,7 +123,7 @@ TEST_F(BackupRpcTest, AServerWithoutADataDirectoryRefusesAndSaysWhatToDo) {
   EXPECT_THAT(pieces, SizeIs(0));
 }
 
-TEST_F(BackupRpcTest, ASecondBackupIsRefusedWhileOneIsUnderWay) {
+TEST_F(BackupRpcTest, ASecondBackupIsRefusedWhileOneRuns) {
   std::promise<void> begun;
   std::promise<void> go_on;
   log_.afterwards = [&](const std::string&) {
@@ -147,7 +147,7 @@ TEST_F(BackupRpcTest, ASecondBackupIsRefusedWhileOneIsUnderWay) {
   EXPECT_TRUE(back_up(stubs, &second).ok()) << "the one before has ended";
 }
 
-TEST_F(BackupRpcTest, OtherCallsAreAnsweredWhileABackupIsUnderWay) {
+TEST_F(BackupRpcTest, OtherCallsAreAnsweredWhileABackupRuns) {
   std::promise<void> begun;
   std::promise<void> go_on;
   log_.afterwards = [&](const std::string&) {
@@ -172,7 +172,7 @@ TEST_F(BackupRpcTest, OtherCallsAreAnsweredWhileABackupIsUnderWay) {
   EXPECT_TRUE(running.get().ok());
 }
 
-TEST_F(BackupRpcTest, WhenTheCallerGoesAwayTheCopyIsRemoved) {
+TEST_F(BackupRpcTest, WhenTheCallerCancelsTheCopyIsRemoved) {
   log_.files = {{"large", bytes_of(kLargeBytes)}};
   Stubs& stubs = start().stubs();
   grpc::ClientContext context;
@@ -187,7 +187,7 @@ TEST_F(BackupRpcTest, WhenTheCallerGoesAwayTheCopyIsRemoved) {
   EXPECT_TRUE(nothing_is_left());
 }
 
-TEST_F(BackupRpcTest, ACallerThatDoesNotReadIsCutOffWhenTheServerEnds) {
+TEST_F(BackupRpcTest, ACallerThatDoesNotReadIsCancelledWhenTheServerEnds) {
   log_.files = {{"large", bytes_of(kLargeBytes)}};
   Stubs& stubs = start().stubs();
   grpc::ClientContext context;
@@ -202,14 +202,14 @@ TEST_F(BackupRpcTest, ACallerThatDoesNotReadIsCutOffWhenTheServerEnds) {
   EXPECT_FALSE(reader->Finish().ok());
 }
 
-TEST_F(BackupRpcTest, WhatAnEarlierProcessLeftBehindIsRemovedAtTheStart) {
+TEST_F(BackupRpcTest, ALeftoverCopyIsRemovedAtTheStart) {
   std::filesystem::create_directories(folder_.file("backup.partial/copy"));
   std::ofstream(folder_.file("backup.partial/copy/CURRENT")) << "old";
   start();
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-TEST_F(BackupRpcTest, WhatTheDiskRefusesIsToldAndNothingIsLeft) {
+TEST_F(BackupRpcTest, AWriteErrorIsReportedAndTheCopyIsRemoved) {
   log_.afterwards = [](const std::string&) { return absl::ResourceExhaustedError("the disk is full"); };
   std::vector<v1::BackupResponse> pieces;
   const grpc::Status status = back_up(start().stubs(), &pieces);
@@ -219,7 +219,7 @@ TEST_F(BackupRpcTest, WhatTheDiskRefusesIsToldAndNothingIsLeft) {
   EXPECT_TRUE(nothing_is_left());
 }
 
-TEST_F(BackupRpcTest, ADataDirectoryThatIsGoneIsToldByItsPath) {
+TEST_F(BackupRpcTest, AMissingDataDirectoryIsReportedWithItsPath) {
   server::ServerConfig config = test_config();
   config.data_dir = folder_.file("gone");
   RunningServer running(config, &log_);
@@ -229,7 +229,7 @@ TEST_F(BackupRpcTest, ADataDirectoryThatIsGoneIsToldByItsPath) {
   EXPECT_THAT(status.error_message(), HasSubstr(folder_.file("gone/backup.partial")));
 }
 
-TEST_F(BackupRpcTest, WhatIsNoRegularFileIsDataLossInsteadOfLeftOut) {
+TEST_F(BackupRpcTest, ANonRegularFileIsDataLoss) {
   log_.afterwards = [](const std::string& path) {
     std::filesystem::create_directory_symlink("/nonexistent", path + "/elsewhere");
     return absl::OkStatus();
@@ -241,7 +241,7 @@ TEST_F(BackupRpcTest, WhatIsNoRegularFileIsDataLossInsteadOfLeftOut) {
   EXPECT_TRUE(nothing_is_left());
 }
 
-TEST_F(BackupRpcTest, AFileThatBecomesShorterWhileItIsReadIsDataLoss) {
+TEST_F(BackupRpcTest, AFileThatShrinksWhileItIsReadIsDataLoss) {
   log_.files = {{"large", bytes_of(kLargeBytes)}};
   std::string file;
   log_.afterwards = [&](const std::string& path) {

@@ -17,7 +17,8 @@ constexpr std::array kMethods = {
     "/locus.v1.QueryService/Query",           "/locus.v1.QueryService/StreamQueries",
 };
 
-// Some of the requests wait for revisions that never come. Far above what any other takes.
+// Deadline of a call, far above the time of any call that is answered. Some requests wait for revisions that are never
+// published.
 constexpr std::chrono::seconds kRequestTimeout{15};
 
 class BadInputTest : public RpcTest {
@@ -29,7 +30,7 @@ class BadInputTest : public RpcTest {
     ASSERT_TRUE(apply(insert_balls(1, 5)).ok());
   }
 
-  // A call that was refused has changed nothing. One that was accepted may have.
+  // Sends a request. Expects a refused call to leave the scene as in `state`; sets `state` after an accepted one.
   void send(const std::string& method, const std::string& bytes, std::string* state) {
     const RawReply reply = raw_call(stubs().channel, method, bytes, kRequestTimeout);
     if (reply.status.ok()) {
@@ -41,7 +42,7 @@ class BadInputTest : public RpcTest {
     EXPECT_EQ(dump(), *state) << method << ": " << reply.status.error_message();
   }
 
-  // The scene as it is once nothing is under way, made anew if it was deleted.
+  // Sets `state` to the scene after all its changes are published. Creates the scene again if it was deleted.
   void settle(std::string* state) {
     ASSERT_TRUE(create("world", {}, nullptr, true).ok());
     while (get("world").pending_changes() > 0) {
@@ -77,7 +78,7 @@ std::string mutated(std::string bytes, Random& random) {
   return bytes;
 }
 
-// A valid request of every method, as a start for changes.
+// Returns a valid request for every method, to be mutated.
 std::vector<std::pair<std::string, std::string>> valid_requests() {
   v1::ApplyUpdatesRequest apply;
   apply.set_scene("world");
@@ -121,7 +122,7 @@ std::vector<std::pair<std::string, std::string>> valid_requests() {
           {"/locus.v1.SceneService/ChangeInstances", place_one("cube", 7).SerializeAsString()}};
 }
 
-TEST_F(BadInputTest, RandomBytesAreRefusedByEveryMethodAndTheServerLives) {
+TEST_F(BadInputTest, RandomBytesAreRefusedByEveryMethodAndTheServerContinues) {
   constexpr uint64_t kSeed = 51;
   SCOPED_TRACE(kSeed);
   Random random(kSeed);
@@ -131,7 +132,7 @@ TEST_F(BadInputTest, RandomBytesAreRefusedByEveryMethodAndTheServerLives) {
   EXPECT_EQ(get("world").name(), "world");
 }
 
-TEST_F(BadInputTest, ChangedRequestsAreAnsweredOrRefusedAndTheServerLives) {
+TEST_F(BadInputTest, MutatedRequestsAreAnsweredOrRefusedAndTheServerContinues) {
   constexpr uint64_t kSeed = 52;
   SCOPED_TRACE(kSeed);
   Random random(kSeed);

@@ -1,4 +1,4 @@
-// What the daemon logs about calls: request ids and traceparents, of the caller or its own, and slow queries.
+// Log lines of calls: request ids, from the caller or generated, traceparents, and slow queries.
 #include "tests/support/daemon_process.h"
 #include "tests/support/rpc_test.h"
 
@@ -21,7 +21,7 @@ class CallLogTest : public ::testing::Test {
 
   using Metadata = std::vector<std::pair<std::string, std::string>>;
 
-  // A call that succeeds; gives the request id that came back.
+  // Makes a call that succeeds and returns the request id of its trailing metadata.
   std::string create_scene(const std::string& name, const Metadata& metadata = {}) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -51,7 +51,7 @@ class CallLogTest : public ::testing::Test {
     return std::string(found->second.data(), found->second.size());
   }
 
-  // Once the daemon has ended.
+  // Returns the log. Call it after the daemon has ended.
   std::string log() {
     daemon_->signal(SIGTERM);
     EXPECT_EQ(daemon_->wait(), 0);
@@ -63,7 +63,7 @@ class CallLogTest : public ::testing::Test {
   std::optional<Stubs> stubs_;
 };
 
-TEST_F(CallLogTest, LinesOfACallHaveTheIdAndTraceparentOfTheCallerWhoGetsTheIdBack) {
+TEST_F(CallLogTest, LinesOfACallHaveTheCallersIdsAndTheRequestIdIsReturned) {
   start();
   EXPECT_EQ(create_scene("world", {{"x-request-id", "mine-1"}, {"traceparent", kTraceparent}}), "mine-1");
   EXPECT_EQ(query("nowhere", {{"x-request-id", "mine-2"}}), "mine-2");
@@ -72,7 +72,7 @@ TEST_F(CallLogTest, LinesOfACallHaveTheIdAndTraceparentOfTheCallerWhoGetsTheIdBa
   EXPECT_THAT(text, HasSubstr("request_id=mine-2"));
 }
 
-TEST_F(CallLogTest, ACallWithoutAnIdIsGivenOne) {
+TEST_F(CallLogTest, ACallWithoutARequestIdGetsOne) {
   start();
   const std::string id = create_scene("world");
   EXPECT_EQ(id.size(), 16u);
@@ -85,7 +85,7 @@ TEST_F(CallLogTest, ACallWithoutAnIdIsGivenOne) {
   EXPECT_THAT(text, HasSubstr("request_id=" + refused));
 }
 
-TEST_F(CallLogTest, WhatIsNotOfItsFormIsAsIfItHadNotCome) {
+TEST_F(CallLogTest, InvalidIdsAreIgnored) {
   start();
   const std::string id = create_scene("world", {{"x-request-id", "has space"}, {"traceparent", "00-zz-zz-01"}});
   EXPECT_EQ(id.size(), 16u);
@@ -95,7 +95,7 @@ TEST_F(CallLogTest, WhatIsNotOfItsFormIsAsIfItHadNotCome) {
   EXPECT_THAT(text, Not(HasSubstr("traceparent")));
 }
 
-TEST_F(CallLogTest, ASlowBatchIsLoggedWithWhatItAskedAndDid) {
+TEST_F(CallLogTest, ASlowBatchIsLoggedWithItsQueriesAndWork) {
   start({"--slow-query-ms", "1"});
   create_scene("world");
   grpc::ClientContext context;

@@ -31,7 +31,7 @@ class DaemonTest : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(DaemonTest, ItServesOnAFreePortAndEndsWithZeroOnSigterm) {
+TEST_F(DaemonTest, ItServesOnAFreePortAndExitsWithZeroOnSigterm) {
   DaemonProcess daemon(on_free_port(), log());
   Stubs stubs(address());
   create_world(stubs);
@@ -56,7 +56,7 @@ TEST_F(DaemonTest, ItNamesTheInstructionSetInUseAndRefusesOneThatTheProcessorLac
   EXPECT_THAT(text_of(folder_.file("refused")), HasSubstr("'mmx'; it runs: "));
 }
 
-TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndCallsInWorkAreAnswered) {
+TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndRunningCallsAreAnswered) {
   DaemonProcess daemon(on_free_port(), log());
   Stubs stubs(address());
   create_world(stubs);
@@ -68,13 +68,13 @@ TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndCallsInWorkAreAnswered) {
   v1::StreamUpdatesResponse response;
   ASSERT_TRUE(stream->Write(request));
   ASSERT_TRUE(stream->Read(&response));
-  // In work until its caller says that all of it was sent.
+  // The upload runs until its caller has sent all of it.
   grpc::ClientContext upload_context;
   set_timeout(upload_context);
   v1::UploadMeshResponse uploaded;
   const auto upload = stubs.scenes->UploadMesh(&upload_context, &uploaded);
   ASSERT_TRUE(upload->Write(whole_mesh("cube")));
-  // Its answer proves that the server has begun the upload before it is told to end.
+  // The answer proves that the server has begun the upload before the signal is sent.
   grpc::ClientContext info_context;
   set_timeout(info_context);
   v1::GetServerResponse info;
@@ -90,7 +90,7 @@ TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndCallsInWorkAreAnswered) {
   daemon.signal(SIGTERM);
   EXPECT_FALSE(stream->Read(&response));
   expect_refused(stream->Finish(), {grpc::StatusCode::UNAVAILABLE, v1::REASON_DRAINING, ""});
-  // Health and GetServer are still answered, new work is not.
+  // Health and GetServer are still answered; new work is refused.
   EXPECT_EQ(raw_call(stubs.channel, "/grpc.health.v1.Health/Check", "").bytes, "\x08\x02");
   EXPECT_EQ(calls_in_work(), 2);
   grpc::ClientContext new_context;
@@ -107,7 +107,7 @@ TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndCallsInWorkAreAnswered) {
   EXPECT_EQ(daemon.wait(), 0);
 }
 
-TEST_F(DaemonTest, AQueryThatWaitsForARevisionDoesNotHoldUpTheEnd) {
+TEST_F(DaemonTest, AQueryThatWaitsForARevisionDoesNotDelayTheEnd) {
   DaemonProcess daemon(on_free_port(), log());
   Stubs stubs(address());
   create_world(stubs);
@@ -178,7 +178,7 @@ TEST_F(DaemonTest, ItServesOverAUnixSocketAndRemovesIt) {
   EXPECT_NE(access(path.c_str(), F_OK), 0);
 }
 
-TEST_F(DaemonTest, ASecondDaemonOnTheSameAddressFailsAndSaysWhyAndTheFirstGoesOn) {
+TEST_F(DaemonTest, ASecondDaemonOnTheSameAddressFailsWithAReasonAndTheFirstContinues) {
   std::vector<std::string> arguments = on_free_port();
   const std::string path = "unix:" + folder_.file("locus.sock");
   arguments.insert(arguments.end(), {"--listen", path});

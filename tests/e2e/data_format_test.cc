@@ -1,7 +1,7 @@
 // Data directories of every format that was ever shipped stay readable: tests/golden/data/ has one of each, made by a
-// daemon that was killed, and in words what it holds.
+// daemon that was killed, and a text with its contents.
 //
-// With LOCUS_WRITE_SAMPLE=FOLDER the second test writes such a sample there: a new format's first commit brings one.
+// With LOCUS_WRITE_SAMPLE=FOLDER the second test writes such a sample there. The first commit of a new format adds one.
 #include <google/protobuf/text_format.h>
 
 #include <cstdlib>
@@ -22,7 +22,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr uint64_t kWriter = 7;
-constexpr uint64_t kBatches = 3;  // numbered ones
+constexpr uint64_t kBatches = 3;  // number of batches with a writer
 
 class DataFormatTest : public ::testing::Test {
  protected:
@@ -39,7 +39,7 @@ class DataFormatTest : public ::testing::Test {
     return response;
   }
 
-  // A batch as protobuf's text says it.
+  // Applies a batch given in protobuf's text format.
   v1::UpdateAck apply(const std::string& scene, const std::string& batch) {
     v1::ApplyUpdatesRequest request;
     request.set_scene(scene);
@@ -71,7 +71,7 @@ class DataFormatTest : public ::testing::Test {
     create_scene(daemon_.stubs(), name, parsed);
   }
 
-  // So many that a snapshot is due, and without them again.
+  // Inserts and removes so many objects that a snapshot is due, and waits until it is written.
   void make_a_snapshot_due(const std::string& scene) {
     std::string ids;
     for (int id = 1000; id < 6000; ++id) absl::StrAppend(&ids, id == 1000 ? "" : ",", id);
@@ -82,7 +82,7 @@ class DataFormatTest : public ::testing::Test {
     EXPECT_THAT(daemon_.log(), HasSubstr("snapshot written"));
   }
 
-  // Everything that a directory may hold, before and after a snapshot.
+  // Writes everything that a directory can contain, before and after a snapshot.
   void fill() {
     upload_cube("cube", "");
     upload_cube("crate", "planks");
@@ -120,7 +120,8 @@ class DataFormatTest : public ::testing::Test {
     return dump.substr(at + 5, dump.find('\n', at) - at - 5);
   }
 
-  // Everything a client can see of it; the scene "quick" and epochs may differ from daemon to daemon.
+  // Returns everything that a client can see of the directory, as text. The scene "quick" and epochs may differ from
+  // daemon to daemon.
   std::string words() {
     std::string words;
     v1::ListScenesResponse scenes =
@@ -145,7 +146,7 @@ class DataFormatTest : public ::testing::Test {
     return rest;
   }
 
-  // What RocksDB says to people is no part of a sample.
+  // Copies a directory without RocksDB's text logs, which do not belong to a sample.
   static void copy_sample(const std::filesystem::path& from, const std::filesystem::path& to) {
     std::filesystem::create_directories(to.parent_path());
     std::filesystem::copy(from, to, std::filesystem::copy_options::recursive);
@@ -169,10 +170,10 @@ TEST_F(DataFormatTest, EveryFormatIsRead) {
     daemon_.start();
     const std::string expected = text_of((sample.path() / "holds.txt").string());
     EXPECT_EQ(without_epochs(words()), without_epochs(expected));
-    // Nothing was lost, so epochs are what they were, but where acks did not wait for the disk.
+    // Without loss, epochs are unchanged, except for scenes whose acks did not wait for the disk.
     for (const char* scene : {"arena", "twin"})
       EXPECT_THAT(expected, HasSubstr(absl::StrCat("epoch: ", get_scene(daemon_.stubs(), scene).epoch(), "\n")));
-    // Writers are remembered, and writing goes on.
+    // The writer's last batch is known, and its next batch is applied.
     EXPECT_TRUE(apply("arena", absl::StrCat("writer: ", kWriter, " batch: ", kBatches)).duplicate());
     EXPECT_FALSE(apply("arena", absl::StrCat("writer: ", kWriter, " batch: ", kBatches + 1)).duplicate());
     EXPECT_EQ(daemon_.stop(), 0);

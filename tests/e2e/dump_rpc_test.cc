@@ -15,7 +15,7 @@ class DumpRpcTest : public RpcTest {
     return pieces;
   }
 
-  // Everything of one kind after the other, pieces forgotten.
+  // Joins the pieces of a dump into one list of objects and one of instances.
   static std::pair<v1::UpdateBatch, v1::ChangeInstancesRequest> joined(
       const std::vector<v1::DumpSceneResponse>& pieces) {
     std::pair<v1::UpdateBatch, v1::ChangeInstancesRequest> all;
@@ -27,7 +27,7 @@ class DumpRpcTest : public RpcTest {
   }
 };
 
-// Objects of all shapes in an order of ids that mixes them.
+// Returns a batch with objects of all shapes, mixed in the order of ids.
 v1::UpdateBatch mixed_objects(Random& random, uint64_t count) {
   v1::UpdateBatch batch;
   for (int kind = 0; kind < 4; ++kind) batch.add_inserts();
@@ -87,7 +87,7 @@ TEST_F(DumpRpcTest, ADumpSentToAnEmptySceneMakesAnEqualScene) {
   EXPECT_EQ(copy.second.place(0).SerializeAsString(), instances.place(0).SerializeAsString());
 }
 
-TEST_F(DumpRpcTest, ManyObjectsComeInBoundedPiecesInOrderOfIdsAtOneRevision) {
+TEST_F(DumpRpcTest, ManyObjectsAreSentInBoundedPiecesInOrderOfIdsAtOneRevision) {
   constexpr uint64_t kObjects = 40000;
   Random random(32);
   ASSERT_TRUE(apply(mixed_objects(random, kObjects)).ok());

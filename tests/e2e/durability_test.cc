@@ -1,4 +1,4 @@
-// A daemon with a data directory: what a restart leaves, what is said of damage, and how it is repaired.
+// A daemon with a data directory: state after a restart, reports of damage, and repair.
 #include <filesystem>
 #include <fstream>
 
@@ -126,7 +126,8 @@ class DurabilityTest : public ::testing::Test {
     return call(*stubs().queries, &v1::QueryService::Stub::Query, request, &response);
   }
 
-  // Turns a byte in the middle of the file that holds most: of records that were written into a table at the end.
+  // Changes a byte in the middle of the largest table file, which has the records: they are written into tables when
+  // the daemon ends.
   void damage_the_log() {
     std::filesystem::path largest;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(daemon_.directory()))
@@ -164,7 +165,7 @@ TEST_F(DurabilityTest, ARestartLeavesEverythingAsItWas) {
   EXPECT_EQ(dump_of(stubs(), "twin"), twin);
   EXPECT_EQ(answer_to_a_ray("arena"), answer);
   EXPECT_THAT(daemon_.log(), HasSubstr("scene recovered"));
-  // Who sends the last batch again because the ack was lost on its way is told so.
+  // A writer that sends its last batch again, because the ack was lost, gets an ack marked as duplicate.
   v1::UpdateAck ack;
   ASSERT_TRUE(apply("arena", numbered(20, point(20, 20)), &ack).ok());
   EXPECT_TRUE(ack.duplicate());
@@ -233,7 +234,7 @@ TEST_F(DurabilityTest, RepairKeepsThePartsOfEveryName) {
   EXPECT_EQ(meshes_now(), meshes);
 }
 
-TEST_F(DurabilityTest, TreesAreRestoredFromTheirOutlinesAndBuiltWhereThoseAreDamagedOrGone) {
+TEST_F(DurabilityTest, TreesAreRestoredFromTheirTopologiesAndRebuiltIfThoseAreDamagedOrMissing) {
   daemon_.start();
   create_scene(stubs(), "arena");
   place_cube("arena");
@@ -254,7 +255,7 @@ TEST_F(DurabilityTest, TreesAreRestoredFromTheirOutlinesAndBuiltWhereThoseAreDam
   expect_tree("restored");
 }
 
-TEST_F(DurabilityTest, WhatWasDeletedStaysAway) {
+TEST_F(DurabilityTest, DeletedScenesAndMeshesStayDeleted) {
   daemon_.start();
   create_scene(stubs(), "arena");
   place_cube("arena");
@@ -271,7 +272,7 @@ TEST_F(DurabilityTest, WhatWasDeletedStaysAway) {
   EXPECT_EQ(meshes.meshes_size(), 0);
 }
 
-TEST_F(DurabilityTest, ASceneWhoseAcksDoNotWaitSurvivesAnOrderlyEndAndGetsAnotherEpochAfterAKill) {
+TEST_F(DurabilityTest, AMemoryDurableSceneKeepsItsEpochAfterACleanEndAndGetsANewOneAfterAKill) {
   daemon_.start();
   v1::SceneSpec spec;
   spec.set_durability(v1::DURABILITY_MEMORY);
@@ -288,7 +289,7 @@ TEST_F(DurabilityTest, ASceneWhoseAcksDoNotWaitSurvivesAnOrderlyEndAndGetsAnothe
   EXPECT_GE(points_of(stubs(), "arena").size(), 1u);
 }
 
-TEST_F(DurabilityTest, WhatReadersMayHoldFollowsTheOptionsOfNow) {
+TEST_F(DurabilityTest, ThePinnedLimitFollowsTheCurrentOptions) {
   daemon_.set_options({"--pinned-limit", "64MiB"});
   daemon_.start();
   create_scene(daemon_.stubs(), "arena");
@@ -305,11 +306,11 @@ TEST_F(DurabilityTest, ASecondDaemonOnTheDirectoryIsRefused) {
   EXPECT_THAT(daemon_.printed(), HasSubstr("in use"));
 }
 
-TEST_F(DurabilityTest, ADamagedSceneIsRefusedByNameTheOthersServeAndRepairSaysWhatIsLost) {
+TEST_F(DurabilityTest, ADamagedSceneIsRefusedTheOthersAreServedAndRepairReportsTheLoss) {
   daemon_.start();
   const uint64_t epoch = create_scene(stubs(), "arena").epoch();
   for (uint64_t i = 1; i <= 200; ++i) ASSERT_TRUE(apply("arena", point(i, 1)).ok());
-  // What there is of it lies behind what is damaged.
+  // This scene's records lie behind the byte that is damaged.
   create_scene(stubs(), "other");
   EXPECT_EQ(daemon_.stop(), 0);
   EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();
@@ -330,7 +331,7 @@ TEST_F(DurabilityTest, ADamagedSceneIsRefusedByNameTheOthersServeAndRepairSaysWh
   EXPECT_EQ(scenes.scenes(1).state(), v1::SCENE_STATE_READY);
   EXPECT_EQ(daemon_.stop(), 0);
 
-  // A second start comes to the same verdict.
+  // A second start reports the same damage.
   daemon_.start();
   expect_refused(look("arena"), {grpc::StatusCode::DATA_LOSS, v1::REASON_DAMAGED, "scene"});
   EXPECT_EQ(daemon_.stop(), 0);
@@ -341,7 +342,7 @@ TEST_F(DurabilityTest, ADamagedSceneIsRefusedByNameTheOthersServeAndRepairSaysWh
   EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();
   daemon_.start();
   EXPECT_NE(get_scene(stubs(), "arena").epoch(), epoch) << "something is lost, but the epoch does not say so";
-  // A prefix of what was acknowledged.
+  // The repaired scene has a prefix of the acknowledged updates.
   const std::map<uint64_t, PlacedPoint> left = points_of(stubs(), "arena");
   EXPECT_LT(left.size(), 200u);
   for (uint64_t i = 1; i <= left.size(); ++i) EXPECT_EQ(left.count(i), 1u);

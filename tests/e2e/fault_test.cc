@@ -1,5 +1,5 @@
-// Callers who give up, who do not read, who come and go by the thousand: what they leave behind, and whether a good
-// caller is still answered. The suites named Long... do the same more often.
+// Callers that cancel, that do not read, that connect and disconnect by the thousand: all resources must be released,
+// and a well-behaved caller must still be answered. The suites named Long... do the same more often.
 #include <dirent.h>
 #include <sys/resource.h>
 
@@ -20,9 +20,9 @@ class FaultTest : public RpcTest {
   explicit FaultTest(const server::ServerConfig& config = test_config()) : RpcTest(config) {}
 
   static constexpr uint64_t kObjects = 2'000;
-  // Between two looks at what takes a moment: whoever looks without a pause takes a core from those waited for.
+  // Pause between two polls. Polling without a pause would take a core from the threads that are waited for.
   static constexpr std::chrono::milliseconds kPatience{2};
-  // For streams that stay while other things are done, however long those take on a machine that is busy.
+  // Deadline of streams that stay open during a test, long enough for a busy machine.
   static constexpr std::chrono::hours kNoHurry{1};
 
   void SetUp() override {
@@ -33,7 +33,7 @@ class FaultTest : public RpcTest {
     ASSERT_TRUE(apply(heap).ok());
   }
 
-  // Every query meets every object: seconds of work where there are many.
+  // Returns a batch whose queries test every object: seconds of work if there are many.
   static v1::QueryBatch heavy_batch(int queries = limits::kMaxQueries) {
     v1::QueryBatch batch;
     v1::QueryBlock* block = batch.add_blocks();
@@ -42,7 +42,7 @@ class FaultTest : public RpcTest {
     block->mutable_balls()->add_radii(10);
     return batch;
   }
-  // Its answer takes about 4 MB, its work little.
+  // Returns a batch with an answer of about 4 MB and little work.
   static v1::QueryBatch long_answer() {
     v1::QueryBatch batch;
     batch.add_blocks()->mutable_lookup()->mutable_ids()->Resize(40'000, 1);
@@ -68,7 +68,7 @@ class FaultTest : public RpcTest {
     return 0;
   }
 
-  // The call that asks counts as one.
+  // The limit's use includes the call that reads it.
   void wait_until_nothing_is_in_work() {
     while (used("calls") > 1 || used("streams") > 0) std::this_thread::sleep_for(kPatience);
   }
@@ -92,7 +92,7 @@ int open_files() {
   return files;
 }
 
-TEST_F(FaultTest, ADeadlineEndsWorkOfSecondsAndLeavesNothingBehind) {
+TEST_F(FaultTest, ADeadlineEndsLongWorkAndReleasesItsResources) {
   for (int i = 0; i < 20; ++i) {
     grpc::ClientContext context;
     set_timeout(context, std::chrono::milliseconds(1));
@@ -107,7 +107,7 @@ TEST_F(FaultTest, ADeadlineEndsWorkOfSecondsAndLeavesNothingBehind) {
   expect_a_good_caller_is_answered();
 }
 
-// Half of them with work that is begun, half while they wait for their turn or for a revision.
+// Makes and cancels calls: half of them while they are processed, half while they are queued or wait for a revision.
 void FaultTest::give_up_calls(int count) {
   v1::QueryBatch waiting;
   waiting.mutable_view()->set_at_least(99);
@@ -115,7 +115,7 @@ void FaultTest::give_up_calls(int count) {
     grpc::ClientContext context;
     set_timeout(context);
     const std::unique_ptr<QueryStream> stream = stubs().queries->StreamQueries(&context);
-    const int messages = i % 9;  // one more than a stream has in work
+    const int messages = i % 9;  // 0 to 8, the number of messages that a stream processes at once
     for (int m = 1; m <= messages; ++m) stream->Write(message(m, i % 2 == 0 ? heavy_batch(8192) : waiting));
     if (i % 3 == 0) stream->Write(message(99, {}));
     v1::StreamQueriesResponse response;
@@ -128,9 +128,9 @@ void FaultTest::give_up_calls(int count) {
   expect_a_good_caller_is_answered();
 }
 
-TEST_F(FaultTest, CallersWhoGiveUpLeaveNothingBehind) { give_up_calls(static_cast<int>(scaled_count(200))); }
+TEST_F(FaultTest, CancelledCallsReleaseTheirResources) { give_up_calls(static_cast<int>(scaled_count(200))); }
 
-TEST_F(FaultTest, ACallerWhoDoesNotReadIsNotReadFromAndOthersAreAnswered) {
+TEST_F(FaultTest, ACallerThatDoesNotReadIsNotReadFromAndOthersAreAnswered) {
   constexpr uint64_t kMessages = 200;  // 64 MB, of which sockets hold some 10
   grpc::ClientContext context;
   set_timeout(context, kNoHurry);
@@ -143,7 +143,7 @@ TEST_F(FaultTest, ACallerWhoDoesNotReadIsNotReadFromAndOthersAreAnswered) {
     }
     stream->WritesDone();
   });
-  // Until nothing moves any more; were the server to read on, all would be written.
+  // Wait until no more messages are written. If the server continued to read, all would be written.
   uint64_t before = 0;
   do {
     before = written;
@@ -151,7 +151,7 @@ TEST_F(FaultTest, ACallerWhoDoesNotReadIsNotReadFromAndOthersAreAnswered) {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   } while (written == 0 || written != before);
   EXPECT_LT(before, kMessages / 2);
-  // Nothing was lost.
+  // Expect an answer to every message.
   std::vector<uint64_t> answered;
   v1::StreamQueriesResponse response;
   while (stream->Read(&response)) {
@@ -165,7 +165,7 @@ TEST_F(FaultTest, ACallerWhoDoesNotReadIsNotReadFromAndOthersAreAnswered) {
   EXPECT_EQ(std::unique(answered.begin(), answered.end()), answered.end());
 }
 
-// Both ends of every connection are files of this process.
+// Raises the limit on open files: both ends of every connection are files of this process.
 void allow_many_files() {
   rlimit limit;
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);
@@ -173,7 +173,7 @@ void allow_many_files() {
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &limit), 0);
 }
 
-// Connections of their own with a stream each; some end well, some are cancelled, some just vanish.
+// Opens connections with one stream each. Some streams end normally, some are cancelled, some lose their connection.
 void FaultTest::come_and_go(int connections, int rounds) {
   allow_many_files();
   expect_a_good_caller_is_answered();
@@ -204,13 +204,13 @@ void FaultTest::come_and_go(int connections, int rounds) {
     }
   }
   wait_until_nothing_is_in_work();
-  // Sockets close a moment after their streams.
+  // Sockets close shortly after their streams.
   while (open_files() > files_before + 4) std::this_thread::sleep_for(kPatience);
   EXPECT_EQ(get("world").pinned_bytes(), 0u);
   expect_a_good_caller_is_answered();
 }
 
-TEST_F(FaultTest, ConnectionsAndStreamsThatComeAndGoLeaveNothingBehind) { come_and_go(40, 2); }
+TEST_F(FaultTest, ClosedConnectionsAndStreamsReleaseTheirResources) { come_and_go(40, 2); }
 
 class FewCallsFaultTest : public FaultTest {
  protected:
@@ -222,7 +222,7 @@ class FewCallsFaultTest : public FaultTest {
         }()) {}
 };
 
-TEST_F(FewCallsFaultTest, CallersWhoAreRefusedAndTryAgainAreAllAnsweredInTheEnd) {
+TEST_F(FewCallsFaultTest, RefusedCallersThatRetryAreAllAnswered) {
   constexpr int kCallers = 12;
   std::atomic<int> answered{0};
   std::vector<std::thread> callers;
@@ -249,9 +249,9 @@ TEST_F(FewCallsFaultTest, CallersWhoAreRefusedAndTryAgainAreAllAnsweredInTheEnd)
 
 using LongFaultTest = FaultTest;
 
-TEST_F(LongFaultTest, AThousandCallersWhoGiveUpLeaveNothingBehind) { give_up_calls(1000); }
+TEST_F(LongFaultTest, AThousandCancelledCallsReleaseTheirResources) { give_up_calls(1000); }
 
-TEST_F(LongFaultTest, AThousandConnectionsThatComeAndGoLeaveNothingBehind) { come_and_go(1000, 3); }
+TEST_F(LongFaultTest, AThousandClosedConnectionsReleaseTheirResources) { come_and_go(1000, 3); }
 
 }  // namespace
 }  // namespace locus::test

@@ -1,5 +1,5 @@
-// A daemon whose disk is full goes on answering queries, acknowledges nothing that it cannot keep, and takes updates
-// again as soon as there is room; one whose disk cannot be written says so and does not start.
+// A daemon whose disk is full answers queries, acknowledges no update that it cannot store, and accepts updates again
+// as soon as there is space. A daemon whose directory cannot be written does not start.
 #include <chrono>
 #include <fstream>
 #include <iostream>
@@ -23,7 +23,7 @@ class FullDiskTest : public ::testing::Test {
     if (!disk_.mounted()) GTEST_SKIP() << "mounting a tmpfs takes root";
   }
 
-  // All points at x = `number`.
+  // Returns a batch that puts all points at x = `number`.
   static v1::UpdateBatch batch(uint64_t number) {
     v1::UpdateBatch batch;
     batch.set_writer(kWriter);
@@ -59,7 +59,7 @@ class FullDiskTest : public ::testing::Test {
     return status;
   }
 
-  // Where the queries see the points.
+  // Expects queries to find all points at x = `number`.
   void expect_points_at(uint64_t number) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -81,7 +81,7 @@ class FullDiskTest : public ::testing::Test {
   SmallDisk disk_{daemon_.directory(), 48};
 };
 
-TEST_F(FullDiskTest, QueriesStayUpNothingIsAckedInVainAndWritesComeBack) {
+TEST_F(FullDiskTest, OnAFullDiskQueriesAreAnsweredNoUpdateIsAckedAndWritesResumeWithSpace) {
   daemon_.start();
   create_scene(daemon_.stubs(), "arena");
   const std::string ballast = daemon_.directory() + "/ballast";

@@ -1,4 +1,4 @@
-// Watchers of the standard health service: what they are told, and when.
+// Watchers of the standard health service: the states they receive, and when.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -13,7 +13,7 @@ namespace {
 using grpc::health::v1::HealthCheckRequest;
 using grpc::health::v1::HealthCheckResponse;
 
-// HealthCheckResponse.status.
+// Values of HealthCheckResponse.status.
 enum Health : uint64_t { kNothing = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
 class Watcher {
@@ -26,7 +26,7 @@ class Watcher {
     reader_ = stub_->Watch(&context_, request);
   }
 
-  // Returns the status of the next message; kNothing at the end of the stream.
+  // Returns the next state; kNothing at the end of the stream.
   uint64_t next() {
     HealthCheckResponse response;
     return reader_->Read(&response) ? static_cast<uint64_t>(response.status()) : kNothing;
@@ -40,7 +40,7 @@ class Watcher {
   std::unique_ptr<grpc::ClientReader<HealthCheckResponse>> reader_;
 };
 
-TEST(HealthTest, AWatcherIsToldAtOnceAndWhenTheServerDrains) {
+TEST(HealthTest, AWatcherIsNotifiedAtOnceAndWhenTheServerDrains) {
   RunningServer running;
   Watcher watcher(running.stubs().channel, "");
   EXPECT_EQ(watcher.next(), kServing);
@@ -52,7 +52,7 @@ TEST(HealthTest, AWatcherIsToldAtOnceAndWhenTheServerDrains) {
   EXPECT_EQ(watcher.end().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
-TEST(HealthTest, AServiceThatIsNotThereIsUnknownToItsWatcher) {
+TEST(HealthTest, AnUnknownServiceIsReportedAsUnknown) {
   RunningServer running;
   Watcher watcher(running.stubs().channel, "no.such.Service");
   EXPECT_EQ(watcher.next(), kServiceUnknown);
@@ -60,7 +60,7 @@ TEST(HealthTest, AServiceThatIsNotThereIsUnknownToItsWatcher) {
   EXPECT_EQ(watcher.end().error_code(), grpc::StatusCode::CANCELLED);
 }
 
-TEST(HealthTest, OneWatcherTooManyIsRefusedAndThereIsRoomAgainWhenOneLeaves) {
+TEST(HealthTest, WatchersBeyondTheMaximumAreRefusedUntilOneEnds) {
   RunningServer running;
   std::vector<std::unique_ptr<Watcher>> watchers;
   for (uint32_t i = 0; i < server::kMaxHealthWatchers; ++i) {
@@ -73,7 +73,7 @@ TEST(HealthTest, OneWatcherTooManyIsRefusedAndThereIsRoomAgainWhenOneLeaves) {
   EXPECT_EQ(error.limit(), "health_watchers");
   watchers.back()->cancel();
   EXPECT_FALSE(watchers.back()->end().ok());
-  // Its thread notices soon.
+  // The watcher's thread notices the cancellation within 100 ms.
   uint64_t told = kNothing;
   for (int tries = 0; told == kNothing && tries < 600; ++tries) {
     Watcher next(running.stubs().channel, "");

@@ -1,5 +1,4 @@
-// The HTTP port of the daemon as it is shipped: metrics of what was called, and health while it starts, serves and
-// ends.
+// The HTTP port of the real daemon: metrics of calls, and health while it starts, serves and drains.
 #include "tests/support/daemon_process.h"
 #include "tests/support/http_get.h"
 #include "tests/support/rpc_test.h"
@@ -21,7 +20,7 @@ class HttpPortTest : public ::testing::Test {
   std::string address() const {
     return "127.0.0.1:" + std::to_string(DaemonProcess::wait_for_port(folder_.file("port")));
   }
-  // Written before the port of the calls.
+  // Returns the HTTP port. The daemon writes it before the gRPC port, so address() has waited for it.
   int http_port() const { return std::atoi(text_of(folder_.file("http")).c_str()); }
 
   TemporaryFolder folder_;
@@ -36,7 +35,7 @@ void create_scene(Stubs& stubs, const std::string& name) {
   ASSERT_TRUE(stubs.scenes->CreateScene(&context, request, &response).ok());
 }
 
-TEST_F(HttpPortTest, MetricsTellWhatWasCalledAndWhatThereIs) {
+TEST_F(HttpPortTest, MetricsCountCallsAndDescribeScenes) {
   DaemonProcess daemon(options(), log());
   Stubs stubs(address());
   create_scene(stubs, "world");
@@ -98,13 +97,13 @@ TEST_F(HttpPortTest, AThousandScenesMakeABoundedNumberOfSeries) {
   EXPECT_THAT(text, HasSubstr("locus_limit_used{limit=\"scenes\"} 1000\n"));
 }
 
-TEST_F(HttpPortTest, ReadinessEndsWhenDrainingBeginsAndLifeGoesOn) {
+TEST_F(HttpPortTest, WhileDrainingTheServerIsAliveAndNotReady) {
   DaemonProcess daemon(options(), log());
   Stubs stubs(address());
   create_scene(stubs, "world");
   EXPECT_EQ(http_get(http_port(), "/healthz").code, 200);
   EXPECT_EQ(http_get(http_port(), "/readyz").body, "ready\n");
-  // In work until its caller says that all of it was sent, which keeps the server from ending.
+  // The upload runs until its caller has sent all of it, which keeps the server from ending.
   grpc::ClientContext context;
   set_timeout(context);
   v1::UploadMeshResponse uploaded;
@@ -125,7 +124,7 @@ TEST_F(HttpPortTest, ReadinessEndsWhenDrainingBeginsAndLifeGoesOn) {
   EXPECT_EQ(http_get(http_port(), "/healthz").code, 0);
 }
 
-TEST_F(HttpPortTest, ATakenAddressEndsTheDaemonWhichNamesIt) {
+TEST_F(HttpPortTest, AnAddressInUseEndsTheDaemonAndIsLogged) {
   DaemonProcess first(options(), log());
   address();
   const std::string taken = "127.0.0.1:" + std::to_string(http_port());
@@ -134,7 +133,7 @@ TEST_F(HttpPortTest, ATakenAddressEndsTheDaemonWhichNamesIt) {
   EXPECT_THAT(text_of(folder_.file("second")), HasSubstr("cannot listen on " + taken));
 }
 
-TEST_F(HttpPortTest, WithAnEmptyAddressThereIsNoPort) {
+TEST_F(HttpPortTest, WithAnEmptyAddressThereIsNoHttpPort) {
   DaemonProcess daemon({"--listen", "127.0.0.1:0", "--port-file", folder_.file("port"), "--http-listen", ""}, log());
   Stubs stubs(address());
   create_scene(stubs, "world");

@@ -15,7 +15,7 @@ class InstanceRpcTest : public RpcTest {
     ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   }
 
-  // Refused, naming the field, and nothing has changed.
+  // Expects the change to be refused naming the field, and the scene to be unchanged.
   void expect_change_refused(const v1::ChangeInstancesRequest& request, const Refused& expected) {
     const std::string before = dump();
     expect_refused(change(request), expected);
@@ -102,7 +102,7 @@ TEST_F(InstanceRpcTest, ChosenIdsAreReturnedAndHaveTheHighBit) {
   }
 }
 
-TEST_F(InstanceRpcTest, WhoDoesNotWaitGetsANumberAndTheChangeComes) {
+TEST_F(InstanceRpcTest, WithNoWaitTheReplyHasANumberAndTheChangeIsPublishedLater) {
   v1::ChangeInstancesRequest request = place_one("cube", 100);
   request.set_no_wait(true);
   v1::ChangeInstancesResponse response;
@@ -116,26 +116,26 @@ TEST_F(InstanceRpcTest, WhoDoesNotWaitGetsANumberAndTheChangeComes) {
   EXPECT_EQ(scene.last_build_error(), "");
 }
 
-TEST_F(InstanceRpcTest, AChangeThatFailsInTheBackgroundSaysWhyInTheScene) {
+TEST_F(InstanceRpcTest, AFailedBackgroundChangeIsReportedByTheScene) {
   v1::ChangeInstancesRequest request;
   request.set_scene("world");
   request.add_remove_ids(12345);
   request.set_no_wait(true);
   ASSERT_TRUE(change(request).ok());
   EXPECT_THAT(get_when_settled().last_build_error(), ::testing::HasSubstr("12345"));
-  // It is about the latest change that failed, so one that does not leaves it.
+  // The error is that of the latest failed change, so a change that succeeds keeps it.
   ASSERT_TRUE(change(place_one("cube", 1)).ok());
   EXPECT_THAT(get("world").last_build_error(), ::testing::HasSubstr("12345"));
 }
 
-TEST_F(InstanceRpcTest, WhoDoesNotWaitIsStillToldOfWrongValues) {
+TEST_F(InstanceRpcTest, WithNoWaitWrongValuesAreStillRefused) {
   v1::ChangeInstancesRequest request = place_one("cube", 1);
   request.set_no_wait(true);
   request.mutable_place(0)->add_scales(-1);
   expect_change_refused(request, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_OUT_OF_RANGE, "place[0].scales", 0});
 }
 
-TEST_F(InstanceRpcTest, ChangesFromManyCallersAllCome) {
+TEST_F(InstanceRpcTest, ConcurrentChangesAreAllPublished) {
   constexpr uint64_t kCallers = 4;
   constexpr uint64_t kChanges = 10;
   std::vector<std::thread> callers;
@@ -212,8 +212,8 @@ TEST_F(InstanceRpcTest, WrongColumnsAndValuesOfAPlacementAreNamed) {
   });
 }
 
-TEST_F(InstanceRpcTest, DumpsNamePlacedMeshesAsTheyAreKnownNow) {
-  // The first name of the bytes is gone by the time they are placed under another.
+TEST_F(InstanceRpcTest, DumpsUseTheCurrentNamesOfMeshes) {
+  // The mesh's first name is deleted before the mesh is placed under another name.
   ASSERT_TRUE(upload({whole_mesh("alias")}).ok());
   v1::DeleteMeshRequest request;
   request.set_mesh("cube");

@@ -1,5 +1,5 @@
-// A daemon that is killed at random moments under load comes back with every batch it acknowledged, none twice, none
-// out of order. The suite named Long... kills more often: 100 times, or as often as LOCUS_FAULT_RUNS says.
+// A daemon that is killed at random moments under load recovers every batch that it acknowledged, none twice, none out
+// of order. The suite named Long... kills it 100 times, or LOCUS_FAULT_RUNS times.
 #include <atomic>
 #include <cstdlib>
 #include <random>
@@ -12,14 +12,14 @@ namespace locus::test {
 namespace {
 
 constexpr int kScenes = 2;
-constexpr uint64_t kWindow = 16;  // batches of a writer that are not answered yet
-constexpr uint64_t kKept = 50;    // latest batches that can be seen in the scene
+constexpr uint64_t kWindow = 16;  // maximum number of unanswered batches of a writer
+constexpr uint64_t kKept = 50;    // number of latest batches whose points are in the scene
 
 std::string scene_name(uint64_t writer) { return "arena-" + std::to_string(writer % kScenes); }
 uint64_t id_of(uint64_t writer, uint64_t batch) { return writer << 32 | batch; }
 
-// A writer whose batches say in the scene which they were: each puts down a point of its own, takes away that of the
-// batch kKept before, and moves one point to its number.
+// A writer whose applied batches can be read from the scene: each inserts a point of its own, removes that of the batch
+// kKept before, and moves a counter point to x = its number.
 class Writer {
  public:
   explicit Writer(uint64_t number) : number_(number) {}
@@ -49,7 +49,7 @@ class Writer {
     return batch;
   }
 
-  // What the scene has of this writer once batch `k` is the last applied.
+  // Returns the points of this writer in the scene if batch `k` is the last one applied.
   std::map<uint64_t, PlacedPoint> model(uint64_t k) const {
     std::map<uint64_t, PlacedPoint> points;
     if (k > 0) points[id_of(number_, 0)] = {static_cast<double>(k), static_cast<double>(number_), 1};
@@ -58,7 +58,8 @@ class Writer {
     return points;
   }
 
-  // Sends batch after batch, from the first that is not acknowledged, until the daemon is gone or `enough` were.
+  // Sends batches from the first one that is not acknowledged, until the connection breaks or batch `enough` is
+  // acknowledged.
   void write(Stubs& stubs, uint64_t enough) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -74,14 +75,14 @@ class Writer {
         if (!stream->Write(request)) return;
         request.clear_scene();
       }
-      most_sent_ = std::max(most_sent_, sent);
+      max_sent_ = std::max(max_sent_, sent);
       if (!stream->Read(&response)) return;
       take(response);
     }
     stream->WritesDone();
   }
 
-  // After a restart: which batch was the last, or a failure.
+  // Checks the scene after a restart, and sets known_applied_ to the last applied batch.
   void check(const std::map<uint64_t, PlacedPoint>& scene) {
     std::map<uint64_t, PlacedPoint> own;
     for (const auto& [id, point] : scene)
@@ -89,7 +90,7 @@ class Writer {
     const auto counter = own.find(id_of(number_, 0));
     const uint64_t last = counter == own.end() ? 0 : static_cast<uint64_t>(counter->second.x);
     EXPECT_GE(last, acknowledged_) << "writer " << number_ << ": acknowledged batches are lost";
-    EXPECT_LE(last, most_sent_);
+    EXPECT_LE(last, max_sent_);
     EXPECT_TRUE(own == model(last)) << "writer " << number_ << ": the scene is not what batches up to " << last
                                     << " make";
     known_applied_ = last;
@@ -100,14 +101,14 @@ class Writer {
     ASSERT_EQ(response.sequence(), acknowledged_ + 1) << "out of order";
     ASSERT_FALSE(response.has_error()) << response.ShortDebugString();
     EXPECT_EQ(response.ack().refused(), 0u) << "batch " << response.sequence() << " was applied before";
-    // What was applied before the kill without an ack is not applied again.
+    // A batch that was applied before the kill, but not acknowledged, is a duplicate.
     EXPECT_EQ(response.ack().duplicate(), response.sequence() <= known_applied_);
     ++acknowledged_;
   }
 
   const uint64_t number_;
   uint64_t acknowledged_ = 0;
-  uint64_t most_sent_ = 0;
+  uint64_t max_sent_ = 0;
   uint64_t known_applied_ = 0;
 };
 
@@ -121,12 +122,12 @@ class KillTest : public ::testing::Test {
     for (uint64_t number = 1; number <= kWriters; ++number) writers_.emplace_back(number);
   }
 
-  // Kills it once all write, after a moment of up to `most_ms`.
-  void kill_under_load(int most_ms) {
+  // Starts all writers and kills the daemon after a random time of up to `max_ms`.
+  void kill_under_load(int max_ms) {
     std::vector<std::thread> threads;
     for (Writer& writer : writers_)
       threads.emplace_back([&] { writer.write(daemon_.stubs(), std::numeric_limits<uint64_t>::max()); });
-    std::this_thread::sleep_for(std::chrono::microseconds(std::uniform_int_distribution(0, 1000 * most_ms)(random_)));
+    std::this_thread::sleep_for(std::chrono::microseconds(std::uniform_int_distribution(0, 1000 * max_ms)(random_)));
     daemon_.kill();
     for (std::thread& thread : threads) thread.join();
   }
@@ -157,18 +158,18 @@ class KillTest : public ::testing::Test {
     EXPECT_EQ(daemon_.stop(), 0) << daemon_.log();
   }
 
-  // Often a snapshot is being written when the end comes.
+  // The small limit makes it likely that a snapshot is being written when the daemon is killed.
   KeptDaemon daemon_{{"--snapshot-after", "64KiB"}};
   std::vector<uint64_t> epochs_;
   std::vector<Writer> writers_;
   std::mt19937 random_{20261122};
 };
 
-TEST_F(KillTest, NothingAcknowledgedIsLostAppliedTwiceOrOutOfOrder) { run(static_cast<int>(scaled_count(10))); }
+TEST_F(KillTest, NoAcknowledgedBatchIsLostRepeatedOrReordered) { run(static_cast<int>(scaled_count(10))); }
 
 using LongKillTest = KillTest;
 
-TEST_F(LongKillTest, NothingAcknowledgedIsLostAppliedTwiceOrOutOfOrder) {
+TEST_F(LongKillTest, NoAcknowledgedBatchIsLostRepeatedOrReordered) {
   const char* runs = std::getenv("LOCUS_FAULT_RUNS");
   run(runs == nullptr ? 100 : std::atoi(runs));
 }

@@ -10,13 +10,13 @@ server::ServerConfig with_memory(uint64_t bytes) {
   return config;
 }
 
-// The process already holds more than it may.
+// Server whose process already uses more memory than its limit.
 class FullMemoryRpcTest : public RpcTest {
  protected:
   FullMemoryRpcTest() : RpcTest(with_memory(1)) {}
 };
 
-// There is room for what is small.
+// Server with memory for small work only.
 class ScarceMemoryRpcTest : public RpcTest {
  protected:
   static constexpr uint64_t kRoom = uint64_t{512} << 20;

@@ -36,7 +36,7 @@ class MeshDownloadRpcTest : public RpcTest {
   }
 };
 
-// Far from one piece: 400,000 vertices, 500,000 triangles, and more parts than one message may describe.
+// Returns a mesh of several pieces: 400,000 vertices, 500,000 triangles, and more parts than fit into one message.
 CubeMesh large_mesh() {
   CubeMesh mesh;
   for (uint32_t i = 0; i < 1'200'000 - 24; ++i) mesh.vertices.push_back(static_cast<float>(i % 1021));
@@ -70,7 +70,7 @@ TEST_F(MeshDownloadRpcTest, ASmallMeshIsOnePieceWithEverythingInIt) {
   EXPECT_EQ(pieces[0].parts(1).first_triangle(), 1u);
 }
 
-TEST_F(MeshDownloadRpcTest, ALargeMeshWithManyPartsComesInBoundedPiecesThatHaveItsHash) {
+TEST_F(MeshDownloadRpcTest, ALargeMeshWithManyPartsIsSentInBoundedPiecesWithItsHash) {
   v1::UploadMeshResponse uploaded;
   ASSERT_TRUE(upload({with_parts(whole_mesh("large", large_mesh()), kParts, limits::kMaxLabelLength)}, &uploaded).ok());
   const std::vector<v1::DownloadMeshResponse> pieces = pieces_of("large");
@@ -86,21 +86,21 @@ TEST_F(MeshDownloadRpcTest, ALargeMeshWithManyPartsComesInBoundedPiecesThatHaveI
   EXPECT_EQ(std::string(hash.begin(), hash.end()), uploaded.mesh().sha256());
 }
 
-TEST_F(MeshDownloadRpcTest, NoOtherPieceStartsBeforeTheOneBeforeIsFull) {
+TEST_F(MeshDownloadRpcTest, APieceIsFullBeforeTheNextBegins) {
   ASSERT_TRUE(upload({whole_mesh("large", large_mesh())}).ok());
   const std::vector<v1::DownloadMeshResponse> pieces = pieces_of("large");
   EXPECT_EQ(pieces.size(), 3u);  // 10.8 MB
   for (size_t i = 0; i + 1 < pieces.size(); ++i) EXPECT_GT(pieces[i].ByteSizeLong(), kMaxPiece - 2048);
 }
 
-TEST_F(MeshDownloadRpcTest, WhatCannotBeSentIsNamed) {
+TEST_F(MeshDownloadRpcTest, UnknownAndInvalidMeshNamesAreRefused) {
   std::vector<v1::DownloadMeshResponse> none;
   expect_refused(download("absent", &none), {grpc::StatusCode::NOT_FOUND, v1::REASON_NOT_FOUND, "mesh"});
   expect_refused(download("two words", &none), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "mesh"});
   EXPECT_TRUE(none.empty());
 }
 
-TEST_F(MeshDownloadRpcTest, AMeshDeletedMeanwhileIsSentToItsEnd) {
+TEST_F(MeshDownloadRpcTest, AMeshDeletedDuringItsDownloadIsSentCompletely) {
   ASSERT_TRUE(upload({whole_mesh("large", large_mesh())}).ok());
   v1::DownloadMeshRequest request;
   request.set_mesh("large");
@@ -118,7 +118,7 @@ TEST_F(MeshDownloadRpcTest, AMeshDeletedMeanwhileIsSentToItsEnd) {
   EXPECT_EQ(joined(pieces).indices_size(), 1'500'000);
 }
 
-TEST_F(MeshDownloadRpcTest, ACallerThatIsGoneEndsTheDownload) {
+TEST_F(MeshDownloadRpcTest, ACancelledCallEndsTheDownload) {
   ASSERT_TRUE(upload({whole_mesh("large", large_mesh())}).ok());
   v1::DownloadMeshRequest request;
   request.set_mesh("large");

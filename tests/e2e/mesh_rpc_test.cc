@@ -91,7 +91,7 @@ TEST_F(MeshRpcTest, WithoutAHashTheServerComputesIt) {
   EXPECT_EQ(response.mesh().sha256(), hash_of({}));
 }
 
-TEST_F(MeshRpcTest, KnownBytesNeedNotBeSentAgain) {
+TEST_F(MeshRpcTest, AMeshWithAKnownHashNeedsNoColumns) {
   ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   v1::UploadMeshRequest request = whole_mesh("other");
   request.set_sha256(hash_of({}));
@@ -102,7 +102,7 @@ TEST_F(MeshRpcTest, KnownBytesNeedNotBeSentAgain) {
   v1::UploadMeshResponse response;
   const auto writer = stubs().scenes->UploadMesh(&context, &response);
   ASSERT_TRUE(writer->Write(request));
-  // Answered though the caller has not said that it is done.
+  // The call is answered although the caller has not closed its side.
   const grpc::Status status = writer->Finish();
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_TRUE(response.already_known());
@@ -111,7 +111,7 @@ TEST_F(MeshRpcTest, KnownBytesNeedNotBeSentAgain) {
   EXPECT_EQ(list().size(), 2u);
 }
 
-TEST_F(MeshRpcTest, UploadingTheSameAgainIsFineAndOtherBytesUnderTheNameAreNot) {
+TEST_F(MeshRpcTest, ANameAcceptsTheSameBytesAgainAndRefusesOthers) {
   ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   v1::UploadMeshResponse response;
   ASSERT_TRUE(upload({whole_mesh("cube")}, &response).ok());
@@ -247,7 +247,7 @@ TEST_F(MeshRpcTest, MoreOrFewerNumbersThanAnnouncedAreRefused) {
   expect_nothing_kept();
 }
 
-TEST_F(MeshRpcTest, WrongVerticesAndIndicesAreNamedWithTheirNumber) {
+TEST_F(MeshRpcTest, WrongVerticesAndIndicesAreNamedWithTheirIndex) {
   CubeMesh mesh;
   mesh.vertices[7] = std::numeric_limits<float>::quiet_NaN();
   expect_refused(upload({whole_mesh("cube", mesh)}),

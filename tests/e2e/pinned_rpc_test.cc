@@ -1,4 +1,4 @@
-// Readers that hold more of a scene than they may: they are ended, and updates wait for that only.
+// Readers that pin more memory of a scene than permitted: they are cancelled, and updates wait only until they end.
 #include <algorithm>
 #include <atomic>
 #include <thread>
@@ -20,7 +20,7 @@ class PinnedRpcTest : public RpcTest {
  protected:
   PinnedRpcTest() : RpcTest(with_little()) {}
 
-  // All objects at one place: 1 to `count`.
+  // Returns a batch that inserts objects 1 to `count`, all at one position.
   static v1::UpdateBatch insert_heap(uint64_t count) {
     v1::UpdateBatch batch = insert_balls(1, count);
     batch.mutable_inserts(0)->clear_positions();
@@ -36,10 +36,10 @@ class PinnedRpcTest : public RpcTest {
   }
 };
 
-TEST_F(PinnedRpcTest, ABatchThatHoldsTooMuchIsEndedAndUpdatesGoOn) {
+TEST_F(PinnedRpcTest, ABatchThatPinsTooMuchIsCancelledAndUpdatesContinue) {
   constexpr uint64_t kObjects = 4'000;
   ASSERT_TRUE(apply(insert_heap(kObjects)).ok());
-  // Seconds of work, were it not ended.
+  // The batch would take seconds if it were not cancelled.
   v1::QueryBatch batch;
   v1::QueryBlock* block = batch.add_blocks();
   block->set_max_results(1);
@@ -64,8 +64,8 @@ TEST_F(PinnedRpcTest, ABatchThatHoldsTooMuchIsEndedAndUpdatesGoOn) {
   EXPECT_EQ(get("world").pinned_bytes(), 0u);
 }
 
-TEST_F(PinnedRpcTest, ADumpThatNobodyReadsIsCutOffAndUpdatesGoOn) {
-  constexpr uint64_t kObjects = 300'000;  // more than what is under way without being read
+TEST_F(PinnedRpcTest, ADumpThatIsNotReadIsCancelledAndUpdatesContinue) {
+  constexpr uint64_t kObjects = 300'000;  // more than a connection buffers for a caller that does not read
   ASSERT_TRUE(apply(insert_heap(kObjects)).ok());
   v1::DumpSceneRequest request;
   request.set_scene("world");
@@ -82,7 +82,7 @@ TEST_F(PinnedRpcTest, ADumpThatNobodyReadsIsCutOffAndUpdatesGoOn) {
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
 }
 
-TEST_F(PinnedRpcTest, TheLimitIsListedAndASceneSaysItsOwn) {
+TEST_F(PinnedRpcTest, TheLimitIsListedAndASceneReportsItsOwn) {
   EXPECT_EQ(get("world").max_pinned_bytes(), kPinnedLimit);
   v1::GetServerResponse server;
   ASSERT_TRUE(call(*stubs().server, &v1::ServerService::Stub::GetServer, v1::GetServerRequest(), &server).ok());

@@ -1,5 +1,5 @@
-// Updates through a proxy that sends a call again where no answer came: each numbered batch is applied once. HAProxy is
-// the proxy; the network behind it loses answers that the daemon has given.
+// Updates through a proxy that repeats a call if it gets no answer: each numbered batch is applied once. HAProxy is the
+// proxy; the network behind it loses answers of the daemon.
 #include <unistd.h>
 
 #include <chrono>
@@ -74,8 +74,8 @@ class ProxyTest : public ::testing::Test {
   std::unique_ptr<Stubs> proxied_;
 };
 
-// What the numbers are for.
-TEST_F(ProxyTest, ABatchWithoutANumberIsAppliedAgainWhereItsAnswerIsLost) {
+// Shows the problem that batch numbers solve.
+TEST_F(ProxyTest, AnUnnumberedBatchIsAppliedAgainIfItsAnswerIsLost) {
   EXPECT_EQ(apply(point(1)).revision(), 1u);
   relay_->lose_one();
   const v1::UpdateAck ack = apply(point(2));
@@ -100,8 +100,8 @@ TEST_F(ProxyTest, ANumberedBatchIsAppliedOnce) {
   EXPECT_EQ(points_of(daemon_.stubs(), "arena").size(), 20u);
 }
 
-// The client's stream sends again by itself, whatever comes between: connections that break, a daemon that is killed.
-TEST_F(ProxyTest, AStreamAppliesEachBatchOnceThoughConnectionsBreakAndTheDaemonIsKilled) {
+// The client library's stream resends batches itself after broken connections and after a kill of the daemon.
+TEST_F(ProxyTest, AStreamAppliesEachBatchOnceDespiteBrokenConnectionsAndKills) {
   constexpr uint64_t kBatches = 400;
   auto client = client::Client::connect("unix:" + socket());
   ASSERT_TRUE(client.ok()) << client.status();
@@ -123,7 +123,7 @@ TEST_F(ProxyTest, AStreamAppliesEachBatchOnceThoughConnectionsBreakAndTheDaemonI
     const absl::StatusOr<v1::UpdateAck> ack = acks[number - 1].get();
     ASSERT_TRUE(ack.ok()) << number << ": " << ack.status();
     EXPECT_EQ(ack->refused(), 0u) << number;
-    // What was applied already is told how far the scene is.
+    // The ack of a batch that was applied before is a duplicate with the scene's current revision.
     EXPECT_GE(ack->revision(), number);
     EXPECT_TRUE(ack->duplicate() || ack->revision() == number) << number;
   }

@@ -15,7 +15,7 @@ using ::testing::IsEmpty;
 const float kNan = std::numeric_limits<float>::quiet_NaN();
 const float kInfinity = std::numeric_limits<float>::infinity();
 
-// Balls 1 to 4 of radius 1 at x = 3, 6, 9, 12, and a cube, instance 100, from 9 to 11.
+// Scene with balls 1 to 4 of radius 1 at x = 3, 6, 9, 12, and a cube, instance 100, from x = 9 to 11.
 class QueryRpcTest : public RpcTest {
  protected:
   void SetUp() override {
@@ -69,7 +69,7 @@ TEST_F(QueryRpcTest, AReplyNamesTheRevisionThatItSaw) {
   EXPECT_FALSE(result.has_work());
 }
 
-TEST_F(QueryRpcTest, RaysFindTheNearestTheAnyAndAll) {
+TEST_F(QueryRpcTest, RaysFindTheFirstAnyAndAllHits) {
   v1::QueryBatch batch = ray_along_x();
   for (const v1::RayMode mode : {v1::RAY_MODE_ANY, v1::RAY_MODE_ALL}) {
     *batch.add_blocks() = batch.blocks(0);
@@ -83,7 +83,7 @@ TEST_F(QueryRpcTest, RaysFindTheNearestTheAnyAndAll) {
   EXPECT_THAT(result.blocks(0).normals(), IsEmpty());
   EXPECT_EQ(result.blocks(1).hits(), std::string(1, '\1'));
   EXPECT_THAT(result.blocks(1).ids(), IsEmpty());
-  // At x = 9 the cube's front side, on the diagonal of two triangles or in one of them, and at 11 its back.
+  // The ray hits the cube's front at x = 9, on the diagonal of two triangles or in one of them, and its back at 11.
   const v1::BlockResult& all = result.blocks(2);
   EXPECT_THAT(all.counts(), ElementsAre(static_cast<uint32_t>(all.ids_size())));
   EXPECT_TRUE(std::is_sorted(all.t().begin(), all.t().end()));
@@ -119,7 +119,7 @@ TEST_F(QueryRpcTest, NearestListsObjectsAndInstancesByDistance) {
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(3u));
 }
 
-TEST_F(QueryRpcTest, SourceMasksAndIgnoresChoose) {
+TEST_F(QueryRpcTest, SourceMasksAndIgnoresFilterResults) {
   v1::QueryBatch batch = ray_along_x();
   v1::QueryBlock* block = batch.mutable_blocks(0);
   block->set_source(v1::SOURCE_STATIC);
@@ -131,7 +131,7 @@ TEST_F(QueryRpcTest, SourceMasksAndIgnoresChoose) {
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(0u));
 }
 
-TEST_F(QueryRpcTest, OnlyWantedColumnsComeAndAllOfThemCan) {
+TEST_F(QueryRpcTest, OnlyRequestedColumnsAreReturnedUpToAllOfThem) {
   v1::QueryBatch batch = ray_along_x();
   for (int column = v1::COLUMN_T; column <= v1::COLUMN_POSE; ++column)
     batch.mutable_blocks(0)->add_columns(static_cast<v1::Column>(column));
@@ -167,7 +167,7 @@ TEST_F(QueryRpcTest, LookupsFindByIdAndByGroup) {
   EXPECT_THAT(result.blocks(1).ids(), ElementsAre(2u, 4u));
 }
 
-TEST_F(QueryRpcTest, CutOverlapsSaySoAndGoOn) {
+TEST_F(QueryRpcTest, TruncatedOverlapsAreListedAndContinueAfterAnId) {
   v1::QueryBatch batch = box_at(6, 100);
   batch.mutable_blocks(0)->set_max_results(2);
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));
@@ -220,7 +220,7 @@ TEST_F(QueryRpcTest, ExplainReportsTheWorkOfTheBatchAndItsBlocks) {
   EXPECT_EQ(explained.SerializeAsString(), plain.SerializeAsString());
 }
 
-TEST_F(QueryRpcTest, AWorkBudgetCutsAndSaysWhere) {
+TEST_F(QueryRpcTest, AWorkBudgetTruncatesResultsAndListsThem) {
   ASSERT_TRUE(apply(insert_balls(1000, 3000)).ok());
   v1::QueryBatch batch;
   for (int i = 0; i < 100; ++i) *batch.add_blocks() = box_at(6, 1e6f).blocks(0);

@@ -1,4 +1,4 @@
-// The past over the wire: scenes that keep it, questions about it, and what is said where it is not kept.
+// History over gRPC: scenes with history, queries about past ticks, and refusals of ticks that are not kept.
 #include <limits>
 
 #include "core/base/limits.h"
@@ -18,7 +18,7 @@ v1::SceneSpec history(uint32_t ticks, uint64_t bytes = 0) {
   return spec;
 }
 
-// A scene that keeps ten ticks, in which ball 1 is at x = 3 + 10 tick, up to tick 30.
+// Scene that keeps ten ticks, with ball 1 at x = 3 + 10 tick, up to tick 30.
 class RewindRpcTest : public RpcTest {
  protected:
   void SetUp() override {
@@ -58,14 +58,14 @@ TEST_F(RewindRpcTest, EachQueryIsAnsweredAtItsOwnTime) {
   EXPECT_THAT(result.clamped(), IsEmpty());
 }
 
-TEST_F(RewindRpcTest, QueriesAboutNowNameNoTime) {
+TEST_F(RewindRpcTest, QueriesWithoutATimeReturnNoTimes) {
   const v1::BlockResult result = answer(ray_along_x());
   EXPECT_THAT(result.ids(), ElementsAre(1));
   EXPECT_THAT(result.resolved_ticks(), IsEmpty());
   EXPECT_THAT(result.resolved_fractions(), IsEmpty());
 }
 
-TEST_F(RewindRpcTest, RaysAndBallsMeetWhatWasThere) {
+TEST_F(RewindRpcTest, RaysAndBallsFindObjectsAtTheirPastPositions) {
   v1::QueryBatch batch = ray_along_x();
   batch.mutable_blocks(0)->add_as_of_ticks(22);
   EXPECT_THAT(answer(batch).t(), ElementsAre(222));
@@ -77,7 +77,7 @@ TEST_F(RewindRpcTest, RaysAndBallsMeetWhatWasThere) {
   EXPECT_THAT(answer(balls).counts(), ElementsAre(1, 0));
 }
 
-TEST_F(RewindRpcTest, TimesThatAreNotKeptAreRefusedWithTheRangeThatIs) {
+TEST_F(RewindRpcTest, TimesOutsideHistoryAreRefusedWithItsRange) {
   const grpc::Status too_old = query(where_at({25, 19}, {0, 0.5f}));
   expect_refused(too_old, {grpc::StatusCode::OUT_OF_RANGE, v1::REASON_OUT_OF_RANGE, "blocks[0].as_of_ticks", 1});
   EXPECT_THAT(too_old.error_message(), HasSubstr("ticks 20 to 30"));
@@ -85,7 +85,7 @@ TEST_F(RewindRpcTest, TimesThatAreNotKeptAreRefusedWithTheRangeThatIs) {
                  {grpc::StatusCode::OUT_OF_RANGE, v1::REASON_OUT_OF_RANGE, "blocks[0].as_of_ticks", 0});
 }
 
-TEST_F(RewindRpcTest, ClampingTakesTheNearestTimeAndSaysSo) {
+TEST_F(RewindRpcTest, ClampingUsesTheNearestTimeAndFlagsIt) {
   v1::QueryBatch batch = where_at({3, 25, 99}, {0.5f});
   batch.mutable_blocks(0)->set_outside_history(v1::OUTSIDE_HISTORY_CLAMP);
   const v1::BlockResult result = answer(batch);
@@ -113,7 +113,7 @@ TEST_F(RewindRpcTest, WrongColumnsAreNamed) {
   refused(batch, v1::REASON_MALFORMED, "outside_history");
 }
 
-TEST_F(RewindRpcTest, ASceneShowsWhatItKeeps) {
+TEST_F(RewindRpcTest, ASceneReportsItsHistory) {
   const v1::Scene scene = get("world");
   EXPECT_EQ(scene.tick(), 30u);
   EXPECT_EQ(scene.oldest_tick(), 20u);
@@ -123,7 +123,7 @@ TEST_F(RewindRpcTest, ASceneShowsWhatItKeeps) {
   EXPECT_EQ(scene.spec().history_bytes(), limits::kDefaultHistoryBytes);
 }
 
-TEST_F(RewindRpcTest, RestartingTicksForgetsThePast) {
+TEST_F(RewindRpcTest, RestartingTicksDropsHistory) {
   v1::UpdateBatch batch;
   batch.set_restart_ticks(true);
   batch.set_tick(1);
@@ -132,7 +132,7 @@ TEST_F(RewindRpcTest, RestartingTicksForgetsThePast) {
   EXPECT_EQ(get("world").recorded_ticks(), 0u);
 }
 
-TEST_F(RewindRpcTest, ASceneWithoutHistoryKnowsOnlyNow) {
+TEST_F(RewindRpcTest, ASceneWithoutHistoryAnswersOnlyTheCurrentTick) {
   ASSERT_TRUE(create("brief").ok());
   v1::UpdateBatch batch = insert_balls(1, 1);
   batch.set_tick(5);

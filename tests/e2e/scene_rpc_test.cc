@@ -55,7 +55,7 @@ TEST_F(SceneRpcTest, ASceneDescribesWhatIsInIt) {
   EXPECT_NEAR(scene.max().x(), 11, 0.01);
 }
 
-TEST_F(SceneRpcTest, ANameThatIsTakenIsRefusedUnlessThatWillDo) {
+TEST_F(SceneRpcTest, ANameInUseIsRefusedUnlessIfAbsentIsSet) {
   v1::Scene first;
   v1::Scene second;
   ASSERT_TRUE(create("arena", {}, &first).ok());
@@ -138,7 +138,7 @@ TEST_F(SceneRpcTest, TheOverloadPolicyIsWhatTheSceneWasCreatedWith) {
   EXPECT_EQ(scene.joined_updates(), 0u);
 }
 
-TEST_F(SceneRpcTest, StaticsCanComeFromAnotherSceneAndThenPartWays) {
+TEST_F(SceneRpcTest, StaticsCopiedFromAnotherSceneChangeIndependently) {
   ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   ASSERT_TRUE(change(place_one("cube", 100)).ok());
   v1::SceneSpec spec;
@@ -244,7 +244,7 @@ class FullServerTest : public RpcTest {
         }()) {}
 };
 
-TEST_F(FullServerTest, OneSceneOrMeshTooManyIsRefusedNamingTheLimit) {
+TEST_F(FullServerTest, ScenesAndMeshesBeyondTheLimitAreRefusedNamingIt) {
   ASSERT_TRUE(create("second").ok());
   v1::Error error = error_of(create("third"));
   expect_error(error, {grpc::StatusCode::RESOURCE_EXHAUSTED, v1::REASON_LIMIT, "name"});
@@ -260,14 +260,14 @@ TEST_F(FullServerTest, OneSceneOrMeshTooManyIsRefusedNamingTheLimit) {
   EXPECT_EQ(error.limit(), "meshes");
 }
 
-TEST_F(FullServerTest, OneCallTooManyIsRefusedAndMayBeTriedAgain) {
+TEST_F(FullServerTest, CallsBeyondTheLimitAreRefusedAndMayBeRetried) {
   grpc::ClientContext context;
   set_timeout(context);
   v1::UploadMeshResponse uploaded;
   const auto first = stubs().scenes->UploadMesh(&context, &uploaded);
   ASSERT_TRUE(first->Write(whole_mesh("cube")));
   grpc::Status status;
-  // Until the upload has begun there is still room.
+  // Calls are admitted until the server has begun the upload.
   do status = create("second", {}, nullptr, true);
   while (status.ok());
   const v1::Error error = error_of(status);
@@ -279,7 +279,7 @@ TEST_F(FullServerTest, OneCallTooManyIsRefusedAndMayBeTriedAgain) {
   EXPECT_TRUE(create("second", {}, nullptr, true).ok());
 }
 
-TEST_F(FullServerTest, OneStreamTooManyIsRefusedAndTheFirstGoesOn) {
+TEST_F(FullServerTest, StreamsBeyondTheLimitAreRefusedAndOpenOnesContinue) {
   v1::StreamUpdatesRequest request;
   request.set_scene("world");
   v1::StreamUpdatesResponse response;

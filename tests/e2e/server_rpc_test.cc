@@ -25,7 +25,7 @@ const v1::Limit& limit_of(const v1::GetServerResponse& server, const std::string
   return v1::Limit::default_instance();
 }
 
-TEST_F(ServerRpcTest, TheServerSaysWhatItIsAndServes) {
+TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
   const v1::GetServerResponse server = get_server(stubs());
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_EQ(server.instruction_set(), instruction_set());
@@ -33,7 +33,7 @@ TEST_F(ServerRpcTest, TheServerSaysWhatItIsAndServes) {
                                                         "latest_wins", "lookup", "nearest", "rays", "static_from"));
 }
 
-TEST_F(ServerRpcTest, LimitsAreListedInOrderWithWhatIsUsed) {
+TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {
   const v1::GetServerResponse server = get_server(stubs());
   std::vector<std::string> names;
   for (const v1::Limit& limit : server.limits()) names.push_back(limit.name());
@@ -63,7 +63,7 @@ TEST_F(ServerRpcTest, OpenStreamsCountAsUsed) {
 
 TEST_F(ServerRpcTest, HealthAnswersServingForTheServerAndEachService) {
   for (const std::string service : {"", "locus.v1.QueryService", "locus.v1.SceneService"}) {
-    // HealthCheckRequest{service = 1}, HealthCheckResponse{status = 1: SERVING}.
+    // Bytes of HealthCheckRequest{service = 1} and HealthCheckResponse{status = 1: SERVING}.
     const std::string request =
         service.empty() ? "" : std::string("\x0a") + static_cast<char>(service.size()) + service;
     const RawReply reply = raw_call(stubs().channel, "/grpc.health.v1.Health/Check", request);
@@ -75,7 +75,7 @@ TEST_F(ServerRpcTest, HealthAnswersServingForTheServerAndEachService) {
 }
 
 TEST_F(ServerRpcTest, ReflectionListsEveryService) {
-  // ServerReflectionRequest{list_services = 7: ""}; the reply's names are plain text in it.
+  // Bytes of ServerReflectionRequest{list_services = 7: ""}; the reply contains the names as plain text.
   const RawReply reply = raw_call(stubs().channel, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                                   std::string("\x3a\x00", 2));
   EXPECT_TRUE(reply.status.ok()) << reply.status.error_message();

@@ -27,7 +27,7 @@ class StreamRpcTest : public RpcTest {
   }
 };
 
-TEST_F(StreamRpcTest, EveryMessageIsAnsweredUnderItsNumber) {
+TEST_F(StreamRpcTest, EveryMessageIsAnsweredUnderItsSequenceNumber) {
   grpc::ClientContext context;
   set_timeout(context);
   const auto stream = stubs().updates->StreamUpdates(&context);
@@ -43,7 +43,7 @@ TEST_F(StreamRpcTest, EveryMessageIsAnsweredUnderItsNumber) {
   EXPECT_TRUE(stream->Finish().ok());
 }
 
-TEST_F(StreamRpcTest, ARefusedMessageIsAnsweredByAnErrorAndTheStreamGoesOn) {
+TEST_F(StreamRpcTest, ARefusedMessageIsAnsweredByAnErrorAndTheStreamContinues) {
   grpc::ClientContext context;
   set_timeout(context);
   const auto stream = stubs().updates->StreamUpdates(&context);
@@ -177,7 +177,7 @@ TEST_F(StreamRpcTest, StreamsInterleaveAndEveryBatchOfEachIsAppliedOnce) {
         v1::UpdateBatch batch = insert_balls(id, id);
         batch.set_writer(s + 1);
         batch.set_batch(i);
-        // Every batch twice: the second time it is a duplicate.
+        // Send every batch twice; the second one is a duplicate.
         for (int time = 0; time < 2; ++time) {
           ASSERT_TRUE(stream->Write(update("world", i, batch)));
           v1::StreamUpdatesResponse response;
@@ -194,7 +194,7 @@ TEST_F(StreamRpcTest, StreamsInterleaveAndEveryBatchOfEachIsAppliedOnce) {
   EXPECT_EQ(get("world").revision(), kStreams * kMessages);
 }
 
-TEST_F(StreamRpcTest, AWaitOnAStreamEndsAfterASecondAndTheStreamGoesOn) {
+TEST_F(StreamRpcTest, AWaitOnAStreamEndsAfterASecondAndTheStreamContinues) {
   grpc::ClientContext context;
   set_timeout(context);
   const auto stream = stubs().queries->StreamQueries(&context);
@@ -212,13 +212,13 @@ TEST_F(StreamRpcTest, AWaitOnAStreamEndsAfterASecondAndTheStreamGoesOn) {
   EXPECT_TRUE(stream->Finish().ok());
 }
 
-TEST_F(StreamRpcTest, AStreamThatItsCallerDropsLeavesNothingBehind) {
+TEST_F(StreamRpcTest, ACancelledStreamReleasesItsResources) {
   for (int i = 0; i < 20; ++i) {
     grpc::ClientContext context;
     set_timeout(context);
     const auto stream = stubs().updates->StreamUpdates(&context);
     ASSERT_TRUE(stream->Write(update("world", 1, insert_balls(1, 2))));
-    // From here on the server has the stream.
+    // After the first answer the server has accepted the stream.
     v1::StreamUpdatesResponse response;
     ASSERT_TRUE(stream->Read(&response));
     if (i % 2 == 0) stream->Write(update("world", 2, insert_balls(3, 4)));
@@ -238,7 +238,7 @@ TEST_F(StreamRpcTest, AStreamThatItsCallerDropsLeavesNothingBehind) {
   EXPECT_EQ(open_streams(), 0);
 }
 
-TEST_F(StreamRpcTest, DrainingEndsStreamsThatWaitForAMessageOnceWhatCameIsAnswered) {
+TEST_F(StreamRpcTest, DrainingEndsIdleStreamsAfterTheirMessagesAreAnswered) {
   grpc::ClientContext update_context;
   set_timeout(update_context);
   const auto updates = stubs().updates->StreamUpdates(&update_context);

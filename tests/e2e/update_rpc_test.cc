@@ -19,14 +19,15 @@ class UpdateRpcTest : public RpcTest {
     ASSERT_TRUE(apply(insert_balls(1, 4)).ok());
   }
 
-  // The whole batch is refused and nothing has changed.
+  // Expects the whole batch to be refused and the scene to be unchanged.
   void expect_batch_refused(const v1::UpdateBatch& batch, const Refused& expected) {
     const std::string before = dump();
     expect_refused(apply(batch), expected);
     EXPECT_EQ(dump(), before);
   }
 
-  // One item is refused, with nothing else in the batch: nothing has changed. With all_or_nothing the batch is.
+  // Expects the only item of the batch to be refused and the scene to be unchanged; with all_or_nothing, expects the
+  // batch to be refused.
   void expect_item_refused(v1::UpdateBatch batch, const std::string& field, uint32_t index, uint64_t id,
                            v1::Reason reason) {
     const std::string before = dump();

@@ -29,7 +29,7 @@ class ViewRpcTest : public RpcTest {
     return status;
   }
 
-  // A query on a thread of its own that waits for a revision which is not there yet.
+  // Starts a query on its own thread that waits for a revision which is not published yet.
   std::future<grpc::Status> waiting_query(uint64_t revision) {
     return std::async(std::launch::async, [this, revision] {
       return query_within(seen([revision](v1::View* view) { view->set_at_least(revision); }),
@@ -54,7 +54,7 @@ TEST_F(ViewRpcTest, AtLeastSeesTheCallersOwnWrites) {
   }
 }
 
-TEST_F(ViewRpcTest, AtLeastWaitsAndIsWokenByTheRevision) {
+TEST_F(ViewRpcTest, AtLeastWaitsUntilTheRevisionIsPublished) {
   std::future<grpc::Status> waiter = waiting_query(2);
   ASSERT_TRUE(apply(insert_balls(1, 1)).ok());
   ASSERT_TRUE(apply(insert_balls(2, 2)).ok());
@@ -66,7 +66,7 @@ TEST_F(ViewRpcTest, AtLeastEndsWithTheCallsDeadline) {
   EXPECT_EQ(query_within(batch, milliseconds(50)).error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
 }
 
-TEST_F(ViewRpcTest, AtLeastWithoutADeadlineEndsAfterASecondAndSaysWhereTheSceneIs) {
+TEST_F(ViewRpcTest, AtLeastWithoutADeadlineEndsAfterASecondWithTheScenesRevision) {
   grpc::ClientContext context;
   v1::QueryRequest request;
   request.set_scene("world");
@@ -76,7 +76,7 @@ TEST_F(ViewRpcTest, AtLeastWithoutADeadlineEndsAfterASecondAndSaysWhereTheSceneI
   expect_refused(status, {grpc::StatusCode::DEADLINE_EXCEEDED, v1::REASON_OUT_OF_RANGE, "view.at_least"});
 }
 
-TEST_F(ViewRpcTest, DeletingTheSceneWakesThoseWhoWait) {
+TEST_F(ViewRpcTest, DeletingTheSceneWakesItsWaiters) {
   std::future<grpc::Status> waiter = waiting_query(99);
   ASSERT_TRUE(remove("world").ok());
   const grpc::Status status = waiter.get();
@@ -84,7 +84,7 @@ TEST_F(ViewRpcTest, DeletingTheSceneWakesThoseWhoWait) {
   EXPECT_EQ(error_of(status).reason(), v1::REASON_NOT_FOUND);
 }
 
-TEST_F(ViewRpcTest, ExactlyGivesTheSameAnswerWhileTheSceneGoesOn) {
+TEST_F(ViewRpcTest, ExactlyGivesTheSameAnswerWhileTheSceneChanges) {
   ASSERT_TRUE(apply(insert_balls(1, 3)).ok());
   v1::QueryBatch batch = ray_along_x();
   batch.mutable_view()->set_exactly(1);
@@ -99,7 +99,7 @@ TEST_F(ViewRpcTest, ExactlyGivesTheSameAnswerWhileTheSceneGoesOn) {
   EXPECT_EQ(after.SerializeAsString(), before.SerializeAsString());
 }
 
-TEST_F(ViewRpcTest, RevisionsThatAreNotKeptAreOutOfRangeAndTheRangeIsNamed) {
+TEST_F(ViewRpcTest, RevisionsThatAreNotKeptAreOutOfRangeWithTheRange) {
   for (uint64_t id = 1; id <= limits::kRecentRevisions + 5; ++id) ASSERT_TRUE(apply(insert_balls(id, id)).ok());
   for (const uint64_t revision : {uint64_t{1}, uint64_t{1000}}) {
     const grpc::Status status = query(seen([revision](v1::View* view) { view->set_exactly(revision); }));
@@ -109,7 +109,7 @@ TEST_F(ViewRpcTest, RevisionsThatAreNotKeptAreOutOfRangeAndTheRangeIsNamed) {
   }
 }
 
-TEST_F(ViewRpcTest, AnotherEpochIsNoticedAfterTheSceneWasMadeAnew) {
+TEST_F(ViewRpcTest, AViewOfTheOldEpochIsRefusedAfterTheSceneIsRecreated) {
   v1::UpdateAck ack;
   ASSERT_TRUE(apply(insert_balls(1, 1), &ack).ok());
   const auto batch = [&ack](const std::function<void(v1::View*)>& set) {
@@ -130,7 +130,7 @@ TEST_F(ViewRpcTest, AnotherEpochIsNoticedAfterTheSceneWasMadeAnew) {
 }
 
 TEST_F(ViewRpcTest, EveryReplyIsOfOneRevisionWhileAWriterRuns) {
-  // Each batch moves both balls, so that both are on the same side in every revision.
+  // Each batch moves both balls, so both are on the same side in every revision.
   ASSERT_TRUE(apply(insert_balls(1, 2)).ok());
   std::thread writer([this] {
     for (int i = 0; i < 200; ++i) {

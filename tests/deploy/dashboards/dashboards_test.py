@@ -1,8 +1,8 @@
-"""What is made for Prometheus and Grafana, against a real locusd:
+"""Checks the files for Prometheus and Grafana against a real locusd:
 
     python3 dashboards_test.py DASHBOARDS_DIRECTORY BIN_DIRECTORY
 
-/metrics is read by Prometheus's own Python library; dashboard, alerts and README name nothing that is not there.
+/metrics is read by Prometheus's own Python library; dashboard, alerts and README may only name existing metrics.
 """
 
 import json
@@ -22,7 +22,7 @@ DASHBOARDS, BIN = sys.argv[1], os.path.abspath(sys.argv[2])
 START_SECONDS = 30
 METRIC = re.compile(r"\b(?:locus|process)_[a-z_]+")
 LABELLED = re.compile(r"\b((?:locus|process)_[a-z_]+)\{([^}]*)\}")
-# Of Prometheus itself.
+# Metrics of Prometheus itself.
 KNOWN_ELSEWHERE = {"up"}
 
 

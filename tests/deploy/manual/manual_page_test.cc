@@ -44,7 +44,7 @@ TEST(ManualPageTest, TheSynopsisShowsWhatIsRequired) {
               HasSubstr("\\fBtool draw\\fR\n\\fB\\-\\-out\\fR \\fIFILE\\fR [\\fIOPTION\\fR]... \\fISHAPE\\fR\n"));
 }
 
-TEST(ManualPageTest, OptionsSayWhatTheyTake) {
+TEST(ManualPageTest, OptionsShowTheirValueAndChoices) {
   const std::string roff = page_of_draw().roff;
   EXPECT_THAT(roff, HasSubstr("\\fB\\-o\\fR, \\fB\\-\\-out\\fR \\fIFILE\\fR\nWhere to. Required.\n"));
   EXPECT_THAT(roff, HasSubstr("How. One of fast, fine.\n"));
@@ -57,7 +57,7 @@ TEST(ManualPageTest, ExamplesStandApartFromTheOtherNotes) {
   EXPECT_THAT(roff, HasSubstr("Draw something.\n.PP\nIt takes a while.\n.PP\nSee the book.\n"));
 }
 
-TEST(ManualPageTest, IndentedNotesStayAsTheyStand) {
+TEST(ManualPageTest, IndentedNotesAreKeptLiterally) {
   const cli::CommandWords tool{
       .path = "tool", .description = "Draws.", .footer = "Shapes:\n  ball   round\n  box\nLast."};
   const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).roff;
@@ -71,7 +71,7 @@ TEST(ManualPageTest, ADescriptionOfSeveralSentencesIsIndexedByItsFirst) {
   EXPECT_THAT(roff, HasSubstr(".SH DESCRIPTION\nDraws balls\nand boxes. Slowly.\n"));
 }
 
-TEST(ManualPageTest, WhatTheParserDoesNotKnowIsOnEveryPage) {
+TEST(ManualPageTest, ExitStatusesAndVariablesAreOnEveryPage) {
   const std::string roff = page_of_draw().roff;
   EXPECT_THAT(roff, HasSubstr(".SH EXIT STATUS\n.TP\n\\fB0\\fR\nIt went well.\n"));
   EXPECT_THAT(roff, HasSubstr(".SH ENVIRONMENT\n.TP\n\\fBTOOL_HOME\\fR\nWhere it lives.\n"));

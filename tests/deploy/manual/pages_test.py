@@ -1,4 +1,4 @@
-"""Formats the built manual pages and wants no complaint: pages_test.py FOLDER. Needs groff and mandoc."""
+"""Formats the built manual pages and expects no warning: pages_test.py FOLDER. Needs groff and mandoc."""
 
 import glob
 import os

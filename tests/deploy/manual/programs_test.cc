@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-// Each option, positional and example of the command, and of those below it, is on its page.
+// Expects each option, positional and example of the command and of its subcommands on its page.
 void expect_pages(const cli::CommandWords& command, const std::string& section,
                   std::map<std::string, std::string>& pages) {
   const std::string file = absl::StrCat(absl::StrReplaceAll(command.path, {{" ", "-"}}), ".", section);

@@ -11,7 +11,7 @@ TEST(RoffTest, NothingInATextIsACommandOrAnEscape) {
   EXPECT_EQ(escaped("a.b\n'c"), "a.b\n\\&\\(aqc");
 }
 
-TEST(RoffTest, WhatIsTypedIsPrintedAsItIsTyped) {
+TEST(RoffTest, SpecialCharactersArePrintedAsTyped) {
   EXPECT_EQ(escaped("--mode `x` \"y\" 'z' ^ ~"), "\\-\\-mode \\(gax\\(ga \\(dqy\\(dq \\(aqz\\(aq \\(ha \\(ti");
 }
 

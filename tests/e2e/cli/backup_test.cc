@@ -37,7 +37,7 @@ std::string bytes_of(const std::string& path) {
   return bytes.str();
 }
 
-TEST(BackupTest, WhatTheLogCopiedIsTheDataDirectoryThatIsRestored) {
+TEST(BackupTest, ARestoredDirectoryHasTheFilesThatTheLogCopied) {
   const TemporaryFolder folder;
   const std::string large(5'000'000, 'x');
   FakeLog log;
@@ -56,7 +56,7 @@ TEST(BackupTest, WhatTheLogCopiedIsTheDataDirectoryThatIsRestored) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("data/SHA256SUMS")));
 }
 
-// The point whose x is the number of the batch that put it there.
+// Inserts point `number` at x = `number`. Returns whether the update was acknowledged.
 bool put_point(Stubs& stubs, uint64_t number) {
   grpc::ClientContext context;
   set_timeout(context);
@@ -70,7 +70,7 @@ bool put_point(Stubs& stubs, uint64_t number) {
   return stubs.updates->ApplyUpdates(&context, request, &response).ok();
 }
 
-TEST(BackupTest, ADaemonIsBackedUpWhileItIsWrittenToAndTheCopyServesWhatWasAcknowledgedBefore) {
+TEST(BackupTest, ABackupUnderWritesServesEveryUpdateAcknowledgedBeforeIt) {
   KeptDaemon daemon, copy;
   const TemporaryFolder folder;
   daemon.start();
@@ -106,7 +106,7 @@ TEST(BackupTest, ADaemonIsBackedUpWhileItIsWrittenToAndTheCopyServesWhatWasAckno
   EXPECT_EQ(get_scene(copy.stubs(), "arena").epoch(), other_epoch);
 }
 
-TEST(BackupTest, AServerThatKeepsNothingSaysWhatToDoInstead) {
+TEST(BackupTest, AServerWithoutADataDirectoryAdvisesToSetOne) {
   const TemporaryFolder folder;
   const RunningServer server;
   const Outcome refused = run(server.address(), {"backup", folder.file("backup")});

@@ -45,7 +45,7 @@ class SceneFilesTest : public RpcTest {
     return Json::parse(text_of(arguments), nullptr, /*allow_exceptions=*/false);
   }
 
-  // One of each shape, and a city placed twice.
+  // Inserts one object of each shape, and places a city twice.
   void fill_world() {
     for (const std::vector<std::string>& line : std::vector<std::vector<std::string>>{
              {"generate", "city", "--triangles", "600", "--scene", "world", "--mesh", "city", "--id", "100"},
@@ -62,7 +62,7 @@ class SceneFilesTest : public RpcTest {
   const std::string path_ = ::testing::TempDir() + "scene_files_test_" + std::to_string(getpid()) + ".glb";
 };
 
-TEST_F(SceneFilesTest, ADumpShowsEverythingInTheWordsOfInsert) {
+TEST_F(SceneFilesTest, ADumpHasTheColumnsOfInsert) {
   fill_world();
   const Json dump = json_of({"dump", "world"});
   EXPECT_EQ(dump["scene"], "world");
@@ -82,7 +82,7 @@ TEST_F(SceneFilesTest, ADumpShowsEverythingInTheWordsOfInsert) {
             R"("scale":1.0,"layers":1,"group":"0","tag":"0"})");
 }
 
-TEST_F(SceneFilesTest, ADumpCanBeOfObjectsOrInstancesOrAnEarlierRevision) {
+TEST_F(SceneFilesTest, ADumpCanSelectObjectsInstancesOrAnEarlierRevision) {
   fill_world();
   const Json objects = json_of({"dump", "world", "--objects"})["things"];
   ASSERT_EQ(objects.size(), 4u);
@@ -153,7 +153,7 @@ TEST_F(SceneFilesTest, MeshesAreListedShownDownloadedAndDeleted) {
   EXPECT_EQ(run({"mesh", "list"}).out, "no meshes\n");
 }
 
-TEST_F(SceneFilesTest, AnExportHoldsTheLevelOnceAndEverythingWhereItStands) {
+TEST_F(SceneFilesTest, AnExportHasTheMeshOnceAndEveryInstanceInItsPlace) {
   fill_world();
   const Json answer = json_of({"export", "world", path_});
   EXPECT_EQ(answer["things"], 6);
@@ -198,7 +198,7 @@ TEST_F(SceneFilesTest, AnExportedLevelImportedAgainAnswersTheSame) {
   EXPECT_EQ(there["hits"][0]["normal"], here["hits"][0]["normal"]);
 }
 
-TEST_F(SceneFilesTest, AFarSceneIsMovedAndTheAnswerSaysSo) {
+TEST_F(SceneFilesTest, AFarSceneIsTranslatedAndTheOffsetReported) {
   text_of({"insert", "world", "ball", "--id", "1", "--at", "123456789.125,0,0", "--radius", "0.5"});
   const Outcome outcome = run({"-o", "json", "export", "world", path_});
   EXPECT_EQ(Json::parse(outcome.out)["recentre"], Json({123456789.0, 0, 0}));
@@ -206,7 +206,7 @@ TEST_F(SceneFilesTest, AFarSceneIsMovedAndTheAnswerSaysSo) {
   EXPECT_EQ(cli::testing::read_glb(path_).node("object 1")["translation"][0], 0.125);
 }
 
-TEST_F(SceneFilesTest, WhatCannotBeExportedIsSaid) {
+TEST_F(SceneFilesTest, ExportErrorsNameTheSceneTheEndingOrThePath) {
   const Outcome empty = run({"export", "world", path_});
   EXPECT_EQ(empty.code, cli::ExitCode::kFailed);
   EXPECT_THAT(empty.err, HasSubstr("scene world has nothing to export"));

@@ -62,7 +62,7 @@ TEST_F(TopTest, OnceAsATableNamesTheSceneAndHasNoEscapes) {
 }
 
 TEST_F(TopTest, ASignalEndsItWithZero) {
-  // Blocked from here on, so that it stays pending until `top` waits for it.
+  // Block the signal, so that it stays pending until `top` waits for it.
   sigset_t interrupt;
   sigset_t before;
   sigemptyset(&interrupt);
@@ -74,13 +74,13 @@ TEST_F(TopTest, ASignalEndsItWithZero) {
   EXPECT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
 }
 
-TEST_F(TopTest, NobodyThereIsUnreachableAndTheHintNamesTheOption) {
+TEST_F(TopTest, AnUnreachableServerIsReportedWithAHint) {
   const Outcome outcome = run_top("127.0.0.1:1", {"--once"});
   EXPECT_EQ(outcome.code, cli::ExitCode::kUnreachable);
   EXPECT_THAT(outcome.err, HasSubstr("--http-listen"));
 }
 
-TEST_F(TopTest, AnotherKindOfServerIsToldApart) {
+TEST_F(TopTest, AGrpcPortOrAnInvalidAddressIsAnError) {
   const Outcome grpc = run_top(running_.address(), {"--once"});
   EXPECT_NE(grpc.code, cli::ExitCode::kOk);
   const Outcome nothing = run_top("not an address", {"--once"});

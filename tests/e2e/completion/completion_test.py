@@ -1,4 +1,4 @@
-"""What the shells offer for half a line of locus: python3 completion_test.py BIN_DIRECTORY. Needs bash, zsh and fish."""
+"""Completions of half a line of locus in each shell: python3 completion_test.py BIN_DIRECTORY. Needs bash, zsh and fish."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ START_SECONDS = 30
 
 
 def last_part(offer):
-    """Shells differ in how much of the word they repeat: what stands behind the last = or comma counts."""
+    """Returns the part behind the last = or comma: shells differ in how much of the word they repeat."""
     return offer.split("=")[-1].split(",")[-1] if not offer.startswith("--") or "=" in offer else offer
 
 

@@ -1,4 +1,4 @@
-"""One class a shell: what it offers for a line when the cursor stands at its end. Each really runs the shell."""
+"""One class a shell: the completions that it offers at the end of a line. Each class runs the real shell."""
 
 import os
 import pty
@@ -32,7 +32,7 @@ class Bash(Shell):
         return self.run("bash", "--norc", "-n", self.script)
 
     def offers(self, line):
-        """Calls the function as readline does, which divides words at = and : too."""
+        """Calls the completion function as readline does, which also splits words at = and : characters."""
         words = re.findall(r"[=:]+|[^\s=:]+", line) + ([""] if line[-1] in " =:" else [])
         return self.run(
             "bash", "--norc", "-c",
@@ -53,7 +53,7 @@ class Fish(Shell):
 
 
 class Zsh(Shell):
-    """Completion needs the line editor, and that a terminal: a key bound to a listing writes the matches to a file."""
+    """Completion needs the line editor, which needs a terminal: a bound key writes the matches to a file."""
 
     name = "zsh"
     SETUP = r"""
@@ -89,7 +89,7 @@ print > $FOUND.done
         return self.run("zsh", "-f", "-n", self.script)
 
     def type(self, keys):
-        """Types and waits until the shell says that it is done."""
+        """Types the text and waits until the shell reports that it is done."""
         said = b""
         os.write(self.terminal, keys.encode())
         deadline = time.monotonic() + SECONDS

@@ -1,4 +1,4 @@
-"""Installs the build into a folder, moves it, and uses it as a stranger would: install_test.py --build DIR --source DIR
+"""Installs the build into a folder, moves it, and uses it as a user would: install_test.py --build DIR --source DIR
 --cmake PROGRAM --compiler PROGRAM --folder DIR.
 
 The user's program is built twice, through find_package and through pkg-config, and run against the installed locusd.

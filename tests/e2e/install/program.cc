@@ -1,4 +1,4 @@
-// What a user of the installed library writes: makes a scene, inserts a ball, and asks a ray what it hits.
+// Program of a user of the installed library: makes a scene, inserts a ball, and prints what a ray hits.
 #include <iostream>
 
 #include "client/lib/client.h"

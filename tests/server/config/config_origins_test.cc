@@ -26,7 +26,7 @@ class ConfigOriginsTest : public testing::Test {
     });
   }
 
-  // As "value, origin, place".
+  // Returns the option as "value, origin, place".
   std::string of(const std::string& name, const std::vector<std::string>& arguments = {}) {
     const auto values = origins(arguments);
     EXPECT_TRUE(values.ok()) << values.status();
@@ -43,7 +43,7 @@ class ConfigOriginsTest : public testing::Test {
       testing::TempDir() + "locusd_" + testing::UnitTest::GetInstance()->current_test_info()->name() + ".conf";
 };
 
-TEST_F(ConfigOriginsTest, WithoutAnythingAllAreDefaults) {
+TEST_F(ConfigOriginsTest, WithoutFlagsEnvironmentAndFileAllValuesAreDefaults) {
   const auto values = origins({});
   ASSERT_TRUE(values.ok()) << values.status();
   std::set<std::string> names;
@@ -61,11 +61,11 @@ TEST_F(ConfigOriginsTest, WithoutAnythingAllAreDefaults) {
   EXPECT_EQ(of("insecure"), "false, default, ");
 }
 
-TEST_F(ConfigOriginsTest, WhatFollowsTheMachineIsShownAsItComesOut) {
+TEST_F(ConfigOriginsTest, DefaultsComputedFromTheMachineShowTheirValue) {
   EXPECT_EQ(of("memory-limit"), std::to_string(read_machine().memory_bytes / 4 * 3) + ", default, ");
 }
 
-TEST_F(ConfigOriginsTest, EachValueNamesTheFlagTheVariableOrTheLineItComesFrom) {
+TEST_F(ConfigOriginsTest, EachValueNamesItsFlagVariableOrLine) {
   write_file("# limits\nmax-scenes = 1\n  max-streams=1\nmax-calls = 1\n\nlog-format = json\n");
   environment_ = {{"LOCUS_CONFIG", file_}, {"LOCUS_MAX_SCENES", "2"}, {"LOCUS_MAX_STREAMS", "2"}};
   const std::vector<std::string> flags = {"--max-scenes", "3", "--insecure", "--log-level=debug"};
@@ -78,22 +78,22 @@ TEST_F(ConfigOriginsTest, EachValueNamesTheFlagTheVariableOrTheLineItComesFrom) 
   EXPECT_EQ(of("max-meshes", flags), "65536, default, ");
 }
 
-TEST_F(ConfigOriginsTest, AFlagNamesTheFileToo) {
+TEST_F(ConfigOriginsTest, AConfigFileNamedByAFlagIsRead) {
   write_file("memory-limit = 1GiB\n");
   EXPECT_EQ(of("memory-limit", {"--config", file_}), "1073741824, file, " + file_ + ":1");
 }
 
-TEST_F(ConfigOriginsTest, SeveralAddressesAreOneValue) {
+TEST_F(ConfigOriginsTest, SeveralAddressesAreListedAsOneValue) {
   EXPECT_EQ(of("listen", {"--listen", "127.0.0.1:1", "--listen", "[::1]:2"}), "127.0.0.1:1,[::1]:2, flag, --listen");
 }
 
-TEST_F(ConfigOriginsTest, AnEmptyVariableSetsOnlyWhatMayBeEmpty) {
+TEST_F(ConfigOriginsTest, AnEmptyVariableSetsOnlyOptionsThatMayBeEmpty) {
   environment_ = {{"LOCUS_HTTP_LISTEN", ""}, {"LOCUS_MAX_SCENES", ""}};
   EXPECT_EQ(of("http-listen"), ", environment, LOCUS_HTTP_LISTEN");
   EXPECT_EQ(of("max-scenes"), "1024, default, ");
 }
 
-TEST_F(ConfigOriginsTest, WhatTheDaemonWouldRefuseIsRefusedWithItsWords) {
+TEST_F(ConfigOriginsTest, OptionsThatTheDaemonRefusesGiveTheSameError) {
   const auto values = origins({"--max-scenes", "0"});
   EXPECT_EQ(values.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(values.status().message()), HasSubstr("--max-scenes"));

@@ -19,7 +19,7 @@ TEST(ListenAddressTest, LoopbackAndUnixAddressesAreLocalAndOthersAreNot) {
   }
 }
 
-TEST(ListenAddressTest, WhatCannotBeListenedToIsRefusedWithAnExample) {
+TEST(ListenAddressTest, AnInvalidAddressIsRefusedWithAnExample) {
   for (const char* text : {"", "7575", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:-1", ":7575",
                            "::1:7575", "unix:", "unix:relative.sock"}) {
     const absl::StatusOr<ListenAddress> address = parse_listen_address(text);
@@ -29,7 +29,7 @@ TEST(ListenAddressTest, WhatCannotBeListenedToIsRefusedWithAnExample) {
   EXPECT_FALSE(parse_listen_address("unix:/" + std::string(200, 'a')).ok());
 }
 
-TEST(ListenAddressTest, PrintsAsItIsRead) {
+TEST(ListenAddressTest, AnAddressIsPrintedInTheFormThatIsParsed) {
   for (const char* text : {"127.0.0.1:7575", "[::1]:7575", "unix:/tmp/locus.sock"})
     EXPECT_EQ(to_string(*parse_listen_address(text), 7575), text);
 }

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A made-up file system with control groups.
+// A temporary folder with the files of control groups.
 class MachineTest : public testing::Test {
  protected:
   MachineTest() : root_(testing::TempDir() + "machine_" + test_name()) { fs::remove_all(root_); }
@@ -28,7 +28,7 @@ class MachineTest : public testing::Test {
   const std::string root_;
 };
 
-TEST_F(MachineTest, VersionTwoGivesTimeRoundedUpToWholeCoresAndMemory) {
+TEST_F(MachineTest, CgroupVersionTwoLimitsCoresRoundedUpAndMemory) {
   write("/proc/self/cgroup", "0::/\n");
   write("/sys/fs/cgroup/cpu.max", "150000 100000\n");
   write("/sys/fs/cgroup/memory.max", "268435456\n");
@@ -42,7 +42,7 @@ TEST_F(MachineTest, LessThanOneCoreCountsAsOne) {
   EXPECT_EQ(read().cores, 1u);
 }
 
-TEST_F(MachineTest, TheLowestLimitOnTheWayUpCounts) {
+TEST_F(MachineTest, TheLowestLimitOfAllParentGroupsApplies) {
   write("/proc/self/cgroup", "0::/pod/container\n");
   write("/sys/fs/cgroup/pod/container/memory.max", "900\n");
   write("/sys/fs/cgroup/pod/container/cpu.max", "100000 100000\n");
@@ -53,7 +53,7 @@ TEST_F(MachineTest, TheLowestLimitOnTheWayUpCounts) {
   EXPECT_EQ(read().cores, 1u);
 }
 
-TEST_F(MachineTest, MaxLimitsNothing) {
+TEST_F(MachineTest, TheWordMaxSetsNoLimit) {
   write("/proc/self/cgroup", "0::/a\n");
   write("/sys/fs/cgroup/a/memory.max", "max\n");
   write("/sys/fs/cgroup/a/cpu.max", "max 100000\n");
@@ -71,7 +71,7 @@ TEST_F(MachineTest, VersionOneIsReadFromEachControllersOwnTree) {
   EXPECT_EQ(read().cores, 3u);
 }
 
-TEST_F(MachineTest, AQuotaOfMinusOneLimitsNothing) {
+TEST_F(MachineTest, AQuotaOfMinusOneSetsNoLimit) {
   write("/proc/self/cgroup", "2:cpu:/\n");
   write("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "-1\n");
   write("/sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000\n");
@@ -88,13 +88,13 @@ TEST_F(MachineTest, AContainerThatSeesItsOwnGroupAsTheTopmostFindsItsLimits) {
   EXPECT_EQ(read().cores, 2u);
 }
 
-TEST_F(MachineTest, ThePureTreeOfAMixedSystemIsReadToo) {
+TEST_F(MachineTest, TheUnifiedTreeOfAHybridSystemIsRead) {
   write("/proc/self/cgroup", "1:name=systemd:/\n0::/service\n");
   write("/sys/fs/cgroup/unified/service/memory.max", "8192\n");
   EXPECT_EQ(read().memory_bytes, 8192u);
 }
 
-TEST_F(MachineTest, WhatCannotBeReadLimitsNothing) {
+TEST_F(MachineTest, UnreadableFilesSetNoLimit) {
   EXPECT_FALSE(read().cores.has_value());
   write("/proc/self/cgroup", "nonsense\n0::/a\n");
   write("/sys/fs/cgroup/a/memory.max", "lots\n");

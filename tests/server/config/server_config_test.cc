@@ -34,7 +34,7 @@ class ServerConfigTest : public testing::Test {
       testing::TempDir() + "locusd_" + testing::UnitTest::GetInstance()->current_test_info()->name() + ".conf";
 };
 
-TEST_F(ServerConfigTest, NothingGivenMeansTheDefaults) {
+TEST_F(ServerConfigTest, WithoutOptionsTheDefaultsApply) {
   const Invocation invocation = read({});
   ASSERT_TRUE(invocation.config.has_value()) << invocation.text;
   EXPECT_THAT(invocation.config->listen, ElementsAre("127.0.0.1:7575"));
@@ -75,13 +75,13 @@ TEST_F(ServerConfigTest, CheckWithoutADirectoryIsAMistake) {
   EXPECT_THAT(invocation.text, HasSubstr("which directory"));
 }
 
-TEST_F(ServerConfigTest, CheckHasHelpOfItsOwn) {
+TEST_F(ServerConfigTest, CheckHasItsOwnHelp) {
   const Invocation invocation = read({"check", "--help"});
   EXPECT_EQ(invocation.exit_code, 0);
   EXPECT_THAT(invocation.text, HasSubstr("locusd check /var/lib/locus"));
 }
 
-TEST_F(ServerConfigTest, LargeBatchesGiveWayByNicenessOrOnIdleCoresOnly) {
+TEST_F(ServerConfigTest, BatchPriorityIsNiceOrIdle) {
   EXPECT_EQ(read({}).config->batch_priority, BatchPriority::kNice);
   EXPECT_EQ(read({"--batch-priority", "idle"}).config->batch_priority, BatchPriority::kIdle);
   const Invocation wrong = read({"--batch-priority", "high"});
@@ -123,7 +123,7 @@ TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
   }
 }
 
-TEST_F(ServerConfigTest, ListeningBeyondTheMachineNeedsASecondWord) {
+TEST_F(ServerConfigTest, NonLocalAddressesNeedInsecure) {
   const Invocation refused = read({"--listen", "0.0.0.0:7575"});
   EXPECT_FALSE(refused.config.has_value());
   EXPECT_EQ(refused.exit_code, 2);

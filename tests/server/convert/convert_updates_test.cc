@@ -60,7 +60,7 @@ TEST(ConvertUpdatesTest, EveryFieldOfABatchArrives) {
   EXPECT_EQ(updates->batch, 12u);
 }
 
-TEST(ConvertUpdatesTest, NothingMeansTheDefaults) {
+TEST(ConvertUpdatesTest, AnEmptyMessageConvertsToTheDefaults) {
   const absl::StatusOr<UpdateBatch> updates = to_updates({});
   ASSERT_TRUE(updates.ok());
   EXPECT_FALSE(updates->tick.has_value());

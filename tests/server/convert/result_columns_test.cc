@@ -12,7 +12,7 @@ using ::testing::ElementsAreArray;
 
 constexpr size_t kRows = 5;
 
-// Writes 1, 2, 3, ... into every column there is, on both ways into a reply.
+// Writes 1, 2, 3, ... into every column, on both ways into a reply.
 template <class T>
 void count_up(T* column, size_t entries, uint32_t first = 1) {
   for (size_t i = 0; i < entries; ++i) column[i] = static_cast<T>(first + i);
@@ -25,7 +25,7 @@ ColumnSet every_column() {
 }
 
 void fill(AnswerSink& sink) {
-  for (int round = 0; round < 2; ++round) {  // columns grow
+  for (int round = 0; round < 2; ++round) {  // the second round makes columns grow
     const RowSpans to = sink.add_rows(1, every_column(), kRows);
     count_up(to.t, kRows);
     count_up(to.ids, kRows, 2);
@@ -48,7 +48,7 @@ void fill(AnswerSink& sink) {
   }
 }
 
-TEST(ResultColumnsTest, EachColumnStandsWhereTheProtocolHasIt) {
+TEST(ResultColumnsTest, EachColumnIsWrittenToItsProtocolField) {
   BatchResult through_core;
   through_core.blocks.resize(2);
   BatchResultSink core_sink(through_core);
@@ -78,7 +78,7 @@ TEST(ResultColumnsTest, EachColumnStandsWhereTheProtocolHasIt) {
   EXPECT_EQ(result.blocks(0).SerializeAsString(), "") << "the other block is untouched";
 }
 
-TEST(ResultColumnsTest, ColumnsNobodyAskedForAreNull) {
+TEST(ResultColumnsTest, ColumnsThatAreNotRequestedAreNull) {
   v1::QueryResult result;
   ResultColumns sink(result, 1);
   const RowSpans to = sink.add_rows(0, {Column::kId}, 3);
@@ -88,7 +88,7 @@ TEST(ResultColumnsTest, ColumnsNobodyAskedForAreNull) {
   EXPECT_EQ(result.blocks(0).t_size(), 0);
 }
 
-TEST(ResultColumnsTest, AReplyThatIsUsedAgainForgetsTheLastAnswerAndKeepsItsMemory) {
+TEST(ResultColumnsTest, AReusedReplyDropsTheLastAnswerAndKeepsItsMemory) {
   v1::QueryResult result;
   const float* before = nullptr;
   {

@@ -59,7 +59,7 @@ TEST(StatusTest, EveryReasonHasItsNumberInTheProtocol) {
   }
 }
 
-TEST(StatusTest, AnIndexOfZeroIsThereAndNoneIsNot) {
+TEST(StatusTest, AnIndexOfZeroDiffersFromNoIndex) {
   EXPECT_TRUE(to_error(refuse_argument(Reason::kOutOfRange, "ids", 0, "no")).has_index());
   EXPECT_FALSE(to_error(refuse_argument(Reason::kOutOfRange, "ids", {}, "no")).has_index());
 }
@@ -80,7 +80,7 @@ TEST(StatusTest, LongTextsAreCutBetweenCharacters) {
   EXPECT_EQ(error_in(status).message(), status.error_message());
 }
 
-TEST(StatusTest, WhatIsNotServedAndDrainingSayWhatToDo) {
+TEST(StatusTest, NotServedNamesTheFieldAndDrainingHasARetryTime) {
   const v1::Error unserved = to_error(not_served("blocks[0].sight"));
   EXPECT_EQ(unserved.code(), grpc::StatusCode::UNIMPLEMENTED);
   EXPECT_EQ(unserved.reason(), v1::REASON_NOT_SERVED);

@@ -43,7 +43,7 @@ TEST(MemoryUseTest, AnUploadCostsMoreThanItsColumnsAndTheLargestDoesNotOverflow)
   EXPECT_GT(upload_cost(limits::kMaxMeshVertices, limits::kMaxMeshTriangles), uint64_t{1} << 32);
 }
 
-TEST(MemoryUseTest, OnlyPlacingCosts) {
+TEST(MemoryUseTest, OnlyPlacementsCostMemory) {
   const std::array<double, 6> translations = {};
   StaticChange change;
   change.remove_ids = kIds;
@@ -63,7 +63,7 @@ TEST(MemoryUseTest, TheProcessHoldsMemoryAndMoreOfItWhenItIsTouched) {
   EXPECT_GT(meter.used(), before + touched.size() / 2);
 }
 
-TEST(MemoryUseTest, GivingBackForgetsTheOldRevisionsOfEveryScene) {
+TEST(MemoryUseTest, FreeingMemoryDropsTheOldRevisionsOfEveryScene) {
   Registry registry;
   std::vector<ScenePtr> scenes;
   for (const char* name : {"a", "b"}) scenes.push_back(registry.create_scene(name, {}, 1, "", false)->scene);

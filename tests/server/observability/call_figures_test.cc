@@ -17,7 +17,7 @@ std::string text_of(const CallMetrics& metrics) {
   return page.text();
 }
 
-TEST(CallFiguresTest, WhatWasCountedStandsUnderItsRpcKindAndReason) {
+TEST(CallFiguresTest, CountersAreLabelledByRpcKindAndReason) {
   CallMetrics metrics;
   metrics.record_call(Rpc::kQuery, absl::StatusCode::kOk, 1500);
   metrics.record_call(Rpc::kQuery, absl::StatusCode::kResourceExhausted, 1500);
@@ -42,7 +42,7 @@ TEST(CallFiguresTest, WhatWasCountedStandsUnderItsRpcKindAndReason) {
     EXPECT_THAT(text, HasSubstr(line));
 }
 
-TEST(CallFiguresTest, AnRpcThatNobodyCalledCountsNullAndHasNoHistogram) {
+TEST(CallFiguresTest, AnRpcWithoutCallsHasCountZeroAndNoHistogram) {
   const std::string text = text_of(CallMetrics());
   EXPECT_THAT(text, HasSubstr("locus_calls_total{rpc=\"DumpScene\",code=\"OK\"} 0\n"));
   EXPECT_THAT(text, Not(HasSubstr("locus_call_seconds_bucket")));

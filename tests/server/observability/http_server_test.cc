@@ -51,7 +51,7 @@ TEST_F(HttpServerTest, HeadGivesTheHeadersOnly) {
   EXPECT_EQ(page.body, "");
 }
 
-TEST_F(HttpServerTest, OtherMethodsAreRefusedAndToldWhichAreNot) {
+TEST_F(HttpServerTest, OtherMethodsAreRefusedAndTheAllowedOnesListed) {
   for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS", "PATCH"}) {
     const HttpAnswer answer = http_get(port(), "/page", method);
     EXPECT_EQ(answer.code, 405) << method;
@@ -59,7 +59,7 @@ TEST_F(HttpServerTest, OtherMethodsAreRefusedAndToldWhichAreNot) {
   }
 }
 
-TEST_F(HttpServerTest, OtherPathsAreNotFoundAndToldWhichThereAre) {
+TEST_F(HttpServerTest, OtherPathsAreNotFoundAndThePagesListed) {
   for (const char* path : {"/", "/pag", "/page/", "/../etc/passwd"})
     EXPECT_EQ(http_get(port(), path).code, 404) << path;
   EXPECT_THAT(http_get(port(), "/nowhere").body, HasSubstr("/page\n"));
@@ -73,19 +73,19 @@ TEST_F(HttpServerTest, ARequestThatIsTooLongIsRefused) {
   EXPECT_EQ(http_get(port(), "/page").code, 200);
 }
 
-TEST_F(HttpServerTest, WhatIsNoRequestIsRefused) {
+TEST_F(HttpServerTest, BytesThatAreNoRequestAreRefused) {
   EXPECT_THAT(RawConnection(port(), "\x16\x03\x01 hello\r\n\r\n").read_all(), HasSubstr("400"));
   EXPECT_EQ(http_get(port(), "/page").code, 200);
 }
 
-TEST_F(HttpServerTest, ConnectionsThatSayNothingDoNotKeepOthersOutForLong) {
+TEST_F(HttpServerTest, SilentConnectionsDoNotBlockOthers) {
   std::vector<std::unique_ptr<RawConnection>> silent;
   for (uint32_t i = 0; i < 2 * kHttpThreads; ++i)
     silent.push_back(std::make_unique<RawConnection>(port(), i % 2 == 0 ? "" : "GET /pa"));
   EXPECT_EQ(http_get(port(), "/page").code, 200);
 }
 
-TEST_F(HttpServerTest, ManyAskAtOnceAndAllAreAnswered) {
+TEST_F(HttpServerTest, ManyConcurrentRequestsAreAllAnswered) {
   std::atomic<int> answered{0};
   std::vector<std::thread> threads;
   for (int i = 0; i < 8; ++i)
@@ -96,13 +96,13 @@ TEST_F(HttpServerTest, ManyAskAtOnceAndAllAreAnswered) {
   EXPECT_EQ(answered, 160);
 }
 
-TEST_F(HttpServerTest, ATakenPortIsAnError) {
+TEST_F(HttpServerTest, APortInUseIsAnError) {
   const ListenAddress address = *parse_listen_address("127.0.0.1:" + std::to_string(port()));
   const auto second = HttpServer::start(address, {});
   EXPECT_EQ(second.status().code(), absl::StatusCode::kUnavailable);
 }
 
-TEST_F(HttpServerTest, AnAddressOfVersionSixIsListenedOn) {
+TEST_F(HttpServerTest, AnIpv6AddressIsListenedOn) {
   const auto server = HttpServer::start(*parse_listen_address("[::1]:0"), {});
   if (!server.ok()) GTEST_SKIP() << "this machine has no [::1]";
   EXPECT_GT((*server)->port(), 0);

@@ -5,7 +5,7 @@
 namespace locus::server {
 namespace {
 
-TEST(LatencyHistogramTest, EveryDurationIsInTheLowestRangeWhoseBoundItDoesNotPass) {
+TEST(LatencyHistogramTest, EveryDurationIsInTheLowestRangeWhoseBoundItDoesNotExceed) {
   for (size_t range = 0; range < kLatencyBounds; ++range) {
     const uint64_t bound = latency_bound(range);
     EXPECT_EQ(latency_range(bound), range);

@@ -23,7 +23,7 @@ class LogTest : public ::testing::Test {
   }
 };
 
-TEST_F(LogTest, LinesOfACallNameIt) {
+TEST_F(LogTest, LinesOfACallHaveItsRequestIdAndTraceparent) {
   const LogScope scope({"abc", "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"});
   EXPECT_THAT(line(LogFormat::kText),
               HasSubstr("info happened to=\"a \\\"thing\\\"\\u000a\" request_id=abc "
@@ -33,12 +33,12 @@ TEST_F(LogTest, LinesOfACallNameIt) {
       HasSubstr("\"request_id\":\"abc\",\"traceparent\":\"00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01\"}"));
 }
 
-TEST_F(LogTest, WithoutATraceparentThereIsNoneOnTheLine) {
+TEST_F(LogTest, WithoutATraceparentTheLineHasNone) {
   const LogScope scope({"abc", ""});
   EXPECT_THAT(line(LogFormat::kJson), HasSubstr("\"request_id\":\"abc\"}"));
 }
 
-TEST_F(LogTest, TheInnermostScopeCountsAndOnlyWhileItLives) {
+TEST_F(LogTest, TheInnermostScopeIsUsedDuringItsLifetime) {
   {
     const LogScope outer({"outer", ""});
     {

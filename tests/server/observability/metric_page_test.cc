@@ -27,7 +27,7 @@ TEST(MetricPageTest, LabelsAreEscaped) {
   EXPECT_THAT(page.text(), HasSubstr("{name=\"a\\\"b\\\\c\\nd\"} 1\n"));
 }
 
-TEST(MetricPageTest, AHistogramCountsUpwardsInSeconds) {
+TEST(MetricPageTest, HistogramBucketsAreCumulativeAndInSeconds) {
   LatencyHistogram histogram;
   histogram.record(1024);
   histogram.record(1'000'000);
@@ -45,7 +45,7 @@ TEST(MetricPageTest, AHistogramCountsUpwardsInSeconds) {
   EXPECT_THAT(text, HasSubstr("locus_wait_seconds_bucket{rpc=\"Query\",le=\"+Inf\"} 3\n"));
 }
 
-TEST(MetricPageDeathTest, ANameIsBegunOnce) {
+TEST(MetricPageDeathTest, BeginningANameTwiceFails) {
   MetricPage page;
   page.begin("locus_level", "A level.", MetricKind::kGauge);
   EXPECT_DEATH(page.begin("locus_level", "Again.", MetricKind::kGauge), "other.name != name");

@@ -34,7 +34,7 @@ TEST(MetricsTest, CallsAreCountedByRpcAndCode) {
   EXPECT_EQ(of(counts, Rpc::kGetServer).latency.count(), 0u);
 }
 
-TEST(MetricsTest, ACodeThatNobodyKnowsCountsAsUnknown) {
+TEST(MetricsTest, AnUnknownCodeCountsAsUnknown) {
   CallMetrics metrics;
   metrics.record_call(Rpc::kQuery, static_cast<absl::StatusCode>(99), 1);
   EXPECT_EQ(of(metrics.read(), Rpc::kQuery).codes[2], 1u);
@@ -56,7 +56,7 @@ TEST(MetricsTest, QueriesAndTheirWorkAreCountedByKind) {
   EXPECT_EQ(counts.queries[static_cast<size_t>(QueryKind::kNearest)].queries, 7u);
 }
 
-TEST(MetricsTest, NothingIsLostWhenManyThreadsCount) {
+TEST(MetricsTest, CountsOfConcurrentThreadsAddUp) {
   constexpr uint64_t kThreads = 20;
   constexpr uint64_t kEach = 2000;
   CallMetrics metrics;
@@ -76,7 +76,7 @@ TEST(MetricsTest, NothingIsLostWhenManyThreadsCount) {
   EXPECT_EQ(counts.update_lag.count(), kThreads * kEach);
 }
 
-TEST(MetricsTest, RefusalsAreCountedByReasonAndLimitOrElseByCode) {
+TEST(MetricsTest, RefusalsAreCountedByReasonAndLimitOrByCode) {
   CallMetrics metrics;
   metrics.record_refusal(refuse_full("", "calls", 256, 257, 100));
   metrics.record_refusal(refuse_full("", "calls", 256, 257, 100));
@@ -86,7 +86,7 @@ TEST(MetricsTest, RefusalsAreCountedByReasonAndLimitOrElseByCode) {
                                                    Pair(Pair("NOT_FINITE", ""), 1u)));
 }
 
-TEST(MetricsTest, RefusalsUnderMoreNamesThanAreKeptApartCountAsOther) {
+TEST(MetricsTest, RefusalsBeyondTheMaximumOfNamesCountAsOther) {
   CallMetrics metrics;
   for (uint32_t i = 0; i < kMaxRefusalNames + 10; ++i)
     metrics.record_refusal(refuse_full("", absl::StrCat("limit", i), 1, 2, 0));
@@ -97,7 +97,7 @@ TEST(MetricsTest, RefusalsUnderMoreNamesThanAreKeptApartCountAsOther) {
   EXPECT_EQ(counts.refusals.at({"LIMIT", "limit0"}), 2u);
 }
 
-TEST(MetricsTest, AStreamIsOpenForAsLongAsItLives) {
+TEST(MetricsTest, AStreamCountsAsOpenDuringItsLifetime) {
   CallMetrics metrics;
   {
     const OpenStream first(metrics, Rpc::kStreamQueries);
@@ -108,7 +108,7 @@ TEST(MetricsTest, AStreamIsOpenForAsLongAsItLives) {
   EXPECT_EQ(of(metrics.read(), Rpc::kStreamQueries).open, 0u);
 }
 
-TEST(MetricsTest, EveryRpcAndKindHasANameOfItsOwn) {
+TEST(MetricsTest, EveryRpcAndKindHasAUniqueName) {
   std::map<absl::string_view, int> names;
   for (size_t i = 0; i < kRpcs; ++i) ++names[rpc_name(static_cast<Rpc>(i))];
   for (size_t i = 0; i < kQueryKinds; ++i) ++names[query_kind_name(static_cast<QueryKind>(i))];

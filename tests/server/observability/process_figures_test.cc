@@ -11,7 +11,7 @@
 namespace locus::server {
 namespace {
 
-TEST(ProcessFiguresTest, TheProcessUsesSomethingOfEverything) {
+TEST(ProcessFiguresTest, EveryFigureOfTheProcessIsPositive) {
   const ProcessFigures process = read_process({});
   EXPECT_GT(process.cpu_seconds, 0);
   EXPECT_GT(process.resident_bytes, 1u << 20);
@@ -23,7 +23,7 @@ TEST(ProcessFiguresTest, TheProcessUsesSomethingOfEverything) {
   EXPECT_GT(process.start_seconds, now - 86400);
 }
 
-TEST(ProcessFiguresTest, ConnectionsToOurAddressesAreCountedAndThoseToOthersAreNot) {
+TEST(ProcessFiguresTest, OnlyConnectionsToTheGivenAddressesAreCounted) {
   const int listening = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in name{};
   name.sin_family = AF_INET;
@@ -36,7 +36,7 @@ TEST(ProcessFiguresTest, ConnectionsToOurAddressesAreCountedAndThoseToOthersAreN
   const std::string address = "127.0.0.1:" + std::to_string(port);
   EXPECT_EQ(read_process({address}).connections, 0u);
   {
-    // Their other ends, in this very process too, have ports of their own.
+    // The other ends are in this process too, but have ports of their own.
     const test::RawConnection first(port, "");
     const test::RawConnection second(port, "");
     const int accepted[] = {accept(listening, nullptr, nullptr), accept(listening, nullptr, nullptr)};

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "server/config/observability_limits.h"
 
@@ -30,13 +32,13 @@ std::vector<std::string> names_of(const std::vector<SceneFigures>& scenes) {
   return names;
 }
 
-TEST(SceneFiguresTest, FewScenesAllHaveTheirLabel) {
+TEST(SceneFiguresTest, UpToTheMaximumEverySceneHasALabel) {
   SceneLabels labels(3);
   EXPECT_THAT(names_of(labels.label(scenes_named({"a", "b", "c"}))), ElementsAre("a", "b", "c"));
   EXPECT_THAT(names_of(labels.label({})), ElementsAre());
 }
 
-TEST(SceneFiguresTest, TheRestIsAddedUp) {
+TEST(SceneFiguresTest, ScenesBeyondTheMaximumAreSummed) {
   SceneLabels labels(2);
   const std::vector<SceneFigures> shown = labels.label(scenes_named({"a", "b", "c", "d", "e"}));
   EXPECT_THAT(names_of(shown), ElementsAre("a", "b", "_other"));
@@ -56,6 +58,7 @@ TEST(SceneFiguresTest, ASceneKeepsItsLabelUntilItIsDeleted) {
 TEST(SceneFiguresTest, AThousandScenesMakeNoMoreLabelsThanTheLimit) {
   std::vector<std::string> names;
   for (int i = 0; i < 1000; ++i) names.push_back(absl::StrCat("scene-", i));
+  std::sort(names.begin(), names.end());
   SceneLabels labels(kMaxLabelledScenes);
   MetricPage page;
   add_scene_figures(labels.label(scenes_named(names)), page);

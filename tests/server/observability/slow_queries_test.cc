@@ -37,7 +37,7 @@ std::string lines_of(SlowQueries& queries, int times, SlowQueries::Time now) {
 
 size_t count_lines(const std::string& text) { return static_cast<size_t>(std::count(text.begin(), text.end(), '\n')); }
 
-TEST(SlowQueriesTest, WhatTakesAsLongAsTheThresholdIsSlow) {
+TEST(SlowQueriesTest, ABatchThatTakesTheThresholdIsSlow) {
   const SlowQueries queries(2);
   EXPECT_FALSE(queries.is_slow(1'999'999));
   EXPECT_TRUE(queries.is_slow(2'000'000));
@@ -45,7 +45,7 @@ TEST(SlowQueriesTest, WhatTakesAsLongAsTheThresholdIsSlow) {
 
 TEST(SlowQueriesTest, WithoutAThresholdNothingIsSlow) { EXPECT_FALSE(SlowQueries(0).is_slow(uint64_t{1} << 62)); }
 
-TEST(SlowQueriesTest, TheLineSaysWhatWasSlow) {
+TEST(SlowQueriesTest, TheLineDescribesTheSlowBatch) {
   SlowQueries queries(1);
   const std::string line = lines_of(queries, 1, kStart);
   EXPECT_THAT(line, HasSubstr("slow queries rpc=Query scene=arena revision=12 kinds=ray,ball queries=8192 ms=1234 "
@@ -53,7 +53,7 @@ TEST(SlowQueriesTest, TheLineSaysWhatWasSlow) {
   EXPECT_EQ(queries.count(), 1u);
 }
 
-TEST(SlowQueriesTest, OfManyInASecondAFewAreLoggedAndAllAreCounted) {
+TEST(SlowQueriesTest, AtMostTheMaximumIsLoggedASecondAndAllAreCounted) {
   SlowQueries queries(1);
   EXPECT_EQ(count_lines(lines_of(queries, 50, kStart)), kMaxSlowQueryLines);
   EXPECT_EQ(count_lines(lines_of(queries, 5, kStart + milliseconds(999))), 0u);

@@ -15,14 +15,14 @@ constexpr const char* kGood = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba90
 
 std::string with(size_t at, const std::string& text) { return std::string(kGood).replace(at, text.size(), text); }
 
-TEST(TraceContextTest, ATraceparentOfItsFormIsTaken) {
+TEST(TraceContextTest, AValidTraceparentIsAccepted) {
   EXPECT_TRUE(is_traceparent(kGood));
   EXPECT_TRUE(is_traceparent(with(53, "00")));
   EXPECT_TRUE(is_traceparent(with(0, "cc")));
   EXPECT_TRUE(is_traceparent(with(0, "cc") + "-what-the-future-holds"));
 }
 
-TEST(TraceContextTest, AnyOtherIsNot) {
+TEST(TraceContextTest, AnInvalidTraceparentIsNotAccepted) {
   for (const std::string& text : std::vector<std::string>{
            "", "00", std::string(kGood).substr(0, 54), std::string(kGood) + "-more", std::string(kGood) + "0",
            with(0, "ff"), with(0, "0x"), with(2, "_"), with(3, "4BF92F"), with(3, "zz"), with(35, "x"), with(52, " "),
@@ -31,7 +31,7 @@ TEST(TraceContextTest, AnyOtherIsNot) {
     EXPECT_FALSE(is_traceparent(text)) << text;
 }
 
-TEST(TraceContextTest, ARequestIdIsShortAndHarmless) {
+TEST(TraceContextTest, ARequestIdIsShortAndHasOnlySafeCharacters) {
   for (const std::string& text : std::vector<std::string>{"a", "0", "A-b_c.9", std::string(kMaxRequestIdLength, 'x')})
     EXPECT_TRUE(is_request_id(text)) << text;
   for (const std::string& text : std::vector<std::string>{"", std::string(kMaxRequestIdLength + 1, 'x'), "a b", "a\n",
@@ -39,7 +39,7 @@ TEST(TraceContextTest, ARequestIdIsShortAndHarmless) {
     EXPECT_FALSE(is_request_id(text)) << text;
 }
 
-TEST(TraceContextTest, RequestIdsMadeHereDifferAndAreTakenWhenTheyComeBack) {
+TEST(TraceContextTest, GeneratedRequestIdsAreUniqueAndValid) {
   std::set<std::string> ids;
   for (int i = 0; i < 10000; ++i) {
     const std::string id = request_id_of(next_request_number());

@@ -1,5 +1,5 @@
-// Calls on completion queues, ended at every moment there is: by their callers, by a broken connection, by the server.
-// Nothing may be left behind, which AddressSanitizer judges, and nothing hang, which the test's time limit does.
+// Calls on completion queues that end after each of their events in turn: by the caller, by a broken connection, by the
+// server. AddressSanitizer detects leaks, and the test's time limit detects calls that hang.
 #include "server/rpc/hot_call.h"
 
 #include <fcntl.h>
@@ -26,18 +26,18 @@ using server::IoThreads;
 using server::Listener;
 using server::MemberTag;
 
-// What a message asks of the work on it, by its number.
+// Behaviour of the work on a message, chosen by the message's max_work.
 enum What : uint64_t {
-  kAtOnce = 1,     // is answered before begin() returns
-  kElsewhere = 2,  // by another thread
-  kHeld = 3,       // when told to give up, or by a message that lets it go
-  kLetGo = 4,
+  kAtOnce = 1,     // answers before begin() returns
+  kElsewhere = 2,  // answers after another thread has posted
+  kHeld = 3,       // answers when give_up() is called, or when a message kLetGo arrives
+  kLetGo = 4,      // makes all held work answer, then answers
   kRefused = 5,
-  kHoldsOthers = 6,  // as kElsewhere, and nothing is read meanwhile
-  kAside = 7,        // set aside
+  kHoldsOthers = 6,  // like kElsewhere, and stops the call from reading meanwhile
+  kAside = 7,        // answers as a deferred task
 };
 
-// Work that can be watched.
+// Work with a chosen behaviour.
 class FakeWork : private server::DeferredTask {
  public:
   explicit FakeWork(CallSlot& slot) : slot_(slot) {}
@@ -122,7 +122,7 @@ struct Streamed {
   Service* service;
 };
 
-// A server with one connection and one IO thread, whose turns the test takes.
+// A server with one connection and one IO loop, whose turns the test takes on its own thread.
 template <class Stream>
 class Bench {
  public:
@@ -148,10 +148,10 @@ class Bench {
     close(client_end_);
   }
 
-  // Nothing is served any more.
+  // Shuts the server down.
   void end() {
     host_.drain.end();
-    // The server waits for its calls, which wait for turns.
+    // Shutdown() blocks until all calls have ended, and calls need turns of the loop to end.
     std::thread shutdown([this] { server_->Shutdown(std::chrono::system_clock::now()); });
     while (!io().empty()) io().turn();
     shutdown.join();
@@ -168,8 +168,8 @@ class Bench {
   }
   void break_connection() { shutdown(client_end_, SHUT_RDWR); }
 
-  // Takes turns, `before` of them at first, then those that it takes until `client` has ended and nothing is left.
-  // False where the client ended within the first ones.
+  // Runs `client` on a thread, takes `before` turns, interrupts, and takes turns until the client has ended and no call
+  // is left. Returns false if the client ended before the interruption.
   template <class Interruption>
   bool interrupt(int before, const std::function<void()>& client, const Interruption& interruption) {
     std::atomic<bool> over{false};
@@ -209,7 +209,7 @@ v1::StreamQueriesRequest message(uint64_t sequence, uint64_t what) {
   return request;
 }
 
-// What a client sends, and what came back.
+// Messages of a client's stream, and the answers to them.
 struct Conversation {
   std::vector<uint64_t> messages = {kAtOnce, kElsewhere, kHeld, kRefused, kAside, kHoldsOthers, kAtOnce, kHeld, kLetGo};
   grpc::ClientContext context;
@@ -228,7 +228,7 @@ struct Conversation {
   }
 };
 
-// One conversation after the other, interrupted after so many events, until one ends before that.
+// Holds conversations that are interrupted after 0, 1, 2, ... events, until one ends before its interruption.
 template <class Stream, class Interruption, class Check>
 void after_every_event(const Interruption& interruption, const Check& check) {
   bool in_time = true;
@@ -248,7 +248,7 @@ class HotCallTest : public ::testing::Test {};
 using Orders = ::testing::Types<Streamed<false>, Streamed<true>>;
 TYPED_TEST_SUITE(HotCallTest, Orders);
 
-TYPED_TEST(HotCallTest, EveryMessageIsAnsweredOnceInTheOrderThatTheRpcPromises) {
+TYPED_TEST(HotCallTest, EveryMessageIsAnsweredOnceInTheOrderOfTheRpc) {
   Bench<TypeParam> bench;
   Conversation conversation;
   bench.interrupt(
@@ -274,13 +274,13 @@ TYPED_TEST(HotCallTest, TheConnectionMayBreakAfterAnyEventOfAStream) {
                                [](const Conversation&) {});
 }
 
-TYPED_TEST(HotCallTest, TheServerMayDrainAfterAnyEventOfAStreamAndAnswersWhatItRead) {
+TYPED_TEST(HotCallTest, TheServerMayDrainAfterAnyEventOfAStreamAndAnswersTheMessagesItRead) {
   after_every_event<TypeParam>(
       [](auto& bench, Conversation&) { bench.drain(); },
       [](Conversation& conversation) {
         if (!conversation.status.ok())
           expect_refused(conversation.status, {grpc::StatusCode::UNAVAILABLE, v1::REASON_DRAINING, ""});
-        // Those read before the end, each once and none left out: the first so many of them.
+        // The answered messages must be the first ones, each once.
         std::sort(conversation.answers.begin(), conversation.answers.end());
         for (size_t i = 0; i < conversation.answers.size(); ++i) EXPECT_EQ(conversation.answers[i], i + 1);
       });
@@ -290,7 +290,7 @@ TEST(UnaryHotCallTest, ACallMayEndInAnyWayAfterAnyEvent) {
   for (const uint64_t what : {kAtOnce, kElsewhere, kHeld, kRefused, kAside})
     for (const char* how : {"cancel", "break", "drain"}) {
       bool in_time = true;
-      // A held call has one event before its end, that it came.
+      // A held call has one event before its end: its arrival.
       for (int before = 0; in_time && (what != kHeld || before < 2); ++before) {
         SCOPED_TRACE(testing::Message() << how << " " << what << " after " << before);
         Bench<Streamed<false>> bench;
@@ -314,7 +314,7 @@ TEST(UnaryHotCallTest, ACallMayEndInAnyWayAfterAnyEvent) {
     }
 }
 
-TEST(UnaryHotCallTest, ACallMayComeWhileTheServerEnds) {
+TEST(UnaryHotCallTest, ACallMayArriveWhileTheServerEnds) {
   for (int i = 0; i < 40; ++i) {
     Bench<Streamed<false>> bench;
     std::thread client([&] {
@@ -325,7 +325,8 @@ TEST(UnaryHotCallTest, ACallMayComeWhileTheServerEnds) {
       v1::QueryResponse response;
       bench.stub().Query(&context, request, &response);
     });
-    // From before it arrives until long after: it waits in the queue, as nobody takes turns.
+    // The delays end the server from before the call arrives until long after. The call stays in the queue meanwhile,
+    // because no turn is taken.
     std::this_thread::sleep_for(std::chrono::microseconds(100 * i));
     bench.end();
     client.join();

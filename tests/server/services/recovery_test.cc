@@ -24,7 +24,7 @@ using test::MemoryLog;
 constexpr char kServing[] = "\x08\x01";
 constexpr char kNotServing[] = "\x08\x02";
 
-// A log whose snapshots are read when the test says so.
+// A log whose read_snapshot() blocks until let_go() is called.
 class HeldLog final : public MemoryLog {
  public:
   explicit HeldLog(const Kept& kept) : MemoryLog(kept) {}
@@ -50,7 +50,7 @@ class RecoveryTest : public testing::Test {
  protected:
   ~RecoveryTest() override { std::remove(socket_.c_str()); }
 
-  // A log with one scene, which has a revision.
+  // Returns the contents of a log with one scene at revision 1.
   static MemoryLog::Kept kept_world() {
     MemoryLog log;
     Registry registry(&log);
@@ -105,7 +105,7 @@ class RecoveryTest : public testing::Test {
   std::future<absl::StatusOr<std::unique_ptr<Server>>> started_;
 };
 
-TEST_F(RecoveryTest, UntilAllIsReadBackCallsAreToldToWaitAndHealthSaysNotServing) {
+TEST_F(RecoveryTest, DuringRecoveryCallsAreRefusedAndHealthIsNotServing) {
   HeldLog log(kept_world());
   start(log);
   log.wait_until_asked();
@@ -123,7 +123,7 @@ TEST_F(RecoveryTest, UntilAllIsReadBackCallsAreToldToWaitAndHealthSaysNotServing
   EXPECT_EQ(test::raw_call(stubs().channel, "/grpc.health.v1.Health/Check", "").bytes, kServing);
 }
 
-TEST_F(RecoveryTest, WhoIsToldToEndMeanwhileDoes) {
+TEST_F(RecoveryTest, AStopDuringRecoveryCancelsTheStart) {
   HeldLog log(kept_world());
   start(log);
   log.wait_until_asked();
