@@ -15,31 +15,32 @@
 namespace locus {
 namespace {
 
+// Writes the wide nodes of `tree` to `layout` in depth-first order.
 template <class S>
 void collapse(const BinaryTree<S>& tree, BvhLayout<S>& layout) {
   struct Pending {
     const BinaryNode<S>* root;
-    uint32_t parent, slot;  // where to write the number of the new node
+    uint32_t parent, slot;  // child slot that gets the index of the new node
     uint32_t depth;
   };
   std::vector<Pending> pending = {{&tree.root(), 0, 0, 1}};
   while (!pending.empty()) {
     const Pending now = pending.back();
     pending.pop_back();
-    const uint32_t number = static_cast<uint32_t>(layout.nodes.size());
-    if (number != 0) layout.nodes[now.parent].children[now.slot] = {number, 0};
+    const uint32_t index = static_cast<uint32_t>(layout.nodes.size());
+    if (index != 0) layout.nodes[now.parent].children[now.slot] = {index, 0};
     BvhNode<S>& node = layout.nodes.emplace_back();
     layout.depth = std::max(layout.depth, now.depth);
     const WideChildren<S> children(*now.root);
     node.child_count = children.size();
-    // Backwards, so that the first child is the next to be taken: depth-first order.
+    // Pushes in reverse order, so that the first child is the next one popped: depth-first order.
     for (uint32_t slot = node.child_count; slot-- > 0;) {
       const BinaryNode<S>& child = children[slot];
       node.bounds[slot] = child.bounds;
       if (child.is_leaf()) {
         node.children[slot] = {child.first, child.count};
       } else {
-        pending.push_back({&child, number, slot, now.depth + 1});
+        pending.push_back({&child, index, slot, now.depth + 1});
       }
     }
   }

@@ -16,28 +16,29 @@ static_assert(kTreeStack == limits::kMaxBvhDepth * (kTreeWidth - 1) + 1 + kTreeW
 
 namespace {
 
-// Triangles whose boxes one thread takes at once.
-constexpr size_t kPieceTriangles = 1u << 14;
+// Triangles in one task that computes boxes.
+constexpr size_t kChunkTriangles = 1u << 14;
 
-// False for a triangle that is not finite.
-bool refer(const Triangle& triangle, uint32_t index, BoxReference<float>& reference) {
+// Computes the reference of a triangle. Returns false if a vertex is not finite.
+bool make_reference(const Triangle& triangle, uint32_t index, BoxReference<float>& reference) {
   const Quad<float> a = Quad<float>::of(triangle.a.x, triangle.a.y, triangle.a.z, 0);
   const Quad<float> b = Quad<float>::of(triangle.b.x, triangle.b.y, triangle.b.z, 0);
   const Quad<float> c = Quad<float>::of(triangle.c.x, triangle.c.y, triangle.c.z, 0);
   reference = BoxReference<float>::of({minimum(minimum(a, b), c), maximum(maximum(a, b), c)}, index);
-  // No other numbers are not 0 when taken from themselves.
-  const Quad<float> nothing = (a - a) + (b - b) + (c - c);
-  return nothing[0] + nothing[1] + nothing[2] == 0;
+  // x - x is 0 for finite x, and NaN otherwise.
+  const Quad<float> difference = (a - a) + (b - b) + (c - c);
+  return difference[0] + difference[1] + difference[2] == 0;
 }
 
-// Fills one reference a triangle. Errors: the first triangle that is not finite; CANCELLED.
-absl::Status refer_all(absl::Span<const Triangle> triangles, const BvhOptions& options,
-                       BoxReference<float>* references) {
-  std::vector<size_t> bad((triangles.size() + kPieceTriangles - 1) / kPieceTriangles, triangles.size());
-  for_each(options, bad.size(), [&](size_t piece) {
-    const size_t end = std::min(triangles.size(), (piece + 1) * kPieceTriangles);
-    for (size_t i = piece * kPieceTriangles; i < end && !cancelled(options); ++i)
-      if (!refer(triangles[i], static_cast<uint32_t>(i), references[i])) bad[piece] = std::min(bad[piece], i);
+// Computes the references of all triangles. Errors: INVALID_ARGUMENT for the first triangle that is not finite;
+// CANCELLED.
+absl::Status make_references(absl::Span<const Triangle> triangles, const BvhOptions& options,
+                             BoxReference<float>* references) {
+  std::vector<size_t> bad((triangles.size() + kChunkTriangles - 1) / kChunkTriangles, triangles.size());
+  for_each(options, bad.size(), [&](size_t chunk) {
+    const size_t end = std::min(triangles.size(), (chunk + 1) * kChunkTriangles);
+    for (size_t i = chunk * kChunkTriangles; i < end && !cancelled(options); ++i)
+      if (!make_reference(triangles[i], static_cast<uint32_t>(i), references[i])) bad[chunk] = std::min(bad[chunk], i);
   });
   if (cancelled(options)) return cancelled_build();
   const size_t first = *std::min_element(bad.begin(), bad.end());
@@ -51,7 +52,7 @@ absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triang
   TriangleBvh built;
   if (triangles.empty()) return built;
   auto references = std::make_unique_for_overwrite<BoxReference<float>[]>(triangles.size());
-  RETURN_IF_ERROR(refer_all(triangles, options, references.get()));
+  RETURN_IF_ERROR(make_references(triangles, options, references.get()));
   const auto count = static_cast<uint32_t>(triangles.size());
   ASSIGN_OR_RETURN(BinaryTree<float> tree, BinaryTree<float>::build(std::move(references), count, options));
   built.arrays_ = TriangleWriter(triangles, tree, options).write();
@@ -82,9 +83,9 @@ void TriangleBvh::set_bounds(const Aabbf& bounds) {
 
 Triangle TriangleBvh::at(size_t position) const {
   LOCUS_CHECK_LT(position, size());
-  const auto behind = std::upper_bound(blocks().begin(), blocks().end(), position,
-                                       [](size_t wanted, const TriangleBlock& block) { return wanted < block.first; });
-  const TriangleBlock& block = *(behind - 1);
+  const auto next = std::upper_bound(blocks().begin(), blocks().end(), position,
+                                     [](size_t wanted, const TriangleBlock& block) { return wanted < block.first; });
+  const TriangleBlock& block = *(next - 1);
   return triangle(block, static_cast<uint32_t>(position - block.first));
 }
 
@@ -95,11 +96,11 @@ size_t TriangleBvh::bytes() const {
 
 double TriangleBvh::sah_cost() const {
   if (size() == 0) return 0;
-  const double whole = double{half_area(bounds_)};
+  const double root_area = double{half_area(bounds_)};
   double sum = 1;
   for (const TriangleNode& node : nodes()) {
     for (int slot = 0; slot < kTreeWidth; ++slot) {
-      if (node.child[slot] != kNoChild) sum += whole > 0 ? double{half_area(box(node, slot))} / whole : 1;
+      if (node.child[slot] != kNoChild) sum += root_area > 0 ? double{half_area(box(node, slot))} / root_area : 1;
     }
   }
   return sum;
@@ -112,14 +113,14 @@ Interval<float> TriangleBvh::node_interval(const SlabRay<float>& slabs, const Aa
   return result;
 }
 
-TriangleBvh::Pending* TriangleBvh::push_near(const TriangleNode& node, const float (&away)[kTreeWidth], float limit,
-                                             Pending* top) {
+TriangleBvh::Pending* TriangleBvh::push_near(const TriangleNode& node, const float (&distances)[kTreeWidth],
+                                             float limit, Pending* top) {
   Pending* const base = top;
   for (int slot = 0; slot < kTreeWidth; ++slot) {
-    if (away[slot] > limit || node.child[slot] == kNoChild) continue;
-    Pending* place = top++;
-    for (; place > base && place[-1].near < away[slot]; --place) *place = place[-1];
-    *place = {node.child[slot], away[slot]};
+    if (distances[slot] > limit || node.child[slot] == kNoChild) continue;
+    Pending* position = top++;
+    for (; position > base && position[-1].near < distances[slot]; --position) *position = position[-1];
+    *position = {node.child[slot], distances[slot]};
   }
   return top;
 }
@@ -131,9 +132,9 @@ TriangleBvh::Pending* TriangleBvh::push_hit(const TriangleNode& node, const Slab
     if (node.child[slot] == kNoChild) continue;
     const Interval<float> interval = node_interval(slabs, box(node, slot));
     if (interval.near > interval.far || interval.far < 0 || beyond(interval.near, limit)) continue;
-    Pending* place = top++;
-    for (; place > base && place[-1].near < interval.near; --place) *place = place[-1];
-    *place = {node.child[slot], interval.near};
+    Pending* position = top++;
+    for (; position > base && position[-1].near < interval.near; --position) *position = position[-1];
+    *position = {node.child[slot], interval.near};
   }
   return top;
 }
