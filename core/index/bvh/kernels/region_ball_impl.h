@@ -65,8 +65,8 @@ static inline float unless(PlantedBug bug, float bound) { return planted(bug) ? 
 struct Vector8 {
   Floats8 x, y, z;
 
-  static inline Vector8 all(const float* three) {
-    return {Floats8::all(three[0]), Floats8::all(three[1]), Floats8::all(three[2])};
+  static inline Vector8 splat(const float* three) {
+    return {Floats8::splat(three[0]), Floats8::splat(three[1]), Floats8::splat(three[2])};
   }
   static inline Vector8 load(const float (*rows)[kTreeWidth]) {
     return {Floats8::load(rows[0]), Floats8::load(rows[1]), Floats8::load(rows[2])};
@@ -85,7 +85,7 @@ static inline Vector8 cross(Vector8 a, Vector8 b) {
 // point, along `edge`.
 static inline Floats8 squared_distance_to_edge(Vector8 offset, Vector8 edge, Floats8 along, Floats8 length) {
   // A quotient of zeros becomes the second operand, zero.
-  const Floats8 foot = minimum(maximum(along / length, Floats8::all(0)), Floats8::all(1));
+  const Floats8 foot = minimum(maximum(along / length, Floats8::splat(0)), Floats8::splat(1));
   const Vector8 rest = {subtract_product(offset.x, foot, edge.x), subtract_product(offset.y, foot, edge.y),
                         subtract_product(offset.z, foot, edge.z)};
   return dot(rest, rest);
@@ -94,17 +94,17 @@ static inline Floats8 squared_distance_to_edge(Vector8 offset, Vector8 edge, Flo
 class BallQuery {
  public:
   inline void set(const KernelBall& ball) {
-    center_ = Vector8::all(ball.center);
+    center_ = Vector8::splat(ball.center);
     outer_ =
-        Floats8::all(ball.radius * ball.radius * (1 + unless(PlantedBug::kRegionReach, kSquarePad)) + square_floor());
-    inner_ =
-        Floats8::all(ball.radius * ball.radius * (1 - unless(PlantedBug::kRegionInside, kSquarePad)) - square_floor());
+        Floats8::splat(ball.radius * ball.radius * (1 + unless(PlantedBug::kRegionReach, kSquarePad)) + square_floor());
+    inner_ = Floats8::splat(ball.radius * ball.radius * (1 - unless(PlantedBug::kRegionInside, kSquarePad)) -
+                            square_floor());
     radius_ = ball.radius;
   }
 
   __attribute__((always_inline)) inline MetChildren meet_node(const TriangleNode& node) const {
     const Vector8 below = Vector8::load(node.bounds) - center_, above = center_ - Vector8::load(node.bounds + 3);
-    const Floats8 zero = Floats8::all(0);
+    const Floats8 zero = Floats8::splat(0);
     const Vector8 gap = {maximum(maximum(below.x, above.x), zero), maximum(maximum(below.y, above.y), zero),
                          maximum(maximum(below.z, above.z), zero)};
     const Vector8 far = {minimum(below.x, above.x), minimum(below.y, above.y), minimum(below.z, above.z)};
@@ -118,7 +118,7 @@ class BallQuery {
     const Floats8 aa = dot(a, a), bb = dot(b, b), cc = dot(c, c), ab = dot(a, b), bc = dot(b, c), ca = dot(c, a);
     const uint32_t all = (1u << block.count) - 1u, in = at_most(minimum(aa, minimum(bb, cc)), inner_) & all;
     const float reach = radius_ + unless(PlantedBug::kRegionBeyond, 0x1p-19f) * (radius_ + block.extent);
-    const Floats8 limit = Floats8::all(reach * reach);
+    const Floats8 limit = Floats8::splat(reach * reach);
     const uint32_t out = lie_beyond(aa, ab, ca, limit) | lie_beyond(bb, bc, ab, limit) | lie_beyond(cc, ca, bc, limit);
     const uint32_t open = all & ~(in | out);
     if (open == 0) return {in, 0};
@@ -130,8 +130,8 @@ class BallQuery {
   // Whether three vertices lie beyond the plane across the first at the square root of `limit`: by its square, and the
   // products of the others with it.
   static inline uint32_t lie_beyond(Floats8 square, Floats8 second, Floats8 third, Floats8 limit) {
-    const Floats8 least = maximum(minimum(square, minimum(second, third)), Floats8::all(0));
-    return below(multiply_add(square, limit, Floats8::all(square_floor())), least * least);
+    const Floats8 least = maximum(minimum(square, minimum(second, third)), Floats8::splat(0));
+    return below(multiply_add(square, limit, Floats8::splat(square_floor())), least * least);
   }
 
   // The triangles of a block whose bits are set. Not inline: it would take the registers of all the rest.
@@ -141,11 +141,11 @@ class BallQuery {
     const Vector8 offset = center_ - a, ab = b - a, ac = c - a;
     const Vector8 normal = cross(ab, ac);
     const float reach = radius_ + 2 * block.extent, square = block.extent * block.extent;
-    const Floats8 plane = Floats8::all(
+    const Floats8 plane = Floats8::splat(
         unless(PlantedBug::kRegionPlane,
                0x1p-17f * square * reach + unless(PlantedBug::kRegionFloor, 0x1p-58f) * reach + square_floor()));
     const Floats8 height = absolute(dot(normal, offset));
-    const Floats8 limit = Floats8::all(radius_) * square_root(dot(normal, normal));
+    const Floats8 limit = Floats8::splat(radius_) * square_root(dot(normal, normal));
     const uint32_t open = at_most(height, limit + plane) & asked;  // the ball may reach the plane
     if (open == 0) return {0, 0};
 
@@ -162,23 +162,23 @@ class BallQuery {
     const float within = radius_ > near ? (radius_ - near) * (radius_ - near) * (1 - kSquarePad) : -1;
     const float beyond = (radius_ + near) * (radius_ + near) * (1 + kSquarePad);
     const float weight = unless(PlantedBug::kRegionWeight, 0x1p-15f * square * block.extent * reach + square_floor());
-    const uint32_t sure = (at_most(to_edges, Floats8::all(within)) |
-                           (below(Floats8::all(weight), least) & below(height, limit - plane))) &
+    const uint32_t sure = (at_most(to_edges, Floats8::splat(within)) |
+                           (below(Floats8::splat(weight), least) & below(height, limit - plane))) &
                           open;
-    const uint32_t far = below(Floats8::all(beyond), to_edges);
-    const MetTriangles met = {sure, open & ~sure & ~(far & below(least, Floats8::all(-weight)))};
+    const uint32_t far = below(Floats8::splat(beyond), to_edges);
+    const MetTriangles met = {sure, open & ~sure & ~(far & below(least, Floats8::splat(-weight)))};
     if (met.unsure == 0) return met;
 
     // Most of these are small triangles in a block of large ones: the bounds of their own decide them.
     const Floats8 longest = maximum(bb, cc), reach8 = square_root(maximum(longest, dot(offset, offset)));
-    const Floats8 own_weight = multiply_add(Floats8::all(unless(PlantedBug::kRegionOwnBounds, 0x1p-17f)),
-                                            longest * square_root(longest) * reach8, Floats8::all(square_floor()));
+    const Floats8 own_weight = multiply_add(Floats8::splat(unless(PlantedBug::kRegionOwnBounds, 0x1p-17f)),
+                                            longest * square_root(longest) * reach8, Floats8::splat(square_floor()));
     const Floats8 own_plane =
-        multiply_add(multiply_add(Floats8::all(unless(PlantedBug::kRegionOwnBounds, 0x1p-19f)), longest,
-                                  Floats8::all(unless(PlantedBug::kRegionFloor, 0x1p-58f))),
-                     reach8 + Floats8::all(radius_), Floats8::all(square_floor()));
+        multiply_add(multiply_add(Floats8::splat(unless(PlantedBug::kRegionOwnBounds, 0x1p-19f)), longest,
+                                  Floats8::splat(unless(PlantedBug::kRegionFloor, 0x1p-58f))),
+                     reach8 + Floats8::splat(radius_), Floats8::splat(square_floor()));
     const uint32_t in = below(own_weight, least) & below(height, limit - own_plane) & met.unsure;
-    const uint32_t out = below(limit + own_plane, height) | (far & below(least, Floats8::all(0) - own_weight));
+    const uint32_t out = below(limit + own_plane, height) | (far & below(least, Floats8::splat(0) - own_weight));
     return {sure | in, met.unsure & ~in & ~out};
   }
 

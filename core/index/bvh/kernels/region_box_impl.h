@@ -69,9 +69,9 @@ template <bool kTurned>
 class BoxQuery {
  public:
   inline void set(const KernelBox& box) {
-    outer_ = {Vector8::all(box.outer_min), Vector8::all(box.outer_max)};
-    inner_ = {Vector8::all(box.inner_min), Vector8::all(box.inner_max)};
-    center_ = Vector8::all(box.center);
+    outer_ = {Vector8::splat(box.outer_min), Vector8::splat(box.outer_max)};
+    inner_ = {Vector8::splat(box.inner_min), Vector8::splat(box.inner_max)};
+    center_ = Vector8::splat(box.center);
     box_ = &box;
   }
 
@@ -124,13 +124,13 @@ class BoxQuery {
       in_range = reach[0] >= least && reach[1] >= least && reach[2] >= least;
       for (int axis = 0; axis < 3; ++axis)
         pad[axis] = unless(PlantedBug::kRegionHalf, kTurned ? 0x1p-18f * sum : 0x1p-20f * reach[axis]);
-      half = Vector8::all(box.half);
-      const Vector8 pads = Vector8::all(pad);
+      half = Vector8::splat(box.half);
+      const Vector8 pads = Vector8::splat(pad);
       inner = half - pads;
       outer = {half.x + pads.x, half.y + pads.y, half.z + pads.z};
-      across = Floats8::all(kTurned ? 0x1p-17f * extent * sum * kEdgeScale : 0);
-      plane = Floats8::all(unless(PlantedBug::kRegionBoxPlane,
-                                  (kTurned ? 0x1p-15f : 0x1p-19f) * extent * extent * sum + square_floor()));
+      across = Floats8::splat(kTurned ? 0x1p-17f * extent * sum * kEdgeScale : 0);
+      plane = Floats8::splat(unless(PlantedBug::kRegionBoxPlane,
+                                    (kTurned ? 0x1p-15f : 0x1p-19f) * extent * extent * sum + square_floor()));
     }
     inline uint32_t contains(Vector8 point) const {
       const Vector8 size = absolute(point);
@@ -144,15 +144,15 @@ class BoxQuery {
 
   static constexpr float kEdgeScale = 0x1p60f;
 
-  static inline Floats8 minus(Floats8 a) { return Floats8::all(0) - a; }
+  static inline Floats8 minus(Floats8 a) { return Floats8::splat(0) - a; }
 
   // Along the box's axes.
   inline Vector8 seen(Vector8 v) const {
     if constexpr (!kTurned) return v;
     const float* r = box_->rotation;
     const auto column = [&](int k) {
-      return multiply_add(Floats8::all(r[k]), v.x,
-                          multiply_add(Floats8::all(r[3 + k]), v.y, Floats8::all(r[6 + k]) * v.z));
+      return multiply_add(Floats8::splat(r[k]), v.x,
+                          multiply_add(Floats8::splat(r[3 + k]), v.y, Floats8::splat(r[6 + k]) * v.z));
     };
     return {column(0), column(1), column(2)};
   }
@@ -163,20 +163,20 @@ class BoxQuery {
 
   // Boxes against the turned box, along its own axes; `low` and `high` are seen from its centre.
   inline MetChildren meet_turned(Vector8 low, Vector8 high) const {
-    const Floats8 half = Floats8::all(0.5f);
+    const Floats8 half = Floats8::splat(0.5f);
     const Vector8 middle = seen({(low.x + high.x) * half, (low.y + high.y) * half, (low.z + high.z) * half});
     const Vector8 extent = times(high - low, half);
-    const Floats8 pad = Floats8::all(unless(PlantedBug::kRegionTurnedNode, 0x1p-19f)) *
+    const Floats8 pad = Floats8::splat(unless(PlantedBug::kRegionTurnedNode, 0x1p-19f)) *
                         (maximum(absolute(low.x), absolute(high.x)) + maximum(absolute(low.y), absolute(high.y)) +
                          maximum(absolute(low.z), absolute(high.z)));
     uint32_t some = 255, whole = 255;
     const Floats8 middles[3] = {absolute(middle.x), absolute(middle.y), absolute(middle.z)};
     for (int k = 0; k < 3; ++k) {
       const float* r = box_->rotation + k;
-      const Floats8 reach =
-          multiply_add(absolute(Floats8::all(r[0])), extent.x,
-                       multiply_add(absolute(Floats8::all(r[3])), extent.y, absolute(Floats8::all(r[6])) * extent.z));
-      const Floats8 own = Floats8::all(box_->half[k]);
+      const Floats8 reach = multiply_add(
+          absolute(Floats8::splat(r[0])), extent.x,
+          multiply_add(absolute(Floats8::splat(r[3])), extent.y, absolute(Floats8::splat(r[6])) * extent.z));
+      const Floats8 own = Floats8::splat(box_->half[k]);
       some &= at_most(middles[k] - reach, own + pad);
       whole &= at_most(middles[k] + reach, own - pad);
     }
@@ -190,7 +190,7 @@ class BoxQuery {
 
   // The axes across an edge from `from`; `other` is the vertex that the edge does not touch.
   static inline void meet_edge(Vector8 edge, Vector8 from, Vector8 other, const Span& span, Shadows& shadows) {
-    const Vector8 e = times(edge, Floats8::all(planted(PlantedBug::kRegionEdgeScale) ? 1 : kEdgeScale));
+    const Vector8 e = times(edge, Floats8::splat(planted(PlantedBug::kRegionEdgeScale) ? 1 : kEdgeScale));
     meet_across(e.y, e.z, from.y, from.z, other.y, other.z, span.inner.y, span.inner.z, span.outer.y, span.outer.z,
                 span.across, shadows);
     meet_across(e.z, e.x, from.z, from.x, other.z, other.x, span.inner.z, span.inner.x, span.outer.z, span.outer.x,
