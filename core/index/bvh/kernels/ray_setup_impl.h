@@ -11,8 +11,8 @@
 namespace locus {
 namespace {
 
-// Relative pad of the slabs of nodes: twice SlabRay's pad of a triangle's own box, so that rounding in float culls no box
-// that SlabRay would keep.
+// Relative pad of the slabs of nodes: twice SlabRay's pad of a triangle's own box, so that rounding in float culls no
+// box that SlabRay would keep.
 constexpr float kTreePad = 0x1p-20f;
 
 // Constants of each ray. Lengths along a ray are in lengths of its direction. x, y and z are the axes of the projection
