@@ -6,11 +6,11 @@
 //   product and the sum. A ray that hits the block's padded box passes within 2^-20 R of it, so sheared coordinates are
 //   at most 2 E + 2^-18 R, and the error of an edge function (two products and a difference) is less than
 //   edge = 2^-17 R E + 2^-36 R^2.
-// - t is an average of vertex depths with the edge functions as weights. If |determinant| > 8 edge, its error is at
-// most
-//   (6 edge E / |determinant| + 2^-20 R) / |d|. A ray that starts on a triangle hits it although rounding may place the
-//   triangle up to 2^-42 R^3 / |determinant / d| behind the start; the interval of t includes this distance. Products
-//   that underflow add at most 2^-150 / |determinant|, which is within 2^-20 R / |d| if R >= 2^-25 and |d| <= 2^20.
+// - t is an average of vertex depths with the edge functions as weights. If |determinant| > 8 edge, its error is
+//   at most (6 edge E / |determinant| + 2^-20 R) / |d|. A ray that starts on a triangle hits it although rounding may
+//   place the triangle up to 2^-42 R^3 / |determinant / d| behind the start; the interval of t includes this distance.
+//   Products that underflow add at most 2^-150 / |determinant|, which is within 2^-20 R / |d| if R >= 2^-25 and |d| <=
+//   2^20.
 // - If TriangleRay calls a triangle nearly edge-on, double is too coarse, and the ray is left undecided. Any other hit
 //   has an error in double of less than 2^-24 of its own coordinates and the origin's. It therefore lies within the
 //   padded slabs of its own box, so that the clamps of t in TriangleRay and to the bounds of an instance have no

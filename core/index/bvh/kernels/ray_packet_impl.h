@@ -156,10 +156,10 @@ class Packet {
     return pack_slots(node, entered, left, octant, slots);
   }
 
-  // Puts the children that any of the rays may hit on the stack, the nearest last. Returns the new top.
+  // Pushes the children that any of the rays may hit, the nearest one last. Returns the new top.
   inline uint32_t open_node(const TriangleNode& node, uint32_t top) {
     ++nodes_;
-    // Copies: the stores to the stack would make every turn of the loop read them again.
+    // Copies, because the compiler would reload the members after each store to the stack.
     const Slabs slabs = slabs_;
     const Floats8 limit = Floats8::load(limits_);
     const uint32_t octant = axis(kOctant);

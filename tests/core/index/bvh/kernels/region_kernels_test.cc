@@ -191,7 +191,7 @@ TEST_P(RegionKernelsTest, ACallPausesAfterTheMaximumNumberOfTests) {
   EXPECT_LT(search.tests(), kMaxRegionTests + 8);
 }
 
-// As many balls as one call of many() answers, from an empty one to one around the whole mesh, and the numbers that
+// Batch of as many balls as one call of many() answers, from an empty ball to one around the mesh, and the numbers that
 // each of them finds in a search of its own.
 struct Together {
   explicit Together(const TriangleBvh& tree) {
