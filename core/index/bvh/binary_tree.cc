@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/index/bvh/splitter.h"
 
@@ -38,6 +39,7 @@ class BinaryBuilder {
     for_each(options_, subtrees.size(), [&](size_t i) { build_subtree(subtrees[i], tree_.nodes_[1 + i]); });
     if (cancelled(options_)) return false;
     choose_upwards(top);
+    check_invariants();
     return true;
   }
 
@@ -103,6 +105,7 @@ class BinaryBuilder {
   }
 
   Halves<S> split(const Part& part) const {
+    LOCUS_DCHECK_LT(part.depth, limits::kMaxBvhDepth);
     return splitter_.split(references_.subspan(part.node->first, part.node->count), part.extent,
                            limits::kMaxBvhDepth - part.depth - 1);
   }
@@ -126,7 +129,10 @@ class BinaryBuilder {
 
   // Computes how to collapse a node, whose children have their choices.
   void choose(BinaryNode<S>& node) const {
-    if (node.is_leaf()) return;
+    if (node.is_leaf()) {
+      LOCUS_DCHECK_LE(node.count, kBvhLeafSize);
+      return;
+    }
     const double share = area_share_ > 0 ? half_area(node.bounds) * area_share_ : 0;
     node.choice = WideChoice(node.children[0].choice, node.children[1].choice, static_cast<float>(share) + node_cost_);
   }
@@ -134,6 +140,27 @@ class BinaryBuilder {
   void choose_upwards(Nodes& nodes) const {
     for (auto pair = nodes.rbegin(); pair != nodes.rend(); ++pair)
       for (BinaryNode<S>& node : *pair) choose(node);
+  }
+
+  // Verifies that the children of each inner node partition its references, and that its bounds are the box around
+  // theirs. O(nodes).
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      for (const Nodes& nodes : tree_.nodes_)
+        for (const std::array<BinaryNode<S>, 2>& pair : nodes)
+          for (const BinaryNode<S>& node : pair) check_node(node);
+    }
+  }
+
+  static void check_node(const BinaryNode<S>& node) {
+    if (node.is_leaf()) return;
+    const BinaryNode<S>&left = node.children[0], &right = node.children[1];
+    LOCUS_DCHECK_LT(0u, left.count);
+    LOCUS_DCHECK_LT(0u, right.count);
+    LOCUS_DCHECK_EQ(left.first, node.first);
+    LOCUS_DCHECK_EQ(right.first, left.first + left.count);
+    LOCUS_DCHECK_EQ(left.count + right.count, node.count);
+    LOCUS_DCHECK(merge(left.bounds, right.bounds) == node.bounds);
   }
 
   BinaryTree<S>& tree_;
@@ -147,6 +174,8 @@ class BinaryBuilder {
 template <class S>
 absl::StatusOr<BinaryTree<S>> BinaryTree<S>::build(std::unique_ptr<BoxReference<S>[]> references, uint32_t count,
                                                    const BvhOptions& options) {
+  LOCUS_DCHECK_LT(0u, count);
+  LOCUS_DCHECK_LE(count, limits::kMaxBvhValues);
   BinaryTree tree;
   tree.references_ = std::move(references);
   if (!BinaryBuilder<S>(tree, count, options).build()) return cancelled_build();

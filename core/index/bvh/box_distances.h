@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/vec3.h"
 #include "core/index/bvh/triangle_tree.h"
@@ -25,6 +26,7 @@ class BoxDistances {
   // Returns the limit in float for a limit of squared distances in double. The relative rounding error of gaps, squares
   // and sums is less than 2^-22 of the distance.
   float limit(double squared) const {
+    LOCUS_DCHECK(!std::isnan(squared));
     const double raised = std::sqrt(squared) * (1 + kRounding) + pad_;
     const double result = raised * raised * (1 + kRounding);
     // Squares below this lose precision in float (denormal range).

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/index/bvh/quad.h"
 
@@ -34,6 +35,7 @@ using BoxReferences = absl::Span<BoxReference<S>>;
 template <>
 inline BoxReference<float> BoxReference<float>::of(const QuadBox<float>& box, uint32_t index) {
   constexpr uint32_t kNormalBits = 0x40000000u;
+  LOCUS_DCHECK_LT(index, kNormalBits);
   BoxReference reference = {box.min, box.max};
   reference.min.lanes[3] = std::bit_cast<float>(index | kNormalBits);
   return reference;

@@ -16,6 +16,7 @@
 #include "absl/container/inlined_vector.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/planted_bug.h"
 #include "core/base/status_macros.h"
@@ -113,7 +114,12 @@ class Bvh {
         depth_(layout.depth) {
     values_.reserve(values.size());
     for (const uint32_t index : layout.order) values_.push_back(std::move(values[index]));
+    LOCUS_DCHECK_EQ(values_.size(), values.size());
+    check_invariants();
   }
+
+  // Verifies the bounds and ranges of all leaves, the order of nodes, and the depth. O(n).
+  void check_invariants() const;
 
   // Returns whether a box can be skipped. A box entered exactly at the limit cannot: it may hold an equal hit with a
   // lower id.
@@ -143,6 +149,31 @@ double Bvh<V>::sah_cost() const {
       sum += root_area > 0 ? double{half_area(node.bounds[slot])} / root_area : 1;
   }
   return sum;
+}
+
+template <Bounded V>
+void Bvh<V>::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(depth_, limits::kMaxBvhDepth);
+    size_t leaf_values = 0;
+    for (uint32_t index = 0; index < nodes_.size(); ++index) {
+      const BvhNode<S>& node = nodes_[index];
+      LOCUS_DCHECK_LE(node.child_count, kBvhWidth);
+      for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+        const BvhChild child = node.children[slot];
+        LOCUS_DCHECK(contains(bounds_, node.bounds[slot]));
+        if (!child.is_leaf()) {
+          LOCUS_DCHECK(index < child.first && child.first < nodes_.size());
+          continue;
+        }
+        LOCUS_DCHECK_LE(size_t{child.first} + child.count, values_.size());
+        for (const V& value : values().subspan(child.first, child.count))
+          LOCUS_DCHECK(contains(node.bounds[slot], Traits::bounds(value)));
+        leaf_values += child.count;
+      }
+    }
+    LOCUS_DCHECK_EQ(leaf_values, values_.size());
+  }
 }
 
 template <Bounded V>
@@ -177,6 +208,7 @@ void Bvh<V>::RayWalk::push_hit(const BvhNode<S>& node, S limit) {
       pending_[position] = pending_[position - 1];
     pending_[position] = {node.children[slot], interval.near};
   }
+  LOCUS_DCHECK_LE(pending_.size(), kStackSize);
 }
 
 template <Bounded V>
@@ -202,6 +234,7 @@ void Bvh<V>::visit_region(Visitor& visitor, Work& work) const {
       for (uint32_t slot = node.child_count; slot-- > 0;) {
         if (visitor.overlaps(node.bounds[slot])) *top++ = node.children[slot];
       }
+      LOCUS_DCHECK_LE(static_cast<size_t>(top - stack), kStackSize);
       continue;
     }
     for (const V& value : values().subspan(now.first, now.count)) {
@@ -245,6 +278,7 @@ void Bvh<V>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) con
         pending[position] = pending[position - 1];
       pending[position] = {node.children[slot], distance};
     }
+    LOCUS_DCHECK_LE(pending.size(), kStackSize);
   }
 }
 

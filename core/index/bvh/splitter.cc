@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
@@ -104,6 +106,7 @@ class Orders {
   // Computes the rank of each reference, which is the number of references before it. All pairs are compared, along all
   // axes at once and without a branch.
   explicit Orders(BoxReferences<S> references) {
+    LOCUS_DCHECK_LE(references.size(), kMaxSorted);
     std::array<Quad<S>, kMaxSorted> centers, ranks;
     for (size_t i = 0; i < references.size(); ++i) {
       const Quad<S> center = references[i].center();
@@ -202,6 +205,7 @@ Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, cons
     }
   });
   halves.left_count = static_cast<uint32_t>(left);
+  LOCUS_DCHECK_LE(left, references.size());
   return halves;
 }
 
@@ -209,6 +213,8 @@ Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, cons
 template <class S>
 Halves<S> split_binned(BoxReferences<S> references, const Extent<S>& extent, const BvhOptions& options) {
   const auto count = static_cast<uint32_t>(references.size());
+  LOCUS_DCHECK_GE(options.bins, 2);
+  LOCUS_DCHECK_LE(options.bins, static_cast<int>(kMaxBvhBins));
   const uint32_t bin_count = std::min(static_cast<uint32_t>(options.bins), 4 + count / 16);
   const Binning<S> binning(extent.centers, bin_count);
   Bins<S> bins;
@@ -264,10 +270,29 @@ Extent<S> extent_of(BoxReferences<S> references) {
 template <class S>
 Halves<S> Splitter<S>::split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const {
   const auto count = static_cast<uint32_t>(references.size());
+  LOCUS_DCHECK_LT(kBvhLeafSize, count);
+  LOCUS_DCHECK_LE(balanced_levels(count), levels + 1);
   Halves<S> halves = count <= kMaxSorted ? split_sorted(references) : split_binned(references, extent, options_);
   const bool found = halves.left_count != 0;
-  if (found && balanced_levels(std::max(halves.left_count, count - halves.left_count)) <= levels) return halves;
-  return halve(references, extent.centers);
+  if (!found || balanced_levels(std::max(halves.left_count, count - halves.left_count)) > levels)
+    halves = halve(references, extent.centers);
+  check_halves(references, extent, levels, halves);
+  return halves;
+}
+
+template <class S>
+void Splitter<S>::check_halves(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels,
+                               const Halves<S>& halves) const {
+  if constexpr (kDebugChecks) {
+    if (cancelled(options_)) return;
+    const auto count = static_cast<uint32_t>(references.size()), left_count = halves.left_count;
+    LOCUS_DCHECK_LT(0u, left_count);
+    LOCUS_DCHECK_LT(left_count, count);
+    LOCUS_DCHECK_LE(balanced_levels(std::max(left_count, count - left_count)), levels);
+    LOCUS_DCHECK(extent_of(references.subspan(0, left_count)).bounds.box() == halves.parts[0].bounds.box());
+    LOCUS_DCHECK(extent_of(references.subspan(left_count)).bounds.box() == halves.parts[1].bounds.box());
+    LOCUS_DCHECK(merge(halves.parts[0].bounds.box(), halves.parts[1].bounds.box()) == extent.bounds.box());
+  }
 }
 
 template Extent<float> extent_of(BoxReferences<float>);

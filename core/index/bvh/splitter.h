@@ -58,6 +58,10 @@ class Splitter {
   Halves<S> split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const;
 
  private:
+  // Verifies the result of split() in debug builds, unless the build was cancelled. O(n).
+  void check_halves(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels,
+                    const Halves<S>& halves) const;
+
   const BvhOptions& options_;
 };
 

@@ -140,6 +140,7 @@ class Restorer {
       triangles[lane] = triangle_(arrays_.numbers[block.first + lane]);
       box = merge(box, bounds_of(triangles[lane]));
     }
+    LOCUS_DCHECK(is_finite(box.min) && is_finite(box.max));
     fill_block(absl::MakeConstSpan(triangles).first(size), box, block.first, block);
   }
 
@@ -157,6 +158,7 @@ class Restorer {
       uint32_t count = 0;
       for (const uint32_t child : arrays_.nodes[index].child) {
         if (child == kNoChild) break;
+        LOCUS_DCHECK((child & kBlockBit) != 0 || index < child);
         node_boxes_[index] = merge(node_boxes_[index], box_of(child));
         count += count_of(child);
       }
@@ -195,6 +197,7 @@ TreeTopology topology_of(const TriangleArrays& arrays) {
       if (child == kNoChild) continue;
       NodeOutline& node = topology.nodes[index];
       uint8_t& kind = (child & kBlockBit) != 0 ? node.blocks : node.nodes;
+      LOCUS_DCHECK(slot == 0 || (node.blocks | node.nodes) >> (slot - 1) == 1);
       kind = static_cast<uint8_t>(kind | 1u << slot);
     }
   }

@@ -12,6 +12,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/triangle.h"
 #include "core/index/bvh/box_distances.h"
@@ -59,6 +60,7 @@ class TriangleBvh {
   TreeTopology topology() const { return topology_of(arrays_); }
   // Returns a view of the arrays, valid until this object is moved or destroyed. The tree must not be empty.
   TriangleTree tree() const {
+    LOCUS_DCHECK_LT(0u, size());
     return {arrays_.nodes.get(), arrays_.ranges.get(), arrays_.blocks.get(), arrays_.numbers.get(), magnitude_};
   }
 
@@ -80,12 +82,18 @@ class TriangleBvh {
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
  private:
+  // Maximum number of pending children in a visit, without the elements that vector code may write beyond them.
+  static constexpr int kMaxPending = kTreeStack - kTreeWidth;
+
   struct Pending {
     uint32_t child;
     float near;
   };
 
   void set_bounds(const Aabbf& bounds);
+  // Verifies the order of nodes, blocks and triangles, all ranges, boxes and orders. O(size).
+  void check_invariants() const;
+  void check_node(uint32_t index) const;
   // Returns whether a box can be skipped. A box entered exactly at the limit cannot: it may hold an equal hit with a
   // lower number.
   static bool beyond(float near, float limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
@@ -108,6 +116,7 @@ class TriangleBvh {
 };
 
 inline Triangle TriangleBvh::triangle(const TriangleBlock& block, uint32_t lane) const {
+  LOCUS_DCHECK_LT(lane, block.count);
   const auto vertex = [&](int first) {
     return Vec3f{block.vertices[first][lane], block.vertices[first + 1][lane], block.vertices[first + 2][lane]};
   };
@@ -134,6 +143,7 @@ void TriangleBvh::visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work&
     if ((now.child & kBlockBit) == 0) {
       ++work.nodes;
       top = push_hit(arrays_.nodes[now.child], slabs, visitor.limit(), top);
+      LOCUS_DCHECK_LE(top - stack, kMaxPending);
       continue;
     }
     const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];
@@ -162,6 +172,7 @@ void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
           if ((child & kBlockBit) == kind && child != kNoChild && visitor.overlaps(box(node, slot))) *top++ = child;
         }
       }
+      LOCUS_DCHECK_LE(top - stack, kMaxPending);
       continue;
     }
     const TriangleBlock& block = arrays_.blocks[now & ~kBlockBit];
@@ -197,6 +208,7 @@ void TriangleBvh::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work
       const TriangleNode& node = arrays_.nodes[now.child];
       box_distances.to_boxes(node.bounds, distances);
       top = push_near(node, distances, near, top);
+      LOCUS_DCHECK_LE(top - stack, kMaxPending);
       continue;
     }
     const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
@@ -60,8 +62,11 @@ float rounded_up_extent(const Aabbf& box) {
 }  // namespace
 
 void fill_boxes(absl::Span<const Aabbf> boxes, TriangleNode& node) {
+  LOCUS_DCHECK(!boxes.empty());
+  LOCUS_DCHECK_LE(boxes.size(), size_t{kTreeWidth});
   for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
     const bool used = slot < boxes.size();
+    LOCUS_DCHECK(!used || !boxes[slot].empty());
     for (int axis = 0; axis < 3; ++axis) {
       node.bounds[axis][slot] = used ? boxes[slot].min[axis] : kUnusedBound;
       node.bounds[3 + axis][slot] = used ? boxes[slot].max[axis] : -kUnusedBound;
@@ -72,12 +77,15 @@ void fill_boxes(absl::Span<const Aabbf> boxes, TriangleNode& node) {
 }
 
 void fill_block(absl::Span<const Triangle> triangles, const Aabbf& box, uint32_t first, TriangleBlock& block) {
+  LOCUS_DCHECK(!triangles.empty());
+  LOCUS_DCHECK_LE(triangles.size(), size_t{kTreeWidth});
   block.first = first;
   block.count = static_cast<uint32_t>(triangles.size());
   block.extent = rounded_up_extent(box);
   std::fill(std::begin(block.unused), std::end(block.unused), 0);
   for (uint32_t lane = 0; lane < kTreeWidth; ++lane) {
     const Triangle& triangle = triangles[std::min(lane, block.count - 1)];
+    LOCUS_DCHECK(contains(box, bounds_of(triangle)));
     int row = 0;
     for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
       for (int axis = 0; axis < 3; ++axis) block.vertices[row++][lane] = vertex[axis];

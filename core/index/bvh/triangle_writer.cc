@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/index/bvh/triangle_parts.h"
 
 namespace locus {
@@ -34,6 +35,7 @@ TriangleArrays TriangleWriter::write() {
     end = {end.node + sizes[i].node, end.block + sizes[i].block, end.position + sizes[i].position};
     arrays_.depth = std::max(arrays_.depth, chunks[i].depth);
   }
+  LOCUS_DCHECK_EQ(size_t{end.position}, triangles_.size());
   arrays_.node_count = end.node;
   arrays_.block_count = end.block;
   arrays_.triangle_count = end.position;
@@ -65,6 +67,7 @@ std::vector<TriangleWriter::Chunk> TriangleWriter::split_into_chunks() const {
     const Pending now = pending.back();
     pending.pop_back();
     const auto index = static_cast<uint32_t>(chunks.size());
+    LOCUS_DCHECK(index == 0 || now.parent < index);
     const bool is_subtree = now.node->count <= kChunkTriangles;
     chunks.push_back({now.node, is_subtree, now.parent, now.slot, now.depth, {}});
     if (is_subtree) continue;
@@ -106,6 +109,7 @@ void TriangleWriter::write_top(const std::vector<Chunk>& chunks) {
       write_node(children_by_area(*chunk.root), {chunk.start.position, chunk.root->count}, chunk.start.node);
   for (size_t i = 1; i < chunks.size(); ++i) {
     const Chunk& chunk = chunks[i];
+    LOCUS_DCHECK(!chunks[chunk.parent].is_subtree);
     arrays_.nodes[chunks[chunk.parent].start.node].child[chunk.slot] =
         is_block(chunk) ? kBlockBit | chunk.start.block : chunk.start.node;
   }
@@ -137,10 +141,12 @@ void TriangleWriter::write_subtree(const Chunk& chunk) {
       open(*now.node);
     }
   }
+  LOCUS_DCHECK_EQ(next.position, chunk.start.position + chunk.root->count);
 }
 
 // Writes a node except for its child indices, which are set when the children are written.
 void TriangleWriter::write_node(const WideChildren<float>& children, NodeRange range, uint32_t index) {
+  LOCUS_DCHECK_LT(index, arrays_.node_count);
   arrays_.ranges[index] = range;
   std::array<Aabbf, kTreeWidth> boxes;
   for (uint32_t slot = 0; slot < children.size(); ++slot) boxes[slot] = children[slot].bounds;
@@ -150,6 +156,7 @@ void TriangleWriter::write_node(const WideChildren<float>& children, NodeRange r
 }
 
 void TriangleWriter::write_block(const BinaryNode<float>& leaf, const Offsets& offsets) {
+  LOCUS_DCHECK_LT(offsets.block, arrays_.block_count);
   std::array<Triangle, kTreeWidth> triangles;
   for (uint32_t lane = 0; lane < leaf.count; ++lane) {
     triangles[lane] = triangles_[tree_.index(leaf.first + lane)];

@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "core/base/check.h"
 #include "core/index/bvh/binary_tree.h"
 
 namespace locus {
@@ -31,11 +32,16 @@ class WideChildren {
         pending[pending_count++] = {&node->children[1], slots - left};
         pending[pending_count++] = {&node->children[0], left};
       }
+      LOCUS_DCHECK_LE(pending_count + size_, size_t{kBvhWidth});
     }
+    check_children(root);
   }
 
   uint32_t size() const { return size_; }
-  const BinaryNode<S>& operator[](size_t slot) const { return *nodes_[slot]; }
+  const BinaryNode<S>& operator[](size_t slot) const {
+    LOCUS_DCHECK_LT(slot, size_);
+    return *nodes_[slot];
+  }
 
   // Sorts the children by increasing area; children of equal area keep their order.
   void sort_by_area() {
@@ -54,6 +60,18 @@ class WideChildren {
   }
 
  private:
+  // Verifies that the children, from left to right, partition the references of `root`.
+  void check_children(const BinaryNode<S>& root) const {
+    if constexpr (kDebugChecks) {
+      uint32_t next = root.first;
+      for (uint32_t i = 0; i < size_; ++i) {
+        LOCUS_DCHECK_EQ(nodes_[i]->first, next);
+        next += nodes_[i]->count;
+      }
+      LOCUS_DCHECK_EQ(next, root.first + root.count);
+    }
+  }
+
   std::array<const BinaryNode<S>*, kBvhWidth> nodes_;
   uint32_t size_ = 0;
 };

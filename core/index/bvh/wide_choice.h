@@ -1,7 +1,8 @@
 // Choice of how a binary tree is collapsed to nodes of eight children at the least cost. For each binary node and each
 // number of child slots it may occupy, it states whether the node is opened, and how many of the slots its left child
 // gets. Computed from the leaves upwards by dynamic programming. The cost of a wide node is its area plus a small
-// constant, which keeps the number of nodes low. Immutable. Source: Ylitie, Karras, Laine, Efficient Incoherent Ray
+// constant, which keeps the number of nodes low. Immutable.
+// Invariant: more slots never cost more. Source: Ylitie, Karras, Laine, Efficient Incoherent Ray
 // Traversal on GPUs Through Compressed Wide BVHs, 2017.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
@@ -9,6 +10,7 @@
 #include <array>
 #include <cstdint>
 
+#include "core/base/check.h"
 #include "core/index/bvh/bvh_node.h"
 
 namespace locus {
@@ -28,13 +30,26 @@ class WideChoice {
       costs_[slots] = open ? opened[slots] : costs_[1];
       if (!open) left_slots_[slots] = 0;
     }
+    check_invariants();
   }
 
   // Returns how many of `slots` slots, two to eight, the left child of an inner node gets; 0 if the node is not opened
   // but becomes a wide node of its own. With eight slots it is always opened.
-  uint32_t left_slots(uint32_t slots) const { return left_slots_[slots]; }
+  uint32_t left_slots(uint32_t slots) const {
+    LOCUS_DCHECK(2 <= slots && slots <= kBvhWidth);
+    return left_slots_[slots];
+  }
 
  private:
+  // Verifies that more slots never cost more, and that each child gets at least one slot of an opened node.
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      for (uint32_t slots = 2; slots < kBvhWidth; ++slots) LOCUS_DCHECK_LE(costs_[slots], costs_[slots - 1]);
+      for (uint32_t slots = 2; slots <= kBvhWidth; ++slots) LOCUS_DCHECK_LT(uint32_t{left_slots_[slots]}, slots);
+      LOCUS_DCHECK_LT(0u, uint32_t{left_slots_[kBvhWidth]});
+    }
+  }
+
   // Returns the least cost of sharing `slots` slots between the children, and stores the left child's share. The even
   // share is tried first and wins if costs are equal.
   float best_share(const WideChoice& left, const WideChoice& right, uint32_t slots) {
