@@ -13,6 +13,7 @@
 namespace locus {
 
 static_assert(kTreeStack == limits::kMaxBvhDepth * (kTreeWidth - 1) + 1 + kTreeWidth);
+static_assert(limits::kMaxBvhValues < kBlockBit >> 1, "kernels use two flag bits in indices of nodes and blocks");
 
 namespace {
 

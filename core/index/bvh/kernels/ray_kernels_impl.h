@@ -22,6 +22,7 @@ namespace {
 constexpr uint32_t kMaxFlights = 32;     // rays traced interleaved
 constexpr uint32_t kMaxPackets = 2;      // packets of coherent rays traced interleaved
 constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; their indices fit in a byte
+static_assert(kPreparedRays <= 256 && kPreparedRays % kTreeWidth == 0 && kMaxFlights <= 256);
 
 // A ray being traced. `waiting` is a stack of nodes and blocks that the ray enters no later than the limit, above a
 // sentinel kNoChild; `nears` are their entry distances.

@@ -15,6 +15,7 @@ namespace {
 
 // Flag of a node or block that is completely inside the region. Indices of nodes and blocks are below it.
 constexpr uint32_t kContainedBit = 0x40000000u;
+static_assert((kContainedBit & kBlockBit) == 0 && kMinRegionRoom >= kTreeWidth);
 
 // State of one query's traversal: the stack `waiting` of nodes, and the collected `items` that are not processed yet.
 template <class Query>
