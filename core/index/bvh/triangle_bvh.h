@@ -76,8 +76,8 @@ class TriangleBvh {
   template <RegionVisitor<Triangle> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
-  // Hands over candidates, roughly nearest first. Culls by distances in float, which never drop a triangle
-  // within the limit (box_distances.h). Allocates nothing.
+  // Hands over candidates, roughly nearest first. Culls by distances in float, which never drop a triangle within the
+  // limit (box_distances.h). Allocates nothing.
   template <PointVisitor<Triangle> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 

@@ -2,8 +2,8 @@
 // number of child slots it may occupy, it states whether the node is opened, and how many of the slots its left child
 // gets. Computed from the leaves upwards by dynamic programming. The cost of a wide node is its area plus a small
 // constant, which keeps the number of nodes low. Immutable.
-// Invariant: more slots never cost more. Source: Ylitie, Karras, Laine, Efficient Incoherent Ray
-// Traversal on GPUs Through Compressed Wide BVHs, 2017.
+// Invariants: more slots never cost more; each child gets at least one slot of an opened node.
+// Source: Ylitie, Karras, Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, 2017.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
 

@@ -37,7 +37,8 @@ inline constexpr uint32_t kMaxRegionTests = 4096;
 inline constexpr size_t kMinRegionRoom = 8;
 // Maximum number of regions in a call of many().
 inline constexpr size_t kMaxRegions = 16;
-// Maximum number of blocks and subtrees that a visit has found but not processed; vector code may write eight more.
+// A visit stops opening nodes when it has more unprocessed items (blocks and contained subtrees) than this. Opening one
+// node adds up to eight items.
 inline constexpr uint32_t kMaxRegionItems = 56;
 
 // Predicate for the triangles that float cannot decide.
