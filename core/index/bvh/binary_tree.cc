@@ -154,7 +154,8 @@ class BinaryBuilder {
 
   static void check_node(const BinaryNode<S>& node) {
     if (node.is_leaf()) return;
-    const BinaryNode<S>&left = node.children[0], &right = node.children[1];
+    const BinaryNode<S>& left = node.children[0];
+    const BinaryNode<S>& right = node.children[1];
     LOCUS_DCHECK_LT(0u, left.count);
     LOCUS_DCHECK_LT(0u, right.count);
     LOCUS_DCHECK_EQ(left.first, node.first);
