@@ -4,17 +4,19 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/index/bvh/splitter.h"
 
 namespace locus {
 namespace {
 
-// Subtrees of up to so many references are built in one go by one thread. A constant, so that the tree does not depend
-// on the number of threads.
+// Maximum number of references in a subtree that one thread builds as one task. A constant, so that the tree does not
+// depend on the number of threads.
 constexpr uint32_t kSubtreeReferences = 4096;
-constexpr size_t kPieceReferences = 1u << 16;  // that one thread measures at once
-// Of all nodes of a tree together, against the area of its root, were every node to hold as many children as blocks.
+constexpr size_t kChunkReferences = 1u << 16;  // references in one task that computes an extent
+// Fixed cost of all nodes of a tree together, relative to the area of its root, if there were one node for each block.
+// Each node costs its part of it (see measure_costs()).
 constexpr double kNodeCost = 4;
 
 }  // namespace
@@ -25,41 +27,42 @@ class BinaryBuilder {
   BinaryBuilder(BinaryTree<S>& tree, uint32_t count, const BvhOptions& options)
       : tree_(tree), references_(tree.references_.get(), count), options_(options), splitter_(options) {}
 
-  // False when cancelled.
+  // Builds the tree. Returns false if it was cancelled.
   bool build() {
-    const Extent<S> whole = whole_extent();
+    const Extent<S> total = total_extent();
     const auto count = static_cast<uint32_t>(references_.size());
-    measure_costs(whole, count);
+    measure_costs(total, count);
     Nodes& top = tree_.nodes_.emplace_back();
-    top.push_back({node_of(0, count, whole), {}});
-    const std::vector<Part> subtrees = split_top({&top[0][0], whole, 1}, top);
+    top.push_back({node_of(0, count, total), {}});
+    const std::vector<Part> subtrees = split_top({&top[0][0], total, 1}, top);
     tree_.nodes_.resize(1 + subtrees.size());
     for_each(options_, subtrees.size(), [&](size_t i) { build_subtree(subtrees[i], tree_.nodes_[1 + i]); });
     if (cancelled(options_)) return false;
     choose_upwards(top);
+    check_invariants();
     return true;
   }
 
  private:
   using Nodes = typename BinaryTree<S>::Nodes;
 
-  // A node, at first without children.
+  // A node that has no children yet.
   struct Part {
     BinaryNode<S>* node;
     Extent<S> extent;
     uint32_t depth;
   };
 
-  Extent<S> whole_extent() const {
-    std::vector<Extent<S>> extents((references_.size() + kPieceReferences - 1) / kPieceReferences);
+  Extent<S> total_extent() const {
+    std::vector<Extent<S>> extents((references_.size() + kChunkReferences - 1) / kChunkReferences);
     for_each(options_, extents.size(),
-             [&](size_t i) { extents[i] = extent_of(references_.subspan(i * kPieceReferences, kPieceReferences)); });
-    Extent<S> whole;
+             [&](size_t i) { extents[i] = extent_of(references_.subspan(i * kChunkReferences, kChunkReferences)); });
+    Extent<S> total;
     for (const Extent<S>& extent : extents) {
-      whole.bounds.add(extent.bounds);
-      whole.centers.add(extent.centers);
+      total.bounds.add(extent.bounds);
+      total.centers.add(extent.centers);
     }
-    return whole;
+    return total;
   }
 
   static BinaryNode<S> node_of(uint32_t first, uint32_t count, const Extent<S>& extent) {
@@ -70,20 +73,20 @@ class BinaryBuilder {
     return node;
   }
 
-  // Splits what is too large for one go, level by level; returns the rest.
+  // Splits nodes that are too large for one task, level by level. Returns the nodes that one task can build.
   std::vector<Part> split_top(const Part& root, Nodes& nodes) const {
-    std::vector<Part> small, wave, next;
-    const auto sort_in = [&](const Part& part) {
+    std::vector<Part> small, level, next;
+    const auto enqueue = [&](const Part& part) {
       (part.node->count <= kSubtreeReferences ? small : next).push_back(part);
     };
-    sort_in(root);
+    enqueue(root);
     while (!next.empty() && !cancelled(options_)) {
-      wave.swap(next);
+      level.swap(next);
       next.clear();
-      std::vector<Halves<S>> halves(wave.size());
-      for_each(options_, wave.size(), [&](size_t i) { halves[i] = split(wave[i]); });
-      for (size_t i = 0; i < wave.size() && !cancelled(options_); ++i)
-        for (const Part& child : open(wave[i], halves[i], nodes)) sort_in(child);
+      std::vector<Halves<S>> halves(level.size());
+      for_each(options_, level.size(), [&](size_t i) { halves[i] = split(level[i]); });
+      for (size_t i = 0; i < level.size() && !cancelled(options_); ++i)
+        for (const Part& child : open(level[i], halves[i], nodes)) enqueue(child);
     }
     return small;
   }
@@ -102,6 +105,7 @@ class BinaryBuilder {
   }
 
   Halves<S> split(const Part& part) const {
+    LOCUS_DCHECK_LT(part.depth, limits::kMaxBvhDepth);
     return splitter_.split(references_.subspan(part.node->first, part.node->count), part.extent,
                            limits::kMaxBvhDepth - part.depth - 1);
   }
@@ -115,15 +119,20 @@ class BinaryBuilder {
     return {Part{&children[0], halves.parts[0], part.depth + 1}, Part{&children[1], halves.parts[1], part.depth + 1}};
   }
 
-  // A node costs its share of the whole area and, so that there are few of them, a little besides.
-  void measure_costs(const Extent<S>& whole, uint32_t count) {
-    const double area = half_area(whole.bounds);
+  // Computes the factors of a wide node's cost: its area relative to the root's, and a small fixed cost that keeps the
+  // number of nodes low.
+  void measure_costs(const Extent<S>& total, uint32_t count) {
+    const double area = half_area(total.bounds);
     area_share_ = area > 0 && std::isfinite(area) ? 1 / area : 0;
     node_cost_ = static_cast<float>(kNodeCost / blocks_for(count));
   }
 
+  // Computes how to collapse a node, whose children have their choices.
   void choose(BinaryNode<S>& node) const {
-    if (node.is_leaf()) return;
+    if (node.is_leaf()) {
+      LOCUS_DCHECK_LE(node.count, kBvhLeafSize);
+      return;
+    }
     const double share = area_share_ > 0 ? half_area(node.bounds) * area_share_ : 0;
     node.choice = WideChoice(node.children[0].choice, node.children[1].choice, static_cast<float>(share) + node_cost_);
   }
@@ -131,6 +140,28 @@ class BinaryBuilder {
   void choose_upwards(Nodes& nodes) const {
     for (auto pair = nodes.rbegin(); pair != nodes.rend(); ++pair)
       for (BinaryNode<S>& node : *pair) choose(node);
+  }
+
+  // Verifies that the children of each inner node partition its references, and that its bounds are the box around
+  // theirs. O(nodes).
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      for (const Nodes& nodes : tree_.nodes_)
+        for (const std::array<BinaryNode<S>, 2>& pair : nodes)
+          for (const BinaryNode<S>& node : pair) check_node(node);
+    }
+  }
+
+  static void check_node(const BinaryNode<S>& node) {
+    if (node.is_leaf()) return;
+    const BinaryNode<S>& left = node.children[0];
+    const BinaryNode<S>& right = node.children[1];
+    LOCUS_DCHECK_LT(0u, left.count);
+    LOCUS_DCHECK_LT(0u, right.count);
+    LOCUS_DCHECK_EQ(left.first, node.first);
+    LOCUS_DCHECK_EQ(right.first, left.first + left.count);
+    LOCUS_DCHECK_EQ(left.count + right.count, node.count);
+    LOCUS_DCHECK(merge(left.bounds, right.bounds) == node.bounds);
   }
 
   BinaryTree<S>& tree_;
@@ -144,6 +175,8 @@ class BinaryBuilder {
 template <class S>
 absl::StatusOr<BinaryTree<S>> BinaryTree<S>::build(std::unique_ptr<BoxReference<S>[]> references, uint32_t count,
                                                    const BvhOptions& options) {
+  LOCUS_DCHECK_LT(0u, count);
+  LOCUS_DCHECK_LE(count, limits::kMaxBvhValues);
   BinaryTree tree;
   tree.references_ = std::move(references);
   if (!BinaryBuilder<S>(tree, count, options).build()) return cancelled_build();

@@ -1,5 +1,7 @@
-// The binary tree over boxes that wide trees are made from, with leaves of up to kBvhLeafSize. Equal references and
-// options give an equal tree, whatever BvhOptions::parallel_for makes of the pieces of work. Internal to this folder.
+// Binary tree over boxes with leaves of up to kBvhLeafSize: the intermediate result from which wide trees are made.
+// Equal references and options result in an equal tree, whatever threads and order BvhOptions::parallel_for chooses.
+// Immutable after build(). Invariants: the two children of a node partition its references; a node's bounds are exactly
+// the box around its references. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
 #define LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
 
@@ -18,23 +20,23 @@ namespace locus {
 template <class S>
 struct BinaryNode {
   Aabb<S> bounds;
-  uint32_t first = 0, count = 0;   // of the references, in the tree's order
-  BinaryNode* children = nullptr;  // left and right, side by side; null: a leaf
+  uint32_t first = 0, count = 0;   // range of references, in the tree's order
+  BinaryNode* children = nullptr;  // left and right child, adjacent; null for a leaf
   WideChoice choice;
 
   bool is_leaf() const { return children == nullptr; }
 };
 
-// Nodes and references stay where they are while the tree stands, moved or not.
+// Owner of the nodes and the reordered references. Their addresses stay valid when the tree is moved.
 template <class S>
 class BinaryTree {
  public:
-  // Takes `count` references, at least one. CANCELLED when told to stop.
+  // Builds a tree of `count` references, at least one, which it reorders. Returns CANCELLED if the cancel flag was set.
   static absl::StatusOr<BinaryTree> build(std::unique_ptr<BoxReference<S>[]> references, uint32_t count,
                                           const BvhOptions& options);
 
   const BinaryNode<S>& root() const { return nodes_.front().front()[0]; }
-  // Of the value at a position of the tree's order.
+  // Returns the input index of the value at a position of the tree's order.
   uint32_t index(uint32_t position) const { return references_[position].index(); }
 
  private:
@@ -44,7 +46,8 @@ class BinaryTree {
   using Nodes = std::deque<std::array<BinaryNode<S>, 2>>;
 
   std::unique_ptr<BoxReference<S>[]> references_;
-  // Those of the top, the root first, and of each subtree that was built in one go; children behind their parents.
+  // First the nodes of the top, beginning with the root, then those of each subtree built as one task. In each list
+  // children follow their parents.
   std::deque<Nodes> nodes_;
 };
 

@@ -1,4 +1,5 @@
-// What the builder sorts instead of values: a box and an index, as narrow as vector instructions allow. Plain data.
+// Element that the builder sorts instead of a value: a box and an index, as small as vector instructions allow. Plain
+// data.
 #ifndef LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
 #define LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
 
@@ -6,34 +7,37 @@
 #include <cstdint>
 
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/index/bvh/quad.h"
 
 namespace locus {
 
-// A value's box and its index, which lies in the spare lane of `min`. Without defaults: large arrays of it are filled
-// by many threads.
+// A value's box and its index, which is stored in the spare lane of `min`. It has no default member initializers, so
+// that large arrays are first written by the threads that fill them.
 template <class S>
 struct BoxReference {
   Quad<S> min, max;
 
-  // The box's spare lanes may hold anything.
+  // Makes a reference. The spare lanes of `box` may hold any value.
   static BoxReference of(const QuadBox<S>& box, uint32_t index);
   uint32_t index() const;
   QuadBox<S> box() const { return {min, max}; }
-  // Twice the centre: only compared with its like.
+  // Returns twice the centre; used only in comparisons with other centres.
   Quad<S> center() const { return min + max; }
 };
 
 template <class S>
 using BoxReferences = absl::Span<BoxReference<S>>;
 
-// A whole number as the bits of an ordinary float, whose sums and products cost nothing.
+// Stores the index in the bits of a normal float of at least 2: arithmetic on the spare lane stays fast, because it
+// meets no denormal number.
 template <>
 inline BoxReference<float> BoxReference<float>::of(const QuadBox<float>& box, uint32_t index) {
-  constexpr uint32_t kOrdinary = 0x40000000u;
+  constexpr uint32_t kNormalBits = 0x40000000u;
+  LOCUS_DCHECK_LT(index, kNormalBits);
   BoxReference reference = {box.min, box.max};
-  reference.min.lanes[3] = std::bit_cast<float>(index | kOrdinary);
+  reference.min.lanes[3] = std::bit_cast<float>(index | kNormalBits);
   return reference;
 }
 template <>

@@ -1,10 +1,10 @@
-// The bounding volume hierarchy for what does not move: a tree of boxes, eight children a node, up to eight values a
-// leaf, built once by the surface area heuristic. Serves the triangles of a mesh and the instances of a scene.
+// Bounding volume hierarchy for values that do not move: a tree of boxes with eight children a node and up to eight
+// values a leaf, built once by the surface area heuristic. Serves the instances of a scene; meshes have TriangleBvh.
 //
 // Threads: immutable after build(); every member may run concurrently.
 // Invariants: a node's box contains the bounds of every value below it, so that the slab test, which is monotone, never
-// culls what a list would report; depth is at most limits::kMaxBvhDepth, which sizes the fixed stack of a visit; values
-// lie in depth-first order.
+// culls a value that a list would report; the depth is at most limits::kMaxBvhDepth, which sizes the fixed stack of a
+// visit; nodes and values are stored in depth-first order.
 // Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008 (wide
 // nodes).
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_H_
@@ -16,6 +16,7 @@
 #include "absl/container/inlined_vector.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/planted_bug.h"
 #include "core/base/status_macros.h"
@@ -35,7 +36,8 @@ class Bvh {
   // An empty tree.
   Bvh() = default;
 
-  // Ids must be unique. No values is legal. Errors: as build_bvh_layout(); `values` of an error is the value's index.
+  // Builds a tree of `values`, whose ids must be unique; an empty vector is legal. Returns the errors of
+  // build_bvh_layout(), whose field "values" carries the index of the refused value.
   static absl::StatusOr<Bvh> build(std::vector<V> values, const BvhOptions& options = {}) {
     std::vector<Aabb<S>> boxes;
     boxes.reserve(values.size());
@@ -45,33 +47,34 @@ class Bvh {
   }
 
   size_t size() const { return values_.size(); }
-  // In depth-first order: the storage order, fixed by input and options.
+  // Returns all values in storage order: depth-first, determined by the input and the options.
   absl::Span<const V> values() const { return values_; }
-  // Of all values; empty for none.
+  // Returns the box around all values; an empty box for an empty tree.
   const Aabb<S>& bounds() const { return bounds_; }
   uint32_t depth() const { return depth_; }
   size_t node_count() const { return nodes_.size(); }
   size_t bytes() const { return nodes_.size() * sizeof(BvhNode<S>) + values_.size() * sizeof(V); }
 
-  // What an average ray that meets the tree's bounds costs: nodes and leaves it opens, by the ratio of surface areas. 0
-  // for an empty tree. O(nodes).
+  // Returns the expected number of nodes and leaves opened by a random ray that hits the tree's bounds: the sum of
+  // their surface areas, relative to that of the bounds. 0 for an empty tree. O(nodes).
   double sah_cost() const;
 
-  // Near to far by the boxes of nodes. Allocates only where more than sixteen nodes wait.
+  // Hands over candidates roughly in the order in which the ray enters their leaves: the children of each node in order
+  // of entry. Allocates only if more than 16 nodes are pending.
   template <RayVisitor<V> Visitor>
   void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
 
-  // In storage order; hands over only values whose own bounds overlap. Allocates nothing.
+  // Hands over the values whose own bounds overlap the region, in storage order. Allocates nothing.
   template <RegionVisitor<V> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
-  // Nearest boxes first; hands over only values whose own bounds are within the limit. Allocates only where more than
-  // sixteen nodes wait.
+  // Hands over the values whose own bounds are within the limit, roughly nearest first. Allocates only if more than
+  // 16 nodes are pending.
   template <PointVisitor<V> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
-  // A ray's way from value to value, for those who cannot answer a visitor at once. Borrows the tree. One thread at a
-  // time.
+  // Resumable traversal of a ray: next() returns one candidate a call, so that the caller can process the candidates of
+  // many rays together. Borrows the tree. One thread at a time.
   class RayWalk {
    public:
     RayWalk(const Bvh& tree, const SlabRay<S>& slabs)
@@ -80,7 +83,8 @@ class Bvh {
           pending_(tree.nodes_.empty() ? 0 : 1, Pending{{0, 0}, -std::numeric_limits<S>::infinity()}) {}
 
     const SlabRay<S>& slabs() const { return slabs_; }
-    // The next value as visit_ray() hands them over, null behind the last. `limit` may fall from call to call.
+    // Returns the next value in the order of visit_ray(), or null after the last one. `limit` may decrease from call to
+    // call, but not increase.
     const V* next(S limit, Work& work);
 
    private:
@@ -89,18 +93,18 @@ class Bvh {
       S near;
     };
 
-    // Nearest last.
+    // Pushes the children that the ray may hit within the limit, the nearest one last.
     void push_hit(const BvhNode<S>& node, S limit);
 
     const Bvh* tree_;
     SlabRay<S> slabs_;
-    const V* value_ = nullptr;  // the next of the leaf's values, up to end_
+    const V* value_ = nullptr;  // next value of the current leaf, up to end_
     const V* end_ = nullptr;
-    absl::InlinedVector<Pending, 16> pending_;  // seldom more, at most kStackSize
+    absl::InlinedVector<Pending, 16> pending_;  // seldom more than 16, at most kStackSize
   };
 
  private:
-  // Each level leaves at most all but one of its children waiting.
+  // Maximum number of pending children: all but one of each level, and one more on the last level.
   static constexpr size_t kStackSize = size_t{limits::kMaxBvhDepth} * (kBvhWidth - 1) + 1;
 
   Bvh(BvhLayout<S> layout, std::vector<V> values)
@@ -110,9 +114,15 @@ class Bvh {
         depth_(layout.depth) {
     values_.reserve(values.size());
     for (const uint32_t index : layout.order) values_.push_back(std::move(values[index]));
+    LOCUS_DCHECK_EQ(values_.size(), values.size());
+    check_invariants();
   }
 
-  // Boxes that start exactly at the limit are wanted: a lower id may wait there.
+  // Verifies the bounds and ranges of all leaves, the order of nodes, and the depth. O(n).
+  void check_invariants() const;
+
+  // Returns whether a box can be skipped. A box entered exactly at the limit cannot: it may hold an equal hit with a
+  // lower id.
   static bool beyond(S near, S limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
 
   Interval<S> node_interval(const SlabRay<S>& slabs, const Aabb<S>& box) const {
@@ -125,20 +135,45 @@ class Bvh {
   std::vector<BvhNode<S>> nodes_;
   std::vector<V> values_;
   Aabb<S> bounds_;
-  S magnitude_ = 0;  // one for all boxes of the tree: at least that of each
+  S magnitude_ = 0;  // largest |coordinate| of the bounds; the slab tests of all nodes use it
   uint32_t depth_ = 0;
 };
 
 template <Bounded V>
 double Bvh<V>::sah_cost() const {
   if (nodes_.empty()) return 0;
-  const double whole = double{half_area(bounds_)};
+  const double root_area = double{half_area(bounds_)};
   double sum = 1;
   for (const BvhNode<S>& node : nodes_) {
     for (uint32_t slot = 0; slot < node.child_count; ++slot)
-      sum += whole > 0 ? double{half_area(node.bounds[slot])} / whole : 1;
+      sum += root_area > 0 ? double{half_area(node.bounds[slot])} / root_area : 1;
   }
   return sum;
+}
+
+template <Bounded V>
+void Bvh<V>::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(depth_, limits::kMaxBvhDepth);
+    size_t leaf_values = 0;
+    for (uint32_t index = 0; index < nodes_.size(); ++index) {
+      const BvhNode<S>& node = nodes_[index];
+      LOCUS_DCHECK_LE(node.child_count, kBvhWidth);
+      for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+        const BvhChild child = node.children[slot];
+        LOCUS_DCHECK(contains(bounds_, node.bounds[slot]));
+        if (!child.is_leaf()) {
+          LOCUS_DCHECK(index < child.first && child.first < nodes_.size());
+          continue;
+        }
+        LOCUS_DCHECK_LE(size_t{child.first} + child.count, values_.size());
+        for (const V& value : values().subspan(child.first, child.count))
+          LOCUS_DCHECK(contains(node.bounds[slot], Traits::bounds(value)));
+        leaf_values += child.count;
+      }
+    }
+    LOCUS_DCHECK_EQ(leaf_values, values_.size());
+  }
 }
 
 template <Bounded V>
@@ -147,7 +182,7 @@ const V* Bvh<V>::RayWalk::next(S limit, Work& work) {
     if (pending_.empty()) return nullptr;
     const Pending now = pending_.back();
     pending_.pop_back();
-    // The limit may have fallen since the push.
+    // The limit may have decreased since the push.
     if (beyond(now.near, limit)) continue;
     if (now.child.is_leaf()) {
       value_ = tree_->values_.data() + now.child.first;
@@ -167,11 +202,13 @@ void Bvh<V>::RayWalk::push_hit(const BvhNode<S>& node, S limit) {
   for (uint32_t slot = 0; slot < node.child_count; ++slot) {
     const Interval<S> interval = tree_->node_interval(slabs_, node.bounds[slot]);
     if (interval.near > interval.far || interval.far < 0 || beyond(interval.near, limit)) continue;
-    size_t place = pending_.size();
+    size_t position = pending_.size();
     pending_.emplace_back();
-    for (; place > base && pending_[place - 1].near < interval.near; --place) pending_[place] = pending_[place - 1];
-    pending_[place] = {node.children[slot], interval.near};
+    for (; position > base && pending_[position - 1].near < interval.near; --position)
+      pending_[position] = pending_[position - 1];
+    pending_[position] = {node.children[slot], interval.near};
   }
+  LOCUS_DCHECK_LE(pending_.size(), kStackSize);
 }
 
 template <Bounded V>
@@ -197,6 +234,7 @@ void Bvh<V>::visit_region(Visitor& visitor, Work& work) const {
       for (uint32_t slot = node.child_count; slot-- > 0;) {
         if (visitor.overlaps(node.bounds[slot])) *top++ = node.children[slot];
       }
+      LOCUS_DCHECK_LE(static_cast<size_t>(top - stack), kStackSize);
       continue;
     }
     for (const V& value : values().subspan(now.first, now.count)) {
@@ -210,16 +248,16 @@ void Bvh<V>::visit_region(Visitor& visitor, Work& work) const {
 template <Bounded V>
 template <PointVisitor<V> Visitor>
 void Bvh<V>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
-  struct Waiting {
+  struct Pending {
     BvhChild child;
-    double away;
+    double distance;
   };
-  absl::InlinedVector<Waiting, 16> waiting(nodes_.empty() ? 0 : 1, Waiting{{0, 0}, 0});
-  while (!waiting.empty()) {
-    const Waiting now = waiting.back();
-    waiting.pop_back();
-    // The limit may have fallen since the push.
-    if (now.away > visitor.limit()) continue;
+  absl::InlinedVector<Pending, 16> pending(nodes_.empty() ? 0 : 1, Pending{{0, 0}, 0});
+  while (!pending.empty()) {
+    const Pending now = pending.back();
+    pending.pop_back();
+    // The limit may have decreased since the push.
+    if (now.distance > visitor.limit()) continue;
     if (now.child.is_leaf()) {
       for (const V& value : values().subspan(now.child.first, now.child.count)) {
         if (squared_distance(point, to_double(Traits::bounds(value))) > visitor.limit()) continue;
@@ -230,15 +268,17 @@ void Bvh<V>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) con
     }
     ++work.nodes;
     const BvhNode<S>& node = nodes_[now.child.first];
-    const size_t base = waiting.size();
+    const size_t base = pending.size();
     for (uint32_t slot = 0; slot < node.child_count; ++slot) {
-      const double away = squared_distance(point, to_double(node.bounds[slot]));
-      if (away > visitor.limit()) continue;
-      size_t place = waiting.size();
-      waiting.emplace_back();
-      for (; place > base && waiting[place - 1].away < away; --place) waiting[place] = waiting[place - 1];
-      waiting[place] = {node.children[slot], away};
+      const double distance = squared_distance(point, to_double(node.bounds[slot]));
+      if (distance > visitor.limit()) continue;
+      size_t position = pending.size();
+      pending.emplace_back();
+      for (; position > base && pending[position - 1].distance < distance; --position)
+        pending[position] = pending[position - 1];
+      pending[position] = {node.children[slot], distance};
     }
+    LOCUS_DCHECK_LE(pending.size(), kStackSize);
   }
 }
 

@@ -1,5 +1,5 @@
-// How a bounding volume hierarchy lies in memory. Plain data, shared by the builder, which knows only boxes, and by
-// Bvh, which knows the values.
+// Memory layout of a bounding volume hierarchy. Plain data, shared by the builder, which knows only boxes, and by Bvh,
+// which knows the values.
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_NODE_H_
 #define LOCUS_CORE_INDEX_BVH_BVH_NODE_H_
 
@@ -12,10 +12,10 @@
 namespace locus {
 
 inline constexpr uint32_t kBvhWidth = 8;     // children of a node
-inline constexpr uint32_t kBvhLeafSize = 8;  // values of a leaf, at most
+inline constexpr uint32_t kBvhLeafSize = 8;  // maximum number of values in a leaf
 
-// What a child slot refers to: `count` values from `first` on, or node `first` where count is 0. Without defaults, so
-// that the stack of a visit costs nothing to set up.
+// Content of a child slot. A leaf (count > 0) holds the values at positions first .. first + count - 1; an inner child
+// (count == 0) is node `first`. It has no default member initializers, so that the stack of a visit needs no set-up.
 struct BvhChild {
   uint32_t first;
   uint32_t count;
@@ -23,7 +23,7 @@ struct BvhChild {
   bool is_leaf() const { return count != 0; }
 };
 
-// Slots from child_count on are unused.
+// One node: bounds and content of up to eight children. Slots from child_count on are unused.
 template <class S>
 struct BvhNode {
   std::array<Aabb<S>, kBvhWidth> bounds;
@@ -31,8 +31,9 @@ struct BvhNode {
   uint32_t child_count = 0;
 };
 
-// Node 0 is the root; nodes stand in depth-first order, and so do the values: position i of the tree holds value
-// order[i] of the input, and every subtree is one contiguous range of positions. All empty for no values.
+// A whole tree over boxes. Node 0 is the root. Nodes and values are stored in depth-first order: position i of the tree
+// holds value order[i] of the input, and the values of a subtree have contiguous positions. All members are empty if
+// there are no values.
 template <class S>
 struct BvhLayout {
   std::vector<BvhNode<S>> nodes;

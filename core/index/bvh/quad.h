@@ -1,5 +1,6 @@
-// Three coordinates and a spare number side by side, so that the builder handles the axes of a float box by one vector
-// instruction each. Lanes are read by subscript or copied out, never by casting pointers. Plain data.
+// Vector of four lanes: the coordinates x, y, z and a spare value, so that the builder processes all axes of a float
+// box by one vector instruction. Lanes are read by subscript or copied out, never by casting pointers: GCC 12
+// miscompiles such casts. Plain data.
 #ifndef LOCUS_CORE_INDEX_BVH_QUAD_H_
 #define LOCUS_CORE_INDEX_BVH_QUAD_H_
 
@@ -22,19 +23,19 @@ struct Quad<float> {
 
   float operator[](int lane) const { return lanes[lane]; }
   static Quad of(float x, float y, float z, float spare) { return {Lanes{x, y, z, spare}}; }
-  static Quad all(float value) { return {Lanes{value, value, value, value}}; }
+  static Quad splat(float value) { return {Lanes{value, value, value, value}}; }
 
   friend Quad operator+(Quad a, Quad b) { return {a.lanes + b.lanes}; }
   friend Quad operator-(Quad a, Quad b) { return {a.lanes - b.lanes}; }
   friend Quad operator*(Quad a, Quad b) { return {a.lanes * b.lanes}; }
-  // The second where either is not a number.
+  // Lane by lane. If either lane is NaN, the result is the lane of `b`.
   friend Quad minimum(Quad a, Quad b) { return {a.lanes < b.lanes ? a.lanes : b.lanes}; }
   friend Quad maximum(Quad a, Quad b) { return {a.lanes > b.lanes ? a.lanes : b.lanes}; }
 
-  // 1 where a <= b, else 0.
-  friend Quad not_above(Quad a, Quad b) { return {a.lanes <= b.lanes ? all(1).lanes : all(0).lanes}; }
+  // Returns 1 in each lane where a <= b, else 0.
+  friend Quad less_or_equal(Quad a, Quad b) { return {a.lanes <= b.lanes ? splat(1).lanes : splat(0).lanes}; }
 
-  // Truncated. Lanes must fit.
+  // Converts each lane by truncation. The lanes must be in the range of int32_t.
   std::array<int32_t, 4> to_int() const {
     using Integers = int32_t __attribute__((vector_size(16)));
     const auto integers = __builtin_convertvector(lanes, Integers);
@@ -44,14 +45,14 @@ struct Quad<float> {
   }
 };
 
-// Doubles go one by one: sets of instances are small next to meshes.
+// Processes its lanes one by one: trees of doubles hold instances, which are few compared to the triangles of a mesh.
 template <>
 struct Quad<double> {
   std::array<double, 4> lanes;
 
   double operator[](int lane) const { return lanes[static_cast<size_t>(lane)]; }
   static Quad of(double x, double y, double z, double spare) { return {{x, y, z, spare}}; }
-  static Quad all(double value) { return {{value, value, value, value}}; }
+  static Quad splat(double value) { return {{value, value, value, value}}; }
 
   template <class Combine>
   static Quad each(const Quad& a, const Quad& b, Combine combine) {
@@ -73,7 +74,7 @@ struct Quad<double> {
   friend Quad maximum(const Quad& a, const Quad& b) {
     return each(a, b, [](double x, double y) { return x > y ? x : y; });
   }
-  friend Quad not_above(const Quad& a, const Quad& b) {
+  friend Quad less_or_equal(const Quad& a, const Quad& b) {
     return each(a, b, [](double x, double y) { return x <= y ? 1.0 : 0.0; });
   }
 
@@ -83,12 +84,13 @@ struct Quad<double> {
   }
 };
 
-// A box of quads. The spare lane means nothing. Without defaults: arrays of it are larger than what is used of them.
+// A box of quads; the spare lanes are ignored. It has no default member initializers, because only a part of the arrays
+// of boxes that the splitter declares is used.
 template <class S>
 struct QuadBox {
   Quad<S> min, max;
 
-  static QuadBox empty() { return {Quad<S>::all(Aabb<S>::kInfinity), Quad<S>::all(-Aabb<S>::kInfinity)}; }
+  static QuadBox empty() { return {Quad<S>::splat(Aabb<S>::kInfinity), Quad<S>::splat(-Aabb<S>::kInfinity)}; }
   static QuadBox of(const Aabb<S>& box) {
     return {Quad<S>::of(box.min.x, box.min.y, box.min.z, 0), Quad<S>::of(box.max.x, box.max.y, box.max.z, 0)};
   }

@@ -4,22 +4,25 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
 using limits::kMaxBvhBins;
 
-// Up to so many references are sorted instead of binned.
+// Maximum number of references that are sorted instead of binned.
 constexpr size_t kMaxSorted = 32;
-// References between two looks at the cancel flag.
+// References processed between two checks of the cancel flag.
 constexpr size_t kReferencesBetweenChecks = 1u << 16;
-// Of a reference beside a block. Of cuts that leave as many blocks at best, whose cost is equal else, those are good
-// that leave few references in large boxes. Much more would make emptier blocks, which take memory.
+// Cost of a reference relative to that of a block. It decides between cuts with an equal number of blocks, which would
+// cost the same otherwise: the better one leaves fewer references in large boxes. A much larger value would result in
+// emptier blocks, which take memory.
 constexpr double kReferenceCost = 1.0 / 128;
 
-// Calls `each` for pieces of `references` in turn. False when told to stop.
+// Calls `each` for successive chunks of `references`. Returns false if the build was cancelled.
 template <class S, class Each>
-bool in_pieces(BoxReferences<S> references, const BvhOptions& options, Each each) {
+bool for_each_chunk(BoxReferences<S> references, const BvhOptions& options, Each each) {
   while (!references.empty()) {
     if (cancelled(options)) return false;
     each(references.subspan(0, kReferencesBetweenChecks));
@@ -28,12 +31,13 @@ bool in_pieces(BoxReferences<S> references, const BvhOptions& options, Each each
   return true;
 }
 
-// Maps centres to bins along all axes at once. An axis where all centres coincide, or their spread is beyond the
-// arithmetic, has one bin.
+// Maps centres to bins along all axes at once. An axis has only one bin if all centres coincide along it, or if their
+// spread overflows or underflows.
 template <class S>
 class Binning {
  public:
-  Binning(const QuadBox<S>& centers, uint32_t bins) : low_(centers.min), last_(Quad<S>::all(static_cast<S>(bins - 1))) {
+  Binning(const QuadBox<S>& centers, uint32_t bins)
+      : low_(centers.min), last_(Quad<S>::splat(static_cast<S>(bins - 1))) {
     std::array<S, 3> scale{};
     for (int axis = 0; axis < 3; ++axis) {
       const S wanted = static_cast<S>(bins) / (centers.max[axis] - centers.min[axis]);
@@ -43,35 +47,37 @@ class Binning {
   }
 
   std::array<int32_t, 4> bins_of(const BoxReference<S>& reference) const {
-    const Quad<S> place = (reference.center() - low_) * scale_;
-    return minimum(maximum(place, Quad<S>::all(0)), last_).to_int();
+    const Quad<S> position = (reference.center() - low_) * scale_;
+    return minimum(maximum(position, Quad<S>::splat(0)), last_).to_int();
   }
 
  private:
   Quad<S> low_, last_, scale_;
 };
 
+// Bounds and number of the references in each bin, by axis.
 template <class S>
 struct Bins {
   std::array<std::array<QuadBox<S>, kMaxBvhBins>, 3> boxes;
   std::array<std::array<uint32_t, kMaxBvhBins>, 3> counts;
 };
 
-// What it costs to meet a part's box, by the references in it.
+// Returns the cost of visiting a part with `count` references.
 template <class S>
 S cost_of(uint32_t count) {
   return static_cast<S>(blocks_for(count)) + static_cast<S>(kReferenceCost) * static_cast<S>(count);
 }
 
+// A cut of a range into two parts.
 template <class S>
 struct Split {
   int axis = -1;     // none found
   uint32_t bin = 0;  // first bin of the right part
   S cost = std::numeric_limits<S>::infinity();
-  uint32_t imbalance = 0;  // between cuts of equal cost the evener one is better
+  uint32_t imbalance = 0;  // decides between cuts of equal cost: the smaller one is better
 };
 
-// Sweeps one axis' bins from both sides; keeps the cheapest cut in `best`.
+// Sweeps the bins of one axis from both sides. Stores the cheapest cut in `best` if it is better than `best`.
 template <class S>
 void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uint32_t total, Split<S>& best) {
   std::array<S, kMaxBvhBins> right_cost;
@@ -93,32 +99,33 @@ void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uin
   }
 }
 
-// The orders of few references along the axes, by centres, equal ones as they stand.
+// Orders of up to kMaxSorted references along each axis: sorted by centre, stable.
 template <class S>
 class Orders {
  public:
-  // A reference's place is the number of those before it: all pairs are compared, along all axes at once and without a
-  // branch.
+  // Computes the rank of each reference, which is the number of references before it. All pairs are compared, along all
+  // axes at once and without a branch.
   explicit Orders(BoxReferences<S> references) {
-    std::array<Quad<S>, kMaxSorted> centers, places;
+    LOCUS_DCHECK_LE(references.size(), kMaxSorted);
+    std::array<Quad<S>, kMaxSorted> centers, ranks;
     for (size_t i = 0; i < references.size(); ++i) {
       const Quad<S> center = references[i].center();
-      Quad<S> place = Quad<S>::all(0);
+      Quad<S> rank = Quad<S>::splat(0);
       for (size_t j = 0; j < i; ++j) {
-        const Quad<S> before = not_above(centers[j], center);
-        place = place + before;
-        places[j] = places[j] + (Quad<S>::all(1) - before);
+        const Quad<S> not_after = less_or_equal(centers[j], center);
+        rank = rank + not_after;
+        ranks[j] = ranks[j] + (Quad<S>::splat(1) - not_after);
       }
       centers[i] = center;
-      places[i] = place;
+      ranks[i] = rank;
     }
     for (size_t i = 0; i < references.size(); ++i) {
-      const std::array<int32_t, 4> place = places[i].to_int();
-      for (size_t axis = 0; axis < 3; ++axis) order_[axis][static_cast<size_t>(place[axis])] = static_cast<uint8_t>(i);
+      const std::array<int32_t, 4> rank = ranks[i].to_int();
+      for (size_t axis = 0; axis < 3; ++axis) order_[axis][static_cast<size_t>(rank[axis])] = static_cast<uint8_t>(i);
     }
   }
 
-  size_t at(size_t axis, size_t place) const { return order_[axis][place]; }
+  size_t at(size_t axis, size_t rank) const { return order_[axis][rank]; }
 
   void apply(size_t axis, BoxReferences<S> references) const {
     std::array<BoxReference<S>, kMaxSorted> ordered;
@@ -130,7 +137,8 @@ class Orders {
   std::array<std::array<uint8_t, kMaxSorted>, 3> order_;
 };
 
-// Sweeps one axis from both sides; keeps the cheapest cut in `best`, whose bin is the left part's length.
+// Sweeps the sorted references of one axis from both sides. Stores the cheapest cut in `best` if it is better than
+// `best`; its `bin` is the length of the left part.
 template <class S>
 void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, size_t axis, Split<S>& best) {
   const size_t count = references.size();
@@ -150,15 +158,16 @@ void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, siz
   }
 }
 
+// Computes the bounds and the number of references of each bin.
 template <class S>
-void fill(BoxReferences<S> references, const Binning<S>& binning, uint32_t bin_count, const BvhOptions& options,
-          Bins<S>& bins) {
+void fill_bins(BoxReferences<S> references, const Binning<S>& binning, uint32_t bin_count, const BvhOptions& options,
+               Bins<S>& bins) {
   for (size_t axis = 0; axis < 3; ++axis) {
     std::fill_n(bins.boxes[axis].begin(), bin_count, QuadBox<S>::empty());
     std::fill_n(bins.counts[axis].begin(), bin_count, 0u);
   }
-  in_pieces(references, options, [&](BoxReferences<S> piece) {
-    for (const BoxReference<S>& reference : piece) {
+  for_each_chunk(references, options, [&](BoxReferences<S> chunk) {
+    for (const BoxReference<S>& reference : chunk) {
       const std::array<int32_t, 4> at = binning.bins_of(reference);
       for (size_t axis = 0; axis < 3; ++axis) {
         const auto bin = static_cast<size_t>(at[axis]);
@@ -169,26 +178,26 @@ void fill(BoxReferences<S> references, const Binning<S>& binning, uint32_t bin_c
   });
 }
 
-// The left part first; finds the extents of centres on the way. Every reference is swapped, whichever way it goes: a
-// branch here would be mispredicted half of the time.
+// Moves the references of the left part to the front and computes the bounds of both parts' centres in the same pass.
+// Every reference is swapped, whatever its part: a branch here would be mispredicted half of the time.
 template <class S>
 Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, const Split<S>& split,
                     const BvhOptions& options) {
-  const Quad<S> nowhere = Quad<S>::all(Aabb<S>::kInfinity), here = Quad<S>::all(0);
-  const std::array<Quad<S>, 3> away = {nowhere, here, nowhere};
+  const Quad<S> excluded = Quad<S>::splat(Aabb<S>::kInfinity), included = Quad<S>::splat(0);
+  const std::array<Quad<S>, 3> offsets = {excluded, included, excluded};
   const auto bin = static_cast<int32_t>(split.bin);
   const auto axis = static_cast<size_t>(split.axis);
   Halves<S> halves;
   size_t left = 0;
-  in_pieces(references, options, [&](BoxReferences<S> piece) {
-    for (BoxReference<S>& reference : piece) {
+  for_each_chunk(references, options, [&](BoxReferences<S> chunk) {
+    for (BoxReference<S>& reference : chunk) {
       const BoxReference<S> moving = reference;
       const size_t goes_left = binning.bins_of(moving)[axis] < bin ? 1 : 0;
       const Quad<S> center = moving.center();
       for (size_t part = 0; part < 2; ++part) {
         QuadBox<S>& centers = halves.parts[part].centers;
-        centers.min = minimum(center + away[part + goes_left], centers.min);
-        centers.max = maximum(center - away[part + goes_left], centers.max);
+        centers.min = minimum(center + offsets[part + goes_left], centers.min);
+        centers.max = maximum(center - offsets[part + goes_left], centers.max);
       }
       reference = references[left];
       references[left] = moving;
@@ -196,17 +205,20 @@ Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, cons
     }
   });
   halves.left_count = static_cast<uint32_t>(left);
+  LOCUS_DCHECK_LE(left, references.size());
   return halves;
 }
 
-// No left part where the heuristic finds nothing.
+// Splits by bins. Returns an empty left part if the heuristic finds no cut.
 template <class S>
 Halves<S> split_binned(BoxReferences<S> references, const Extent<S>& extent, const BvhOptions& options) {
   const auto count = static_cast<uint32_t>(references.size());
+  LOCUS_DCHECK_GE(options.bins, 2);
+  LOCUS_DCHECK_LE(options.bins, static_cast<int>(kMaxBvhBins));
   const uint32_t bin_count = std::min(static_cast<uint32_t>(options.bins), 4 + count / 16);
   const Binning<S> binning(extent.centers, bin_count);
   Bins<S> bins;
-  fill(references, binning, bin_count, options, bins);
+  fill_bins(references, binning, bin_count, options, bins);
   Split<S> best;
   for (size_t axis = 0; axis < 3; ++axis) find_cheapest_cut(bins, axis, bin_count, count, best);
   if (best.axis < 0) return {};
@@ -216,7 +228,7 @@ Halves<S> split_binned(BoxReferences<S> references, const Extent<S>& extent, con
   return halves;
 }
 
-// Tries every cut of the centres' orders along each axis. No left part where areas are beyond the arithmetic.
+// Splits at the cheapest cut of the sorted centres along any axis. Returns an empty left part if areas overflow.
 template <class S>
 Halves<S> split_sorted(BoxReferences<S> references) {
   const Orders<S> orders(references);
@@ -227,12 +239,13 @@ Halves<S> split_sorted(BoxReferences<S> references) {
   return {best.bin, {extent_of<S>(references.subspan(0, best.bin)), extent_of<S>(references.subspan(best.bin))}};
 }
 
+// Splits at the median centre along the axis of the largest spread.
 template <class S>
 Halves<S> halve(BoxReferences<S> references, const QuadBox<S>& centers) {
   const Vec3<S> spread = centers.box().extent();
   const int axis = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
   const size_t middle = references.size() / 2;
-  // The index decides between equal centres, so that the halves do not depend on the order found here.
+  // The index decides between equal centres, so that the halves do not depend on the order of the input.
   std::nth_element(references.begin(), references.begin() + middle, references.end(),
                    [axis](const BoxReference<S>& a, const BoxReference<S>& b) {
                      const S center_a = a.center()[axis], center_b = b.center()[axis];
@@ -257,10 +270,29 @@ Extent<S> extent_of(BoxReferences<S> references) {
 template <class S>
 Halves<S> Splitter<S>::split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const {
   const auto count = static_cast<uint32_t>(references.size());
+  LOCUS_DCHECK_LT(kBvhLeafSize, count);
+  LOCUS_DCHECK_LE(balanced_levels(count), levels + 1);
   Halves<S> halves = count <= kMaxSorted ? split_sorted(references) : split_binned(references, extent, options_);
   const bool found = halves.left_count != 0;
-  if (found && balanced_levels(std::max(halves.left_count, count - halves.left_count)) <= levels) return halves;
-  return halve(references, extent.centers);
+  if (!found || balanced_levels(std::max(halves.left_count, count - halves.left_count)) > levels)
+    halves = halve(references, extent.centers);
+  check_halves(references, extent, levels, halves);
+  return halves;
+}
+
+template <class S>
+void Splitter<S>::check_halves(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels,
+                               const Halves<S>& halves) const {
+  if constexpr (kDebugChecks) {
+    if (cancelled(options_)) return;
+    const auto count = static_cast<uint32_t>(references.size()), left_count = halves.left_count;
+    LOCUS_DCHECK_LT(0u, left_count);
+    LOCUS_DCHECK_LT(left_count, count);
+    LOCUS_DCHECK_LE(balanced_levels(std::max(left_count, count - left_count)), levels);
+    LOCUS_DCHECK(extent_of(references.subspan(0, left_count)).bounds.box() == halves.parts[0].bounds.box());
+    LOCUS_DCHECK(extent_of(references.subspan(left_count)).bounds.box() == halves.parts[1].bounds.box());
+    LOCUS_DCHECK(merge(halves.parts[0].bounds.box(), halves.parts[1].bounds.box()) == extent.bounds.box());
+  }
 }
 
 template Extent<float> extent_of(BoxReferences<float>);

@@ -1,7 +1,7 @@
-// Splits ranges of boxes in two: by the binned surface area heuristic, few boxes by every cut of their sorted centres,
-// and by halves where areas tell nothing. What a part costs is its area times the blocks that its boxes fill at best
-// and a little for each box. Internal to this folder. Pure functions. Source: Wald, On fast Construction of SAH-based
-// Bounding Volume Hierarchies, 2007.
+// Splits a range of boxes into two parts by the surface area heuristic: large ranges by bins, small ranges by trying
+// every cut of the sorted centres. If the heuristic finds no cut, the range is halved. The cost of a part is its
+// surface area times (the minimum number of leaves for its boxes + a small term for each box). Internal to this folder.
+// Pure functions. Source: Wald, On fast Construction of SAH-based Bounding Volume Hierarchies, 2007.
 #ifndef LOCUS_CORE_INDEX_BVH_SPLITTER_H_
 #define LOCUS_CORE_INDEX_BVH_SPLITTER_H_
 
@@ -15,9 +15,10 @@
 
 namespace locus {
 
+// Returns the minimum number of leaves (blocks) for `count` values.
 constexpr uint32_t blocks_for(uint32_t count) { return (count + kBvhLeafSize - 1) / kBvhLeafSize; }
 
-// Levels that halving needs below a range until its parts fit leaves.
+// Returns the number of times a range must be halved until each part fits in a leaf.
 constexpr uint32_t balanced_levels(uint32_t count) {
   return static_cast<uint32_t>(std::bit_width(blocks_for(count) - 1));
 }
@@ -26,33 +27,41 @@ static_assert(balanced_levels(8) == 0 && balanced_levels(9) == 1 && balanced_lev
 static_assert(balanced_levels(limits::kMaxBvhValues) < limits::kMaxBvhDepth,
               "halving alone stays within the depth limit");
 
-// Bounds of references, and of their centres.
+// Bounds of a range of references, and bounds of their centres.
 template <class S>
 struct Extent {
   QuadBox<S> bounds = QuadBox<S>::empty();
   QuadBox<S> centers = QuadBox<S>::empty();
 };
 
+// Returns the extent of a range. O(n).
 template <class S>
 Extent<S> extent_of(BoxReferences<S> references);
 
-// Two parts of a range of references, each with its extent.
+// Result of a split: the length of the left part, and the extents of both parts.
 template <class S>
 struct Halves {
   uint32_t left_count = 0;
   std::array<Extent<S>, 2> parts;
 };
 
+// Splits ranges for one build. Borrows the options.
 template <class S>
 class Splitter {
  public:
   explicit Splitter(const BvhOptions& options) : options_(options) {}
 
-  // Reorders `references`, more than a leaf of them; both parts hold some. By halves too where another cut would leave
-  // too few of the `levels` below to halve the larger part. Means nothing once the build is cancelled.
+  // Reorders `references`, which must be too many for a leaf, so that the left part stands before the right part;
+  // neither part is empty. `levels` is the number of levels available below the parts. If the best cut would need more
+  // levels to halve its larger part into leaves, the range is halved instead. The result is undefined if the build was
+  // cancelled.
   Halves<S> split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const;
 
  private:
+  // Verifies the result of split() in debug builds, unless the build was cancelled. O(n).
+  void check_halves(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels,
+                    const Halves<S>& halves) const;
+
   const BvhOptions& options_;
 };
 

@@ -14,51 +14,54 @@
 namespace locus {
 namespace {
 
-// Blocks or nodes that one thread fills at once.
-constexpr size_t kPiece = 4096;
+// Blocks or nodes in one task.
+constexpr size_t kChunk = 4096;
 
-absl::Status no_outline(absl::string_view why) {
-  return absl::InvalidArgumentError(absl::StrCat("the outline of the tree does not fit: ", why));
+// Returns INVALID_ARGUMENT.
+absl::Status mismatch(absl::string_view why) {
+  return absl::InvalidArgumentError(absl::StrCat("the topology does not fit the mesh: ", why));
 }
 
+// Restores a tree: verifies the topology, links blocks and nodes, then computes their boxes from the triangles.
 class Restorer {
  public:
   Restorer(const TreeTopology& topology, uint32_t triangle_count, absl::FunctionRef<Triangle(uint32_t)> triangle,
            const BvhOptions& options)
-      : outline_(topology), triangle_(triangle), options_(options) {
+      : topology_(topology), triangle_(triangle), options_(options) {
     arrays_.triangle_count = triangle_count;
     arrays_.block_count = static_cast<uint32_t>(topology.block_sizes.size());
     arrays_.node_count = static_cast<uint32_t>(topology.nodes.size());
   }
 
   absl::StatusOr<TriangleArrays> restore() {
-    RETURN_IF_ERROR(check_numbers());
+    RETURN_IF_ERROR(check_triangle_numbers());
     make_arrays();
-    RETURN_IF_ERROR(place_blocks());
-    RETURN_IF_ERROR(place_nodes());
-    in_pieces(arrays_.block_count, [this](uint32_t block) { fill(block); });
+    RETURN_IF_ERROR(set_block_positions());
+    RETURN_IF_ERROR(link_nodes());
+    for_each_in_chunks(arrays_.block_count, [this](uint32_t block) { fill_block_at(block); });
     if (cancelled(options_)) return cancelled_build();
-    enclose();
-    in_pieces(arrays_.node_count, [this](uint32_t node) { fill_node(node); });
+    compute_node_boxes();
+    for_each_in_chunks(arrays_.node_count, [this](uint32_t node) { fill_node_at(node); });
     if (cancelled(options_)) return cancelled_build();
     return std::move(arrays_);
   }
 
  private:
-  struct Waiting {
+  struct Pending {
     uint32_t parent, slot;
     uint32_t depth;
   };
 
-  // That every triangle is there, once.
-  absl::Status check_numbers() const {
-    if (outline_.numbers.size() != arrays_.triangle_count) return no_outline("other triangles");
-    if (outline_.nodes.empty() || outline_.nodes.size() > outline_.numbers.size() ||
-        outline_.block_sizes.size() > outline_.numbers.size())
-      return no_outline("nodes or blocks without triangles");
+  // Verifies that every triangle number occurs exactly once.
+  absl::Status check_triangle_numbers() const {
+    if (topology_.numbers.size() != arrays_.triangle_count) return mismatch("different number of triangles");
+    if (topology_.nodes.empty() || topology_.nodes.size() > topology_.numbers.size() ||
+        topology_.block_sizes.size() > topology_.numbers.size())
+      return mismatch("no nodes, or more nodes or blocks than triangles");
     std::vector<bool> seen(arrays_.triangle_count);
-    for (const uint32_t number : outline_.numbers) {
-      if (number >= arrays_.triangle_count || seen[number]) return no_outline("a triangle is missing");
+    for (const uint32_t number : topology_.numbers) {
+      if (number >= arrays_.triangle_count || seen[number])
+        return mismatch("a triangle number is repeated or out of range");
       seen[number] = true;
     }
     return absl::OkStatus();
@@ -69,73 +72,75 @@ class Restorer {
     arrays_.ranges = make_large_array<NodeRange>(arrays_.node_count);
     arrays_.blocks = make_large_array<TriangleBlock>(arrays_.block_count);
     arrays_.numbers = make_large_array<uint32_t>(arrays_.triangle_count);
-    std::copy(outline_.numbers.begin(), outline_.numbers.end(), arrays_.numbers.get());
+    std::copy(topology_.numbers.begin(), topology_.numbers.end(), arrays_.numbers.get());
     block_boxes_.resize(arrays_.block_count);
     node_boxes_.resize(arrays_.node_count);
   }
 
-  // Which triangles each block has.
-  absl::Status place_blocks() {
+  // Computes the first position of each block.
+  absl::Status set_block_positions() {
     uint64_t position = 0;
     for (uint32_t block = 0; block < arrays_.block_count; ++block) {
-      const uint32_t size = outline_.block_sizes[block];
-      if (size == 0 || size > kTreeWidth) return no_outline("the size of a block");
+      const uint32_t size = topology_.block_sizes[block];
+      if (size == 0 || size > kTreeWidth) return mismatch("block size out of range");
       arrays_.blocks[block].first = static_cast<uint32_t>(position);
       position += size;
     }
-    if (position != arrays_.triangle_count) return no_outline("blocks of other triangles");
+    if (position != arrays_.triangle_count) return mismatch("block sizes do not add up to the number of triangles");
     return absl::OkStatus();
   }
 
-  // Which children each node has, and with which triangle it begins.
-  absl::Status place_nodes() {
+  // Sets the children of each node, and the first position of its triangles.
+  absl::Status link_nodes() {
     uint32_t next_block = 0;
-    std::vector<Waiting> waiting = {{0, 0, 1}};
-    for (uint32_t number = 0; number < arrays_.node_count; ++number) {
-      if (waiting.empty()) return no_outline("nodes too many");
-      const Waiting now = waiting.back();
-      waiting.pop_back();
-      if (now.depth > limits::kMaxBvhDepth) return no_outline("too deep");
-      if (number > 0) arrays_.nodes[now.parent].child[now.slot] = number;
+    std::vector<Pending> pending = {{0, 0, 1}};
+    for (uint32_t index = 0; index < arrays_.node_count; ++index) {
+      if (pending.empty()) return mismatch("too many nodes");
+      const Pending now = pending.back();
+      pending.pop_back();
+      if (now.depth > limits::kMaxBvhDepth) return mismatch("too deep");
+      if (index > 0) arrays_.nodes[now.parent].child[now.slot] = index;
       arrays_.depth = std::max(arrays_.depth, now.depth);
-      const NodeOutline children = outline_.nodes[number];
+      const NodeOutline children = topology_.nodes[index];
       const uint32_t used = children.blocks | children.nodes;
       if ((children.blocks & children.nodes) != 0 || used == 0 || (used & (used + 1)) != 0)
-        return no_outline("the children of a node");
+        return mismatch("invalid children of a node");
       if (arrays_.block_count - next_block < static_cast<uint32_t>(std::popcount(children.blocks)))
-        return no_outline("blocks are missing");
-      // Where there is no block left for what is below, the walk fails there.
-      arrays_.ranges[number].first =
+        return mismatch("too few blocks");
+      // If no block is left, a node below this one is refused.
+      arrays_.ranges[index].first =
           next_block < arrays_.block_count ? arrays_.blocks[next_block].first : arrays_.triangle_count;
-      TriangleNode& node = arrays_.nodes[number];
+      TriangleNode& node = arrays_.nodes[index];
       std::fill(std::begin(node.child), std::end(node.child), kNoChild);
       for (uint32_t slot = 0; slot < kTreeWidth; ++slot)
         if ((children.blocks >> slot & 1u) != 0) node.child[slot] = kBlockBit | next_block++;
       for (uint32_t slot = kTreeWidth; slot-- > 0;)
-        if ((children.nodes >> slot & 1u) != 0) waiting.push_back({number, slot, now.depth + 1});
+        if ((children.nodes >> slot & 1u) != 0) pending.push_back({index, slot, now.depth + 1});
     }
-    if (!waiting.empty()) return no_outline("nodes are missing");
-    if (next_block != arrays_.block_count) return no_outline("blocks too many");
+    if (!pending.empty()) return mismatch("too few nodes");
+    if (next_block != arrays_.block_count) return mismatch("too many blocks");
     return absl::OkStatus();
   }
 
-  void in_pieces(uint32_t count, absl::FunctionRef<void(uint32_t)> work) const {
-    for_each(options_, (count + kPiece - 1) / kPiece, [&](size_t piece) {
+  // Calls work(0) .. work(count - 1) in parallel tasks; skips the rest if the build is cancelled.
+  void for_each_in_chunks(uint32_t count, absl::FunctionRef<void(uint32_t)> work) const {
+    for_each(options_, (count + kChunk - 1) / kChunk, [&](size_t chunk) {
       if (cancelled(options_)) return;
-      const auto end = static_cast<uint32_t>(std::min<size_t>(count, (piece + 1) * kPiece));
-      for (auto i = static_cast<uint32_t>(piece * kPiece); i < end; ++i) work(i);
+      const auto end = static_cast<uint32_t>(std::min<size_t>(count, (chunk + 1) * kChunk));
+      for (auto i = static_cast<uint32_t>(chunk * kChunk); i < end; ++i) work(i);
     });
   }
 
-  void fill(uint32_t number) {
-    TriangleBlock& block = arrays_.blocks[number];
-    const uint32_t size = outline_.block_sizes[number];
+  void fill_block_at(uint32_t index) {
+    TriangleBlock& block = arrays_.blocks[index];
+    const uint32_t size = topology_.block_sizes[index];
     std::array<Triangle, kTreeWidth> triangles;
-    Aabbf& box = block_boxes_[number];
-    for (uint32_t place = 0; place < size; ++place) {
-      triangles[place] = triangle_(arrays_.numbers[block.first + place]);
-      box = merge(box, bounds_of(triangles[place]));
+    Aabbf& box = block_boxes_[index];
+    for (uint32_t lane = 0; lane < size; ++lane) {
+      triangles[lane] = triangle_(arrays_.numbers[block.first + lane]);
+      box = merge(box, bounds_of(triangles[lane]));
     }
+    LOCUS_DCHECK(is_finite(box.min) && is_finite(box.max));
     fill_block(absl::MakeConstSpan(triangles).first(size), box, block.first, block);
   }
 
@@ -146,28 +151,30 @@ class Restorer {
     return (child & kBlockBit) != 0 ? arrays_.blocks[child & ~kBlockBit].count : arrays_.ranges[child].count;
   }
 
-  // The boxes and sizes of all nodes, from the last on: children come behind their parents.
-  void enclose() {
-    for (uint32_t number = arrays_.node_count; number-- > 0;) {
+  // Computes the box and the number of triangles of each node, from the last node to the first: children follow their
+  // parents.
+  void compute_node_boxes() {
+    for (uint32_t index = arrays_.node_count; index-- > 0;) {
       uint32_t count = 0;
-      for (const uint32_t child : arrays_.nodes[number].child) {
+      for (const uint32_t child : arrays_.nodes[index].child) {
         if (child == kNoChild) break;
-        node_boxes_[number] = merge(node_boxes_[number], box_of(child));
+        LOCUS_DCHECK((child & kBlockBit) != 0 || index < child);
+        node_boxes_[index] = merge(node_boxes_[index], box_of(child));
         count += count_of(child);
       }
-      arrays_.ranges[number].count = count;
+      arrays_.ranges[index].count = count;
     }
   }
 
-  void fill_node(uint32_t number) {
-    TriangleNode& node = arrays_.nodes[number];
+  void fill_node_at(uint32_t index) {
+    TriangleNode& node = arrays_.nodes[index];
     std::array<Aabbf, kTreeWidth> boxes;
     size_t used = 0;
     for (; used < kTreeWidth && node.child[used] != kNoChild; ++used) boxes[used] = box_of(node.child[used]);
     fill_boxes(absl::MakeConstSpan(boxes).first(used), node);
   }
 
-  const TreeTopology& outline_;
+  const TreeTopology& topology_;
   const absl::FunctionRef<Triangle(uint32_t)> triangle_;
   const BvhOptions& options_;
   TriangleArrays arrays_;
@@ -176,7 +183,7 @@ class Restorer {
 
 }  // namespace
 
-TreeTopology outline_of(const TriangleArrays& arrays) {
+TreeTopology topology_of(const TriangleArrays& arrays) {
   LOCUS_CHECK_LT(0u, arrays.node_count);
   TreeTopology topology;
   topology.numbers = {arrays.numbers.get(), arrays.triangle_count};
@@ -184,12 +191,13 @@ TreeTopology outline_of(const TriangleArrays& arrays) {
   for (uint32_t block = 0; block < arrays.block_count; ++block)
     topology.block_sizes.push_back(static_cast<uint8_t>(arrays.blocks[block].count));
   topology.nodes.resize(arrays.node_count);
-  for (uint32_t number = 0; number < arrays.node_count; ++number) {
+  for (uint32_t index = 0; index < arrays.node_count; ++index) {
     for (int slot = 0; slot < kTreeWidth; ++slot) {
-      const uint32_t child = arrays.nodes[number].child[slot];
+      const uint32_t child = arrays.nodes[index].child[slot];
       if (child == kNoChild) continue;
-      NodeOutline& node = topology.nodes[number];
+      NodeOutline& node = topology.nodes[index];
       uint8_t& kind = (child & kBlockBit) != 0 ? node.blocks : node.nodes;
+      LOCUS_DCHECK(slot == 0 || (node.blocks | node.nodes) >> (slot - 1) == 1);
       kind = static_cast<uint8_t>(kind | 1u << slot);
     }
   }

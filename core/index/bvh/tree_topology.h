@@ -1,7 +1,7 @@
-// What a build has found out about a mesh, without one coordinate: which triangles share a block, and which blocks and
-// nodes a node. Five bytes a triangle that give the same tree again in a fraction of the time, to the byte but for the
-// signs of zeros in boxes, and that can be wrong without harm: boxes are made from the triangles themselves, so
-// whatever an outline says, a tree that is restored from it answers right. A bad one only makes it slow.
+// Topology of a triangle tree: which triangles form a block, and which blocks and nodes are the children of a node. It
+// holds no coordinates and takes five bytes a triangle. The same tree is restored from it in a fraction of the time of
+// a build, byte for byte except for the signs of zeros in boxes. Boxes are computed from the triangles themselves, so
+// any topology that fits the mesh results in correct answers; a bad one only makes queries slow.
 //
 // Plain data; free functions, any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_TREE_TOPOLOGY_H_
@@ -20,7 +20,8 @@
 
 namespace locus {
 
-// Bit k of each: whether slot k holds a block, or a node. Slots are in use from the first on without a gap.
+// Children of one node. Bit k of `blocks` is set if slot k holds a block, bit k of `nodes` if it holds a node. Used
+// slots are contiguous from slot 0 on.
 struct NodeOutline {
   uint8_t blocks = 0;
   uint8_t nodes = 0;
@@ -28,18 +29,20 @@ struct NodeOutline {
   friend bool operator==(const NodeOutline&, const NodeOutline&) = default;
 };
 
-// All in the order of a TriangleTree: depth-first, the blocks of a node before the nodes below it.
+// Topology of a whole tree, in the order of a TriangleTree: depth-first, the blocks of a node before the nodes below
+// it.
 struct TreeTopology {
-  absl::Span<const uint32_t> numbers;  // of the triangles, by position; borrowed
-  std::vector<uint8_t> block_sizes;    // 1 to kTreeWidth
+  absl::Span<const uint32_t> numbers;  // triangle number of each position; borrowed
+  std::vector<uint8_t> block_sizes;    // triangles of each block, 1 to kTreeWidth
   std::vector<NodeOutline> nodes;
 };
 
-// Of a tree that is not empty. Borrows from it.
-TreeTopology outline_of(const TriangleArrays& arrays);
+// Returns the topology of a tree that is not empty. Borrows the triangle numbers from `arrays`.
+TreeTopology topology_of(const TriangleArrays& arrays);
 
-// Of `triangle_count` triangles, each number from 0 on asked for once, on any threads. INVALID_ARGUMENT for an outline
-// that is none of so many triangles, CANCELLED. O(n).
+// Restores the tree of a topology. Calls `triangle` once for each number below `triangle_count`, on any threads; the
+// vertices it returns must be finite. Errors: INVALID_ARGUMENT if the topology is not one of a tree of `triangle_count`
+// triangles within the depth limit; CANCELLED. O(n).
 absl::StatusOr<TriangleArrays> restore_arrays(const TreeTopology& topology, uint32_t triangle_count,
                                               absl::FunctionRef<Triangle(uint32_t)> triangle,
                                               const BvhOptions& options);

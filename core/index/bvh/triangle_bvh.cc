@@ -13,31 +13,34 @@
 namespace locus {
 
 static_assert(kTreeStack == limits::kMaxBvhDepth * (kTreeWidth - 1) + 1 + kTreeWidth);
+static_assert(limits::kMaxBvhValues < kBlockBit >> 1, "kernels use two flag bits in indices of nodes and blocks");
 
 namespace {
 
-// Triangles whose boxes one thread takes at once.
-constexpr size_t kPieceTriangles = 1u << 14;
+// Triangles in one task that computes boxes.
+constexpr size_t kChunkTriangles = 1u << 14;
 
-// False for a triangle that is not finite.
-bool refer(const Triangle& triangle, uint32_t index, BoxReference<float>& reference) {
+// Computes the reference of a triangle. Returns false if a vertex is not finite.
+bool make_reference(const Triangle& triangle, uint32_t index, BoxReference<float>& reference) {
   const Quad<float> a = Quad<float>::of(triangle.a.x, triangle.a.y, triangle.a.z, 0);
   const Quad<float> b = Quad<float>::of(triangle.b.x, triangle.b.y, triangle.b.z, 0);
   const Quad<float> c = Quad<float>::of(triangle.c.x, triangle.c.y, triangle.c.z, 0);
   reference = BoxReference<float>::of({minimum(minimum(a, b), c), maximum(maximum(a, b), c)}, index);
-  // No other numbers are not 0 when taken from themselves.
-  const Quad<float> nothing = (a - a) + (b - b) + (c - c);
-  return nothing[0] + nothing[1] + nothing[2] == 0;
+  // x - x is 0 for finite x, and NaN otherwise.
+  const Quad<float> difference = (a - a) + (b - b) + (c - c);
+  return difference[0] + difference[1] + difference[2] == 0;
 }
 
-// Fills one reference a triangle. Errors: the first triangle that is not finite; CANCELLED.
-absl::Status refer_all(absl::Span<const Triangle> triangles, const BvhOptions& options,
-                       BoxReference<float>* references) {
-  std::vector<size_t> bad((triangles.size() + kPieceTriangles - 1) / kPieceTriangles, triangles.size());
-  for_each(options, bad.size(), [&](size_t piece) {
-    const size_t end = std::min(triangles.size(), (piece + 1) * kPieceTriangles);
-    for (size_t i = piece * kPieceTriangles; i < end && !cancelled(options); ++i)
-      if (!refer(triangles[i], static_cast<uint32_t>(i), references[i])) bad[piece] = std::min(bad[piece], i);
+// Computes the references of all triangles. Errors: INVALID_ARGUMENT for the first triangle that is not finite;
+// CANCELLED.
+absl::Status make_references(absl::Span<const Triangle> triangles, const BvhOptions& options,
+                             BoxReference<float>* references) {
+  std::vector<size_t> bad((triangles.size() + kChunkTriangles - 1) / kChunkTriangles, triangles.size());
+  for_each(options, bad.size(), [&](size_t chunk) {
+    LOCUS_DCHECK_LT(chunk, bad.size());
+    const size_t end = std::min(triangles.size(), (chunk + 1) * kChunkTriangles);
+    for (size_t i = chunk * kChunkTriangles; i < end && !cancelled(options); ++i)
+      if (!make_reference(triangles[i], static_cast<uint32_t>(i), references[i])) bad[chunk] = std::min(bad[chunk], i);
   });
   if (cancelled(options)) return cancelled_build();
   const size_t first = *std::min_element(bad.begin(), bad.end());
@@ -51,12 +54,13 @@ absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triang
   TriangleBvh built;
   if (triangles.empty()) return built;
   auto references = std::make_unique_for_overwrite<BoxReference<float>[]>(triangles.size());
-  RETURN_IF_ERROR(refer_all(triangles, options, references.get()));
+  RETURN_IF_ERROR(make_references(triangles, options, references.get()));
   const auto count = static_cast<uint32_t>(triangles.size());
   ASSIGN_OR_RETURN(BinaryTree<float> tree, BinaryTree<float>::build(std::move(references), count, options));
   built.arrays_ = TriangleWriter(triangles, tree, options).write();
   if (cancelled(options)) return cancelled_build();
   built.set_bounds(tree.root().bounds);
+  built.check_invariants();
   LOCUS_CHECK_EQ(built.size(), triangles.size());
   LOCUS_CHECK_LE(built.depth(), limits::kMaxBvhDepth);
   return built;
@@ -72,6 +76,7 @@ absl::StatusOr<TriangleBvh> TriangleBvh::restore(const TreeTopology& topology, u
   Aabbf bounds;
   for (int slot = 0; slot < kTreeWidth && root.child[slot] != kNoChild; ++slot) bounds = merge(bounds, box(root, slot));
   restored.set_bounds(bounds);
+  restored.check_invariants();
   return restored;
 }
 
@@ -80,11 +85,71 @@ void TriangleBvh::set_bounds(const Aabbf& bounds) {
   magnitude_ = magnitude(bounds);
 }
 
+void TriangleBvh::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(depth(), limits::kMaxBvhDepth);
+    std::vector<uint32_t> pending = {0};
+    uint32_t next_node = 0, next_block = 0, next_position = 0;
+    while (!pending.empty()) {
+      const uint32_t index = pending.back();
+      pending.pop_back();
+      LOCUS_DCHECK_EQ(index, next_node);
+      ++next_node;
+      LOCUS_DCHECK_EQ(arrays_.ranges[index].first, next_position);
+      check_node(index);
+      const absl::Span<const uint32_t> children(arrays_.nodes[index].child);
+      for (const uint32_t child : children) {
+        if (child == kNoChild || (child & kBlockBit) == 0) continue;
+        LOCUS_DCHECK_EQ(child & ~kBlockBit, next_block);
+        ++next_block;
+        LOCUS_DCHECK_EQ(arrays_.blocks[child & ~kBlockBit].first, next_position);
+        next_position += arrays_.blocks[child & ~kBlockBit].count;
+      }
+      for (size_t slot = children.size(); slot-- > 0;)
+        if ((children[slot] & kBlockBit) == 0) pending.push_back(children[slot]);
+    }
+    LOCUS_DCHECK_EQ(next_node, arrays_.node_count);
+    LOCUS_DCHECK_EQ(next_block, arrays_.block_count);
+    LOCUS_DCHECK_EQ(next_position, arrays_.triangle_count);
+  }
+}
+
+// Verifies one node: contiguous slots, orders that contain every slot once, boxes that contain the boxes or triangles
+// below them, and the size of its range.
+void TriangleBvh::check_node(uint32_t index) const {
+  if constexpr (kDebugChecks) {
+    const TriangleNode& node = arrays_.nodes[index];
+    uint32_t count = 0;
+    for (int slot = 0; slot < kTreeWidth; ++slot) {
+      const uint32_t child = node.child[slot];
+      LOCUS_DCHECK(child == kNoChild || slot == 0 || node.child[slot - 1] != kNoChild);
+      uint32_t slots_in_order = 0;
+      for (int rank = 0; rank < kTreeWidth; ++rank) slots_in_order |= 1u << (node.order[slot] >> (3 * rank) & 7u);
+      LOCUS_DCHECK_EQ(slots_in_order, 0xFFu);
+      if (child == kNoChild) continue;
+      if ((child & kBlockBit) == 0) {
+        const TriangleNode& below = arrays_.nodes[child];
+        for (int i = 0; i < kTreeWidth && below.child[i] != kNoChild; ++i)
+          LOCUS_DCHECK(contains(box(node, slot), box(below, i)));
+        count += arrays_.ranges[child].count;
+      } else {
+        const TriangleBlock& block = arrays_.blocks[child & ~kBlockBit];
+        LOCUS_DCHECK(0 < block.count && block.count <= kTreeWidth);
+        for (uint32_t lane = 0; lane < block.count; ++lane)
+          LOCUS_DCHECK(contains(box(node, slot), bounds_of(triangle(block, lane))));
+        count += block.count;
+      }
+    }
+    LOCUS_DCHECK_LT(0u, count);
+    LOCUS_DCHECK_EQ(count, arrays_.ranges[index].count);
+  }
+}
+
 Triangle TriangleBvh::at(size_t position) const {
   LOCUS_CHECK_LT(position, size());
-  const auto behind = std::upper_bound(blocks().begin(), blocks().end(), position,
-                                       [](size_t wanted, const TriangleBlock& block) { return wanted < block.first; });
-  const TriangleBlock& block = *(behind - 1);
+  const auto next = std::upper_bound(blocks().begin(), blocks().end(), position,
+                                     [](size_t wanted, const TriangleBlock& block) { return wanted < block.first; });
+  const TriangleBlock& block = *(next - 1);
   return triangle(block, static_cast<uint32_t>(position - block.first));
 }
 
@@ -95,11 +160,11 @@ size_t TriangleBvh::bytes() const {
 
 double TriangleBvh::sah_cost() const {
   if (size() == 0) return 0;
-  const double whole = double{half_area(bounds_)};
+  const double root_area = double{half_area(bounds_)};
   double sum = 1;
   for (const TriangleNode& node : nodes()) {
     for (int slot = 0; slot < kTreeWidth; ++slot) {
-      if (node.child[slot] != kNoChild) sum += whole > 0 ? double{half_area(box(node, slot))} / whole : 1;
+      if (node.child[slot] != kNoChild) sum += root_area > 0 ? double{half_area(box(node, slot))} / root_area : 1;
     }
   }
   return sum;
@@ -112,14 +177,14 @@ Interval<float> TriangleBvh::node_interval(const SlabRay<float>& slabs, const Aa
   return result;
 }
 
-TriangleBvh::Pending* TriangleBvh::push_near(const TriangleNode& node, const float (&away)[kTreeWidth], float limit,
-                                             Pending* top) {
+TriangleBvh::Pending* TriangleBvh::push_near(const TriangleNode& node, const float (&distances)[kTreeWidth],
+                                             float limit, Pending* top) {
   Pending* const base = top;
   for (int slot = 0; slot < kTreeWidth; ++slot) {
-    if (away[slot] > limit || node.child[slot] == kNoChild) continue;
-    Pending* place = top++;
-    for (; place > base && place[-1].near < away[slot]; --place) *place = place[-1];
-    *place = {node.child[slot], away[slot]};
+    if (distances[slot] > limit || node.child[slot] == kNoChild) continue;
+    Pending* position = top++;
+    for (; position > base && position[-1].near < distances[slot]; --position) *position = position[-1];
+    *position = {node.child[slot], distances[slot]};
   }
   return top;
 }
@@ -131,9 +196,9 @@ TriangleBvh::Pending* TriangleBvh::push_hit(const TriangleNode& node, const Slab
     if (node.child[slot] == kNoChild) continue;
     const Interval<float> interval = node_interval(slabs, box(node, slot));
     if (interval.near > interval.far || interval.far < 0 || beyond(interval.near, limit)) continue;
-    Pending* place = top++;
-    for (; place > base && place[-1].near < interval.near; --place) *place = place[-1];
-    *place = {node.child[slot], interval.near};
+    Pending* position = top++;
+    for (; position > base && position[-1].near < interval.near; --position) *position = position[-1];
+    *position = {node.child[slot], interval.near};
   }
   return top;
 }

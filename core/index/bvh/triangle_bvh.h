@@ -1,9 +1,10 @@
-// The bounding volume hierarchy over one mesh's triangles, in the layout that the vector kernels read. As an index it
-// hands triangles to visitors, like Bvh; whoever only wants a ray's first hit, or whether there is one, asks the
-// kernels of ray_kernels.h for tree().
+// Bounding volume hierarchy over the triangles of one mesh, in the layout that the vector kernels read. As a spatial
+// index it hands triangles to visitors, like Bvh. Callers that need no visitor pass tree() to the faster kernels of
+// ray_kernels.h and region_kernels.h.
 //
-// Threads: immutable after build(); every member may run concurrently.
-// Invariants: as Bvh's. Every block's box is its child slot's box, and every box contains its triangles.
+// Threads: immutable after build() or restore(); every member may run concurrently.
+// Invariants: the box of a child slot contains all triangles below it; the depth is at most limits::kMaxBvhDepth;
+// nodes, blocks and triangles are stored in the depth-first order described in triangle_tree.h.
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
 
@@ -11,6 +12,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/triangle.h"
 #include "core/index/bvh/box_distances.h"
@@ -29,70 +31,80 @@ class TriangleBvh {
   // An empty tree.
   TriangleBvh() = default;
 
-  // Numbers must be unique; no triangles is legal. Errors: as build_bvh_layout().
+  // Builds a tree of `triangles`, whose numbers must be unique; an empty span is legal. Returns the errors of
+  // build_bvh_layout().
   static absl::StatusOr<TriangleBvh> build(absl::Span<const Triangle> triangles, const BvhOptions& options = {});
-  // The same tree again from what outline() gave, of triangles whose numbers are 0 to triangle_count - 1 and whose
-  // vertices are finite: O(n) and several times faster. From any other outline of so many triangles a tree that answers
-  // as right, if slower. Errors: as restore_arrays().
+  // Restores a tree from its topology(). The triangles have the numbers 0 to triangle_count - 1 and finite vertices.
+  // O(n) and several times faster than build(). Any other topology of that many triangles results in a tree with
+  // equally correct answers, possibly slower. Returns the errors of restore_arrays().
   static absl::StatusOr<TriangleBvh> restore(const TreeTopology& topology, uint32_t triangle_count,
                                              absl::FunctionRef<Triangle(uint32_t)> triangle,
                                              const BvhOptions& options = {});
 
   size_t size() const { return arrays_.triangle_count; }
-  // The triangle at a position of the storage order, which input and options fix, or the outline. Position below
-  // size().
+  // Returns the triangle at a position of the storage order, which is determined by the input and options of the build,
+  // or by the topology. `position` must be below size(). O(log n).
   Triangle at(size_t position) const;
-  // Of all triangles; empty for none.
+  // Returns the box around all triangles; an empty box for an empty tree.
   const Aabbf& bounds() const { return bounds_; }
   uint32_t depth() const { return arrays_.depth; }
   size_t node_count() const { return arrays_.node_count; }
   size_t block_count() const { return arrays_.block_count; }
-  // One of a block, which is one of tree(); place below the block's count.
-  Triangle triangle(const TriangleBlock& block, uint32_t place) const;
-  // All memory that stays taken besides the object itself.
+  // Returns a triangle of a block of this tree. `lane` must be below the block's count.
+  Triangle triangle(const TriangleBlock& block, uint32_t lane) const;
+  // Returns the allocated bytes, without the object itself.
   size_t bytes() const;
-  // As Bvh::sah_cost().
+  // Returns the expected cost of a random ray: see Bvh::sah_cost().
   double sah_cost() const;
-  // Not for an empty tree. Valid while this object stands.
-  TreeTopology topology() const { return outline_of(arrays_); }
-  // Valid while this object stands unmoved. Not for an empty tree.
+  // Returns the topology, which borrows from this object. The tree must not be empty.
+  TreeTopology topology() const { return topology_of(arrays_); }
+  // Returns a view of the arrays, valid until this object is moved or destroyed. The tree must not be empty.
   TriangleTree tree() const {
+    LOCUS_DCHECK_LT(0u, size());
     return {arrays_.nodes.get(), arrays_.ranges.get(), arrays_.blocks.get(), arrays_.numbers.get(), magnitude_};
   }
 
-  // In storage order.
+  // Calls `visit` for each triangle in storage order.
   template <class Visit>
   void for_each(Visit visit) const;
 
-  // Near to far by the boxes of nodes. Allocates nothing.
+  // Hands over candidates roughly in the order in which the ray enters their blocks. Allocates nothing.
   template <RayVisitor<Triangle> Visitor>
   void visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const;
 
-  // In storage order; hands over only triangles whose own bounds overlap. Allocates nothing.
+  // Hands over the triangles whose own bounds overlap the region, in storage order. Allocates nothing.
   template <RegionVisitor<Triangle> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
-  // Nearest boxes first, by distances in float that never exceed the true ones. Allocates nothing.
+  // Hands over candidates, roughly nearest first. Culls by distances in float, which never drop a triangle within the
+  // limit (box_distances.h). Allocates nothing.
   template <PointVisitor<Triangle> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
  private:
+  // Maximum number of pending children in a visit, without the elements that vector code may write beyond them.
+  static constexpr int kMaxPending = kTreeStack - kTreeWidth;
+
   struct Pending {
     uint32_t child;
     float near;
   };
 
   void set_bounds(const Aabbf& bounds);
-  // Boxes that start exactly at the limit are wanted: a lower number may wait there.
+  // Verifies the order of nodes, blocks and triangles, all ranges, boxes and orders. O(size).
+  void check_invariants() const;
+  void check_node(uint32_t index) const;
+  // Returns whether a box can be skipped. A box entered exactly at the limit cannot: it may hold an equal hit with a
+  // lower number.
   static bool beyond(float near, float limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
   static Aabbf box(const TriangleNode& node, int slot) {
     return {{node.bounds[0][slot], node.bounds[1][slot], node.bounds[2][slot]},
             {node.bounds[3][slot], node.bounds[4][slot], node.bounds[5][slot]}};
   }
   Interval<float> node_interval(const SlabRay<float>& slabs, const Aabbf& box) const;
-  // Puts the children within the limit on the stack, farthest first. Returns the new top.
-  static Pending* push_near(const TriangleNode& node, const float (&away)[kTreeWidth], float limit, Pending* top);
-  // Puts the children the ray may hit on the stack, farthest first. Returns the new top.
+  // Pushes the children within the limit, the nearest one last. Returns the new top.
+  static Pending* push_near(const TriangleNode& node, const float (&distances)[kTreeWidth], float limit, Pending* top);
+  // Pushes the children that the ray may hit within the limit, the nearest one last. Returns the new top.
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
 
   absl::Span<const TriangleNode> nodes() const { return {arrays_.nodes.get(), arrays_.node_count}; }
@@ -103,17 +115,18 @@ class TriangleBvh {
   float magnitude_ = 0;
 };
 
-inline Triangle TriangleBvh::triangle(const TriangleBlock& block, uint32_t place) const {
+inline Triangle TriangleBvh::triangle(const TriangleBlock& block, uint32_t lane) const {
+  LOCUS_DCHECK_LT(lane, block.count);
   const auto vertex = [&](int first) {
-    return Vec3f{block.vertices[first][place], block.vertices[first + 1][place], block.vertices[first + 2][place]};
+    return Vec3f{block.vertices[first][lane], block.vertices[first + 1][lane], block.vertices[first + 2][lane]};
   };
-  return {vertex(0), vertex(3), vertex(6), arrays_.numbers[block.first + place]};
+  return {vertex(0), vertex(3), vertex(6), arrays_.numbers[block.first + lane]};
 }
 
 template <class Visit>
 void TriangleBvh::for_each(Visit visit) const {
   for (const TriangleBlock& block : blocks()) {
-    for (uint32_t place = 0; place < block.count; ++place) visit(triangle(block, place));
+    for (uint32_t lane = 0; lane < block.count; ++lane) visit(triangle(block, lane));
   }
 }
 
@@ -125,17 +138,18 @@ void TriangleBvh::visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work&
   *top++ = {0, -std::numeric_limits<float>::infinity()};
   while (top != stack) {
     const Pending now = *--top;
-    // The limit may have fallen since the push.
+    // The limit may have decreased since the push.
     if (beyond(now.near, visitor.limit())) continue;
     if ((now.child & kBlockBit) == 0) {
       ++work.nodes;
       top = push_hit(arrays_.nodes[now.child], slabs, visitor.limit(), top);
+      LOCUS_DCHECK_LE(top - stack, kMaxPending);
       continue;
     }
     const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];
-    for (uint32_t place = 0; place < block.count; ++place) {
+    for (uint32_t lane = 0; lane < block.count; ++lane) {
       ++work.tests;
-      if (!visitor.visit(triangle(block, place))) return;
+      if (!visitor.visit(triangle(block, lane))) return;
     }
   }
 }
@@ -151,18 +165,19 @@ void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
     if ((now & kBlockBit) == 0) {
       ++work.nodes;
       const TriangleNode& node = arrays_.nodes[now];
-      // Blocks are taken before nodes: in storage order.
+      // Nodes are pushed first, so that blocks are popped before nodes: storage order.
       for (const uint32_t kind : {uint32_t{0}, kBlockBit}) {
         for (int slot = kTreeWidth; slot-- > 0;) {
           const uint32_t child = node.child[slot];
           if ((child & kBlockBit) == kind && child != kNoChild && visitor.overlaps(box(node, slot))) *top++ = child;
         }
       }
+      LOCUS_DCHECK_LE(top - stack, kMaxPending);
       continue;
     }
     const TriangleBlock& block = arrays_.blocks[now & ~kBlockBit];
-    for (uint32_t place = 0; place < block.count; ++place) {
-      const Triangle candidate = triangle(block, place);
+    for (uint32_t lane = 0; lane < block.count; ++lane) {
+      const Triangle candidate = triangle(block, lane);
       if (!visitor.overlaps(bounds_of(candidate))) continue;
       ++work.tests;
       if (!visitor.visit(candidate)) return;
@@ -173,34 +188,35 @@ void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
 template <PointVisitor<Triangle> Visitor>
 void TriangleBvh::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
   if (size() == 0) return;
-  const BoxDistances distances(point);
+  const BoxDistances box_distances(point);
   Pending stack[kTreeStack];
   Pending* top = stack;
   *top++ = {0, 0};
   double limit = visitor.limit();
-  float near = distances.limit(limit);
+  float near = box_distances.limit(limit);
   const auto update_limit = [&] {
     if (visitor.limit() == limit) return;
     limit = visitor.limit();
-    near = distances.limit(limit);
+    near = box_distances.limit(limit);
   };
-  float away[kTreeWidth];
+  float distances[kTreeWidth];
   while (top != stack) {
     const Pending now = *--top;
     if (now.near > near) continue;
     if ((now.child & kBlockBit) == 0) {
       ++work.nodes;
       const TriangleNode& node = arrays_.nodes[now.child];
-      distances.to_boxes(node.bounds, away);
-      top = push_near(node, away, near, top);
+      box_distances.to_boxes(node.bounds, distances);
+      top = push_near(node, distances, near, top);
+      LOCUS_DCHECK_LE(top - stack, kMaxPending);
       continue;
     }
     const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];
-    distances.to_triangles(block.vertices, away);
-    for (uint32_t place = 0; place < block.count; ++place) {
-      if (away[place] > near) continue;
+    box_distances.to_triangles(block.vertices, distances);
+    for (uint32_t lane = 0; lane < block.count; ++lane) {
+      if (distances[lane] > near) continue;
       ++work.tests;
-      if (!visitor.visit(triangle(block, place))) return;
+      if (!visitor.visit(triangle(block, lane))) return;
       update_limit();
     }
   }

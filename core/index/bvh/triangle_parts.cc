@@ -5,16 +5,19 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
-// Coordinates of a box that no slab test meets.
-constexpr float kNowhere = 1e30f;
+// Coordinate of a box that no test hits: min = +kUnusedBound, max = -kUnusedBound.
+constexpr float kUnusedBound = 1e30f;
 
 using Orders = std::array<uint32_t, 8>;  // one for each octant of directions
 
-// How far each octant meets a box along its diagonal. A quarter of each coordinate, so that sums stay finite.
-std::array<float, 8> corners_toward(const Aabbf& box) {
+// Returns, for each octant of directions, the distance of the box's nearest corner along the octant's diagonal. Uses a
+// quarter of each coordinate, so that sums stay finite.
+std::array<float, 8> corner_distances(const Aabbf& box) {
   std::array<float, 8> result;
   for (uint32_t octant = 0; octant < 8; ++octant) {
     float sum = 0;
@@ -24,33 +27,34 @@ std::array<float, 8> corners_toward(const Aabbf& box) {
   return result;
 }
 
-// Slots from far to near along the diagonal of each octant, equal ones by number, behind those without a child. A
-// slot's place is the number of slots that stand before it: all octants are ranked at once, without a branch.
+// Returns, for each octant, the order of slots from far to near along its diagonal: unused slots first, equal distances
+// by slot. The rank of a slot is the number of slots before it; all octants are ranked at once, without a branch.
 Orders orders_of(absl::Span<const Aabbf> boxes) {
-  std::array<std::array<float, 8>, kTreeWidth> corners;
-  std::array<Orders, kTreeWidth> places{};
+  std::array<std::array<float, 8>, kTreeWidth> distances;
+  std::array<Orders, kTreeWidth> ranks{};
   const auto used = static_cast<uint32_t>(boxes.size());
   for (uint32_t slot = 0; slot < used; ++slot) {
-    corners[slot] = corners_toward(boxes[slot]);
+    distances[slot] = corner_distances(boxes[slot]);
     for (uint32_t before = 0; before < slot; ++before) {
       for (size_t octant = 0; octant < 8; ++octant) {
-        const uint32_t farther = corners[slot][octant] > corners[before][octant] ? 1 : 0;
-        places[before][octant] += farther;
-        places[slot][octant] += 1 - farther;
+        const uint32_t farther = distances[slot][octant] > distances[before][octant] ? 1 : 0;
+        ranks[before][octant] += farther;
+        ranks[slot][octant] += 1 - farther;
       }
     }
   }
   Orders orders{};
   for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
-    const uint32_t empty = kTreeWidth - used;
+    const uint32_t unused_count = kTreeWidth - used;
     for (size_t octant = 0; octant < 8; ++octant) {
-      const uint32_t place = slot < used ? empty + places[slot][octant] : slot - used;
-      orders[octant] |= slot << (3 * place);
+      const uint32_t rank = slot < used ? unused_count + ranks[slot][octant] : slot - used;
+      orders[octant] |= slot << (3 * rank);
     }
   }
   return orders;
 }
 
+// Returns the longest side of a box, rounded up to the next float.
 float rounded_up_extent(const Aabbf& box) {
   return std::nextafter(max_component(box.extent()), std::numeric_limits<float>::infinity());
 }
@@ -58,11 +62,14 @@ float rounded_up_extent(const Aabbf& box) {
 }  // namespace
 
 void fill_boxes(absl::Span<const Aabbf> boxes, TriangleNode& node) {
+  LOCUS_DCHECK(!boxes.empty());
+  LOCUS_DCHECK_LE(boxes.size(), size_t{kTreeWidth});
   for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
     const bool used = slot < boxes.size();
+    LOCUS_DCHECK(!used || !boxes[slot].empty());
     for (int axis = 0; axis < 3; ++axis) {
-      node.bounds[axis][slot] = used ? boxes[slot].min[axis] : kNowhere;
-      node.bounds[3 + axis][slot] = used ? boxes[slot].max[axis] : -kNowhere;
+      node.bounds[axis][slot] = used ? boxes[slot].min[axis] : kUnusedBound;
+      node.bounds[3 + axis][slot] = used ? boxes[slot].max[axis] : -kUnusedBound;
     }
   }
   const Orders orders = orders_of(boxes);
@@ -70,12 +77,15 @@ void fill_boxes(absl::Span<const Aabbf> boxes, TriangleNode& node) {
 }
 
 void fill_block(absl::Span<const Triangle> triangles, const Aabbf& box, uint32_t first, TriangleBlock& block) {
+  LOCUS_DCHECK(!triangles.empty());
+  LOCUS_DCHECK_LE(triangles.size(), size_t{kTreeWidth});
   block.first = first;
   block.count = static_cast<uint32_t>(triangles.size());
   block.extent = rounded_up_extent(box);
   std::fill(std::begin(block.unused), std::end(block.unused), 0);
   for (uint32_t lane = 0; lane < kTreeWidth; ++lane) {
     const Triangle& triangle = triangles[std::min(lane, block.count - 1)];
+    LOCUS_DCHECK(contains(box, bounds_of(triangle)));
     int row = 0;
     for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
       for (int axis = 0; axis < 3; ++axis) block.vertices[row++][lane] = vertex[axis];

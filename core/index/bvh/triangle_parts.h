@@ -1,5 +1,5 @@
-// One node or one block of a TriangleTree, filled from boxes and triangles: for whoever makes one. Internal to this
-// folder; free functions, any thread.
+// Functions that fill one node or one block of a TriangleTree from boxes or triangles; used by the build and by the
+// restore of a tree. Internal to this folder. Free functions, any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_PARTS_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_PARTS_H_
 
@@ -9,11 +9,12 @@
 
 namespace locus {
 
-// Bounds and orders from the children's boxes, slot by slot, at most kTreeWidth; slots behind them are left empty. All
-// but the numbers of the children.
+// Sets the bounds and orders of a node from the boxes of its children, 1 to kTreeWidth, by slot. Slots without a box
+// get a box that no test hits. Leaves `child` unchanged.
 void fill_boxes(absl::Span<const Aabbf> boxes, TriangleNode& node);
 
-// From 1 to kTreeWidth triangles and the box around all of them. `first` is the position of the first.
+// Sets all members of a block from 1 to kTreeWidth triangles and the box around them. `first` is the storage position
+// of the first triangle.
 void fill_block(absl::Span<const Triangle> triangles, const Aabbf& box, uint32_t first, TriangleBlock& block);
 
 }  // namespace locus

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/index/bvh/triangle_parts.h"
 
 namespace locus {
@@ -12,9 +13,10 @@ static_assert(kBvhWidth == kTreeWidth && kBvhLeafSize == kTreeWidth);
 
 namespace {
 
-// What lies below a node of up to so many triangles is written in one go. A constant, though nothing depends on it.
-constexpr uint32_t kPieceTriangles = 8192;
+// Maximum number of triangles in a subtree that is written as one chunk. The result does not depend on it.
+constexpr uint32_t kChunkTriangles = 8192;
 
+// Returns the children of a wide node in order of increasing area.
 WideChildren<float> children_by_area(const BinaryNode<float>& root) {
   WideChildren<float> children(root);
   children.sort_by_area();
@@ -24,15 +26,16 @@ WideChildren<float> children_by_area(const BinaryNode<float>& root) {
 }  // namespace
 
 TriangleArrays TriangleWriter::write() {
-  std::vector<Piece> pieces = cut();
-  std::vector<Place> sizes(pieces.size());
-  for_each(options_, pieces.size(), [&](size_t i) { sizes[i] = count(pieces[i]); });
-  Place end;
-  for (size_t i = 0; i < pieces.size(); ++i) {
-    pieces[i].start = end;
+  std::vector<Chunk> chunks = split_into_chunks();
+  std::vector<Offsets> sizes(chunks.size());
+  for_each(options_, chunks.size(), [&](size_t i) { sizes[i] = count(chunks[i]); });
+  Offsets end;
+  for (size_t i = 0; i < chunks.size(); ++i) {
+    chunks[i].start = end;
     end = {end.node + sizes[i].node, end.block + sizes[i].block, end.position + sizes[i].position};
-    arrays_.depth = std::max(arrays_.depth, pieces[i].depth);
+    arrays_.depth = std::max(arrays_.depth, chunks[i].depth);
   }
+  LOCUS_DCHECK_EQ(size_t{end.position}, triangles_.size());
   arrays_.node_count = end.node;
   arrays_.block_count = end.block;
   arrays_.triangle_count = end.position;
@@ -40,89 +43,93 @@ TriangleArrays TriangleWriter::write() {
   arrays_.ranges = make_large_array<NodeRange>(end.node);
   arrays_.blocks = make_large_array<TriangleBlock>(end.block);
   arrays_.numbers = make_large_array<uint32_t>(end.position);
-  for_each(options_, pieces.size(), [&](size_t i) {
-    if (!cancelled(options_) && pieces[i].whole) write_whole(pieces[i]);
+  for_each(options_, chunks.size(), [&](size_t i) {
+    if (!cancelled(options_) && chunks[i].is_subtree) write_subtree(chunks[i]);
   });
-  write_top(pieces);
+  write_top(chunks);
   return std::move(arrays_);
 }
 
-// Backwards, so that the first child is the next to be taken: depth-first order. Leaves are taken before nodes.
+// Pushes in reverse order, so that the first child is the next one popped: depth-first order. Leaves are popped before
+// inner nodes.
 void TriangleWriter::push_children(const WideChildren<float>& children, uint32_t parent, uint32_t depth,
-                                   std::vector<Waiting>& waiting) {
+                                   std::vector<Pending>& pending) {
   for (const bool leaves : {false, true})
     for (uint32_t slot = children.size(); slot-- > 0;)
-      if (children[slot].is_leaf() == leaves) waiting.push_back({&children[slot], parent, slot, depth});
+      if (children[slot].is_leaf() == leaves) pending.push_back({&children[slot], parent, slot, depth});
 }
 
-// Depth-first: the single nodes of the top, and the pieces below them.
-std::vector<TriangleWriter::Piece> TriangleWriter::cut() const {
-  std::vector<Piece> pieces;
-  std::vector<Waiting> waiting = {{&tree_.root(), 0, 0, 1}};
-  while (!waiting.empty()) {
-    const Waiting now = waiting.back();
-    waiting.pop_back();
-    const auto number = static_cast<uint32_t>(pieces.size());
-    const bool whole = now.node->count <= kPieceTriangles;
-    pieces.push_back({now.node, whole, now.parent, now.slot, now.depth, {}});
-    if (whole) continue;
+// Returns the chunks in depth-first order: the single nodes of the top, and the subtrees below them.
+std::vector<TriangleWriter::Chunk> TriangleWriter::split_into_chunks() const {
+  std::vector<Chunk> chunks;
+  std::vector<Pending> pending = {{&tree_.root(), 0, 0, 1}};
+  while (!pending.empty()) {
+    const Pending now = pending.back();
+    pending.pop_back();
+    const auto index = static_cast<uint32_t>(chunks.size());
+    LOCUS_DCHECK(index == 0 || now.parent < index);
+    const bool is_subtree = now.node->count <= kChunkTriangles;
+    chunks.push_back({now.node, is_subtree, now.parent, now.slot, now.depth, {}});
+    if (is_subtree) continue;
     const WideChildren<float> children = children_by_area(*now.node);
-    push_children(children, number, now.depth + 1, waiting);
+    push_children(children, index, now.depth + 1, pending);
   }
-  return pieces;
+  return chunks;
 }
 
-// A leaf of the top; the root of the tree is opened even where it is a leaf.
-bool TriangleWriter::is_block(const Piece& piece) const { return piece.root->is_leaf() && piece.root != &tree_.root(); }
+// Returns whether a chunk is a single block. The root of the tree always becomes a node, even if it is a leaf.
+bool TriangleWriter::is_block(const Chunk& chunk) const { return chunk.root->is_leaf() && chunk.root != &tree_.root(); }
 
-TriangleWriter::Place TriangleWriter::count(Piece& piece) const {
-  if (!piece.whole) return {1, 0, 0};
-  if (is_block(piece)) return {0, 1, piece.root->count};
-  Place size{0, 0, piece.root->count};
-  std::vector<Waiting> waiting = {{piece.root, 0, 0, piece.depth}};
-  while (!waiting.empty()) {
-    const Waiting now = waiting.back();
-    waiting.pop_back();
+TriangleWriter::Offsets TriangleWriter::count(Chunk& chunk) const {
+  if (!chunk.is_subtree) return {1, 0, 0};
+  if (is_block(chunk)) return {0, 1, chunk.root->count};
+  Offsets size{0, 0, chunk.root->count};
+  std::vector<Pending> pending = {{chunk.root, 0, 0, chunk.depth}};
+  while (!pending.empty()) {
+    const Pending now = pending.back();
+    pending.pop_back();
     ++size.node;
-    piece.depth = std::max(piece.depth, now.depth);
+    chunk.depth = std::max(chunk.depth, now.depth);
     const WideChildren<float> children(*now.node);
     for (uint32_t slot = 0; slot < children.size(); ++slot) {
       if (children[slot].is_leaf()) {
         ++size.block;
       } else {
-        waiting.push_back({&children[slot], 0, 0, now.depth + 1});
+        pending.push_back({&children[slot], 0, 0, now.depth + 1});
       }
     }
   }
   return size;
 }
 
-// After the pieces below have their places.
-void TriangleWriter::write_top(const std::vector<Piece>& pieces) {
-  for (const Piece& piece : pieces)
-    if (!piece.whole)
-      write_node(children_by_area(*piece.root), {piece.start.position, piece.root->count}, piece.start.node);
-  for (size_t i = 1; i < pieces.size(); ++i) {
-    const Piece& piece = pieces[i];
-    arrays_.nodes[pieces[piece.parent].start.node].child[piece.slot] =
-        is_block(piece) ? kBlockBit | piece.start.block : piece.start.node;
+// Writes the nodes of the top, and links every chunk to its parent. All chunks must have their offsets.
+void TriangleWriter::write_top(const std::vector<Chunk>& chunks) {
+  for (const Chunk& chunk : chunks)
+    if (!chunk.is_subtree)
+      write_node(children_by_area(*chunk.root), {chunk.start.position, chunk.root->count}, chunk.start.node);
+  for (size_t i = 1; i < chunks.size(); ++i) {
+    const Chunk& chunk = chunks[i];
+    LOCUS_DCHECK(!chunks[chunk.parent].is_subtree);
+    arrays_.nodes[chunks[chunk.parent].start.node].child[chunk.slot] =
+        is_block(chunk) ? kBlockBit | chunk.start.block : chunk.start.node;
   }
 }
 
-void TriangleWriter::write_whole(const Piece& piece) {
-  if (is_block(piece)) return write_block(*piece.root, piece.start);
-  Place next = piece.start;
-  std::vector<Waiting> waiting;
+// Writes all nodes and blocks of a subtree.
+void TriangleWriter::write_subtree(const Chunk& chunk) {
+  if (is_block(chunk)) return write_block(*chunk.root, chunk.start);
+  Offsets next = chunk.start;
+  std::vector<Pending> pending;
   const auto open = [&](const BinaryNode<float>& node) {
     const WideChildren<float> children = children_by_area(node);
     write_node(children, {next.position, node.count}, next.node);
-    push_children(children, next.node, 0, waiting);
+    push_children(children, next.node, 0, pending);
     ++next.node;
   };
-  open(*piece.root);
-  while (!waiting.empty()) {
-    const Waiting now = waiting.back();
-    waiting.pop_back();
+  open(*chunk.root);
+  while (!pending.empty()) {
+    const Pending now = pending.back();
+    pending.pop_back();
     uint32_t& child = arrays_.nodes[now.parent].child[now.slot];
     if (now.node->is_leaf()) {
       child = kBlockBit | next.block;
@@ -134,26 +141,29 @@ void TriangleWriter::write_whole(const Piece& piece) {
       open(*now.node);
     }
   }
+  LOCUS_DCHECK_EQ(next.position, chunk.start.position + chunk.root->count);
 }
 
-// All but the numbers of its children.
-void TriangleWriter::write_node(const WideChildren<float>& children, NodeRange range, uint32_t number) {
-  arrays_.ranges[number] = range;
+// Writes a node except for its child indices, which are set when the children are written.
+void TriangleWriter::write_node(const WideChildren<float>& children, NodeRange range, uint32_t index) {
+  LOCUS_DCHECK_LT(index, arrays_.node_count);
+  arrays_.ranges[index] = range;
   std::array<Aabbf, kTreeWidth> boxes;
   for (uint32_t slot = 0; slot < children.size(); ++slot) boxes[slot] = children[slot].bounds;
-  TriangleNode& node = arrays_.nodes[number];
+  TriangleNode& node = arrays_.nodes[index];
   std::fill(std::begin(node.child), std::end(node.child), kNoChild);
   fill_boxes(absl::MakeConstSpan(boxes).first(children.size()), node);
 }
 
-void TriangleWriter::write_block(const BinaryNode<float>& leaf, const Place& place) {
+void TriangleWriter::write_block(const BinaryNode<float>& leaf, const Offsets& offsets) {
+  LOCUS_DCHECK_LT(offsets.block, arrays_.block_count);
   std::array<Triangle, kTreeWidth> triangles;
   for (uint32_t lane = 0; lane < leaf.count; ++lane) {
     triangles[lane] = triangles_[tree_.index(leaf.first + lane)];
-    arrays_.numbers[place.position + lane] = triangles[lane].number;
+    arrays_.numbers[offsets.position + lane] = triangles[lane].number;
   }
-  fill_block(absl::MakeConstSpan(triangles).first(leaf.count), leaf.bounds, place.position,
-             arrays_.blocks[place.block]);
+  fill_block(absl::MakeConstSpan(triangles).first(leaf.count), leaf.bounds, offsets.position,
+             arrays_.blocks[offsets.block]);
 }
 
 }  // namespace locus

@@ -1,6 +1,7 @@
-// Turns a binary tree over triangles into the nodes and blocks that TriangleBvh serves: children by rising area,
-// everything depth-first, blocks before nodes. Pieces of the tree are written by many threads to where a count has told
-// that they go. Internal to this folder.
+// Converts a binary tree over triangles to the nodes and blocks of a TriangleBvh: children in order of increasing area,
+// everything depth-first, blocks before nodes. The tree is divided into chunks. A first pass counts the nodes, blocks
+// and triangles of each chunk, which determines where it is stored; a second pass writes the chunks. Both passes run on
+// many threads. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 
@@ -15,7 +16,7 @@
 
 namespace locus {
 
-// The arrays behind a TriangleTree, of exactly the length needed.
+// Owner of the arrays of a TriangleTree, each of exactly the length needed.
 struct TriangleArrays {
   LargeArray<TriangleNode> nodes;
   LargeArray<NodeRange> ranges;
@@ -25,44 +26,46 @@ struct TriangleArrays {
   uint32_t depth = 0;  // levels of nodes
 };
 
+// Writes one tree. Borrows its arguments; for one call of write().
 class TriangleWriter {
  public:
   TriangleWriter(absl::Span<const Triangle> triangles, const BinaryTree<float>& tree, const BvhOptions& options)
       : triangles_(triangles), tree_(tree), options_(options) {}
 
-  // Incomplete once the build is cancelled.
+  // Returns the arrays, which are incomplete if the build was cancelled.
   TriangleArrays write();
 
  private:
-  // Where something goes, or how much there is.
-  struct Place {
+  // Offsets in the arrays, or numbers of elements.
+  struct Offsets {
     uint32_t node = 0, block = 0, position = 0;
   };
-  // What is written in one go: a single node, or all that lies below one.
-  struct Piece {
+  // Unit of work: a single node of the top, or a whole subtree.
+  struct Chunk {
     const BinaryNode<float>* root;
-    bool whole;
-    uint32_t parent, slot;  // the piece that is its parent, and which child of it
-    uint32_t depth;         // levels of nodes down to its root
-    Place start;
+    bool is_subtree;
+    uint32_t parent, slot;  // index of the parent's chunk, and slot in the parent
+    uint32_t depth;  // levels of nodes from the tree's root to the chunk's root; count() extends it to the deepest node
+    Offsets start;
   };
-  // A child that waits for its turn.
-  struct Waiting {
+  // A child that was not visited yet.
+  struct Pending {
     const BinaryNode<float>* node;
     uint32_t parent, slot;
     uint32_t depth;
   };
 
   static void push_children(const WideChildren<float>& children, uint32_t parent, uint32_t depth,
-                            std::vector<Waiting>& waiting);
-  std::vector<Piece> cut() const;
-  bool is_block(const Piece& piece) const;
-  // Deepens the piece's depth to that of its deepest node.
-  Place count(Piece& piece) const;
-  void write_top(const std::vector<Piece>& pieces);
-  void write_whole(const Piece& piece);
-  void write_node(const WideChildren<float>& children, NodeRange range, uint32_t number);
-  void write_block(const BinaryNode<float>& leaf, const Place& place);
+                            std::vector<Pending>& pending);
+  std::vector<Chunk> split_into_chunks() const;
+  bool is_block(const Chunk& chunk) const;
+  // Returns the numbers of nodes, blocks and triangles of a chunk. Raises the chunk's depth to that of its deepest
+  // node.
+  Offsets count(Chunk& chunk) const;
+  void write_top(const std::vector<Chunk>& chunks);
+  void write_subtree(const Chunk& chunk);
+  void write_node(const WideChildren<float>& children, NodeRange range, uint32_t index);
+  void write_block(const BinaryNode<float>& leaf, const Offsets& offsets);
 
   const absl::Span<const Triangle> triangles_;
   const BinaryTree<float>& tree_;

@@ -1,9 +1,11 @@
-// The children of one wide node: the binary nodes that the tree's choices leave in its eight slots. Plain data.
+// Children of one wide node: the up to eight binary nodes to which the choices of wide_choice.h collapse it. Borrows
+// the binary tree.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 
 #include <array>
 
+#include "core/base/check.h"
 #include "core/index/bvh/binary_tree.h"
 
 namespace locus {
@@ -11,47 +13,65 @@ namespace locus {
 template <class S>
 class WideChildren {
  public:
-  // Left to right. Of a leaf, which only a tree of one leaf has for a root: itself.
+  // Collects the children from left to right. If `root` is a leaf, which happens only for a tree of a single leaf, it
+  // is its own only child.
   explicit WideChildren(const BinaryNode<S>& root) {
     struct Pending {
       const BinaryNode<S>* node;
       uint32_t slots;
     };
     std::array<Pending, kBvhWidth> pending;
-    size_t waiting = 0;
-    pending[waiting++] = {&root, kBvhWidth};
-    while (waiting > 0) {
-      const auto [node, slots] = pending[--waiting];
+    size_t pending_count = 0;
+    pending[pending_count++] = {&root, kBvhWidth};
+    while (pending_count > 0) {
+      const auto [node, slots] = pending[--pending_count];
       const uint32_t left = node->is_leaf() || slots == 1 ? 0 : node->choice.left_slots(slots);
       if (left == 0) {
         nodes_[size_++] = node;
       } else {
-        pending[waiting++] = {&node->children[1], slots - left};
-        pending[waiting++] = {&node->children[0], left};
+        pending[pending_count++] = {&node->children[1], slots - left};
+        pending[pending_count++] = {&node->children[0], left};
       }
+      LOCUS_DCHECK_LE(pending_count + size_, size_t{kBvhWidth});
     }
+    check_children(root);
   }
 
   uint32_t size() const { return size_; }
-  const BinaryNode<S>& operator[](size_t slot) const { return *nodes_[slot]; }
+  const BinaryNode<S>& operator[](size_t slot) const {
+    LOCUS_DCHECK_LT(slot, size_);
+    return *nodes_[slot];
+  }
 
-  // By rising area, equal ones left to right.
+  // Sorts the children by increasing area; children of equal area keep their order.
   void sort_by_area() {
     std::array<S, kBvhWidth> areas;
     for (size_t i = 0; i < size_; ++i) {
       const BinaryNode<S>* const node = nodes_[i];
       const S area = half_area(node->bounds);
-      size_t place = i;
-      for (; place > 0 && areas[place - 1] > area; --place) {
-        areas[place] = areas[place - 1];
-        nodes_[place] = nodes_[place - 1];
+      size_t position = i;
+      for (; position > 0 && areas[position - 1] > area; --position) {
+        areas[position] = areas[position - 1];
+        nodes_[position] = nodes_[position - 1];
       }
-      areas[place] = area;
-      nodes_[place] = node;
+      areas[position] = area;
+      nodes_[position] = node;
     }
   }
 
  private:
+  // Verifies that the children, from left to right, partition the references of `root`.
+  void check_children(const BinaryNode<S>& root) const {
+    if constexpr (kDebugChecks) {
+      uint32_t next = root.first;
+      for (uint32_t i = 0; i < size_; ++i) {
+        LOCUS_DCHECK_EQ(nodes_[i]->first, next);
+        next += nodes_[i]->count;
+      }
+      LOCUS_DCHECK_EQ(next, root.first + root.count);
+    }
+  }
+
   std::array<const BinaryNode<S>*, kBvhWidth> nodes_;
   uint32_t size_ = 0;
 };

@@ -1,56 +1,72 @@
-// How a binary tree collapses to nodes of eight children at the least cost: for each binary node and each number of
-// child slots it may be given, whether to open it and how its two children share them. Found from the leaves up by
-// dynamic programming. What counts is the area of nodes, and a little for each node, so that there are few of them.
-// Plain data. Source: Ylitie, Karras, Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs,
-// 2017.
+// Choice of how a binary tree is collapsed to nodes of eight children at the least cost. For each binary node and each
+// number of child slots it may occupy, it states whether the node is opened, and how many of the slots its left child
+// gets. Computed from the leaves upwards by dynamic programming. The cost of a wide node is its area plus a small
+// constant, which keeps the number of nodes low. Immutable.
+// Invariants: more slots never cost more; each child gets at least one slot of an opened node.
+// Source: Ylitie, Karras, Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, 2017.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
 
 #include <array>
 #include <cstdint>
 
+#include "core/base/check.h"
 #include "core/index/bvh/bvh_node.h"
 
 namespace locus {
 
 class WideChoice {
  public:
-  // Of a leaf: costs nothing in any number of slots.
+  // Makes the choice of a leaf, whose cost is 0 with any number of slots.
   WideChoice() = default;
 
-  // Of an inner node whose own wide node would cost `cost`.
+  // Makes the choice of an inner node from those of its children. `cost` is the cost of a wide node of its own.
   WideChoice(const WideChoice& left, const WideChoice& right, float cost) {
     std::array<float, kBvhWidth + 1> opened{};
-    for (uint32_t slots = 2; slots <= kBvhWidth; ++slots) opened[slots] = share(left, right, slots);
+    for (uint32_t slots = 2; slots <= kBvhWidth; ++slots) opened[slots] = best_share(left, right, slots);
     costs_[1] = cost + opened[kBvhWidth];
     for (uint32_t slots = 2; slots < kBvhWidth; ++slots) {
       const bool open = opened[slots] <= costs_[1];
       costs_[slots] = open ? opened[slots] : costs_[1];
       if (!open) left_slots_[slots] = 0;
     }
+    check_invariants();
   }
 
-  // Of an inner node with `slots` slots, two to eight: how many go to its left child; 0 where it stays one child. It
-  // always opens into eight.
-  uint32_t left_slots(uint32_t slots) const { return left_slots_[slots]; }
+  // Returns how many of `slots` slots, two to eight, the left child of an inner node gets; 0 if the node is not opened
+  // but becomes a wide node of its own. With eight slots it is always opened.
+  uint32_t left_slots(uint32_t slots) const {
+    LOCUS_DCHECK(2 <= slots && slots <= kBvhWidth);
+    return left_slots_[slots];
+  }
 
  private:
-  // From the middle outwards, so that equal costs share evenly.
-  float share(const WideChoice& left, const WideChoice& right, uint32_t slots) {
+  // Verifies that more slots never cost more, and that each child gets at least one slot of an opened node.
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      for (uint32_t slots = 2; slots < kBvhWidth; ++slots) LOCUS_DCHECK_LE(costs_[slots], costs_[slots - 1]);
+      for (uint32_t slots = 2; slots <= kBvhWidth; ++slots) LOCUS_DCHECK_LT(uint32_t{left_slots_[slots]}, slots);
+      LOCUS_DCHECK_LT(0u, uint32_t{left_slots_[kBvhWidth]});
+    }
+  }
+
+  // Returns the least cost of sharing `slots` slots between the children, and stores the left child's share. The even
+  // share is tried first and wins if costs are equal.
+  float best_share(const WideChoice& left, const WideChoice& right, uint32_t slots) {
     uint32_t best = slots / 2;
-    float least = left.costs_[best] + right.costs_[slots - best];
+    float min_cost = left.costs_[best] + right.costs_[slots - best];
     for (uint32_t k = 1; k < slots; ++k) {
       const float cost = left.costs_[k] + right.costs_[slots - k];
-      if (cost < least) {
-        least = cost;
+      if (cost < min_cost) {
+        min_cost = cost;
         best = k;
       }
     }
     left_slots_[slots] = static_cast<uint8_t>(best);
-    return least;
+    return min_cost;
   }
 
-  std::array<float, kBvhWidth> costs_{};  // by slots, from 1
+  std::array<float, kBvhWidth> costs_{};  // least cost by number of slots, from 1 on
   std::array<uint8_t, kBvhWidth + 1> left_slots_{};
 };
 

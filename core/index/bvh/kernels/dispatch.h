@@ -1,4 +1,4 @@
-// Which of the tree's kernels serve: those of the instruction set in use.
+// Selection of the tree's kernels for the instruction set in use.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 
@@ -8,7 +8,7 @@
 
 namespace locus {
 
-// Null for InstructionSet::kPortable. Thread-safe.
+// Return the kernels of active_instruction_set(); null for InstructionSet::kPortable. Thread-safe.
 const RayKernels* active_ray_kernels();
 const RegionKernels* active_region_kernels();
 

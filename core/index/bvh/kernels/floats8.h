@@ -1,6 +1,6 @@
-// Eight floats at once, for the kernels: the thinnest wrapper that lets one source serve several instruction sets. What
-// each function does stands in floats8_avx2.h; the others offer the same. Everything has internal linkage, since each
-// object is compiled for a processor that the next may not be.
+// Vector of eight floats for the kernels: a thin wrapper that lets one source serve several instruction sets. The
+// functions are documented in floats8_avx2.h; floats8_sse4.h offers the same functions. Everything has internal
+// linkage, because each object is compiled for another instruction set and the linker must not merge their functions.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_H_
 
@@ -13,7 +13,7 @@
 namespace locus {
 namespace {
 
-// Asks for the memory of a child before it is needed.
+// Prefetches `bytes` bytes of memory from `from` on.
 static inline void prefetch(const void* from, int bytes) {
   for (int line = 0; line < bytes; line += 64) _mm_prefetch(static_cast<const char*>(from) + line, _MM_HINT_T0);
 }

@@ -1,5 +1,5 @@
-// Eight floats at once in two registers of SSE, up to 4.2 (x86-64-v2): see floats8.h, and floats8_avx2.h for what each
-// function does. Without fused products: the bounds of the kernels allow for one more rounding.
+// Vector of eight floats in two SSE registers (SSE 4.2, x86-64-v2): see floats8.h; the functions are documented in
+// floats8_avx2.h. Products are not fused with sums: the error bounds of the kernels include the additional rounding.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_SSE4_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_SSE4_H_
 
@@ -16,9 +16,9 @@ struct Floats8 {
   __m128 low, high;
 
   static inline Floats8 both_halves(__m128 half) { return {half, half}; }
-  static inline Floats8 all(float value) { return both_halves(_mm_set1_ps(value)); }
+  static inline Floats8 splat(float value) { return both_halves(_mm_set1_ps(value)); }
   static inline Floats8 load(const float* from) { return {_mm_load_ps(from), _mm_load_ps(from + 4)}; }
-  static inline Floats8 load_any(const float* from) { return {_mm_loadu_ps(from), _mm_loadu_ps(from + 4)}; }
+  static inline Floats8 load_unaligned(const float* from) { return {_mm_loadu_ps(from), _mm_loadu_ps(from + 4)}; }
   inline void store(float* to) const {
     _mm_storeu_ps(to, low);
     _mm_storeu_ps(to + 4, high);
@@ -52,17 +52,17 @@ static inline Floats8 bit_and(Floats8 a, Floats8 b) { return {_mm_and_ps(a.low, 
 static inline Floats8 bit_or(Floats8 a, Floats8 b) { return {_mm_or_ps(a.low, b.low), _mm_or_ps(a.high, b.high)}; }
 static inline Floats8 absolute(Floats8 a) { return bit_and(a, bits_of(0x7FFFFFFFu)); }
 static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
-static inline Floats8 where_at_least(Floats8 a, Floats8 b) {
+static inline Floats8 greater_equal_mask(Floats8 a, Floats8 b) {
   return {_mm_cmpge_ps(a.low, b.low), _mm_cmpge_ps(a.high, b.high)};
 }
-static inline Floats8 choose(Floats8 where, Floats8 yes, Floats8 no) {
-  return {_mm_blendv_ps(no.low, yes.low, where.low), _mm_blendv_ps(no.high, yes.high, where.high)};
+static inline Floats8 select(Floats8 mask, Floats8 yes, Floats8 no) {
+  return {_mm_blendv_ps(no.low, yes.low, mask.low), _mm_blendv_ps(no.high, yes.high, mask.high)};
 }
 
-static inline Floats8 largest(Floats8 a) {
+static inline Floats8 horizontal_max(Floats8 a) {
   const __m128 halves = _mm_max_ps(a.low, a.high);
   const __m128 pairs = _mm_max_ps(halves, _mm_movehl_ps(halves, halves));
-  return Floats8::all(_mm_cvtss_f32(_mm_max_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1))));
+  return Floats8::splat(_mm_cvtss_f32(_mm_max_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1))));
 }
 
 static inline uint32_t lanes_of(__m128 low, __m128 high) {
@@ -89,8 +89,8 @@ static inline uint32_t pack_slots(const TriangleNode& node, Floats8 near, Floats
                                   uint32_t* slots) {
   const uint32_t set = at_most(near, far), order = node.order[octant];
   uint32_t count = 0;
-  for (uint32_t place = 0; place < kTreeWidth; ++place) {
-    slots[count] = order >> (3 * place);
+  for (uint32_t rank = 0; rank < kTreeWidth; ++rank) {
+    slots[count] = order >> (3 * rank);
     count += set >> (slots[count] & 7u) & 1u;
   }
   return count;
@@ -102,8 +102,8 @@ static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Float
   near.store(entered);
   const uint32_t set = at_most(near, far), order = node.order[octant];
   uint32_t count = 0;
-  for (uint32_t place = 0; place < kTreeWidth; ++place) {
-    const uint32_t slot = order >> (3 * place) & 7u;
+  for (uint32_t rank = 0; rank < kTreeWidth; ++rank) {
+    const uint32_t slot = order >> (3 * rank) & 7u;
     children[count] = node.child[slot];
     nears[count] = entered[slot];
     count += set >> slot & 1u;
@@ -156,9 +156,9 @@ static inline uint32_t block_slots(const TriangleNode& node) {
 
 static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t set, uint32_t* to) {
   uint32_t kept = 0;
-  for (uint32_t number = 0; number < count; ++number) {
-    to[kept] = from[number];
-    kept += set >> number & 1u;
+  for (uint32_t i = 0; i < count; ++i) {
+    to[kept] = from[i];
+    kept += set >> i & 1u;
   }
 }
 

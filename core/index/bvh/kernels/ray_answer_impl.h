@@ -1,5 +1,4 @@
-// What single rays and packets of rays have in common: the rows of a node by the way a ray goes, and which hits are the
-// answer.
+// Code shared by single rays and packets of rays: the rows of a node's bounds by octant, and the choice between hits.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 
@@ -12,8 +11,8 @@ namespace {
 
 constexpr uint32_t kNoNumber = 0xFFFFFFFFu;
 
-// For each octant the rows of TriangleNode::bounds that a ray enters by, x, y, z, and those it leaves by: their first
-// floats.
+// For each octant of directions, the rows of TriangleNode::bounds with the planes through which a ray enters and leaves
+// a box, by axis: indices of their first floats.
 struct RowTable {
   uint32_t entered[8][4], left[8][4];
   constexpr RowTable() : entered(), left() {
@@ -28,37 +27,40 @@ struct RowTable {
 };
 static constexpr RowTable kRows;
 
-static inline uint32_t number_of(const TriangleTree& tree, const TriangleBlock& block, int place) {
-  return tree.numbers[block.first + static_cast<uint32_t>(place)];
+// Returns the number of a triangle of a block.
+static inline uint32_t number_of(const TriangleTree& tree, const TriangleBlock& block, int lane) {
+  return tree.numbers[block.first + static_cast<uint32_t>(lane)];
 }
 
-// Whether a hit is better than the best so far, which stands at the limit if anything was found.
+// Returns whether a hit replaces the best one so far: it is nearer, or equally near with a lower number. If a hit was
+// found before, `limit` is its t.
 static inline bool is_better(float t, uint32_t number, float limit, bool found, uint32_t best) {
   if (t > limit || (planted(PlantedBug::kKernelLimit) && !found && t == limit)) return false;
   return !found || t < limit || (number >= best) == planted(PlantedBug::kKernelTie);
 }
 
-// The lowest hits of one ray so far.
+// The lowest hits of one ray so far, up to `max_rows`.
 struct KeptRows {
-  KernelRow* rows;  // where they are as many as wanted, the farthest stands first
-  uint32_t most;
+  KernelRow* rows;  // if there are max_rows of them, the farthest one is first
+  uint32_t max_rows;
 
   static inline bool is_lower(const KernelRow& a, const KernelRow& b) {
     if (planted(PlantedBug::kKernelRowTie)) return a.t < b.t;
     return a.t < b.t || (a.t == b.t && a.number < b.number);
   }
 
-  // `count`: how many there are. Lowers the limit once there are as many as wanted.
+  // Adds a hit if it is among the lowest. `count` is the number of rows. Lowers `limit` to the farthest row once there
+  // are max_rows rows.
   inline void offer(const KernelRow& row, uint32_t& count, float& limit) const {
     if (row.t > limit) return;
-    if (count < most)
+    if (count < max_rows)
       rows[count++] = row;
     else if (is_lower(row, rows[0]))
       rows[0] = row;
     else
       return;
-    if (count < most) return;
-    for (uint32_t i = 1; i < most; ++i) {
+    if (count < max_rows) return;
+    for (uint32_t i = 1; i < max_rows; ++i) {
       if (!is_lower(rows[0], rows[i])) continue;
       const KernelRow farther = rows[i];
       rows[i] = rows[0];

@@ -1,8 +1,8 @@
-// What the kernels of every instruction set offer: rays against one mesh's tree, many triangles at a time. They decide
-// in float where float is certain by a written bound and in double elsewhere, by the very arithmetic of TriangleRay
-// (core/geometry/ray_triangle.h), so that their answers are its answers bit for bit; what neither settles is left
-// undecided, and the caller asks again, triangle by triangle. Plain data; functions without state, safe from any
-// thread; they take 220 KB of stack.
+// Ray kernels: intersect many rays with the tree of one mesh by vector instructions; every instruction set has its own
+// object. A kernel decides in float only outside a documented error bound, and otherwise in double by the arithmetic of
+// TriangleRay (core/geometry/ray_triangle.h), so that its answers equal those of TriangleRay bit for bit. If double
+// cannot decide either, the ray is left undecided and the caller traces it triangle by triangle. Plain data; functions
+// without state, safe from any thread; they use 220 KB of stack.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 
@@ -13,58 +13,61 @@
 
 namespace locus {
 
-// In mesh axes. The largest |component| of the direction lies within kMinKernelDirection .. kMaxKernelDirection and the
-// origin is finite; of other rays the kernels may leave out or invent hits.
+// Ray in mesh axes. Precondition: the origin is finite, and the largest |component| of the direction is within
+// kMinKernelDirection .. kMaxKernelDirection; otherwise the kernels may miss or invent hits.
 struct KernelRay {
   double origin[3];
   double direction[3];
-  float limit;        // hits up to here, included; in lengths of the direction
+  float limit;        // largest t of a hit, inclusive; in lengths of the direction
   bool accept_front;  // triangles seen counter-clockwise
   bool accept_back;
-  // Nothing has turned the ray: components of the direction that are zero are so exactly, and triangles across such an
-  // axis exactly edge-on.
-  bool unturned = false;
+  // True if the ray was not rotated into mesh axes: a zero component of its direction is exact, so that a triangle
+  // perpendicular to that axis is exactly edge-on.
+  bool unrotated = false;
 };
 
 inline constexpr double kMinKernelDirection = 0x1p-20;
 inline constexpr double kMaxKernelDirection = 0x1p20;
-// So must the largest |coordinate| of the origin plus the largest of the mesh within these: elsewhere the products of
-// the bounds would vanish or overflow.
+// Limits of the largest |coordinate| of the origin plus the largest |coordinate| of the mesh. Outside of them the
+// products of the error bounds would underflow or overflow.
 inline constexpr double kMinKernelReach = 0x1p-24;
 inline constexpr double kMaxKernelReach = 0x1p33;
-// A ray that has met this many triangles is left undecided, so that a call ends soon.
+// A ray that has tested more triangles than this is left undecided, which bounds the time of a call.
 inline constexpr uint32_t kMaxKernelTests = 4096;
 
 enum class KernelVerdict : uint8_t { kMiss, kHit, kUndecided };
 
+// Answer to one ray.
 struct KernelHit {
-  float t;          // in lengths of the direction; FIRST only
-  uint32_t number;  // FIRST: of the triangle, the lowest of those at t; ALL: how many rows stand
+  float t;          // in lengths of the direction; first() only
+  uint32_t number;  // first(): lowest number of the triangles hit at t; all(): number of rows
   KernelVerdict verdict;
-  uint32_t nodes;  // opened
-  uint32_t tests;  // triangles met
+  uint32_t nodes;  // nodes opened
+  uint32_t tests;  // triangles tested
 };
 
-// One hit of many.
+// One of the hits found by all().
 struct KernelRow {
   float t;  // in lengths of the direction
   uint32_t number;
 };
 
+// Kernels of one instruction set.
 struct RayKernels {
-  const char* name;  // of the instruction set
-  // Nearest hits of `count` rays. Many rays in one call are answered faster than one in each: they are on their way at
-  // once. Each answer depends on its own ray alone.
+  const char* name;  // instruction set
+  // Finds the nearest hits of `count` rays. One call with many rays is faster than many calls, because the rays are
+  // traced interleaved. Each answer depends only on its own ray.
   void (*first)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
-  // Whether there is a hit at all.
+  // Determines whether each of `count` rays hits any triangle.
   void (*any)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
-  // The hits of each ray, or the lowest `most` of them, in order of t, then number, where there are that many or more;
-  // `most` >= 1. Those of ray i stand from rows[i * most] on, in no order. What an undecided ray leaves there is void.
+  // Finds all hits of each ray, or the lowest `max_rows` of them by (t, number); `max_rows` >= 1. The rows of ray i
+  // begin at rows[i * max_rows] and are not sorted. The rows of an undecided ray are undefined.
   void (*all)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count, KernelRow* rows,
-              uint32_t most);
+              uint32_t max_rows);
 };
 
-// The exported symbol of each instruction set's object. Only to be called on a processor that has it.
+// Return the kernels of one instruction set: the only exported symbol of its object. Must be called only on a processor
+// that supports the instruction set.
 const RayKernels& ray_kernels_avx2();
 const RayKernels& ray_kernels_sse4();
 

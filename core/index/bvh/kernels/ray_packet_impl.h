@@ -1,7 +1,7 @@
-// Eight rays that go nearly the same way, through one tree together: every box and every triangle is met by all of them
-// at once. Cameras and sensors ask so. Each ray meets what it would meet alone, by the same arithmetic, so that its
-// answer is the same; boxes that none of them can meet are left out before, eight at a time. Packets take turns, so
-// that one goes on while another waits for memory.
+// Packet of eight coherent rays, traced through one tree together: each box and each triangle is tested with all rays
+// at once. Cameras and sensors send such rays. Each ray tests the same boxes and triangles by the same arithmetic as if
+// it were alone, so that its answer is the same. Boxes that no ray can hit are culled first, eight at a time, by a
+// frustum around the rays. Packets are stepped in turns, so that one continues while another waits for memory.
 //
 // Source: Wald, Slusallek, Benthin, Wagner, Interactive Rendering with Coherent Ray Tracing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
@@ -15,31 +15,32 @@
 namespace locus {
 namespace {
 
-// Whether eight rays may go together: in one octant and along one axis, which they must have in common, and close
-// enough to gain by it: their directions within a cone, their starts within a small part of everything.
-static inline bool go_together(const PreparedRays& rays, float magnitude) {
+// Returns whether eight rays are coherent. They must have the same octant and the same axis of projection, which the
+// packet requires; and, for speed, directions within a narrow cone and origins that are close compared to the mesh.
+static inline bool are_coherent(const PreparedRays& rays, float magnitude) {
   constexpr float kMaxSpread = 0.03f;
-  const auto apart = [&](uint32_t column, float most) {
-    const Floats8 off = absolute(Floats8::load(rays.columns[column]) - Floats8::all(rays.columns[column][0]));
-    return at_most(off, Floats8::all(most)) != 255u;
+  const auto differ = [&](uint32_t column, float max_difference) {
+    const Floats8 difference = absolute(Floats8::load(rays.columns[column]) - Floats8::splat(rays.columns[column][0]));
+    return at_most(difference, Floats8::splat(max_difference)) != 255u;
   };
   for (uint32_t column = kFromX; column <= kFromZ; ++column)
-    if (apart(column, kMaxSpread * magnitude)) return false;
-  if (apart(kShearX, kMaxSpread) || apart(kShearY, kMaxSpread)) return false;
-  // As the whole numbers they are: as floats they are denormal, and equal where the host takes those for zero.
+    if (differ(column, kMaxSpread * magnitude)) return false;
+  if (differ(kShearX, kMaxSpread) || differ(kShearY, kMaxSpread)) return false;
+  // Compared as integers: as floats they are denormal, and equal if the host process treats denormals as zero.
   const PreparedRay first(rays, 0);
   uint32_t different = 0;
   for (uint32_t i = 1; i < kTreeWidth; ++i) {
     const PreparedRay other(rays, i);
-    different |= (other.whole(kOctant) ^ first.whole(kOctant)) | (other.whole(kAxisZ) ^ first.whole(kAxisZ));
+    different |= (other.integer(kOctant) ^ first.integer(kOctant)) | (other.integer(kAxisZ) ^ first.integer(kAxisZ));
   }
   return different == 0;
 }
 
+// Eight coherent rays and the state of their traversal.
 template <bool kAny>
 class Packet {
  public:
-  // Eight of each, at the root.
+  // Starts eight rays at the root. `hits` has eight elements.
   inline void start(const TriangleTree& tree, const KernelRay* rays, const PreparedRays& prepared, KernelHit* hits) {
     tree_ = &tree;
     rays_ = rays;
@@ -51,25 +52,26 @@ class Packet {
       slabs_.near_offset[k] = Floats8::load(prepared.columns[kNearOffset + k]);
       slabs_.far_offset[k] = Floats8::load(prepared.columns[kFarOffset + k]);
     }
-    bind_beam();
+    compute_frustum();
     front_ = back_ = nodes_ = 0;
     for (uint32_t i = 0; i < kTreeWidth; ++i) {
       hits[i] = {limits_[i], kNoNumber, KernelVerdict::kMiss, 0, 0};
-      kept_[i] = 0;
+      candidate_counts_[i] = 0;
       front_ |= (rays[i].accept_front ? 1u : 0u) << i;
       back_ |= (rays[i].accept_back ? 1u : 0u) << i;
     }
-    waiting_[0] = {Floats8::all(0), 255, 0};
+    waiting_[0] = {Floats8::splat(0), 255, 0};
     top_ = 1;
   }
 
-  // Opens one node or block. False, once, at the end.
+  // Opens one node or block. If none is left, writes the answers and returns false; must not be called again then.
   inline bool step() {
     while (top_ != 0) {
-      // By reference: a copy would be made in halves, and the processor would wait for both to read the whole.
+      // By reference: a copy would be stored in two halves, and the following load of the whole would stall.
       const Waiting& now = waiting_[--top_];
       const uint32_t reference = now.reference;
-      // Limits may have fallen since. A box that starts exactly at one is opened: a lower number may wait there.
+      // Limits may have decreased since the push. A box entered exactly at a limit is opened: it may hold an equal hit
+      // with a lower number.
       const Floats8 limit = Floats8::load(limits_);
       const uint32_t rays =
           now.rays & (planted(PlantedBug::kKernelPruneEqual) ? below(now.near, limit) : at_most(now.near, limit));
@@ -78,37 +80,37 @@ class Packet {
         top_ = open_node(tree_->nodes[reference], top_);
       else
         open_block(tree_->blocks[reference & ~kBlockBit], rays);
-      fetch_next();
+      prefetch_next();
       return true;
     }
-    for (uint32_t i = 0; i < kTreeWidth; ++i) settle_kept(i);
+    for (uint32_t i = 0; i < kTreeWidth; ++i) resolve_candidates(i);
     hits_[0].nodes = nodes_;
     return false;
   }
 
  private:
   static constexpr uint32_t kMaxCandidates = 4;
-  static constexpr float kNever = -1;  // the limit of a ray that looks for nothing more
+  static constexpr float kNever = -1;  // limit of a ray that needs no more hits
 
   struct Waiting {
-    Floats8 near;
-    uint32_t rays;  // that meet the box
+    Floats8 near;   // entry distances of the rays
+    uint32_t rays;  // rays that hit the box
     uint32_t reference;
   };
 
-  // A triangle that a ray may hit, not yet decided.
+  // A triangle that a ray may hit, to be decided in double.
   struct Candidate {
     const TriangleBlock* block;
-    uint32_t place;
-    float earliest;  // no hit on it comes before
+    uint32_t lane;
+    float earliest;  // lower bound of t
   };
 
   struct Slabs {
     Floats8 reciprocal[3], near_offset[3], far_offset[3];
   };
 
-  // Asks for the memory of what comes next, while other packets have their turns.
-  inline void fetch_next() const {
+  // Prefetches the next node or block; other packets are stepped meanwhile.
+  inline void prefetch_next() const {
     if (top_ == 0) return;
     const uint32_t reference = waiting_[top_ - 1].reference;
     if ((reference & kBlockBit) == 0)
@@ -117,131 +119,133 @@ class Packet {
       prefetch(&tree_->blocks[reference & ~kBlockBit], sizeof(TriangleBlock));
   }
 
-  // All that the rays have between them, the same in all lanes: a slab is entered no earlier and left no later than by
-  // any start and any direction of theirs. With twice the rays' own pad, for the roundings here.
+  // Frustum around the rays, the same in all lanes: bounds of their origins and reciprocal directions, from which a
+  // slab is entered no later and left no earlier than by any of the rays. It uses twice the pad of the rays, for the
+  // rounding of this computation.
   struct RayFrustum {
-    Floats8 near_origin[3], far_origin[3], least[3], most[3], pad[3];
+    Floats8 near_origin[3], far_origin[3], min_reciprocal[3], max_reciprocal[3], pad[3];
   };
 
-  static inline Floats8 lowest(Floats8 a) { return Floats8::all(0) - largest(Floats8::all(0) - a); }
+  static inline Floats8 horizontal_min(Floats8 a) { return Floats8::splat(0) - horizontal_max(Floats8::splat(0) - a); }
 
-  inline void bind_beam() {
+  inline void compute_frustum() {
     for (uint32_t k = 0; k < 3; ++k) {
       const uint32_t world = axis(kAxisX + k);
       const Floats8 origin = Floats8::load(prepared_->columns[kFromX + k]);
       const bool negative = (axis(kOctant) >> world & 1u) != 0;
-      frustum_.near_origin[world] = negative ? lowest(origin) : largest(origin);
-      frustum_.far_origin[world] = negative ? largest(origin) : lowest(origin);
-      frustum_.least[world] = lowest(slabs_.reciprocal[world]);
-      frustum_.most[world] = largest(slabs_.reciprocal[world]);
-      frustum_.pad[world] = largest(slabs_.near_offset[world] - slabs_.far_offset[world]);
+      frustum_.near_origin[world] = negative ? horizontal_min(origin) : horizontal_max(origin);
+      frustum_.far_origin[world] = negative ? horizontal_max(origin) : horizontal_min(origin);
+      frustum_.min_reciprocal[world] = horizontal_min(slabs_.reciprocal[world]);
+      frustum_.max_reciprocal[world] = horizontal_max(slabs_.reciprocal[world]);
+      frustum_.pad[world] = horizontal_max(slabs_.near_offset[world] - slabs_.far_offset[world]);
     }
   }
 
-  // The slots that the beam meets, from far to near; returns how many.
-  inline uint32_t slots_met(const TriangleNode& node, uint32_t octant, Floats8 limit, uint32_t* slots) const {
+  // Writes the slots whose boxes the frustum hits, from far to near. Returns their number.
+  inline uint32_t slots_hit(const TriangleNode& node, uint32_t octant, Floats8 limit, uint32_t* slots) const {
     const float* const bounds = node.bounds[0];
     Floats8 near[3], far[3];
     for (uint32_t k = 0; k < 3; ++k) {
-      const Floats8 in = Floats8::load(bounds + kRows.entered[octant][k]) - frustum_.near_origin[k];
-      const Floats8 out = Floats8::load(bounds + kRows.left[octant][k]) - frustum_.far_origin[k];
-      near[k] = minimum(in * frustum_.least[k], in * frustum_.most[k]) - frustum_.pad[k];
-      far[k] = maximum(out * frustum_.least[k], out * frustum_.most[k]) + frustum_.pad[k];
+      const Floats8 entry = Floats8::load(bounds + kRows.entered[octant][k]) - frustum_.near_origin[k];
+      const Floats8 exit = Floats8::load(bounds + kRows.left[octant][k]) - frustum_.far_origin[k];
+      near[k] = minimum(entry * frustum_.min_reciprocal[k], entry * frustum_.max_reciprocal[k]) - frustum_.pad[k];
+      far[k] = maximum(exit * frustum_.min_reciprocal[k], exit * frustum_.max_reciprocal[k]) + frustum_.pad[k];
     }
-    const Floats8 entered = maximum(maximum(near[0], near[1]), maximum(near[2], Floats8::all(0)));
-    const Floats8 left = minimum(minimum(far[0], far[1]), minimum(far[2], largest(limit)));
+    const Floats8 entered = maximum(maximum(near[0], near[1]), maximum(near[2], Floats8::splat(0)));
+    const Floats8 left = minimum(minimum(far[0], far[1]), minimum(far[2], horizontal_max(limit)));
     return pack_slots(node, entered, left, octant, slots);
   }
 
-  // Puts the children that any of the rays may hit on the stack, the nearest last. Returns the new top.
+  // Pushes the children that any of the rays may hit, the nearest one last. Returns the new top.
   inline uint32_t open_node(const TriangleNode& node, uint32_t top) {
     ++nodes_;
-    // Copies: the stores to the stack would make every turn of the loop read them again.
+    // Copies, because the compiler would reload the members after each store to the stack.
     const Slabs slabs = slabs_;
     const Floats8 limit = Floats8::load(limits_);
     const uint32_t octant = axis(kOctant);
     uint32_t slots[kTreeWidth];
-    const uint32_t count = slots_met(node, octant, limit, slots);
+    const uint32_t count = slots_hit(node, octant, limit, slots);
     const uint32_t* const rows_in = kRows.entered[octant];
     const uint32_t* const rows_out = kRows.left[octant];
     for (uint32_t i = 0; i < count; ++i) {
       const uint32_t slot = slots[i] & 7u;
       const float* const bounds = node.bounds[0] + slot;
       const auto near = [&](uint32_t k) {
-        return multiply_subtract(Floats8::all(bounds[rows_in[k]]), slabs.reciprocal[k], slabs.near_offset[k]);
+        return multiply_subtract(Floats8::splat(bounds[rows_in[k]]), slabs.reciprocal[k], slabs.near_offset[k]);
       };
       const auto far = [&](uint32_t k) {
-        return multiply_subtract(Floats8::all(bounds[rows_out[k]]), slabs.reciprocal[k], slabs.far_offset[k]);
+        return multiply_subtract(Floats8::splat(bounds[rows_out[k]]), slabs.reciprocal[k], slabs.far_offset[k]);
       };
-      const Floats8 entered = maximum(maximum(near(0), near(1)), maximum(near(2), Floats8::all(0)));
-      const uint32_t met = at_most(entered, minimum(minimum(far(0), far(1)), minimum(far(2), limit)));
-      waiting_[top] = {entered, met, node.child[slot]};
-      top += met != 0 ? 1 : 0;
+      const Floats8 entered = maximum(maximum(near(0), near(1)), maximum(near(2), Floats8::splat(0)));
+      const uint32_t hit = at_most(entered, minimum(minimum(far(0), far(1)), minimum(far(2), limit)));
+      waiting_[top] = {entered, hit, node.child[slot]};
+      top += hit != 0 ? 1 : 0;
     }
     return top;
   }
 
-  // Triangle by triangle, or ray by ray where few of the rays meet the block.
+  // Tests the rays with a block: triangle by triangle, or ray by ray if few of the rays hit the block.
   inline void open_block(const TriangleBlock& block, uint32_t rays) {
     for (uint32_t i = 0; i < kTreeWidth; ++i) hits_[i].tests += (rays >> i & 1u) * block.count;
-    constexpr int kRayCost = 5, kTriangleCost = 2;  // measured, in proportion
+    constexpr int kRayCost = 5, kTriangleCost = 2;  // measured relative costs
     if (__builtin_popcount(rays) * kRayCost < static_cast<int>(block.count) * kTriangleCost)
-      meet_by_ray(block, rays);
+      test_by_ray(block, rays);
     else
-      meet_by_triangle(block, rays);
+      test_by_triangle(block, rays);
     for (uint32_t i = 0; i < kTreeWidth; ++i)
       if (hits_[i].tests > kMaxKernelTests) give_up(i);
   }
 
-  inline void meet_by_ray(const TriangleBlock& block, uint32_t rays) {
+  inline void test_by_ray(const TriangleBlock& block, uint32_t rays) {
     for (; rays != 0; rays &= rays - 1u) {
       const auto i = static_cast<uint32_t>(__builtin_ctz(rays));
-      const BlockMet met = meet_block<kAny>(block, PreparedRay(*prepared_, i), limits_[i], rays_[i]);
-      if (met.sure != 0) {
-        find(i);
+      const BlockResults results = test_block<kAny>(block, PreparedRay(*prepared_, i), limits_[i], rays_[i]);
+      if (results.certain != 0) {
+        record_any_hit(i);
         continue;
       }
-      for (uint32_t open = met.open; open != 0; open &= open - 1u) settle(block, __builtin_ctz(open), i);
+      for (uint32_t candidates = results.candidates; candidates != 0; candidates &= candidates - 1u)
+        resolve(block, __builtin_ctz(candidates), i);
     }
   }
 
-  inline void meet_by_triangle(const TriangleBlock& block, uint32_t rays) {
+  inline void test_by_triangle(const TriangleBlock& block, uint32_t rays) {
     alignas(32) float earliest[kTreeWidth], latest[kTreeWidth];
     Pairs pairs = pairs_with(block);
     const uint32_t x = axis(kAxisX), y = axis(kAxisY), z = axis(kAxisZ);
-    for (uint32_t place = 0; place < block.count; ++place) {
+    for (uint32_t lane = 0; lane < block.count; ++lane) {
       for (uint32_t vertex = 0; vertex < 3; ++vertex) {
-        pairs.xs[vertex] = Floats8::all(block.vertices[x + 3 * vertex][place]);
-        pairs.ys[vertex] = Floats8::all(block.vertices[y + 3 * vertex][place]);
-        pairs.zs[vertex] = Floats8::all(block.vertices[z + 3 * vertex][place]);
+        pairs.xs[vertex] = Floats8::splat(block.vertices[x + 3 * vertex][lane]);
+        pairs.ys[vertex] = Floats8::splat(block.vertices[y + 3 * vertex][lane]);
+        pairs.zs[vertex] = Floats8::splat(block.vertices[z + 3 * vertex][lane]);
       }
-      const PairsMet met = meet(pairs);
-      uint32_t open = met.open & rays;
-      if (open == 0) continue;
-      const uint32_t certain = sure(pairs, met, front_, back_);
-      met.earliest.store(earliest);
-      met.latest.store(latest);
-      for (; open != 0; open &= open - 1u) {
-        const auto i = static_cast<uint32_t>(__builtin_ctz(open));
+      const PairResults results = test_pairs(pairs);
+      uint32_t candidates = results.candidates & rays;
+      if (candidates == 0) continue;
+      const uint32_t certain = certain_hits(pairs, results, front_, back_);
+      results.earliest.store(earliest);
+      results.latest.store(latest);
+      for (; candidates != 0; candidates &= candidates - 1u) {
+        const auto i = static_cast<uint32_t>(__builtin_ctz(candidates));
         if ((certain >> i & 1u) == 0)
-          settle(block, static_cast<int>(place), i);
+          resolve(block, static_cast<int>(lane), i);
         else if (kAny)
-          find(i);
+          record_any_hit(i);
         else
-          keep(i, {&block, place, earliest[i]}, latest[i]);
+          add_candidate(i, {&block, lane, earliest[i]}, latest[i]);
         if (limits_[i] < 0) rays &= ~(1u << i);
       }
       pairs.limit = Floats8::load(limits_);
     }
   }
 
-  // Of any of the rays: they have it in common.
-  inline uint32_t axis(uint32_t column) const { return PreparedRay(*prepared_, 0).whole(column); }
+  // Returns an axis or the octant, which is equal for all rays of the packet.
+  inline uint32_t axis(uint32_t column) const { return PreparedRay(*prepared_, 0).integer(column); }
 
-  // What does not depend on the triangle.
+  // Returns pairs with all members set that depend only on the rays and the block.
   inline Pairs pairs_with(const TriangleBlock& block) const {
-    const auto column = [&](uint32_t number) { return Floats8::load(prepared_->columns[number]); };
-    const Floats8 extent = Floats8::all(block.extent);
+    const auto column = [&](uint32_t index) { return Floats8::load(prepared_->columns[index]); };
+    const Floats8 extent = Floats8::splat(block.extent);
     Pairs pairs;
     pairs.from_x = column(kFromX);
     pairs.from_y = column(kFromY);
@@ -251,53 +255,54 @@ class Packet {
     pairs.reciprocal_z = column(kReciprocalZ);
     pairs.limit = Floats8::load(limits_);
     pairs.edge =
-        planted(PlantedBug::kKernelEdgeBound) ? Floats8::all(0) : column(kEdgeScale) * extent + column(kEdgeFloor);
+        planted(PlantedBug::kKernelEdgeBound) ? Floats8::splat(0) : column(kEdgeScale) * extent + column(kEdgeFloor);
     pairs.noise = pairs.edge * extent * column(kEdgeNoise) + column(kStartNoise);
     pairs.t_floor = column(kTFloor);
     return pairs;
   }
 
-  // Puts off to decide whether a triangle is hit: most that come first are not the nearest. `limit`: no hit beyond is
-  // wanted.
-  inline void keep(uint32_t i, const Candidate& candidate, float limit) {
+  // Adds a triangle that is certainly hit. Its exact t is computed later, because most hits found first are not the
+  // nearest. `limit` is the upper bound of its t; hits beyond it are not wanted any more.
+  inline void add_candidate(uint32_t i, const Candidate& candidate, float limit) {
     if (limit < limits_[i]) {
       limits_[i] = limit;
       uint32_t kept = 0;
-      for (uint32_t k = 0; k < kept_[i]; ++k) {
+      for (uint32_t k = 0; k < candidate_counts_[i]; ++k) {
         candidates_[i][kept] = candidates_[i][k];
         kept += candidates_[i][k].earliest <= limit ? 1 : 0;
       }
-      kept_[i] = kept;
+      candidate_counts_[i] = kept;
     }
-    if (kept_[i] == kMaxCandidates) settle_kept(i);
-    candidates_[i][kept_[i]++] = candidate;
+    if (candidate_counts_[i] == kMaxCandidates) resolve_candidates(i);
+    candidates_[i][candidate_counts_[i]++] = candidate;
   }
 
-  inline void settle_kept(uint32_t i) {
-    for (uint32_t k = 0; k < kept_[i]; ++k) {
+  inline void resolve_candidates(uint32_t i) {
+    for (uint32_t k = 0; k < candidate_counts_[i]; ++k) {
       const Candidate& candidate = candidates_[i][k];
-      if (candidate.earliest <= limits_[i]) settle(*candidate.block, static_cast<int>(candidate.place), i);
+      if (candidate.earliest <= limits_[i]) resolve(*candidate.block, static_cast<int>(candidate.lane), i);
     }
-    kept_[i] = 0;
+    candidate_counts_[i] = 0;
   }
 
-  // Decides a pair that float left open. Not of a ray that looks for nothing more: one given up stays so, whatever else
-  // of the same block it hits.
-  inline void settle(const TriangleBlock& block, int place, uint32_t i) {
+  // Decides a pair in double. Does nothing for a ray that needs no more hits: a ray that was given up stays undecided,
+  // even if it hits another triangle of the same block.
+  inline void resolve(const TriangleBlock& block, int lane, uint32_t i) {
     if (limits_[i] < 0 && !planted(PlantedBug::kKernelHitAfterGivingUp)) return;
-    const Verdict verdict = decide(block, place, rays_[i], PreparedRay(*prepared_, i));
-    if (verdict.what == KernelVerdict::kUndecided) give_up(i);
-    if (verdict.what != KernelVerdict::kHit) return;
-    take(i, verdict.t, number_of(*tree_, block, place));
+    const Verdict verdict = decide(block, lane, rays_[i], PreparedRay(*prepared_, i));
+    if (verdict.verdict == KernelVerdict::kUndecided) give_up(i);
+    if (verdict.verdict != KernelVerdict::kHit) return;
+    record_hit(i, verdict.t, number_of(*tree_, block, lane));
   }
 
-  // kAny: nothing more is wanted of the ray.
-  inline void find(uint32_t i) {
+  // Records that the ray hits something (kAny only).
+  inline void record_any_hit(uint32_t i) {
     hits_[i].verdict = KernelVerdict::kHit;
     limits_[i] = kNever;
   }
 
-  inline void take(uint32_t i, float t, uint32_t number) {
+  // Records a hit if it is better than the best one so far.
+  inline void record_hit(uint32_t i, float t, uint32_t number) {
     KernelHit& hit = hits_[i];
     if (!is_better(t, number, hit.t, hit.verdict == KernelVerdict::kHit, hit.number)) return;
     hit.verdict = KernelVerdict::kHit;
@@ -309,6 +314,7 @@ class Packet {
       limits_[i] = t;
   }
 
+  // Leaves a ray undecided.
   inline void give_up(uint32_t i) {
     hits_[i].verdict = KernelVerdict::kUndecided;
     limits_[i] = kNever;
@@ -320,11 +326,11 @@ class Packet {
   KernelHit* hits_;
   Slabs slabs_;
   RayFrustum frustum_;
-  uint32_t front_, back_;  // the rays that accept a triangle seen so
+  uint32_t front_, back_;  // rays that accept a triangle seen from the front, and from the back
   uint32_t nodes_;
   uint32_t top_;
   alignas(32) float limits_[kTreeWidth];
-  uint32_t kept_[kTreeWidth];
+  uint32_t candidate_counts_[kTreeWidth];
   Candidate candidates_[kTreeWidth][kMaxCandidates];
   Waiting waiting_[kTreeStack];
 };

@@ -1,4 +1,4 @@
-// What the ray kernels need to know of their rays, made eight rays at a time.
+// Per-ray constants of the ray kernels, computed for eight rays at a time.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_SETUP_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_SETUP_IMPL_H_
 
@@ -11,15 +11,17 @@
 namespace locus {
 namespace {
 
-constexpr float kTreePad = 0x1p-20f;  // twice the triangle's own, so that no rounding here culls what that would keep
+// Relative pad of the slabs of nodes: twice SlabRay's pad of a triangle's own box, so that rounding in float culls no
+// box that SlabRay would keep.
+constexpr float kTreePad = 0x1p-20f;
 
-// What is known of each ray. Lengths along a ray count lengths of its direction. x, y and z are the axes of the
-// projection along the ray: z the direction's largest component, the first of equals, as TriangleRay chooses it; x and
-// y the others, so that seen along the ray x to y always turns the same way.
+// Constants of each ray. Lengths along a ray are in lengths of its direction. x, y and z are the axes of the projection
+// along the ray: z is the axis of the direction's largest component (of equal ones the first), as TriangleRay chooses
+// it; x and y are the other two, in the order that keeps the orientation of a projected triangle the same for all rays.
 enum Column : uint32_t {
-  kReciprocal = 0,  // of the direction, three by world axis
-  kNearOffset = 3,  // three: a slab is entered at bound * reciprocal - near offset
-  kFarOffset = 6,   // three: and left at bound * reciprocal - far offset
+  kReciprocal = 0,  // three, by axis of the mesh: 1 / direction
+  kNearOffset = 3,  // three: a slab is entered at t = bound * reciprocal - near offset
+  kFarOffset = 6,   // three: and left at t = bound * reciprocal - far offset
   kLimit = 9,
   kFromX,
   kFromY,
@@ -27,46 +29,47 @@ enum Column : uint32_t {
   kShearX,
   kShearY,
   kReciprocalZ,
-  kEdgeScale,  // the bound of the edge functions: scale * extent + floor
+  kEdgeScale,  // error bound of the edge functions: scale * extent + floor
   kEdgeFloor,
-  kEdgeNoise,  // the bound of t: (edge noise * bound of edge functions * extent + start noise) / determinant + floor
+  kEdgeNoise,  // error bound of t: (edge noise * bound of edge functions * extent + start noise) / determinant + floor
   kStartNoise,
   kTFloor,
-  kAxisX,  // the world axes of x, y and z: whole numbers
+  kAxisX,  // axes of the mesh that are x, y and z: integers
   kAxisY,
   kAxisZ,
-  kOctant,  // bit k: component k of the direction is negative: a whole number
+  kOctant,  // bit k is set if component k of the direction is negative: an integer
   kColumns
 };
 
-// Eight rays side by side.
+// Constants of eight rays: one column each, one lane a ray.
 struct alignas(64) PreparedRays {
   float columns[kColumns][kTreeWidth];
 };
 
-// One of them: where it stands in the first column.
+// Reference to one lane of PreparedRays.
 class PreparedRay {
  public:
   inline PreparedRay() = default;
-  inline PreparedRay(const PreparedRays& rays, size_t place) : at_(&rays.columns[0][place]) {}
+  inline PreparedRay(const PreparedRays& rays, size_t lane) : first_column_(&rays.columns[0][lane]) {}
 
-  inline float number(uint32_t column) const { return at_[column * kTreeWidth]; }
-  inline Floats8 spread(uint32_t column) const { return Floats8::all(number(column)); }
-  inline uint32_t whole(uint32_t column) const {
+  inline float value(uint32_t column) const { return first_column_[column * kTreeWidth]; }
+  inline Floats8 splat(uint32_t column) const { return Floats8::splat(value(column)); }
+  inline uint32_t integer(uint32_t column) const {
     uint32_t bits;
-    __builtin_memcpy(&bits, at_ + column * kTreeWidth, sizeof(bits));
+    __builtin_memcpy(&bits, first_column_ + column * kTreeWidth, sizeof(bits));
     return bits;
   }
 
  private:
-  const float* at_;
+  const float* first_column_;
 };
 
+// Eight rays as columns.
 struct RayColumns {
   Floats8 origin[3], direction[3], limit;
 };
 
-// Rows to columns; behind `count` the last ray stands again.
+// Converts up to eight rays to columns. If `count` is less than eight, the last ray is repeated.
 static inline RayColumns columns_of(const KernelRay* rays, size_t count) {
   const double* first[kTreeWidth];
   const double* second[kTreeWidth];
@@ -84,30 +87,30 @@ static inline RayColumns columns_of(const KernelRay* rays, size_t count) {
   return columns;
 }
 
-// Puts the components of three-dimensional columns in the order of a projection's axes.
+// Axes of eight rays' projections; permutes components of vectors from mesh axes to projection axes.
 class Projection {
  public:
   inline Projection(const Floats8* direction, const KernelRay* rays, size_t count) {
     const Floats8 x = absolute(direction[0]), y = absolute(direction[1]), z = absolute(direction[2]);
     const Floats8 longest = maximum(maximum(x, y), z);
-    is_x_ = where_at_least(x, longest);
-    is_y_ = where_at_least(y, longest);
-    const uint32_t most_x = at_most(longest, x), most_y = at_most(longest, y), most_z = at_most(longest, z);
-    const uint32_t ties = (most_x & (most_y | most_z)) | (most_y & most_z);
+    is_x_ = greater_equal_mask(x, longest);
+    is_y_ = greater_equal_mask(y, longest);
+    const uint32_t is_max_x = at_most(longest, x), is_max_y = at_most(longest, y), is_max_z = at_most(longest, z);
+    const uint32_t ties = (is_max_x & (is_max_y | is_max_z)) | (is_max_y & is_max_z);
     if (ties != 0 && !planted(PlantedBug::kKernelFloatAxis)) decide_ties(ties, rays, count);
     backwards_ = planted(PlantedBug::kKernelWinding) ? bits_of(0) : along(direction[0], direction[1], direction[2]);
   }
 
-  inline Floats8 along(Floats8 x, Floats8 y, Floats8 z) const { return choose(is_x_, x, choose(is_y_, y, z)); }
+  inline Floats8 along(Floats8 x, Floats8 y, Floats8 z) const { return select(is_x_, x, select(is_y_, y, z)); }
   inline Floats8 first(Floats8 x, Floats8 y, Floats8 z) const {
-    return choose(backwards_, along(z, x, y), along(y, z, x));
+    return select(backwards_, along(z, x, y), along(y, z, x));
   }
   inline Floats8 second(Floats8 x, Floats8 y, Floats8 z) const {
-    return choose(backwards_, along(y, z, x), along(z, x, y));
+    return select(backwards_, along(y, z, x), along(z, x, y));
   }
 
  private:
-  // In double: on the axis depend the last bits of t.
+  // Chooses between equal components in double, because the last bits of t depend on the axis.
   void decide_ties(uint32_t ties, const KernelRay* rays, size_t count) {
     alignas(32) float x[kTreeWidth], y[kTreeWidth];
     is_x_.store(x);
@@ -115,9 +118,9 @@ class Projection {
     for (; ties != 0; ties &= ties - 1u) {
       const auto i = static_cast<size_t>(__builtin_ctz(ties));
       const double* const d = rays[i < count ? i : count - 1].direction;
-      const double size_x = __builtin_fabs(d[0]), size_y = __builtin_fabs(d[1]), size_z = __builtin_fabs(d[2]);
-      x[i] = size_x >= size_y && size_x >= size_z ? -1.0f : 1.0f;
-      y[i] = size_y >= size_z ? -1.0f : 1.0f;
+      const double abs_x = __builtin_fabs(d[0]), abs_y = __builtin_fabs(d[1]), abs_z = __builtin_fabs(d[2]);
+      x[i] = abs_x >= abs_y && abs_x >= abs_z ? -1.0f : 1.0f;
+      y[i] = abs_y >= abs_z ? -1.0f : 1.0f;
     }
     is_x_ = Floats8::load(x);
     is_y_ = Floats8::load(y);
@@ -126,38 +129,41 @@ class Projection {
   Floats8 is_x_, is_y_, backwards_;  // sign bits
 };
 
+// Computes the slab constants and the octant. `inverse` receives the reciprocals of the directions.
 static inline void prepare_slabs(const RayColumns& rays, Floats8 reach, Floats8* inverse, PreparedRays& to) {
   const Floats8* const d = rays.direction;
   const Floats8 longest = maximum(maximum(absolute(d[0]), absolute(d[1])), absolute(d[2]));
-  // As SlabRay does: a component of zero becomes 1e-18 of the largest.
-  const Floats8 least = longest * Floats8::all(1e-18f),
-                pad = reach * Floats8::all(planted(PlantedBug::kKernelTreePad) ? 0 : kTreePad);
+  // A component of zero is replaced by 1e-18 of the largest one, like in SlabRay.
+  const Floats8 min_component = longest * Floats8::splat(1e-18f),
+                pad = reach * Floats8::splat(planted(PlantedBug::kKernelTreePad) ? 0 : kTreePad);
   Floats8 octant = bits_of(0);
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    inverse[axis] = Floats8::all(1) / bit_or(maximum(absolute(d[axis]), least), bit_and(bits_of(0x80000000u), d[axis]));
-    const Floats8 center = rays.origin[axis] * inverse[axis], around = pad * absolute(inverse[axis]);
+    inverse[axis] =
+        Floats8::splat(1) / bit_or(maximum(absolute(d[axis]), min_component), bit_and(bits_of(0x80000000u), d[axis]));
+    const Floats8 center = rays.origin[axis] * inverse[axis], offset = pad * absolute(inverse[axis]);
     inverse[axis].store(to.columns[kReciprocal + axis]);
-    (center + around).store(to.columns[kNearOffset + axis]);
-    (center - around).store(to.columns[kFarOffset + axis]);
-    octant = bit_or(octant, choose(d[axis], bits_of(1u << axis), bits_of(0)));
+    (center + offset).store(to.columns[kNearOffset + axis]);
+    (center - offset).store(to.columns[kFarOffset + axis]);
+    octant = bit_or(octant, select(d[axis], bits_of(1u << axis), bits_of(0)));
   }
   octant.store(to.columns[kOctant]);
 }
 
-static inline void prepare_bounds(Floats8 reach, Floats8 size_of_reciprocal_z, PreparedRays& to) {
-  (reach * Floats8::all(0x1p-17f)).store(to.columns[kEdgeScale]);
-  (reach * reach * Floats8::all(0x1p-36f)).store(to.columns[kEdgeFloor]);
-  (Floats8::all(6) * size_of_reciprocal_z).store(to.columns[kEdgeNoise]);
-  (reach * reach * reach * Floats8::all(0x1p-42f) * size_of_reciprocal_z).store(to.columns[kStartNoise]);
-  (reach * Floats8::all(0x1p-20f) * size_of_reciprocal_z).store(to.columns[kTFloor]);
+// Computes the error bounds explained in ray_block_impl.h. `reach` is R.
+static inline void prepare_bounds(Floats8 reach, Floats8 abs_reciprocal_z, PreparedRays& to) {
+  (reach * Floats8::splat(0x1p-17f)).store(to.columns[kEdgeScale]);
+  (reach * reach * Floats8::splat(0x1p-36f)).store(to.columns[kEdgeFloor]);
+  (Floats8::splat(6) * abs_reciprocal_z).store(to.columns[kEdgeNoise]);
+  (reach * reach * reach * Floats8::splat(0x1p-42f) * abs_reciprocal_z).store(to.columns[kStartNoise]);
+  (reach * Floats8::splat(0x1p-20f) * abs_reciprocal_z).store(to.columns[kTFloor]);
 }
 
-// Of the first eight rays, or as many as there are.
+// Computes the constants of the first eight rays, or of all if there are fewer.
 static inline void prepare(const KernelRay* rays, size_t count, float magnitude, PreparedRays& to) {
   const RayColumns columns = columns_of(rays, count);
   const Floats8* const o = columns.origin;
   const Floats8* const d = columns.direction;
-  const Floats8 reach = maximum(maximum(absolute(o[0]), absolute(o[1])), absolute(o[2])) + Floats8::all(magnitude);
+  const Floats8 reach = maximum(maximum(absolute(o[0]), absolute(o[1])), absolute(o[2])) + Floats8::splat(magnitude);
   Floats8 inverse[3];
   prepare_slabs(columns, reach, inverse, to);
   columns.limit.store(to.columns[kLimit]);

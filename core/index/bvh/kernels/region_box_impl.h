@@ -1,26 +1,26 @@
-// Boxes against boxes and triangles, eight at a time, for region_kernels_impl.h: separating axes in the box's own axes,
-// as the predicate's. The error bounds of the triangle test, with u = 2^-24, E = the block's extent, h = the half
-// extents and R = h + 2 E, by axis; the box reaches the block's box, so no coordinate of a vertex, seen from the centre
-// along the box's axes, is larger than R. The differences of floats, all that is computed from, are off by u of
-// themselves, and every product and every sum counts as a rounding of its own, as it does without fused products. In a
-// box that is not turned:
+// Tests of a box with eight boxes or eight triangles at a time, for region_kernels_impl.h: separating axes in the box's
+// own axes, like the predicate. Error bounds of the triangle test, with u = 2^-24, E = the block's extent, h = the half
+// extents and, by axis, R = h + 2 E. The box overlaps the block's box, so no coordinate of a vertex, relative to the
+// centre and along the box's axes, exceeds R. All computations start with differences of floats, whose relative error
+// is u, and each product and each sum is counted as one rounding, as without fused products. If the box is not rotated:
 //
-// - A shadow on the axis across a box axis and an edge (x, y) is off by 4 u (|x| R_y + |y| R_x): two differences, a
-//   product and a sum; the box's reach as well. The shadow of half extents smaller or larger by 16 u R differs by twice
-//   that. Where an edge is parallel to the box's axis, the shadows are exactly zero, and zero is in reach of zero.
-//   Edges are taken 2^60 times, so that no product underflows.
-// - A normal's component, at most E^2, is off by 3 u of each of its products and u of itself: 7 u E^2. The height is
-// off
-//   by 7 u and 4 u of E^2 (R_x + R_y + R_z), the reach by 7 u and 3 u, the sums with the bound by u each: 23 u in all,
-//   and plane = 32 u of it.
+// - On the axis perpendicular to a box axis and an edge (x, y), the error of a projected vertex is
+//   4 u (|x| R_y + |y| R_x): two differences, a product and a sum; that of the projected box is the same. Half extents
+//   that are smaller or larger by 16 u R change the projected box by twice that. If an edge is parallel to the box's
+//   axis, all projections are exactly zero, which counts as overlapping. Edges are scaled by 2^60, so that no product
+//   underflows.
+// - The error of a normal's component, which is at most E^2, is 3 u of each of its products and u of itself: 7 u E^2.
+//   The error of the triangle's height is 7 u and 4 u of E^2 (R_x + R_y + R_z), that of the projected box 7 u and 3 u,
+//   and each sum with the bound adds u: 23 u in total, within plane = 32 u of it.
 //
-// In a turned box, with S the sum of R, coordinates are sums of three products, off by 5 u S, and edges by 9 u E: half
-// extents differ by 2^-18 S. Across an edge a shadow is off by 42 u E S and the reach by 14 u E S, against 2^-17 E S.
-// A normal's component is off by 78 u E^2, the height by 78 u, 26 u and 9 u of E^2 S, the reach by 87 u, against
-// 2^-15 E^2 S.
+// If the box is rotated, with S the sum of R: the error of coordinates, sums of three products, is 5 u S, and that of
+// edges 9 u E: half extents differ by 2^-18 S. Across an edge, the error of a projected vertex is 42 u E S and that of
+// the projected box 14 u E S, within 2^-17 E S. The error of a normal's component is 78 u E^2, that of the height 78 u,
+// 26 u and 9 u of E^2 S, and that of the projected box 87 u, within 2^-15 E^2 S.
 //
-// What is certain to overlap on all axes has a point in common with the box, and so has its bounds; triangles without
-// area never are, but where they lie inside: a vertex inside is in reach on every axis, by monotone rounding.
+// A triangle that certainly overlaps on all axes has a point in common with the box, and so have its bounds. Triangles
+// without area are never certain unless a vertex is inside; a vertex inside overlaps on every axis, because rounding is
+// monotone.
 //
 // Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_BOX_IMPL_H_
@@ -31,16 +31,16 @@
 namespace locus {
 namespace {
 
-static inline Vector8 smallest(Vector8 a, Vector8 b, Vector8 c) {
+static inline Vector8 min_of_three(Vector8 a, Vector8 b, Vector8 c) {
   return {minimum(a.x, minimum(b.x, c.x)), minimum(a.y, minimum(b.y, c.y)), minimum(a.z, minimum(b.z, c.z))};
 }
-static inline Vector8 largest(Vector8 a, Vector8 b, Vector8 c) {
+static inline Vector8 max_of_three(Vector8 a, Vector8 b, Vector8 c) {
   return {maximum(a.x, maximum(b.x, c.x)), maximum(a.y, maximum(b.y, c.y)), maximum(a.z, maximum(b.z, c.z))};
 }
 static inline Vector8 absolute(Vector8 a) { return {absolute(a.x), absolute(a.y), absolute(a.z)}; }
-static inline Vector8 times(Vector8 a, Floats8 s) { return {a.x * s, a.y * s, a.z * s}; }
+static inline Vector8 scaled(Vector8 a, Floats8 s) { return {a.x * s, a.y * s, a.z * s}; }
 
-// Whether low to high overlaps, or lies within, a box of floats.
+// Box of floats, in all lanes. Tests whether it overlaps or contains the boxes `low` to `high`.
 struct Boxes8 {
   Vector8 min, max;
 
@@ -54,83 +54,86 @@ struct Boxes8 {
   }
 };
 
-// Of eight triangles, bits of those that float cannot tell to be separated from the box along an axis, and of those
-// that are certain not to be.
-struct Shadows {
-  uint32_t possible, certain;
+// Results of the separating axis test for eight triangles; one bit a triangle.
+struct OverlapBits {
+  uint32_t possible;  // not certainly separated from the box along any axis tested so far
+  uint32_t certain;   // certainly not separated along any axis tested so far
 
-  inline void meet(Floats8 gap, Floats8 inner, Floats8 outer) {
+  // Adds an axis. `gap` is the distance between the projections of the box's centre and the triangle.
+  inline void add_axis(Floats8 gap, Floats8 inner, Floats8 outer) {
     certain &= at_most(gap, inner);
     possible &= at_most(gap, outer);
   }
 };
 
-template <bool kTurned>
+// A box as a query of region_kernels_impl.h.
+template <bool kRotated>
 class BoxQuery {
  public:
   inline void set(const KernelBox& box) {
-    outer_ = {Vector8::all(box.outer_min), Vector8::all(box.outer_max)};
-    inner_ = {Vector8::all(box.inner_min), Vector8::all(box.inner_max)};
-    center_ = Vector8::all(box.center);
+    outer_ = {Vector8::splat(box.outer_min), Vector8::splat(box.outer_max)};
+    inner_ = {Vector8::splat(box.inner_min), Vector8::splat(box.inner_max)};
+    center_ = Vector8::splat(box.center);
     box_ = &box;
   }
 
-  __attribute__((always_inline)) inline MetChildren meet_node(const TriangleNode& node) const {
+  __attribute__((always_inline)) inline ChildResults test_node(const TriangleNode& node) const {
     const Vector8 low = Vector8::load(node.bounds), high = Vector8::load(node.bounds + 3);
-    const uint32_t some = outer_.overlaps(low, high);
-    if constexpr (kTurned) {
-      if (some == 0) return {0, 0};
-      const MetChildren turned = meet_turned(low - center_, high - center_);
-      return {some & turned.some, some & turned.whole};
+    const uint32_t overlapping = outer_.overlaps(low, high);
+    if constexpr (kRotated) {
+      if (overlapping == 0) return {0, 0};
+      const ChildResults rotated = test_rotated(low - center_, high - center_);
+      return {overlapping & rotated.overlapping, overlapping & rotated.contained};
     }
-    return {some, some & inner_.contains(low, high)};
+    return {overlapping, overlapping & inner_.contains(low, high)};
   }
 
-  inline MetTriangles meet_block(const TriangleBlock& block) const {
-    const uint32_t all = (1u << block.count) - 1u;
-    const Span span(*box_, block.extent);
-    if (!span.in_range) return {0, all};
-    const Vector8 a = seen(Vector8::load(block.vertices) - center_),
-                  b = seen(Vector8::load(block.vertices + 3) - center_),
-                  c = seen(Vector8::load(block.vertices + 6) - center_);
-    const Vector8 low = smallest(a, b, c), high = largest(a, b, c);
-    Shadows shadows = {all, all};
-    const Vector8 gap = {maximum(low.x, minus(high.x)), maximum(low.y, minus(high.y)), maximum(low.z, minus(high.z))};
-    shadows.meet(gap.x, span.inner.x, span.outer.x);
-    shadows.meet(gap.y, span.inner.y, span.outer.y);
-    shadows.meet(gap.z, span.inner.z, span.outer.z);
-    uint32_t inside = span.contains(a) & all;
-    const uint32_t b_inside = span.contains(b), c_inside = span.contains(c);
-    inside = (inside | b_inside | c_inside) & all;
-    if ((shadows.possible & ~inside) == 0) return {inside, 0};
+  inline TriangleResults test_block(const TriangleBlock& block) const {
+    const uint32_t lanes = (1u << block.count) - 1u;
+    const BlockBounds bounds(*box_, block.extent);
+    if (!bounds.in_range) return {0, lanes};
+    const Vector8 a = to_box_axes(Vector8::load(block.vertices) - center_),
+                  b = to_box_axes(Vector8::load(block.vertices + 3) - center_),
+                  c = to_box_axes(Vector8::load(block.vertices + 6) - center_);
+    const Vector8 low = min_of_three(a, b, c), high = max_of_three(a, b, c);
+    OverlapBits overlap = {lanes, lanes};
+    const Vector8 gap = {maximum(low.x, negated(high.x)), maximum(low.y, negated(high.y)),
+                         maximum(low.z, negated(high.z))};
+    overlap.add_axis(gap.x, bounds.inner.x, bounds.outer.x);
+    overlap.add_axis(gap.y, bounds.inner.y, bounds.outer.y);
+    overlap.add_axis(gap.z, bounds.inner.z, bounds.outer.z);
+    uint32_t inside = bounds.contains(a) & lanes;
+    const uint32_t b_inside = bounds.contains(b), c_inside = bounds.contains(c);
+    inside = (inside | b_inside | c_inside) & lanes;
+    if ((overlap.possible & ~inside) == 0) return {inside, 0};
 
     const Vector8 ab = edge_of(block, 0, 3), bc = edge_of(block, 3, 6), ca = edge_of(block, 6, 0);
-    meet_normal(cross(ab, bc), a, span, shadows);
-    if ((shadows.possible & ~inside) == 0) return {inside, 0};
-    meet_edge(ab, a, c, span, shadows);
-    meet_edge(bc, b, a, span, shadows);
-    meet_edge(ca, c, b, span, shadows);
-    const uint32_t sure = inside | (shadows.certain & shadows.possible);
-    return {sure, shadows.possible & ~sure};
+    add_normal(cross(ab, bc), a, bounds, overlap);
+    if ((overlap.possible & ~inside) == 0) return {inside, 0};
+    add_edge_axes(ab, a, c, bounds, overlap);
+    add_edge_axes(bc, b, a, bounds, overlap);
+    add_edge_axes(ca, c, b, bounds, overlap);
+    const uint32_t certain = inside | (overlap.certain & overlap.possible);
+    return {certain, overlap.possible & ~certain};
   }
 
  private:
-  // What a block's shadows are held against.
-  struct Span {
-    inline Span(const KernelBox& box, float extent) {
+  // Half extents of the box and error bounds for the triangles of one block.
+  struct BlockBounds {
+    inline BlockBounds(const KernelBox& box, float extent) {
       float reach[3], pad[3], sum = 0;
       for (int axis = 0; axis < 3; ++axis) sum += reach[axis] = box.half[axis] + 2 * extent;
-      const float least = unless(PlantedBug::kRegionRange, 0x1p-39f);
-      in_range = reach[0] >= least && reach[1] >= least && reach[2] >= least;
+      const float min_reach = bound_unless(PlantedBug::kRegionRange, 0x1p-39f);
+      in_range = reach[0] >= min_reach && reach[1] >= min_reach && reach[2] >= min_reach;
       for (int axis = 0; axis < 3; ++axis)
-        pad[axis] = unless(PlantedBug::kRegionHalf, kTurned ? 0x1p-18f * sum : 0x1p-20f * reach[axis]);
-      half = Vector8::all(box.half);
-      const Vector8 pads = Vector8::all(pad);
+        pad[axis] = bound_unless(PlantedBug::kRegionHalf, kRotated ? 0x1p-18f * sum : 0x1p-20f * reach[axis]);
+      half = Vector8::splat(box.half);
+      const Vector8 pads = Vector8::splat(pad);
       inner = half - pads;
       outer = {half.x + pads.x, half.y + pads.y, half.z + pads.z};
-      across = Floats8::all(kTurned ? 0x1p-17f * extent * sum * kEdgeScale : 0);
-      plane = Floats8::all(unless(PlantedBug::kRegionBoxPlane,
-                                  (kTurned ? 0x1p-15f : 0x1p-19f) * extent * extent * sum + square_floor()));
+      across = Floats8::splat(kRotated ? 0x1p-17f * extent * sum * kEdgeScale : 0);
+      plane = Floats8::splat(bound_unless(PlantedBug::kRegionBoxPlane,
+                                          (kRotated ? 0x1p-15f : 0x1p-19f) * extent * extent * sum + square_floor()));
     }
     inline uint32_t contains(Vector8 point) const {
       const Vector8 size = absolute(point);
@@ -139,75 +142,79 @@ class BoxQuery {
 
     Vector8 half, inner, outer;
     Floats8 across, plane;
-    bool in_range;  // no product of shadows underflows
+    bool in_range;  // no product of projections underflows
   };
 
   static constexpr float kEdgeScale = 0x1p60f;
 
-  static inline Floats8 minus(Floats8 a) { return Floats8::all(0) - a; }
+  static inline Floats8 negated(Floats8 a) { return Floats8::splat(0) - a; }
 
-  // Along the box's axes.
-  inline Vector8 seen(Vector8 v) const {
-    if constexpr (!kTurned) return v;
+  // Rotates vectors from mesh axes to box axes.
+  inline Vector8 to_box_axes(Vector8 v) const {
+    if constexpr (!kRotated) return v;
     const float* r = box_->rotation;
     const auto column = [&](int k) {
-      return multiply_add(Floats8::all(r[k]), v.x,
-                          multiply_add(Floats8::all(r[3 + k]), v.y, Floats8::all(r[6 + k]) * v.z));
+      return multiply_add(Floats8::splat(r[k]), v.x,
+                          multiply_add(Floats8::splat(r[3 + k]), v.y, Floats8::splat(r[6 + k]) * v.z));
     };
     return {column(0), column(1), column(2)};
   }
 
+  // Returns the edge between two vertices, given by their rows, in box axes.
   inline Vector8 edge_of(const TriangleBlock& block, int from, int to) const {
-    return seen(Vector8::load(block.vertices + to) - Vector8::load(block.vertices + from));
+    return to_box_axes(Vector8::load(block.vertices + to) - Vector8::load(block.vertices + from));
   }
 
-  // Boxes against the turned box, along its own axes; `low` and `high` are seen from its centre.
-  inline MetChildren meet_turned(Vector8 low, Vector8 high) const {
-    const Floats8 half = Floats8::all(0.5f);
-    const Vector8 middle = seen({(low.x + high.x) * half, (low.y + high.y) * half, (low.z + high.z) * half});
-    const Vector8 extent = times(high - low, half);
-    const Floats8 pad = Floats8::all(unless(PlantedBug::kRegionTurnedNode, 0x1p-19f)) *
+  // Tests the rotated box with boxes along its own axes. `low` and `high` are relative to its centre.
+  inline ChildResults test_rotated(Vector8 low, Vector8 high) const {
+    const Floats8 half = Floats8::splat(0.5f);
+    const Vector8 middle = to_box_axes({(low.x + high.x) * half, (low.y + high.y) * half, (low.z + high.z) * half});
+    const Vector8 extent = scaled(high - low, half);
+    const Floats8 pad = Floats8::splat(bound_unless(PlantedBug::kRegionTurnedNode, 0x1p-19f)) *
                         (maximum(absolute(low.x), absolute(high.x)) + maximum(absolute(low.y), absolute(high.y)) +
                          maximum(absolute(low.z), absolute(high.z)));
-    uint32_t some = 255, whole = 255;
+    uint32_t overlapping = 255, contained = 255;
     const Floats8 middles[3] = {absolute(middle.x), absolute(middle.y), absolute(middle.z)};
     for (int k = 0; k < 3; ++k) {
       const float* r = box_->rotation + k;
-      const Floats8 reach =
-          multiply_add(absolute(Floats8::all(r[0])), extent.x,
-                       multiply_add(absolute(Floats8::all(r[3])), extent.y, absolute(Floats8::all(r[6])) * extent.z));
-      const Floats8 own = Floats8::all(box_->half[k]);
-      some &= at_most(middles[k] - reach, own + pad);
-      whole &= at_most(middles[k] + reach, own - pad);
+      const Floats8 projected_extent = multiply_add(
+          absolute(Floats8::splat(r[0])), extent.x,
+          multiply_add(absolute(Floats8::splat(r[3])), extent.y, absolute(Floats8::splat(r[6])) * extent.z));
+      const Floats8 own = Floats8::splat(box_->half[k]);
+      overlapping &= at_most(middles[k] - projected_extent, own + pad);
+      contained &= at_most(middles[k] + projected_extent, own - pad);
     }
-    return {some, whole & some};
+    return {overlapping, contained & overlapping};
   }
 
-  static inline void meet_normal(Vector8 normal, Vector8 vertex, const Span& span, Shadows& shadows) {
-    const Floats8 height = absolute(dot(normal, vertex)), reach = dot(absolute(normal), span.half);
-    shadows.meet(height, reach - span.plane, reach + span.plane);
+  // Adds the normal of the triangle as an axis. `vertex` is any vertex.
+  static inline void add_normal(Vector8 normal, Vector8 vertex, const BlockBounds& bounds, OverlapBits& overlap) {
+    const Floats8 height = absolute(dot(normal, vertex)), projected_half = dot(absolute(normal), bounds.half);
+    overlap.add_axis(height, projected_half - bounds.plane, projected_half + bounds.plane);
   }
 
-  // The axes across an edge from `from`; `other` is the vertex that the edge does not touch.
-  static inline void meet_edge(Vector8 edge, Vector8 from, Vector8 other, const Span& span, Shadows& shadows) {
-    const Vector8 e = times(edge, Floats8::all(planted(PlantedBug::kRegionEdgeScale) ? 1 : kEdgeScale));
-    meet_across(e.y, e.z, from.y, from.z, other.y, other.z, span.inner.y, span.inner.z, span.outer.y, span.outer.z,
-                span.across, shadows);
-    meet_across(e.z, e.x, from.z, from.x, other.z, other.x, span.inner.z, span.inner.x, span.outer.z, span.outer.x,
-                span.across, shadows);
-    meet_across(e.x, e.y, from.x, from.y, other.x, other.y, span.inner.x, span.inner.y, span.outer.x, span.outer.y,
-                span.across, shadows);
+  // Adds the axes perpendicular to an edge and each box axis. The edge starts at `from`; `other` is the opposite
+  // vertex.
+  static inline void add_edge_axes(Vector8 edge, Vector8 from, Vector8 other, const BlockBounds& bounds,
+                                   OverlapBits& overlap) {
+    const Vector8 e = scaled(edge, Floats8::splat(planted(PlantedBug::kRegionEdgeScale) ? 1 : kEdgeScale));
+    add_edge_axis(e.y, e.z, from.y, from.z, other.y, other.z, bounds.inner.y, bounds.inner.z, bounds.outer.y,
+                  bounds.outer.z, bounds.across, overlap);
+    add_edge_axis(e.z, e.x, from.z, from.x, other.z, other.x, bounds.inner.z, bounds.inner.x, bounds.outer.z,
+                  bounds.outer.x, bounds.across, overlap);
+    add_edge_axis(e.x, e.y, from.x, from.y, other.x, other.y, bounds.inner.x, bounds.inner.y, bounds.outer.x,
+                  bounds.outer.y, bounds.across, overlap);
   }
 
-  // In the plane of two of the box's axes: the axis across the edge (x, y) is (-y, x).
-  static inline void meet_across(Floats8 x, Floats8 y, Floats8 from_x, Floats8 from_y, Floats8 other_x, Floats8 other_y,
-                                 Floats8 inner_x, Floats8 inner_y, Floats8 outer_x, Floats8 outer_y, Floats8 across,
-                                 Shadows& shadows) {
+  // Adds one axis, in the plane of two of the box's axes: the axis perpendicular to the edge (x, y) is (-y, x).
+  static inline void add_edge_axis(Floats8 x, Floats8 y, Floats8 from_x, Floats8 from_y, Floats8 other_x,
+                                   Floats8 other_y, Floats8 inner_x, Floats8 inner_y, Floats8 outer_x, Floats8 outer_y,
+                                   Floats8 across, OverlapBits& overlap) {
     const Floats8 p = multiply_subtract(x, from_y, y * from_x), q = multiply_subtract(x, other_y, y * other_x);
-    const Floats8 gap = maximum(minimum(p, q), minus(maximum(p, q)));
-    const Floats8 size_x = absolute(x), size_y = absolute(y);
-    shadows.meet(gap, multiply_add(size_y, inner_x, multiply_subtract(size_x, inner_y, across)),
-                 multiply_add(size_y, outer_x, multiply_add(size_x, outer_y, across)));
+    const Floats8 gap = maximum(minimum(p, q), negated(maximum(p, q)));
+    const Floats8 abs_x = absolute(x), abs_y = absolute(y);
+    overlap.add_axis(gap, multiply_add(abs_y, inner_x, multiply_subtract(abs_x, inner_y, across)),
+                     multiply_add(abs_y, outer_x, multiply_add(abs_x, outer_y, across)));
   }
 
   Boxes8 outer_, inner_;

@@ -1,8 +1,8 @@
-// What the kernels of every instruction set offer: all triangles of one mesh's tree that a ball or a box meets, eight
-// boxes or triangles at a time. They decide in float where float is certain by a written bound, and ask the caller's
-// judge, the predicates of core/geometry/triangle_overlap.h, for the rest, so that their answers are its answers bit
-// for bit. A subtree that lies wholly inside is emitted as it stands. core/query/kinds/triangle_search.h is the way to
-// use them. Plain data; functions without state, safe from any thread.
+// Region kernels: find all triangles of one mesh's tree that overlap a ball or a box, eight boxes or triangles at a
+// time; every instruction set has its own object. A kernel decides in float only outside a documented error bound, and
+// asks the caller's RegionJudge, the predicates of core/geometry/triangle_overlap.h, otherwise, so that its answers
+// equal theirs bit for bit. The numbers of a subtree that lies completely inside the region are copied without tests.
+// Use them through core/query/kinds/triangle_search.h. Plain data; functions without state, safe from any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 
@@ -13,54 +13,56 @@
 
 namespace locus {
 
-// In mesh axes, like every region here. Finite, and the largest |coordinate| of the centre, plus the radius, plus the
-// tree's magnitude, at most kMaxRegionReach.
+// Ball in mesh axes. Precondition: it is finite, and the largest |coordinate| of its centre + its radius + the tree's
+// magnitude is at most kMaxRegionReach.
 struct KernelBall {
   float center[3];
   float radius;
 };
 
-// A box of any orientation. The same limit holds, with the sum of its half extents for the radius.
+// Box of any orientation in mesh axes. Precondition: as for KernelBall, with the sum of the half extents as the radius.
 struct KernelBox {
   float center[3];
   float half[3];
-  float rotation[9];  // rows of the matrix from box axes
-  // Around all that the box reaches in mesh axes, strictly; and, where it is not turned, strictly within it.
+  float rotation[9];  // rows of the matrix from box axes to mesh axes
+  // Axis-aligned box strictly around the box, and, if the box is not rotated, one strictly within it.
   float outer_min[3], outer_max[3];
   float inner_min[3], inner_max[3];
 };
 
 inline constexpr float kMaxRegionReach = 0x1p29f;
-// A call ends after so many triangles, for its caller to see whether to go on.
+// A call pauses after this number of tested triangles, so that its caller can check deadlines and cancellation.
 inline constexpr uint32_t kMaxRegionTests = 4096;
-// The least room for numbers that a call works with.
+// Minimum room for numbers in a call.
 inline constexpr size_t kMinRegionRoom = 8;
-// Regions that a call for many takes.
+// Maximum number of regions in a call of many().
 inline constexpr size_t kMaxRegions = 16;
-// Blocks and subtrees that a visit may have found, but not yet looked into; eight more may be written behind the last.
+// A visit stops opening nodes when it has more unprocessed items (blocks and contained subtrees) than this. Opening one
+// node adds up to eight items.
 inline constexpr uint32_t kMaxRegionItems = 56;
 
-// Decides what float leaves open.
+// Predicate for the triangles that float cannot decide.
 struct RegionJudge {
-  bool (*meets)(const void* region, const TriangleBlock& block, uint32_t place);
+  bool (*meets)(const void* region, const TriangleBlock& block, uint32_t lane);
   const void* region;
 };
 
-// A visit of one tree for one region: where it stands between two calls, and where its numbers go.
+// Resumable visit of one tree for one region: its state between two calls, and the output of the last call.
 struct RegionVisit {
   RegionJudge judge;
-  uint32_t* numbers;                         // where the next call writes to
-  size_t room;                               // and how far: at least kMinRegionRoom; all of it may be written to
-  size_t found;                              // by the last call: in storage order, behind those of the calls before
-  uint32_t nodes;                            // opened by the last call
-  uint32_t tests;                            // triangles met by the last call
-  uint32_t judged;                           // of these, by the judge
-  uint32_t top;                              // of `waiting`
-  uint32_t next, end;                        // of `items`
-  NodeRange rest;                            // of a subtree that is found, but not yet written
-  alignas(32) uint32_t waiting[kTreeStack];  // nodes
+  uint32_t* numbers;   // output of the next call
+  size_t room;         // its length, at least kMinRegionRoom; the call may write to all of it
+  size_t found;        // number of numbers written by the last call; in storage order over all calls
+  uint32_t nodes;      // nodes opened by the last call
+  uint32_t tests;      // triangles tested by the last call
+  uint32_t judged;     // number of these that were decided by the judge
+  uint32_t top;        // length of `waiting`
+  uint32_t next, end;  // range of unprocessed elements of `items`
+  NodeRange rest;      // remaining positions of a contained subtree that did not fit
+  alignas(32) uint32_t waiting[kTreeStack];  // nodes, and contained subtrees
   alignas(32) uint32_t items[kMaxRegionItems + kTreeWidth];
 
+  // Begins a visit at the root.
   void start(const RegionJudge& by) {
     judge = by;
     top = 1;
@@ -68,13 +70,15 @@ struct RegionVisit {
     rest = {};
     waiting[0] = 0;
   }
+  // Returns whether all triangles were found.
   bool over() const { return top == 0 && next == end && rest.count == 0; }
 };
 
-// One goes on with a visit, which pauses when it is over, when it has no room left, or after kMaxRegionTests tests.
-// Many answers up to kMaxRegions regions, whose nodes it opens in turns, so that they wait for memory together: the
-// numbers of each behind those of the one before, and how many there are. It returns how many regions are answered:
-// all, unless there was no room for more.
+// Kernel of one kind of region.
+// - one() continues a visit until it is over, its room is used up, or kMaxRegionTests triangles were tested.
+// - many() answers up to kMaxRegions regions and opens their nodes in turns, which overlaps their memory accesses. It
+//   writes the numbers of the regions one after the other, and the count of each. It returns the number of answered
+//   regions: all of them, unless `room` was too small for the next one.
 template <class Region>
 struct RegionKernel {
   void (*one)(const TriangleTree&, const Region&, RegionVisit&);
@@ -82,14 +86,16 @@ struct RegionKernel {
                  uint32_t* counts);
 };
 
+// Kernels of one instruction set.
 struct RegionKernels {
-  const char* name;  // of the instruction set
+  const char* name;  // instruction set
   RegionKernel<KernelBall> ball;
-  RegionKernel<KernelBox> box;  // not turned
+  RegionKernel<KernelBox> box;  // not rotated
   RegionKernel<KernelBox> turned_box;
 };
 
-// The exported symbol of the instruction set's object. Only to be called on a processor that has it.
+// Return the kernels of one instruction set: the only exported symbol of its object. Must be called only on a processor
+// that supports the instruction set.
 const RegionKernels& region_kernels_avx2();
 const RegionKernels& region_kernels_sse4();
 

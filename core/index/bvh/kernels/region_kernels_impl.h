@@ -1,8 +1,9 @@
-// How the region kernels go through a tree, compiled once for each instruction set by the file that includes this one.
-// They open nodes first and collect what they find: blocks to look into, and blocks and subtrees that are wholly
-// inside. Only then do they look into it, item by item, so that neither part waits for the other's branches. Of a
-// node's children the blocks stand before the nodes, which wait with the last slot lowest, so that items come in
-// storage order. region_ball_impl.h and region_box_impl.h hold the tests and their error bounds.
+// Traversal of the region kernels, compiled once for each instruction set by the .cc file that includes it. A traversal
+// first opens nodes and collects items: blocks to test, and blocks and subtrees that are completely inside the region.
+// Then it processes the items one by one. The two phases alternate, so that the mispredicted branches of one do not
+// delay the other. Of a node's children, the blocks become items at once and the nodes are pushed with the last slot
+// lowest, so that items are collected in storage order. region_ball_impl.h and region_box_impl.h contain the tests and
+// their error bounds.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 
@@ -12,10 +13,11 @@
 namespace locus {
 namespace {
 
-// What waits or is found is wholly inside. Numbers of nodes and blocks stay below it.
-constexpr uint32_t kWholeBit = 0x40000000u;
+// Flag of a node or block that is completely inside the region. Indices of nodes and blocks are below it.
+constexpr uint32_t kContainedBit = 0x40000000u;
+static_assert((kContainedBit & kBlockBit) == 0 && kMinRegionRoom >= kTreeWidth);
 
-// Where a query stands among the nodes: those that wait, and what was found and is not yet looked into.
+// State of one query's traversal: the stack `waiting` of nodes, and the collected `items` that are not processed yet.
 template <class Query>
 struct Walk {
   Query query;
@@ -23,64 +25,68 @@ struct Walk {
   uint32_t* items;
   uint32_t top, end, nodes;
 
-  inline bool goes_on() const { return (top != 0) & (end <= kMaxRegionItems); }
+  // Returns whether a node is pending and `items` has room for its blocks.
+  inline bool can_continue() const { return (top != 0) & (end <= kMaxRegionItems); }
 
-  // Opens the node on top.
+  // Pops and opens one node.
   __attribute__((always_inline)) inline void step(const TriangleTree& tree) {
     const uint32_t now = waiting[--top];
-    if ((now & kWholeBit) != 0) {
+    if ((now & kContainedBit) != 0) {
       items[end++] = now;
       return;
     }
     const TriangleNode& node = tree.nodes[now];
     ++nodes;
-    const MetChildren met = query.meet_node(node);
-    const uint32_t blocks = block_slots(node) & met.some, inner = met.some & ~blocks;
-    pack_rising(node, blocks, met.whole, kWholeBit, items + end);
-    pack_falling(node, inner, met.whole, kWholeBit, waiting + top);
+    const ChildResults children = query.test_node(node);
+    const uint32_t blocks = block_slots(node) & children.overlapping, inner = children.overlapping & ~blocks;
+    pack_rising(node, blocks, children.contained, kContainedBit, items + end);
+    pack_falling(node, inner, children.contained, kContainedBit, waiting + top);
     end += static_cast<uint32_t>(__builtin_popcount(blocks));
     top += static_cast<uint32_t>(__builtin_popcount(inner));
   }
 };
 
-static inline uint32_t judged(const TriangleBlock& block, uint32_t unsure, const RegionJudge& judge) {
+// Returns the bits of `undecided` whose triangles overlap the region, by the judge.
+static inline uint32_t judged(const TriangleBlock& block, uint32_t undecided, const RegionJudge& judge) {
   uint32_t found = 0;
-  for (; unsure != 0; unsure &= unsure - 1u) {
-    const auto place = static_cast<uint32_t>(__builtin_ctz(unsure));
-    if (judge.meets(judge.region, block, place)) found |= 1u << place;
+  for (; undecided != 0; undecided &= undecided - 1u) {
+    const auto lane = static_cast<uint32_t>(__builtin_ctz(undecided));
+    if (judge.meets(judge.region, block, lane)) found |= 1u << lane;
   }
   return found;
 }
 
-// Where numbers go.
+// Output of triangle numbers.
 struct Sink {
-  uint32_t* to;
+  uint32_t* out;
   size_t count, room;
-  NodeRange rest;  // of a subtree that did not fit
+  NodeRange rest;  // remaining positions of a subtree that did not fit
   uint32_t tests, judged;
 
+  // Returns whether there is no room for a block.
   inline bool full() const { return room - count < kTreeWidth; }
 
-  // Copies what fits of the rest; not when full.
+  // Copies as much of `rest` as fits. Must not be called when full.
   inline void copy_rest(const TriangleTree& tree) {
-    const size_t most = room - count - (kTreeWidth - 1);
-    const uint32_t fits = rest.count <= most ? rest.count : static_cast<uint32_t>(most);
-    copy_numbers(tree.numbers + rest.first, fits, to + count);
+    const size_t max_count = room - count - (kTreeWidth - 1);
+    const uint32_t fits = rest.count <= max_count ? rest.count : static_cast<uint32_t>(max_count);
+    copy_numbers(tree.numbers + rest.first, fits, out + count);
     count += fits;
     rest.first += fits;
     rest.count -= fits;
   }
 
+  // Writes the numbers of an item's triangles that overlap the region.
   template <class Query>
-  __attribute__((always_inline)) inline void look_into(const TriangleTree& tree, const Query& query,
-                                                       const RegionJudge& judge, uint32_t item) {
+  __attribute__((always_inline)) inline void process_item(const TriangleTree& tree, const Query& query,
+                                                          const RegionJudge& judge, uint32_t item) {
     if ((item & kBlockBit) == 0) {
-      rest = tree.ranges[item & ~kWholeBit];
+      rest = tree.ranges[item & ~kContainedBit];
       return copy_rest(tree);
     }
-    const TriangleBlock& block = tree.blocks[item & ~(kBlockBit | kWholeBit)];
-    const uint32_t found = (item & kWholeBit) != 0 ? (1u << block.count) - 1u : tested(query, judge, block);
-    pack_numbers(tree.numbers + block.first, block.count, found, to + count);
+    const TriangleBlock& block = tree.blocks[item & ~(kBlockBit | kContainedBit)];
+    const uint32_t found = (item & kContainedBit) != 0 ? (1u << block.count) - 1u : tested(query, judge, block);
+    pack_numbers(tree.numbers + block.first, block.count, found, out + count);
     count += static_cast<size_t>(__builtin_popcount(found));
   }
 
@@ -89,13 +95,14 @@ struct Sink {
   __attribute__((always_inline)) inline uint32_t tested(const Query& query, const RegionJudge& judge,
                                                         const TriangleBlock& block) {
     tests += block.count;
-    const MetTriangles met = query.meet_block(block);
-    if (__builtin_expect(met.unsure == 0, 1)) return met.sure;
-    judged += static_cast<uint32_t>(__builtin_popcount(met.unsure));
-    return met.sure | locus::judged(block, met.unsure, judge);
+    const TriangleResults results = query.test_block(block);
+    if (__builtin_expect(results.undecided == 0, 1)) return results.certain;
+    judged += static_cast<uint32_t>(__builtin_popcount(results.undecided));
+    return results.certain | locus::judged(block, results.undecided, judge);
   }
 };
 
+// Implements RegionKernel::one.
 template <class Query, class Region>
 static void find_one(const TriangleTree& tree, const Region& region, RegionVisit& visit) {
   Walk<Query> walk;
@@ -110,12 +117,12 @@ static void find_one(const TriangleTree& tree, const Region& region, RegionVisit
   if (sink.rest.count != 0 && !sink.full()) sink.copy_rest(tree);
   while (sink.rest.count == 0 && sink.tests < kMaxRegionTests && !sink.full()) {
     if (next != walk.end) {
-      sink.look_into(tree, walk.query, visit.judge, visit.items[next++]);
+      sink.process_item(tree, walk.query, visit.judge, visit.items[next++]);
       continue;
     }
     next = walk.end = 0;
     if (walk.top == 0) break;
-    while (walk.goes_on()) walk.step(tree);
+    while (walk.can_continue()) walk.step(tree);
   }
   visit.top = walk.top;
   visit.next = next;
@@ -127,7 +134,7 @@ static void find_one(const TriangleTree& tree, const Region& region, RegionVisit
   visit.judged = sink.judged;
 }
 
-// The walks of several queries.
+// Traversals of several queries.
 template <class Query>
 class Walks {
  public:
@@ -146,19 +153,20 @@ class Walks {
 
   inline Walk<Query>& operator[](size_t i) { return lanes_[i].walk; }
 
-  // All of them in turns: while one waits for memory or for its last step's outcome, the others go on.
-  inline void go_on(const TriangleTree& tree) {
-    uint32_t going[kMaxRegions];
-    for (uint32_t i = 0; i < count_; ++i) going[i] = i;
-    for (uint32_t left = count_; left != 0;) {
-      uint32_t still = 0;
-      for (uint32_t i = 0; i < left; ++i) {
-        const uint32_t now = going[i];
+  // Opens nodes of all queries in turns: while one waits for memory or for the result of its last step, the others
+  // continue.
+  inline void open_all(const TriangleTree& tree) {
+    uint32_t active[kMaxRegions];
+    for (uint32_t i = 0; i < count_; ++i) active[i] = i;
+    for (uint32_t active_count = count_; active_count != 0;) {
+      uint32_t remaining = 0;
+      for (uint32_t i = 0; i < active_count; ++i) {
+        const uint32_t now = active[i];
         lanes_[now].walk.step(tree);
-        going[still] = now;
-        still += static_cast<uint32_t>(lanes_[now].walk.goes_on());
+        active[remaining] = now;
+        remaining += static_cast<uint32_t>(lanes_[now].walk.can_continue());
       }
-      left = still;
+      active_count = remaining;
     }
   }
 
@@ -173,26 +181,27 @@ class Walks {
   uint32_t count_;
 };
 
-// All that a walk finds; false if there is no room for it.
+// Completes a walk and writes its numbers. Returns false if there is no room for them.
 template <class Query>
 static inline bool finish(const TriangleTree& tree, const RegionJudge& judge, Walk<Query>& walk, Sink& sink) {
   for (;;) {
     for (uint32_t next = 0; next < walk.end; ++next) {
       if (sink.full()) return false;
-      sink.look_into(tree, walk.query, judge, walk.items[next]);
+      sink.process_item(tree, walk.query, judge, walk.items[next]);
       if (sink.rest.count != 0) return false;
     }
     if (walk.top == 0) return true;
     walk.end = 0;
-    while (walk.goes_on()) walk.step(tree);
+    while (walk.can_continue()) walk.step(tree);
   }
 }
 
+// Implements RegionKernel::many.
 template <class Query, class Region>
 static size_t find_many(const TriangleTree& tree, const Region* regions, const RegionJudge* judges, size_t count,
                         uint32_t* numbers, size_t room, uint32_t* counts) {
   Walks<Query> walks(regions, count);
-  walks.go_on(tree);
+  walks.open_all(tree);
   Sink sink = {numbers, 0, room, {}, 0, 0};
   for (size_t i = 0; i < count; ++i) {
     const size_t before = sink.count;

@@ -14,9 +14,9 @@ struct Eight {
   float vertices[9][kTreeWidth];
 };
 
-Eight random_eight(Random& random, double place, double size) {
+Eight random_eight(Random& random, double extent, double size) {
   Eight eight;
-  const Vec3d near = random.vector(place);
+  const Vec3d near = random.vector(extent);
   for (int i = 0; i < kTreeWidth; ++i) {
     Triangle& t = eight.triangles[i];
     for (Vec3f* vertex : {&t.a, &t.b, &t.c}) *vertex = to_float(near + random.vector(size));
@@ -32,14 +32,15 @@ Eight random_eight(Random& random, double place, double size) {
   return eight;
 }
 
-// A limit exactly at a box, far and near, large and small: wherever double wants the box, float does.
-TEST(BoxDistancesTest, NoBoxIsLeftOutThatDoubleWants) {
+// The limit is exactly the distance of one of the boxes, at any scale: a box within the limit in double must be within
+// it in float.
+TEST(BoxDistancesTest, NoBoxWithinTheLimitInDoubleIsCulledInFloat) {
   constexpr uint64_t kSeed = 61;
   Random random(kSeed);
-  int left_out = 0;
+  int culled = 0;
   for (int i = 0; i < 50000; ++i) {
-    const double place = random.magnitude(-20, 30), size = place * random.magnitude(-24, 2);
-    const Eight eight = random_eight(random, place, size);
+    const double extent = random.magnitude(-20, 30), size = extent * random.magnitude(-24, 2);
+    const Eight eight = random_eight(random, extent, size);
     const Vec3d point = to_double(eight.triangles[0].a) + random.vector(size * random.magnitude(-10, 20));
     const BoxDistances distances(point);
     float to_boxes[kTreeWidth], to_triangles[kTreeWidth];
@@ -53,21 +54,22 @@ TEST(BoxDistancesTest, NoBoxIsLeftOutThatDoubleWants) {
         if (exact <= limit) {
           ASSERT_LE(to_boxes[slot], distances.limit(limit)) << "seed " << kSeed << " case " << i;
         } else {
-          left_out += to_boxes[slot] > distances.limit(limit);
+          culled += to_boxes[slot] > distances.limit(limit);
         }
       }
     }
   }
-  EXPECT_GT(left_out, 100000);
+  EXPECT_GT(culled, 100000);
 }
 
-TEST(BoxDistancesTest, NothingIsBeyondAnInfiniteLimit) {
+TEST(BoxDistancesTest, NoBoxIsBeyondAnInfiniteLimit) {
   const BoxDistances distances({1e20, -1e20, 3});
   float bounds[6][kTreeWidth] = {};
   for (auto& row : bounds) std::fill(row, row + kTreeWidth, 1e21f);
-  float away[kTreeWidth];
-  distances.to_boxes(bounds, away);
-  for (const float squared : away) EXPECT_LE(squared, distances.limit(std::numeric_limits<double>::infinity()));
+  float squared_distances[kTreeWidth];
+  distances.to_boxes(bounds, squared_distances);
+  for (const float squared : squared_distances)
+    EXPECT_LE(squared, distances.limit(std::numeric_limits<double>::infinity()));
 }
 
 }  // namespace

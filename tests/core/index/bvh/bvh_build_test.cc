@@ -22,7 +22,7 @@ BvhLayout<S> build(const std::vector<Aabb<S>>& boxes, int bins = 32) {
   return layout.ok() ? *std::move(layout) : BvhLayout<S>();
 }
 
-// Walks a layout and checks what its comments promise.
+// Visits all nodes of a layout and checks its documented properties.
 template <class S>
 class LayoutChecker {
  public:
@@ -34,7 +34,7 @@ class LayoutChecker {
       EXPECT_TRUE(layout_.nodes.empty());
       return;
     }
-    // Depth-first on a stack: every node and every position comes in turn.
+    // Depth-first order: nodes and positions must be visited in the order of their indices.
     struct Pending {
       BvhChild child;
       Aabb<S> bounds;
@@ -49,7 +49,7 @@ class LayoutChecker {
         continue;
       }
       ASSERT_EQ(now.child.first, nodes_seen_++);
-      deepest_ = std::max(deepest_, now.depth);
+      max_depth_ = std::max(max_depth_, now.depth);
       const BvhNode<S>& node = layout_.nodes[now.child.first];
       ASSERT_GE(node.child_count, boxes_.size() > kBvhLeafSize ? 2u : 1u);
       ASSERT_LE(node.child_count, kBvhWidth);
@@ -60,7 +60,7 @@ class LayoutChecker {
     }
     EXPECT_EQ(nodes_seen_, layout_.nodes.size());
     EXPECT_EQ(positions_seen_, boxes_.size());
-    EXPECT_EQ(deepest_, layout_.depth);
+    EXPECT_EQ(max_depth_, layout_.depth);
     EXPECT_LE(layout_.depth, limits::kMaxBvhDepth);
     EXPECT_LT(layout_.nodes.size(), 2 * boxes_.size());
   }
@@ -83,11 +83,11 @@ class LayoutChecker {
   const BvhLayout<S>& layout_;
   const std::vector<Aabb<S>>& boxes_;
   size_t nodes_seen_ = 0, positions_seen_ = 0;
-  uint32_t deepest_ = 0;
+  uint32_t max_depth_ = 0;
 };
 
 template <class S>
-void expect_sound(const std::vector<Aabb<S>>& boxes) {
+void expect_valid(const std::vector<Aabb<S>>& boxes) {
   for (const int bins : {2, 5, 32, 64}) {
     SCOPED_TRACE(std::to_string(boxes.size()) + " boxes, " + std::to_string(bins) + " bins");
     const BvhLayout<S> layout = build(boxes, bins);
@@ -116,9 +116,9 @@ class BvhBuildTest : public ::testing::Test {};
 using Scalars = ::testing::Types<float, double>;
 TYPED_TEST_SUITE(BvhBuildTest, Scalars);
 
-TYPED_TEST(BvhBuildTest, SmallAndOrdinaryInputsGiveSoundTrees) {
+TYPED_TEST(BvhBuildTest, SmallAndOrdinaryInputsGiveValidTrees) {
   for (const size_t count : {0, 1, 2, 7, 8, 9, 16, 17, 64, 65, 1000})
-    expect_sound(random_boxes<TypeParam>(count, count));
+    expect_valid(random_boxes<TypeParam>(count, count));
 }
 
 TYPED_TEST(BvhBuildTest, NoBoxesGiveNoNodes) {
@@ -135,19 +135,19 @@ TYPED_TEST(BvhBuildTest, OneBoxGivesOneNodeWithOneLeaf) {
   EXPECT_EQ(layout.nodes[0].child_count, 1u);
 }
 
-TYPED_TEST(BvhBuildTest, ManyBoxesGiveASoundTree) { expect_sound(random_boxes<TypeParam>(scaled_count(100'000), 1)); }
+TYPED_TEST(BvhBuildTest, ManyBoxesGiveAValidTree) { expect_valid(random_boxes<TypeParam>(scaled_count(100'000), 1)); }
 
 TYPED_TEST(BvhBuildTest, CoincidentBoxesGiveAShallowTree) {
   const size_t count = scaled_count(100'000);
   const std::vector<Aabb<TypeParam>> boxes(count, {{1, 2, 3}, {4, 5, 6}});
-  expect_sound(boxes);
-  // Full nodes of equal depth would take log8(count / 8) levels.
+  expect_valid(boxes);
+  // A tree of full nodes has log8(count / 8) levels.
   const double ideal = std::log2(static_cast<double>(count) / 8) / 3;
   EXPECT_LE(build(boxes).depth, static_cast<uint32_t>(std::ceil(2 * ideal)));
 }
 
 TYPED_TEST(BvhBuildTest, CoincidentPointsAreHalved) {
-  expect_sound(std::vector<Aabb<TypeParam>>(1000, point_box<TypeParam>(0, 0, 0)));
+  expect_valid(std::vector<Aabb<TypeParam>>(1000, point_box<TypeParam>(0, 0, 0)));
 }
 
 TYPED_TEST(BvhBuildTest, ExponentialSpacingStaysWithinTheDepthLimit) {
@@ -157,25 +157,25 @@ TYPED_TEST(BvhBuildTest, ExponentialSpacingStaysWithinTheDepthLimit) {
     for (int e = -kExponents; e < kExponents; ++e)
       boxes.push_back(point_box(std::ldexp(TypeParam{1}, e), TypeParam{0}, TypeParam{0}));
   }
-  expect_sound(boxes);
+  expect_valid(boxes);
 }
 
-TYPED_TEST(BvhBuildTest, SpreadsBeyondTheArithmeticAreHalved) {
+TYPED_TEST(BvhBuildTest, SpreadsThatOverflowOrUnderflowAreHalved) {
   constexpr TypeParam kLargest = std::numeric_limits<TypeParam>::max();
   constexpr TypeParam kSmallest = std::numeric_limits<TypeParam>::denorm_min();
   std::vector<Aabb<TypeParam>> boxes;
   for (int i = 0; i < 100; ++i) {
     boxes.push_back(point_box(i % 2 == 0 ? kLargest : -kLargest, kSmallest * TypeParam(i), TypeParam{0}));
   }
-  expect_sound(boxes);
+  expect_valid(boxes);
   for (Aabb<TypeParam>& box : boxes) box.min.x = box.max.x = 0;
-  expect_sound(boxes);
+  expect_valid(boxes);
 }
 
-TYPED_TEST(BvhBuildTest, OneHugeBoxAmongTinyOnesGivesASoundTree) {
+TYPED_TEST(BvhBuildTest, OneHugeBoxAmongTinyOnesGivesAValidTree) {
   std::vector<Aabb<TypeParam>> boxes = random_boxes<TypeParam>(500, 8);
   boxes.push_back({{-1e9f, -1e9f, -1e9f}, {1e9f, 1e9f, 1e9f}});
-  expect_sound(boxes);
+  expect_valid(boxes);
 }
 
 TYPED_TEST(BvhBuildTest, EqualInputsGiveEqualTrees) {
@@ -201,7 +201,7 @@ TEST(BvhBuildRefusalTest, ASetCancelFlagEndsTheBuildWithCancelled) {
   EXPECT_EQ(build_bvh_layout<float>(boxes, options).status().code(), absl::StatusCode::kCancelled);
 }
 
-TEST(BvhBuildRefusalTest, BinsOutOfRangeAreRefusedByName) {
+TEST(BvhBuildRefusalTest, BinsOutOfRangeAreRefusedWithTheFieldName) {
   for (const int bins : {-1, 0, 1, 65, 1'000'000}) {
     BvhOptions options;
     options.bins = bins;

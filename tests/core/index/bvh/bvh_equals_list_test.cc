@@ -1,4 +1,4 @@
-// Trees answer as the list does, bit for bit, whatever the number of bins they were built with.
+// Trees answer as the list does, bit for bit, for any number of bins.
 #include <gtest/gtest.h>
 
 #include "tests/support/scene_search.h"

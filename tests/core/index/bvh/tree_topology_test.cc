@@ -1,5 +1,5 @@
-// What is restored from an outline: the very tree that was built where it is its own, and from any other one a tree
-// that answers as right.
+// Trees restored from a topology: from its own topology, a tree equals the built one byte for byte; from any other
+// topology, it answers as correctly.
 #include "core/index/bvh/tree_topology.h"
 
 #include <gtest/gtest.h>
@@ -28,14 +28,14 @@ std::vector<Triangle> renumbered(std::vector<Triangle> triangles) {
   return triangles;
 }
 
-// With `triangles` in the order of their numbers.
+// Restores a tree. `triangles` are in the order of their numbers.
 absl::StatusOr<TriangleBvh> restore(const TreeTopology& topology, const std::vector<Triangle>& triangles,
                                     const BvhOptions& options = {}) {
   const auto triangle = [&](uint32_t number) { return triangles[number]; };
   return TriangleBvh::restore(topology, static_cast<uint32_t>(triangles.size()), triangle, options);
 }
 
-TEST(TreeTopologyTest, ATreeComesBackByteForByteOnAnyThreads) {
+TEST(TreeTopologyTest, ATreeIsRestoredByteForByteOnAnyThreads) {
   for (const std::vector<Triangle>& triangles : {bumpy_sphere(130, 0.05, 6), box_city(9, 1), bumpy_sphere(2, 0.1, 1)}) {
     const TriangleBvh built = *TriangleBvh::build(triangles);
     for (const ParallelFor& parallel_for : {on_threads(1), on_threads(3), backwards()}) {
@@ -48,7 +48,7 @@ TEST(TreeTopologyTest, ATreeComesBackByteForByteOnAnyThreads) {
   }
 }
 
-TEST(TreeTopologyTest, ATreeOfEverySmallSizeComesBack) {
+TEST(TreeTopologyTest, TreesOfEverySmallSizeAreRestored) {
   const std::vector<Triangle> all = bumpy_sphere(6, 0.1, 2);
   for (size_t count = 1; count <= all.size(); ++count) {
     const std::vector<Triangle> some(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
@@ -59,8 +59,9 @@ TEST(TreeTopologyTest, ATreeOfEverySmallSizeComesBack) {
   }
 }
 
-// The promise that makes it safe to keep them.
-std::string difference_of_any_outline(const TestScene<Triangle>& scene) {
+// Returns the first difference between a list and a tree restored from a random topology. That there is none makes it
+// safe to store topologies.
+std::string difference_of_any_topology(const TestScene<Triangle>& scene) {
   if (scene.values.empty()) return "";
   TestScene<Triangle> numbered = scene;
   numbered.values = renumbered(scene.values);
@@ -72,23 +73,23 @@ std::string difference_of_any_outline(const TestScene<Triangle>& scene) {
   return IndexJudge<TriangleBvh>(*tree, oracle).difference(numbered);
 }
 
-TEST(TreeTopologyTest, AnyOutlineThatFitsAnswersAsTheListDoes) {
-  EXPECT_EQ(search_all_scenes<Triangle>(scaled_count(1'000), scaled_count(300), difference_of_any_outline), "");
+TEST(TreeTopologyTest, ATreeOfAnyTopologyThatFitsAnswersAsTheListDoes) {
+  EXPECT_EQ(search_all_scenes<Triangle>(scaled_count(1'000), scaled_count(300), difference_of_any_topology), "");
 }
 
-TEST(TreeTopologyTest, KernelsAnswerRightInATreeOfAnyOutline) {
+TEST(TreeTopologyTest, KernelsAnswerATreeOfAnyTopologyAsAllTrianglesDo) {
   const std::vector<Triangle> triangles = bumpy_sphere(14, 0.1, 1);
   for (const std::string& name : instruction_sets()) {
     ASSERT_TRUE(use_instruction_set(name).ok());
     const RayKernels* const kernels = active_ray_kernels();
     const RegionKernels* const region_kernels = active_region_kernels();
-    if (kernels == nullptr) continue;  // the portable way has none
+    if (kernels == nullptr) continue;  // there are no portable kernels
     for (uint64_t seed = 0; seed < 4; ++seed) {
       Random random(seed);
       const RandomOutline made(static_cast<uint32_t>(triangles.size()), random);
       absl::StatusOr<TriangleBvh> tree = restore(made.topology(), triangles);
       ASSERT_TRUE(tree.ok()) << tree.status();
-      const KernelTrial trial(absl::StrCat("outline ", seed), triangles,
+      const KernelTrial trial(absl::StrCat("topology ", seed), triangles,
                               random_questions(triangles, scaled_count(500), seed), *std::move(tree));
       EXPECT_EQ(trial.difference(*kernels), "") << name;
       tree = restore(made.topology(), triangles);
@@ -99,9 +100,9 @@ TEST(TreeTopologyTest, KernelsAnswerRightInATreeOfAnyOutline) {
   ASSERT_TRUE(use_instruction_set("").ok());
 }
 
-class WrongOutlineTest : public ::testing::Test {
+class WrongTopologyTest : public ::testing::Test {
  protected:
-  WrongOutlineTest() : built_(*TriangleBvh::build(triangles_)), wrong_(built_.topology()) {
+  WrongTopologyTest() : built_(*TriangleBvh::build(triangles_)), wrong_(built_.topology()) {
     numbers_.assign(wrong_.numbers.begin(), wrong_.numbers.end());
     wrong_.numbers = numbers_;
   }
@@ -113,54 +114,54 @@ class WrongOutlineTest : public ::testing::Test {
   TreeTopology wrong_;
 };
 
-TEST_F(WrongOutlineTest, TheOneOfTheTreeFits) { EXPECT_EQ(refused(), ""); }
+TEST_F(WrongTopologyTest, TheTopologyOfTheTreeIsAccepted) { EXPECT_EQ(refused(), ""); }
 
-TEST_F(WrongOutlineTest, OneOfOtherTrianglesIsRefused) {
+TEST_F(WrongTopologyTest, ATopologyOfOtherTrianglesIsRefused) {
   numbers_[5] = numbers_[4];
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: a triangle is missing");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: a triangle number is repeated or out of range");
   numbers_[5] = static_cast<uint32_t>(numbers_.size());
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: a triangle is missing");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: a triangle number is repeated or out of range");
   wrong_.numbers.remove_suffix(1);
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: other triangles");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: different number of triangles");
 }
 
-TEST_F(WrongOutlineTest, BlocksThatDoNotAddUpAreRefused) {
+TEST_F(WrongTopologyTest, BlocksThatDoNotAddUpAreRefused) {
   const std::vector<uint8_t> sizes = wrong_.block_sizes;
   for (const int size : {0, 9, 255}) {
     wrong_.block_sizes[1] = static_cast<uint8_t>(size);
-    EXPECT_EQ(refused(), "the outline of the tree does not fit: the size of a block");
+    EXPECT_EQ(refused(), "the topology does not fit the mesh: block size out of range");
   }
   wrong_.block_sizes = sizes;
   wrong_.block_sizes.pop_back();
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: blocks of other triangles");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: block sizes do not add up to the number of triangles");
 }
 
-TEST_F(WrongOutlineTest, NodesThatDoNotHoldTogetherAreRefused) {
+TEST_F(WrongTopologyTest, NodesThatDoNotFormATreeAreRefused) {
   const std::vector<NodeOutline> nodes = wrong_.nodes;
   wrong_.nodes.clear();
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: nodes or blocks without triangles");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: no nodes, or more nodes or blocks than triangles");
   wrong_.nodes = nodes;
   wrong_.nodes.pop_back();
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: nodes are missing");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: too few nodes");
   wrong_.nodes = nodes;
   wrong_.nodes.push_back({1, 0});
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: nodes too many");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: too many nodes");
   for (const NodeOutline children : {NodeOutline{0, 0}, NodeOutline{1, 1}, NodeOutline{2, 0}, NodeOutline{4, 1}}) {
     wrong_.nodes = nodes;
     wrong_.nodes.back() = children;
-    EXPECT_EQ(refused(), "the outline of the tree does not fit: the children of a node");
+    EXPECT_EQ(refused(), "the topology does not fit the mesh: invalid children of a node");
   }
   wrong_.nodes = nodes;
   const auto has_room = [](const NodeOutline& node) { return node.nodes == 0 && node.blocks < 0x7F; };
   std::find_if(wrong_.nodes.rbegin(), wrong_.nodes.rend(), has_room)->blocks = 0xFF;
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: blocks are missing");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: too few blocks");
   wrong_.nodes = nodes;
   wrong_.nodes.back() = {1, 0};
-  EXPECT_EQ(refused(), "the outline of the tree does not fit: blocks too many");
+  EXPECT_EQ(refused(), "the topology does not fit the mesh: too many blocks");
 }
 
-// A chain of nodes: each has as many blocks as it can beside the next, and all of them are spread over the mesh, so
-// that who walks it finds everything near and has as much waiting as may ever wait.
+// Chain of nodes: each node has seven blocks and the next node. The triangles of every block are spread over the mesh,
+// so that queries meet every box and the stack of a visit reaches its maximum length.
 class Chain {
  public:
   explicit Chain(uint32_t levels) : triangles_(bumpy_sphere(31, 0.1, 1)) {
@@ -171,24 +172,24 @@ class Chain {
     std::iota(numbers_.begin(), numbers_.end(), 0);
     Random random(1);
     random.shuffle(numbers_);
-    outline_.numbers = numbers_;
-    outline_.block_sizes.assign(blocks, kTreeWidth);
-    outline_.nodes.assign(levels - 1, NodeOutline{0x7F, 0x80});
-    outline_.nodes.push_back({0xFF, 0});
+    topology_.numbers = numbers_;
+    topology_.block_sizes.assign(blocks, kTreeWidth);
+    topology_.nodes.assign(levels - 1, NodeOutline{0x7F, 0x80});
+    topology_.nodes.push_back({0xFF, 0});
   }
   Chain(const Chain&) = delete;
   Chain& operator=(const Chain&) = delete;
 
   const std::vector<Triangle>& triangles() const { return triangles_; }
-  absl::StatusOr<TriangleBvh> tree() const { return restore(outline_, triangles_); }
+  absl::StatusOr<TriangleBvh> tree() const { return restore(topology_, triangles_); }
 
  private:
   std::vector<Triangle> triangles_;
   std::vector<uint32_t> numbers_;
-  TreeTopology outline_;
+  TreeTopology topology_;
 };
 
-TEST(TreeTopologyTest, TheDeepestTreeThatIsLetInIsWalkedToItsEnd) {
+TEST(TreeTopologyTest, ATreeOfTheMaximumDepthIsVisitedCompletely) {
   const Chain chain(limits::kMaxBvhDepth);
   absl::StatusOr<TriangleBvh> tree = chain.tree();
   ASSERT_TRUE(tree.ok()) << tree.status();
@@ -207,19 +208,18 @@ TEST(TreeTopologyTest, TheDeepestTreeThatIsLetInIsWalkedToItsEnd) {
   const RegionTrial regions = random_region_trial("chain", chain.triangles(), *chain.tree(), scaled_count(40), 4);
   for (const std::string& name : instruction_sets()) {
     ASSERT_TRUE(use_instruction_set(name).ok());
-    if (active_ray_kernels() == nullptr) continue;  // the portable way has none
+    if (active_ray_kernels() == nullptr) continue;  // there are no portable kernels
     EXPECT_EQ(trial.difference(*active_ray_kernels()), "") << name;
     EXPECT_EQ(regions.difference(*active_region_kernels()), "") << name;
   }
   ASSERT_TRUE(use_instruction_set("").ok());
 }
 
-TEST(TreeTopologyTest, OneThatIsDeeperIsRefused) {
-  EXPECT_EQ(Chain(limits::kMaxBvhDepth + 1).tree().status().message(),
-            "the outline of the tree does not fit: too deep");
+TEST(TreeTopologyTest, ATopologyDeeperThanTheLimitIsRefused) {
+  EXPECT_EQ(Chain(limits::kMaxBvhDepth + 1).tree().status().message(), "the topology does not fit the mesh: too deep");
 }
 
-TEST(TreeTopologyTest, CancelledItMakesNone) {
+TEST(TreeTopologyTest, ACancelledRestoreReturnsCancelled) {
   const std::vector<Triangle> triangles = box_city(3, 1);
   const TriangleBvh built = *TriangleBvh::build(triangles);
   const std::atomic<bool> cancel = true;

@@ -1,6 +1,5 @@
-// What a build of TriangleBvh promises beside right answers: one tree for any threads, an end when cancelled, and trees
-// that cost little. The cost of a tree is a number of its own: a builder that splits badly still answers everything
-// right.
+// Properties of a TriangleBvh build other than correct answers: equal trees on any number of threads, cancellation, and
+// trees of low cost. Cost needs tests of its own, because a badly split tree still answers correctly.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +24,7 @@ TriangleBvh build(const std::vector<Triangle>& triangles, const BvhOptions& opti
   return tree.ok() ? *std::move(tree) : TriangleBvh();
 }
 
-// Large enough for many pieces of work.
+// Returns a mesh that is large enough for many tasks.
 std::vector<Triangle> large_mesh() { return bumpy_sphere(130, 0.05, 6); }
 
 TEST(TriangleBvhBuildTest, AnyNumberOfThreadsGivesTheSameBytes) {
@@ -50,26 +49,27 @@ TEST(TriangleBvhBuildTest, CoincidentTrianglesGiveTheSameBytesOnAnyThreadsToo) {
   expect_equal_bytes(build(triangles, options), build(triangles));
 }
 
-// Cancelled in its first piece of work, its second, and so on: wherever it stands, it ends with CANCELLED.
+// Cancels the build in every seventh task: the result must be CANCELLED each time.
 TEST(TriangleBvhBuildTest, ABuildCancelledAnywhereEndsWithCancelled) {
   const std::vector<Triangle> triangles = large_mesh();
-  size_t pieces = 0;
-  for (size_t fatal = 0; fatal <= pieces; fatal += 7) {
+  size_t tasks = 0;
+  for (size_t cancelled_task = 0; cancelled_task <= tasks; cancelled_task += 7) {
     std::atomic<bool> cancel = false;
     size_t done = 0;
     BvhOptions options;
     options.cancel = &cancel;
     options.parallel_for = [&](size_t count, const std::function<void(size_t)>& work) {
       for (size_t i = 0; i < count; ++i) {
-        if (fatal != 0 && ++done == fatal) cancel = true;
-        if (fatal == 0) ++pieces;
+        if (cancelled_task != 0 && ++done == cancelled_task) cancel = true;
+        if (cancelled_task == 0) ++tasks;
         work(i);
       }
     };
     const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles, options);
-    EXPECT_EQ(tree.status().code(), fatal == 0 ? absl::StatusCode::kOk : absl::StatusCode::kCancelled) << fatal;
+    EXPECT_EQ(tree.status().code(), cancelled_task == 0 ? absl::StatusCode::kOk : absl::StatusCode::kCancelled)
+        << cancelled_task;
   }
-  EXPECT_GT(pieces, 30u);
+  EXPECT_GT(tasks, 30u);
 }
 
 TEST(TriangleBvhBuildTest, TheFirstTriangleThatIsNotFiniteIsNamedByAnyThreads) {
@@ -84,8 +84,9 @@ TEST(TriangleBvhBuildTest, TheFirstTriangleThatIsNotFiniteIsNamedByAnyThreads) {
   }
 }
 
-// As the ground among houses: whoever shares its block is met by all rays that meet the ground.
-TEST(TriangleBvhBuildTest, ALargeTriangleTakesNoSmallOnesIntoItsBlockToSaveOne) {
+// Example: the ground below houses. Small triangles in the block of the ground would be tested by every ray that meets
+// the ground.
+TEST(TriangleBvhBuildTest, ALargeTriangleGetsABlockOfItsOwn) {
   std::vector<Triangle> triangles;
   for (int i = 0; i < 15; ++i) {
     const auto x = static_cast<float>(i);
@@ -100,7 +101,7 @@ TEST(TriangleBvhBuildTest, ALargeTriangleTakesNoSmallOnesIntoItsBlockToSaveOne) 
     EXPECT_EQ(tree.blocks[block].count == 1, tree.numbers[tree.blocks[block].first] == 15);
 }
 
-// Adds up what first hits open. A block is met when its first triangle is.
+// Visitor that searches the first hit and counts the blocks it visits, by their first triangles.
 class CountingRay {
  public:
   CountingRay(const TriangleRay& ray, const std::unordered_set<uint32_t>& first_of_block, size_t& blocks)
@@ -121,10 +122,10 @@ class CountingRay {
 };
 
 struct TreeCost {
-  double sah, nodes, blocks, bytes;  // the latter three a ray, a ray, and a triangle
+  double sah, nodes, blocks, bytes;  // `nodes` and `blocks` are counts a ray; `bytes` are a triangle
 };
 
-// Of first hits of incoherent rays that start within the tree's bounds.
+// Returns the mean cost of the first hits of incoherent rays that start within the tree's bounds.
 TreeCost cost_of(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
   const TriangleBvh tree = build(triangles, options);
   std::unordered_set<uint32_t> first_of_block;
@@ -153,7 +154,7 @@ void expect_below(const TreeCost& cost, const TreeCost& ceiling) {
   EXPECT_LT(cost.bytes, ceiling.bytes);
 }
 
-// Ceilings lie 4 % above what this builder reaches.
+// The ceilings are 4 % above the costs of the current builder.
 TEST(TriangleBvhBuildTest, ASphereStaysBelowItsCeilings) {
   expect_below(cost_of(bumpy_sphere(64, 0.02, 1)), {11.3, 5.2, 1.46, 56});
 }

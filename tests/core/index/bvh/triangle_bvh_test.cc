@@ -59,7 +59,7 @@ TEST(TriangleBvhTest, KeepsEveryTriangleAsItIs) {
   EXPECT_EQ(tree.size(), triangles.size());
 }
 
-TEST(TriangleBvhTest, AtFindsWhatStandsAtAPosition) {
+TEST(TriangleBvhTest, AtReturnsTheTriangleAtAStoragePosition) {
   const TriangleBvh tree = build(bumpy_sphere(9, 0.1, 2));
   const std::vector<Triangle> stored = in_storage_order(tree);
   for (size_t position = 0; position < stored.size(); ++position) ASSERT_EQ(tree.at(position), stored[position]);
@@ -72,7 +72,7 @@ TEST(TriangleBvhTest, RegionsAreVisitedInStorageOrder) {
   EXPECT_EQ(found, in_storage_order(tree));
 }
 
-TEST(TriangleBvhTest, ChildrenStandByRisingAreaAndOrdersNameEverySlotOnce) {
+TEST(TriangleBvhTest, ChildrenAreSortedByAreaAndOrdersContainEverySlotOnce) {
   const TriangleBvh built = build(box_city(12, 3));
   const TriangleTree tree = built.tree();
   for (size_t number = 0; number < built.node_count(); ++number) {
@@ -86,13 +86,13 @@ TEST(TriangleBvhTest, ChildrenStandByRisingAreaAndOrdersNameEverySlotOnce) {
     }
     for (const uint32_t order : node.order) {
       uint32_t slots = 0;
-      for (int place = 0; place < kTreeWidth; ++place) slots |= 1u << (order >> (3 * place) & 7u);
+      for (int rank = 0; rank < kTreeWidth; ++rank) slots |= 1u << (order >> (3 * rank) & 7u);
       ASSERT_EQ(slots, 255u);
     }
   }
 }
 
-TEST(TriangleBvhTest, EveryNodesRangeIsThoseOfItsBlocksThenOfItsNodesInTurn) {
+TEST(TriangleBvhTest, TheRangeOfANodeIsTheRangesOfItsBlocksThenOfItsNodes) {
   const TriangleBvh built = build(box_city(12, 3));
   const TriangleTree tree = built.tree();
   EXPECT_EQ(tree.ranges[0].count, built.size());
@@ -110,8 +110,8 @@ TEST(TriangleBvhTest, EveryNodesRangeIsThoseOfItsBlocksThenOfItsNodesInTurn) {
   }
 }
 
-// As good as the tree of values it is made from, which has ceilings of its own.
-TEST(TriangleBvhTest, CostsWhatTheTreeOfValuesCosts) {
+// Bvh is built by the same builder and has cost ceilings of its own (bvh_test.cc).
+TEST(TriangleBvhTest, CostsTheSameAsABvhOfTheTriangles) {
   const std::vector<Triangle> triangles = bumpy_sphere(64, 0.02, 1);
   const absl::StatusOr<Bvh<Triangle>> values = Bvh<Triangle>::build(triangles);
   ASSERT_TRUE(values.ok());

@@ -1,4 +1,4 @@
-// Every instruction set's kernels against all triangles one by one, bit for bit.
+// Compares the ray kernels of every instruction set with tests of all triangles one by one, bit for bit.
 #include "core/index/bvh/kernels/ray_kernels.h"
 
 #include <gtest/gtest.h>
@@ -29,27 +29,27 @@ class RayKernelsTest : public ::testing::TestWithParam<std::string> {
   const RayKernels* kernels_ = nullptr;
 };
 
-TEST_P(RayKernelsTest, DecideRandomRaysOfMeshesOfAnySizeAsAllTrianglesDo) {
+TEST_P(RayKernelsTest, AnswerRandomRaysInMeshesOfAnySizeAsAllTrianglesDo) {
   for (const KernelTrial& trial : ordinary_trials()) {
     EXPECT_EQ(trial.difference(*kernels_), "");
     EXPECT_LT(trial.undecided_share(*kernels_), 0.001);
   }
 }
 
-TEST_P(RayKernelsTest, DecideFarMeshesAsAllTrianglesDo) {
+TEST_P(RayKernelsTest, AnswerRaysInFarMeshesAsAllTrianglesDo) {
   for (const KernelTrial& trial : far_trials()) EXPECT_EQ(trial.difference(*kernels_), "");
 }
 
-TEST_P(RayKernelsTest, DecideRaysThatGoTogetherAsAllTrianglesDo) {
+TEST_P(RayKernelsTest, AnswerCoherentRaysAsAllTrianglesDo) {
   for (const KernelTrial& trial : beam_trials()) EXPECT_EQ(trial.difference(*kernels_), "");
 }
 
 #ifdef __SSE__
-// Some libraries tell the processor so for the whole thread.
-TEST_P(RayKernelsTest, AnswersStayWhereDenormalsCountAsZero) {
+// Some libraries set these processor flags for the whole thread.
+TEST_P(RayKernelsTest, AnswersDoNotChangeIfDenormalsAreTreatedAsZero) {
   const TriangleBvh tree = *TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
   std::vector<KernelRay> rays;
-  for (int i = 0; i < 8; ++i)  // nearly the same way, but in different octants
+  for (int i = 0; i < 8; ++i)  // nearly equal directions in different octants
     rays.push_back({{0, 0, 0}, {1, i % 2 == 0 ? 0.01 : -0.01, i % 4 < 2 ? 0.01 : -0.01}, 10, true, true});
   const auto numbers = [&] {
     std::vector<KernelHit> hits(rays.size());
@@ -67,7 +67,7 @@ TEST_P(RayKernelsTest, AnswersStayWhereDenormalsCountAsZero) {
 }
 #endif
 
-TEST_P(RayKernelsTest, RaysThatGoTogetherOpenNodesOnce) {
+TEST_P(RayKernelsTest, CoherentRaysOpenEachNodeOnce) {
   const TriangleBvh tree = *TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
   std::vector<KernelRay> rays;
   for (int i = 0; i < 8; ++i) rays.push_back({{0, 0, 0}, {1, 0.2 + 0.001 * i, 0.3}, 10, true, true});
@@ -83,30 +83,30 @@ TEST_P(RayKernelsTest, RaysThatGoTogetherOpenNodesOnce) {
   EXPECT_LT(nodes(8) * 4, nodes(1));
 }
 
-TEST_P(RayKernelsTest, DecideRaysOfALatticeAsAllTrianglesDo) { EXPECT_EQ(lattice_trial().difference(*kernels_), ""); }
+TEST_P(RayKernelsTest, AnswerRaysOnALatticeAsAllTrianglesDo) { EXPECT_EQ(lattice_trial().difference(*kernels_), ""); }
 
-TEST_P(RayKernelsTest, DecideNearDiagonalsAsAllTrianglesDo) {
+TEST_P(RayKernelsTest, AnswerNearlyDiagonalRaysAsAllTrianglesDo) {
   EXPECT_EQ(near_diagonal_trial().difference(*kernels_), "");
 }
 
-TEST_P(RayKernelsTest, DecideRaysAimedAtVerticesAndEdgesAsAllTrianglesDo) {
+TEST_P(RayKernelsTest, AnswerRaysAimedAtVerticesAndEdgesAsAllTrianglesDo) {
   const KernelTrial trial = border_trial();
   EXPECT_EQ(trial.difference(*kernels_), "");
   EXPECT_LT(trial.undecided_share(*kernels_), 0.001);
 }
 
-TEST_P(RayKernelsTest, DecideRaysFromTheSurfaceAsAllTrianglesDo) {
+TEST_P(RayKernelsTest, AnswerRaysFromTheSurfaceAsAllTrianglesDo) {
   EXPECT_EQ(surface_trial().difference(*kernels_), "");
 }
 
-TEST_P(RayKernelsTest, DecideSliversAndTrianglesWithoutAreaAsAllTrianglesDo) {
+TEST_P(RayKernelsTest, AnswerSliversAndTrianglesWithoutAreaAsAllTrianglesDo) {
   EXPECT_EQ(sliver_trial().difference(*kernels_), "");
 }
 
 TEST_P(RayKernelsTest, OfEqualHitsTheLowestNumberWins) { EXPECT_EQ(copies_trial().difference(*kernels_), ""); }
 
-// Where few of many are wanted, what lies behind them is not looked at.
-TEST_P(RayKernelsTest, RowsThatAreFullShortenTheRay) {
+// If max_rows hits were found, triangles behind them must not be tested.
+TEST_P(RayKernelsTest, FullRowsShortenTheRay) {
   std::vector<Triangle> walls;
   for (uint32_t i = 0; i < 1'000; ++i) walls.push_back(wall_at(static_cast<float>(i), i));
   const TriangleBvh tree = *TriangleBvh::build(walls);
@@ -118,8 +118,8 @@ TEST_P(RayKernelsTest, RowsThatAreFullShortenTheRay) {
   EXPECT_LT(hit.tests, 60u);
 }
 
-// The bound of a call: a pile of triangles that all lie on the ray's way and are all missed.
-TEST_P(RayKernelsTest, ARayThatMeetsTooManyTrianglesIsLeftUndecided) {
+// The ray hits the boxes of all triangles of a pile and misses each of the triangles.
+TEST_P(RayKernelsTest, ARayThatTestsTooManyTrianglesIsLeftUndecided) {
   std::vector<Triangle> pile;
   for (uint32_t i = 0; i < 3 * kMaxKernelTests; ++i) pile.push_back(wall_at(static_cast<float>(i), i));
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(pile);

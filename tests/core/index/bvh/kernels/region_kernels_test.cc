@@ -1,4 +1,4 @@
-// Every instruction set's kernels against all triangles one by one.
+// Compares the region kernels of every instruction set with tests of all triangles one by one.
 #include "core/index/bvh/kernels/region_kernels.h"
 
 #include <gtest/gtest.h>
@@ -33,23 +33,23 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
   }
   void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
 
-  // Every kind of region, `count` of each.
-  void judge(const std::vector<Triangle>& triangles, size_t count, uint64_t seed) {
+  // Compares `count` regions of each kind.
+  void compare(const std::vector<Triangle>& triangles, size_t count, uint64_t seed) {
     const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles);
     ASSERT_TRUE(tree.ok()) << tree.status();
     RandomRegions regions(triangles, seed);
     for (size_t i = 0; i < count && !HasFailure(); ++i) {
-      judge_one(*tree, regions.ball());
-      judge_one(*tree, regions.touching_ball());
-      judge_one(*tree, regions.box(false));
-      judge_one(*tree, regions.box(true));
-      judge_one(*tree, regions.touching_box(false));
-      judge_one(*tree, regions.touching_box(true));
+      compare_one(*tree, regions.ball());
+      compare_one(*tree, regions.touching_ball());
+      compare_one(*tree, regions.box(false));
+      compare_one(*tree, regions.box(true));
+      compare_one(*tree, regions.touching_box(false));
+      compare_one(*tree, regions.touching_box(true));
     }
   }
 
   template <class Shape>
-  void judge_one(const TriangleBvh& tree, const Shape& shape) {
+  void compare_one(const TriangleBvh& tree, const Shape& shape) {
     ASSERT_TRUE(TriangleSearch<Shape>::served(tree, shape));
     std::vector<uint32_t> expected, found;
     tree.for_each([&](const Triangle& triangle) {
@@ -66,41 +66,41 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
     EXPECT_EQ(found, expected) << described(shape);
   }
 
-  // How much was left to the predicates.
+  // Returns the share of tested triangles that the predicates decided.
   double judged_share() const { return static_cast<double>(judged_) / static_cast<double>(tests_); }
 
  private:
   uint64_t tests_ = 0, judged_ = 0;
 };
 
-TEST_P(RegionKernelsTest, FindInRandomRegionsWhatThePredicatesFind) {
-  judge(bumpy_sphere(14, 0.1, 1), scaled_count(1'500), 1);
+TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesInRandomRegions) {
+  compare(bumpy_sphere(14, 0.1, 1), scaled_count(1'500), 1);
   EXPECT_LT(judged_share(), 0.03);  // touching regions included
 }
 
-TEST_P(RegionKernelsTest, FindOnALatticeWhatThePredicatesFind) {
+TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesOnALattice) {
   const std::vector<Triangle> city = box_city(4, 1);
-  judge(city, scaled_count(800), 2);
+  compare(city, scaled_count(800), 2);
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(city);
   ASSERT_TRUE(tree.ok());
   Random random(3);
   for (size_t i = 0; i < scaled_count(1'500) && !HasFailure(); ++i) {
     const auto half_units = [&](int low, int high) { return static_cast<float>(random.whole(low, high)) * 0.5f; };
     const Vec3f center = {half_units(-4, 80), half_units(-4, 80), half_units(-4, 44)};
-    judge_one(*tree, Ballf{center, half_units(0, 20)});
-    judge_one(*tree, Obbf{center, {half_units(0, 20), half_units(0, 20), half_units(0, 20)}, {}});
+    compare_one(*tree, Ballf{center, half_units(0, 20)});
+    compare_one(*tree, Obbf{center, {half_units(0, 20), half_units(0, 20), half_units(0, 20)}, {}});
   }
 }
 
-TEST_P(RegionKernelsTest, FindInTinyHugeAndFarMeshesWhatThePredicatesFind) {
+TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesInTinyHugeAndFarMeshes) {
   const std::vector<Triangle> sphere = bumpy_sphere(8, 0.1, 1);
   for (const float scale : {0x1p-60f, 0x1p-40f, 0x1p-20f, 1e-3f, 1e6f, 0x1p22f})
-    judge(moved(sphere, scale, {}), scaled_count(150), 4);
+    compare(moved(sphere, scale, {}), scaled_count(150), 4);
   for (const float distance : {1e3f, 1e5f, 1e7f})
-    judge(moved(sphere, 1, {distance, -2 * distance, distance / 2}), scaled_count(150), 5);
+    compare(moved(sphere, 1, {distance, -2 * distance, distance / 2}), scaled_count(150), 5);
 }
 
-TEST_P(RegionKernelsTest, FindOfSliversAndTrianglesWithoutAreaWhatThePredicatesFind) {
+TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongSliversAndTrianglesWithoutArea) {
   Random random(6);
   std::vector<Triangle> slivers;
   for (int i = 0; i < 400; ++i) {
@@ -110,11 +110,11 @@ TEST_P(RegionKernelsTest, FindOfSliversAndTrianglesWithoutAreaWhatThePredicatesF
     if (random.chance(0.1)) slivers.back() = {a, a, a};
   }
   number_in_order(slivers);
-  judge(slivers, scaled_count(1'000), 7);
+  compare(slivers, scaled_count(1'000), 7);
 }
 
-// Where the foot of the perpendicular is near an edge, and the triangle's two other edges are near as well.
-TEST_P(RegionKernelsTest, FindWithBallsBesideNarrowTrianglesWhatThePredicatesFind) {
+// Balls for which the foot of the perpendicular is near one edge, while the other two edges are near as well.
+TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesForBallsBesideNarrowTriangles) {
   Random random(12);
   for (size_t i = 0; i < scaled_count(20'000) && !HasFailure(); ++i) {
     const Vec3d a = random.vector(1), along = random.vector(1), aside = random.unit_vector();
@@ -128,12 +128,12 @@ TEST_P(RegionKernelsTest, FindWithBallsBesideNarrowTrianglesWhatThePredicatesFin
     const double distance = std::sqrt(squared_distance(to_double(ball.center), narrow));
     ball.radius =
         static_cast<float>(distance * random.pick(std::vector<double>{1, 1, 1 - 0x1p-20, 1 + 0x1p-20, 1 - 0x1p-10}));
-    judge_one(*tree, ball);
+    compare_one(*tree, ball);
   }
 }
 
-// Coordinates that are nearly zero, as sines and cosines leave them: products of theirs underflow.
-TEST_P(RegionKernelsTest, FindOfNearlyFlatTrianglesWhatThePredicatesFind) {
+// Coordinates that are nearly zero, like results of sine and cosine: their products underflow.
+TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongNearlyFlatTriangles) {
   Random random(8);
   std::vector<Triangle> flat;
   for (int i = 0; i < 300; ++i) {
@@ -146,11 +146,12 @@ TEST_P(RegionKernelsTest, FindOfNearlyFlatTrianglesWhatThePredicatesFind) {
     flat.push_back(triangle);
   }
   number_in_order(flat);
-  judge(flat, scaled_count(1'000), 9);
+  compare(flat, scaled_count(1'000), 9);
 }
 
-// Small and large triangles side by side, whose bounds differ by much within a block.
-TEST_P(RegionKernelsTest, FindAmongTrianglesOfManySizesWhatThePredicatesFind) {
+// Small and large triangles share blocks: the error bound by the block's extent is much larger than that of a small
+// one.
+TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongTrianglesOfManySizes) {
   Random random(10);
   std::vector<Triangle> mixed;
   for (int i = 0; i < 600; ++i) {
@@ -159,11 +160,11 @@ TEST_P(RegionKernelsTest, FindAmongTrianglesOfManySizesWhatThePredicatesFind) {
     mixed.push_back({a, a + random.float_vector(size), a + random.float_vector(size)});
   }
   number_in_order(mixed);
-  judge(mixed, scaled_count(1'000), 11);
+  compare(mixed, scaled_count(1'000), 11);
   EXPECT_LT(judged_share(), 0.05);
 }
 
-TEST_P(RegionKernelsTest, WhatIsWhollyInsideIsNotTested) {
+TEST_P(RegionKernelsTest, TrianglesInsideTheRegionAreNotTested) {
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
   ASSERT_TRUE(tree.ok());
   std::vector<uint32_t> numbers(tree->size() + kMinRegionRoom);
@@ -174,7 +175,7 @@ TEST_P(RegionKernelsTest, WhatIsWhollyInsideIsNotTested) {
   EXPECT_EQ(search.nodes(), 1u);
 }
 
-TEST_P(RegionKernelsTest, ACallEndsAfterAnAmountOfTests) {
+TEST_P(RegionKernelsTest, ACallPausesAfterTheMaximumNumberOfTests) {
   std::vector<Triangle> pile;
   for (uint32_t i = 0; i < 3 * kMaxRegionTests; ++i) {
     const float x = static_cast<float>(i) * 1e-6f;
@@ -190,7 +191,8 @@ TEST_P(RegionKernelsTest, ACallEndsAfterAnAmountOfTests) {
   EXPECT_LT(search.tests(), kMaxRegionTests + 8);
 }
 
-// As many as one call answers, from nothing to the whole mesh, and their numbers one by one.
+// Batch of as many balls as one call of many() answers, from an empty ball to one around the mesh, and the numbers that
+// each of them finds in a search of its own.
 struct Together {
   explicit Together(const TriangleBvh& tree) {
     for (size_t i = 0; i < kMaxRegions; ++i) {
@@ -217,10 +219,10 @@ struct Together {
   RegionJudge judges[kMaxRegions];
   uint32_t counts[kMaxRegions];
   std::vector<uint32_t> numbers, alone;
-  std::vector<size_t> ends;  // of each region's numbers in `alone`
+  std::vector<size_t> ends;  // end of each region's numbers in `alone`
 };
 
-TEST_P(RegionKernelsTest, RegionsAnsweredTogetherFindWhatTheyFindAlone) {
+TEST_P(RegionKernelsTest, RegionsAnsweredTogetherFindTheSameAsAlone) {
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(40, 0.1, 1));
   ASSERT_TRUE(tree.ok());
   Together together(*tree);
@@ -231,7 +233,7 @@ TEST_P(RegionKernelsTest, RegionsAnsweredTogetherFindWhatTheyFindAlone) {
   EXPECT_EQ(together.numbers, together.alone);
 }
 
-TEST_P(RegionKernelsTest, RegionsForWhichThereIsNoRoomAreNotAnswered) {
+TEST_P(RegionKernelsTest, RegionsWithoutRoomForTheirNumbersAreNotAnswered) {
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
   ASSERT_TRUE(tree.ok());
   Together together(*tree);
@@ -240,7 +242,7 @@ TEST_P(RegionKernelsTest, RegionsForWhichThereIsNoRoomAreNotAnswered) {
     ASSERT_LT(answered, kMaxRegions);
     size_t end = 0;
     for (size_t i = 0; i < answered; ++i) EXPECT_EQ(end += together.counts[i], together.ends[i]) << i;
-    // What is answered fits, and the next would not with what may be written behind it.
+    // The answered regions fit, and the next one does not, given that a kernel may write beyond its last number.
     EXPECT_LE(end, room);
     EXPECT_LT(room, together.ends[answered] + kMinRegionRoom);
   }
