@@ -5,7 +5,7 @@
 namespace locus {
 namespace {
 
-// Unit vector of `axis` that points to the side where `sign` does.
+// Returns the unit vector of `axis` with the sign of `sign`.
 Vec3d axis_normal(int axis, double sign) {
   Vec3d normal;
   normal[axis] = sign < 0 ? -1 : 1;

@@ -7,14 +7,15 @@ Transform make_transform(Vec3d translation, const Quaternion& quaternion, float 
 }
 
 Aabbd bounds_to_world(const Transform& transform, const Aabbf& mesh_box) {
-  constexpr double kMargin = 0x1p-40;
+  constexpr double kEpsilon = 0x1p-40;
   const Aabbd box = to_double(mesh_box);
   const Vec3d center = (box.min + box.max) * 0.5;
   const Vec3d half = (box.max - box.min) * 0.5;
   const Vec3d world_center = transform.point_to_world(center);
   const Vec3d world_half = transform.rotation.extent_to_world(half) * double{transform.scale};
-  const double margin = kMargin * (max_component(abs(transform.translation)) + 4.0 * transform.scale * magnitude(box));
-  return grown(Aabbd{world_center - world_half, world_center + world_half}, margin);
+  const double epsilon =
+      kEpsilon * (max_component(abs(transform.translation)) + 4.0 * transform.scale * magnitude(box));
+  return grown(Aabbd{world_center - world_half, world_center + world_half}, epsilon);
 }
 
 }  // namespace locus
