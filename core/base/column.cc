@@ -3,6 +3,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 
 namespace locus {
@@ -17,6 +18,7 @@ bool fits(size_t value_count, size_t width, size_t items, ColumnNeed need) {
 }  // namespace
 
 absl::Status check_column(size_t value_count, size_t width, size_t items, ColumnNeed need, absl::string_view field) {
+  LOCUS_DCHECK_GT(width, 0u);
   if (fits(value_count, width, items, need)) return absl::OkStatus();
   std::string accepted = absl::StrCat(width * items);
   if (need == ColumnNeed::kEachOrOne || need == ColumnNeed::kOptional)

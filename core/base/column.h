@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 
 namespace locus {
 
@@ -15,11 +16,18 @@ namespace locus {
 template <class T>
 class ColumnReader {
  public:
-  ColumnReader(absl::Span<const T> values, size_t width) : values_(values), width_(width) {}
+  ColumnReader(absl::Span<const T> values, size_t width) : values_(values), width_(width) {
+    LOCUS_DCHECK_GT(width_, 0u);
+    LOCUS_DCHECK_EQ(values_.size() % width_, 0u);
+  }
 
   bool given() const { return !values_.empty(); }
   // Returns the first value of item i's entry. Precondition: given().
-  const T* entry(size_t i) const { return values_.data() + (values_.size() == width_ ? 0 : i * width_); }
+  const T* entry(size_t i) const {
+    LOCUS_DCHECK(given());
+    LOCUS_DCHECK(values_.size() == width_ || i < values_.size() / width_);
+    return values_.data() + (values_.size() == width_ ? 0 : i * width_);
+  }
   T value(size_t i, T fallback) const { return given() ? *entry(i) : fallback; }
 
  private:

@@ -12,9 +12,12 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <new>
 #include <type_traits>
+
+#include "core/base/check.h"
 
 namespace locus {
 
@@ -35,6 +38,7 @@ using LargeArray = std::unique_ptr<T[], FreeLargeArray>;
 template <class T>
 LargeArray<T> make_large_array(size_t count) {
   static_assert(std::is_trivially_destructible_v<T> && std::is_trivially_copyable_v<T>);
+  LOCUS_DCHECK_LE(count, std::numeric_limits<size_t>::max() / sizeof(T));
   const size_t bytes = count * sizeof(T);
   const std::align_val_t alignment{bytes < kLargeArray ? std::max(alignof(T), alignof(std::max_align_t)) : kLargePage};
   void* const memory = ::operator new(bytes, alignment);

@@ -50,13 +50,17 @@ class PersistentArray {
   // Returns a snapshot for readers. O(1).
   PersistentArray snapshot() {
     owner_ = internal::kNoOwner;
+    check_invariants();
     return PersistentArray(list_);
   }
 
   // Returns one more than the highest index that was ever set.
   size_t size() const { return list_->size; }
   // Returns the value at `index` < size(): T() if it was never set.
-  const T& operator[](size_t index) const { return list_->leaves[index / kLeafSize]->values[index % kLeafSize]; }
+  const T& operator[](size_t index) const {
+    LOCUS_DCHECK_LT(index, size());
+    return list_->leaves[index / kLeafSize]->values[index % kLeafSize];
+  }
   // Sets the value at `index` and extends the array if necessary. O(1); after a snapshot also a copy of the leaf and,
   // once, of the list of leaves.
   void set(size_t index, T value);
@@ -80,6 +84,13 @@ class PersistentArray {
   };
 
   explicit PersistentArray(std::shared_ptr<List> list) : list_(std::move(list)) {}
+  // Checks the leaf count and the owner of the list. O(1).
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      LOCUS_CHECK_EQ(list_->leaves.size(), (list_->size + kLeafSize - 1) / kLeafSize);
+      LOCUS_CHECK(owner_ == internal::kNoOwner || list_->owner == owner_);
+    }
+  }
   // Chooses an owner if there is none, and copies the list if another owner created it.
   void make_list_writable();
   // Returns whether both arrays share leaf `leaf`.
@@ -114,7 +125,10 @@ void PersistentArray<T, kLeafSize>::set(size_t index, T value) {
     leaf = std::make_shared<Leaf>(*leaf);
     leaf->owner = owner_;
   }
+  LOCUS_DCHECK_EQ(leaf.use_count(), 1);
   leaf->values[index % kLeafSize] = std::move(value);
+  LOCUS_DCHECK_LT(index, size());
+  check_invariants();
 }
 
 template <class T, size_t kLeafSize>

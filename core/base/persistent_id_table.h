@@ -43,6 +43,7 @@ class PersistentIdTable {
   // Returns a snapshot for readers. O(1).
   PersistentIdTable snapshot() {
     owner_ = internal::kNoOwner;
+    check_invariants();
     return {leaves_.snapshot(), bucket_count_, size_, hash_};
   }
 
@@ -114,6 +115,7 @@ class PersistentIdTable {
   size_t home(Id id) const { return absl::Uint128High64(absl::uint128(hash_(id)) * bucket_count_); }
   size_t next(size_t bucket) const { return bucket + 1 == bucket_count_ ? 0 : bucket + 1; }
   const Bucket& bucket(size_t index) const {
+    LOCUS_DCHECK_LT(index, bucket_count_);
     return leaves_[index / kBucketsPerLeaf]->buckets[index % kBucketsPerLeaf];
   }
   // Returns the slot of `id` in `bucket`, or -1. Branch-free, since the slot is unpredictable.
@@ -141,6 +143,12 @@ class PersistentIdTable {
   void put(Id id, uint32_t value);
   // Inserts all ids into a new table of `leaf_count` leaves.
   void rebuild(size_t leaf_count);
+  // Checks the sizes. O(1).
+  void check_invariants() const;
+  // Checks a bucket: each slot is empty or full, and each id is reachable from its home bucket.
+  void check_bucket(size_t index) const;
+  // Checks all buckets and that they contain size() ids. O(size), so only after a rebuild.
+  void check_all_buckets() const;
 
   LeafArray leaves_;
   size_t bucket_count_ = 0;
@@ -152,6 +160,7 @@ class PersistentIdTable {
 
 template <class Hash>
 void PersistentIdTable<Hash>::find(absl::Span<const Id> ids, absl::Span<uint32_t> values) const {
+  LOCUS_DCHECK_GE(values.size(), ids.size());
   if (bucket_count_ == 0) return std::fill(values.begin(), values.begin() + ids.size(), kNone);
   std::array<const Bucket*, kFindBatch> first;
   for (size_t begin = 0; begin < ids.size(); begin += kFindBatch) {
@@ -179,16 +188,19 @@ typename PersistentIdTable<Hash>::Position PersistentIdTable<Hash>::search(Id id
 template <class Hash>
 typename PersistentIdTable<Hash>::Bucket& PersistentIdTable<Hash>::writable_bucket(size_t index) {
   claim_owner();
+  LOCUS_DCHECK_LT(index, bucket_count_);
   const size_t leaf = index / kBucketsPerLeaf;
   if (leaves_[leaf]->owner != owner_) {
     leaves_.set(leaf, std::make_shared<Leaf>(*leaves_[leaf], owner_));
     replaced_bytes_ += sizeof(Leaf);
   }
+  LOCUS_DCHECK_EQ(leaves_[leaf]->owner, owner_);
   return leaves_[leaf]->buckets[index % kBucketsPerLeaf];
 }
 
 template <class Hash>
 void PersistentIdTable<Hash>::put(Id id, uint32_t value) {
+  LOCUS_DCHECK_LT(size_, capacity());
   for (size_t index = home(id);; index = next(index)) {
     Bucket& current = writable_bucket(index);
     if (const int slot = slot_of(current, kNoId); slot >= 0) {
@@ -202,14 +214,18 @@ void PersistentIdTable<Hash>::put(Id id, uint32_t value) {
 
 template <class Hash>
 bool PersistentIdTable<Hash>::set(Id id, uint32_t value) {
-  LOCUS_DCHECK(id != kNoId && value != kNone);
+  LOCUS_DCHECK_NE(id, kNoId);
+  LOCUS_DCHECK_NE(value, kNone);
   if (const Position found = search(id); found.slot >= 0) {
     writable_bucket(found.bucket).values[static_cast<size_t>(found.slot)] = value;
+    check_invariants();
     return false;
   }
   if (size_ == capacity()) fit(size_ + 1);
   put(id, value);
   ++size_;
+  if constexpr (kDebugChecks) check_bucket(search(id).bucket);
+  check_invariants();
   return true;
 }
 
@@ -217,19 +233,28 @@ template <class Hash>
 bool PersistentIdTable<Hash>::erase(Id id) {
   const Position found = id == kNoId ? Position{0, -1} : search(id);
   if (found.slot < 0) return false;
-  for (size_t index = home(id); index != found.bucket; index = next(index)) --writable_bucket(index).overflow;
+  for (size_t index = home(id); index != found.bucket; index = next(index)) {
+    Bucket& skipped = writable_bucket(index);
+    LOCUS_DCHECK_GT(skipped.overflow, 0u);
+    --skipped.overflow;
+  }
   Bucket& bucket = writable_bucket(found.bucket);
   bucket.ids[static_cast<size_t>(found.slot)] = kNoId;
   bucket.values[static_cast<size_t>(found.slot)] = kNone;
+  LOCUS_DCHECK_GT(size_, 0u);
   --size_;
+  if constexpr (kDebugChecks) check_bucket(found.bucket);
+  check_invariants();
   return true;
 }
 
 template <class Hash>
 void PersistentIdTable<Hash>::fit(size_t ids) {
-  LOCUS_DCHECK(ids >= size_);
+  LOCUS_DCHECK_GE(ids, size_);
   if (ids > capacity()) rebuild(std::max(leaves_for(ids), leaf_count() + leaf_count() / 2));
   if (ids * 4 <= capacity() && leaves_for(2 * ids) < leaf_count()) rebuild(leaves_for(2 * ids));
+  LOCUS_DCHECK_GE(capacity(), ids);
+  check_invariants();
 }
 
 template <class Hash>
@@ -243,6 +268,43 @@ void PersistentIdTable<Hash>::rebuild(size_t leaf_count) {
     for (const Bucket& bucket : before[leaf]->buckets)
       for (size_t slot = 0; slot < kSlots; ++slot)
         if (bucket.ids[slot] != kNoId) put(bucket.ids[slot], bucket.values[slot]);
+  }
+  check_all_buckets();
+}
+
+template <class Hash>
+void PersistentIdTable<Hash>::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(size_, capacity());
+    LOCUS_CHECK_EQ(bucket_count_ % kBucketsPerLeaf, 0u);
+    LOCUS_CHECK_EQ(leaves_.size(), leaf_count());
+  }
+}
+
+template <class Hash>
+void PersistentIdTable<Hash>::check_bucket(size_t index) const {
+  if constexpr (kDebugChecks) {
+    const Bucket& checked = bucket(index);
+    for (size_t slot = 0; slot < kSlots; ++slot) {
+      const Id id = checked.ids[slot];
+      LOCUS_CHECK_EQ(id == kNoId, checked.values[slot] == kNone);
+      if (id == kNoId) continue;
+      const Position found = search(id);
+      LOCUS_CHECK_EQ(found.slot, static_cast<int>(slot));
+      LOCUS_CHECK_EQ(found.bucket, index);
+    }
+  }
+}
+
+template <class Hash>
+void PersistentIdTable<Hash>::check_all_buckets() const {
+  if constexpr (kDebugChecks) {
+    size_t ids = 0;
+    for (size_t index = 0; index < bucket_count_; ++index) {
+      check_bucket(index);
+      for (const Id id : bucket(index).ids) ids += id != kNoId ? 1 : 0;
+    }
+    LOCUS_CHECK_EQ(ids, size_);
   }
 }
 

@@ -4,9 +4,11 @@
 #include <vector>
 
 #include "absl/strings/cord.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/check.h"
 
 namespace locus {
 namespace {
@@ -57,6 +59,9 @@ absl::string_view reason_name(Reason reason) {
 }
 
 absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal) {
+  LOCUS_DCHECK(code != absl::StatusCode::kOk);
+  LOCUS_DCHECK(!absl::StrContains(refusal.field, kSeparator));
+  LOCUS_DCHECK(!absl::StrContains(refusal.limit, kSeparator));
   absl::Status status(code, absl::StrCat(location(refusal), message));
   const std::string index = refusal.index ? absl::StrCat(*refusal.index) : "";
   const std::string separator(1, kSeparator);

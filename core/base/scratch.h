@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/base/check.h"
+
 namespace locus {
 
 inline constexpr size_t kKeptScratch = size_t{1} << 18;  // largest capacity that is kept, in bytes
@@ -15,6 +17,8 @@ template <class T>
 void clear_scratch(std::vector<T>& scratch) {
   scratch.clear();
   if (scratch.capacity() * sizeof(T) > kKeptScratch) std::vector<T>().swap(scratch);
+  LOCUS_DCHECK(scratch.empty());
+  LOCUS_DCHECK_LE(scratch.capacity() * sizeof(T), kKeptScratch);
 }
 
 }  // namespace locus

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/vec3.h"
 
@@ -78,6 +79,7 @@ constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
 // Returns the largest squared_distance() whose rounded square root can be at most `distance`, rounded up: boxes beyond
 // it can be pruned.
 inline double squared_limit(double distance) {
+  LOCUS_DCHECK_GE(distance, 0.0);
   if (planted(PlantedBug::kNearestLimit)) return distance * distance * (1 - 0x1p-50);
   return distance * distance * (1 + 0x1p-50);
 }

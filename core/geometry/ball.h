@@ -5,6 +5,7 @@
 
 #include <type_traits>
 
+#include "core/base/check.h"
 #include "core/geometry/aabb.h"
 
 namespace locus {
@@ -31,6 +32,7 @@ constexpr bool reaches(const Ball<S>& ball, const Aabb<S>& box) {
 // which reaches() is true.
 template <class S>
 Aabb<S> bounds_of(const Ball<S>& ball) {
+  LOCUS_DCHECK_GE(ball.radius, S{0});
   constexpr S kEpsilon = static_cast<S>(std::is_same_v<S, double> ? 0x1p-40 : 0x1p-20);
   const S epsilon = kEpsilon * (max_component(abs(ball.center)) + ball.radius);
   return grown(Aabb<S>{ball.center, ball.center}, ball.radius + epsilon);

@@ -8,6 +8,8 @@
 #ifndef LOCUS_CORE_GEOMETRY_DOUBLE_DOUBLE_H_
 #define LOCUS_CORE_GEOMETRY_DOUBLE_DOUBLE_H_
 
+#include "core/base/check.h"
+
 namespace locus {
 
 // Invariant: |low_| is at most half a unit in the last place of high_.
@@ -37,7 +39,7 @@ class DoubleDouble {
   friend constexpr bool operator==(const DoubleDouble&, const DoubleDouble&) = default;
 
  private:
-  constexpr DoubleDouble(double high, double low) : high_(high), low_(low) {}
+  constexpr DoubleDouble(double high, double low) : high_(high), low_(low) { LOCUS_DCHECK_EQ(high_ + low_, high_); }
 
   // Returns a + b exactly.
   static constexpr DoubleDouble sum(double a, double b) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/geometry/double_double.h"
 
 namespace locus {
@@ -108,6 +109,7 @@ std::optional<EdgeOnHit> hit_at_border(const Corner& a, const Corner& b, const C
 
 std::optional<EdgeOnHit> edge_on_hit(const StoredRay& ray, const Triangle& triangle, Cull cull,
                                      EdgeOnVerdict double_verdict) {
+  LOCUS_DCHECK_GE(double_verdict.corner_error, 0.0);
   const Projection projection(ray);
   const Corner a = projection.corner(triangle.a), b = projection.corner(triangle.b), c = projection.corner(triangle.c);
   const DoubleDouble weight_a = edge_function(c, b), weight_b = edge_function(a, c), weight_c = edge_function(b, a);

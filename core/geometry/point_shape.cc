@@ -1,5 +1,6 @@
 #include "core/geometry/point_shape.h"
 
+#include "core/base/check.h"
 #include "core/geometry/segment.h"
 
 namespace locus {
@@ -26,6 +27,7 @@ double max_with_root(double a, double b) { return a > 0 && a * a > b * (1 + 0x1p
 }  // namespace
 
 double core_radius(const Shape& shape) {
+  LOCUS_DCHECK(shape.radius >= 0 || shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBox);
   return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule ? shape.radius : 0;
 }
 

@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/geometry/aabb.h"
 
 namespace locus {
@@ -59,6 +60,8 @@ class SlabRay {
         direction_(ray.direction),
         pad_(static_cast<S>(pad)),
         magnitude_(max_component(abs(ray.origin))) {
+    LOCUS_DCHECK_GT(max_component(abs(ray.direction)), S{0});
+    LOCUS_DCHECK_GE(pad_, S{0});
     const S smallest = static_cast<S>(1e-18) * max_component(abs(ray.direction));
     for (int axis = 0; axis < 3; ++axis) {
       const S d = ray.direction[axis];

@@ -1,5 +1,6 @@
 #include "core/geometry/ray_capsule.h"
 
+#include "core/base/check.h"
 #include "core/geometry/ray_ball.h"
 #include "core/geometry/segment.h"
 
@@ -38,6 +39,7 @@ Range merge(const Range& a, const Range& b) {
 }  // namespace
 
 std::optional<Chord> chord_of_capsule(const Line& line, Vec3d half_axis, double radius) {
+  LOCUS_DCHECK_GE(radius, 0.0);
   const double rr = radius * radius;
   Range range = merge(line_in_ball({line.origin - half_axis, line.direction}, rr),
                       line_in_ball({line.origin + half_axis, line.direction}, rr));

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/edge_on_triangle.h"
 #include "core/geometry/float_step.h"
@@ -92,6 +93,8 @@ TriangleRay::TriangleRay(const StoredRay& stored, Vec3d origin, Vec3d direction,
       slabs_({to_float(origin_), to_float(direction_)}, kTrianglePad),
       cull_(cull) {
   const Vec3d size = abs(direction_);
+  LOCUS_DCHECK_GE(max_component(size), 0.5);
+  LOCUS_DCHECK_LT(max_component(size), 1.0);
   axis_z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   axis_x_ = (axis_z_ + 1) % 3;
   axis_y_ = (axis_z_ + 2) % 3;
@@ -192,6 +195,7 @@ std::optional<TriangleHit> TriangleRay::hit(const Triangle& triangle) const {
   const Interval<float> own = slabs_.interval(bounds_of(triangle));
   if (!(own.near <= own.far) || own.far < 0) return std::nullopt;
   result->t = std::min(std::max(result->t, own.near), own.far);
+  LOCUS_DCHECK_GE(result->t, 0.0f);
   return result;
 }
 

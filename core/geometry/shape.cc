@@ -1,5 +1,6 @@
 #include "core/geometry/shape.h"
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/obb_obb.h"
 #include "core/geometry/point_shape.h"
@@ -32,6 +33,7 @@ LocalRay local_ray(const Rayd& ray, const Shape& shape) {
   (void)std::frexp(max_component(abs(ray.direction)), &local.exponent);
   const Vec3d direction = {std::ldexp(ray.direction.x, -local.exponent), std::ldexp(ray.direction.y, -local.exponent),
                            std::ldexp(ray.direction.z, -local.exponent)};
+  LOCUS_DCHECK_GE(max_component(abs(direction)), 0.5);
   if (shape.kind != ShapeKind::kBall) local.rotation = rotation_of(shape.rotation);
   local.line = {local.rotation.to_local(ray.origin - shape.position), local.rotation.to_local(direction)};
   return local;

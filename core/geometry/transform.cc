@@ -1,8 +1,13 @@
 #include "core/geometry/transform.h"
 
+#include "core/base/check.h"
+#include "core/base/limits.h"
+
 namespace locus {
 
 Transform make_transform(Vec3d translation, const Quaternion& quaternion, float scale) {
+  LOCUS_DCHECK_GT(scale, 0.0f);
+  LOCUS_DCHECK_LE(unit_deviation(quaternion), limits::kMaxQuaternionDeviation);
   return {translation, quaternion, scale, rotation_of(quaternion)};
 }
 

@@ -19,7 +19,7 @@ struct Transform {
   Vec3d point_to_world(Vec3d mesh) const { return translation + rotation.to_world(mesh) * double{scale}; }
 };
 
-// Returns the transform; `quaternion` must have unit length and `scale` be positive.
+// Returns the transform. `quaternion` must have unit length up to limits::kMaxQuaternionDeviation, `scale` be positive.
 Transform make_transform(Vec3d translation, const Quaternion& quaternion, float scale);
 
 // Returns world bounds of a box in mesh axes, grown by 2^-40 of the magnitudes. This covers the rounding of this

@@ -1,6 +1,9 @@
 #include "core/mesh/packed_indices.h"
 
 #include <algorithm>
+#include <limits>
+
+#include "core/base/check.h"
 
 namespace locus {
 namespace {
@@ -31,9 +34,12 @@ uint32_t PackedIndices::Reader::next() {
     const uint64_t byte = *next_++;
     code |= (byte & (kMore - 1)) << shift;
     if ((byte & kMore) == 0) break;
+    LOCUS_DCHECK_LT(shift, 28);  // a code has at most 34 bits
   }
   const auto half = static_cast<int64_t>(code >> 1);
   const int64_t index = next_unused_ - ((code & 1) != 0 ? -half - 1 : half);
+  LOCUS_DCHECK_GE(index, 0);
+  LOCUS_DCHECK_LE(index, int64_t{std::numeric_limits<uint32_t>::max()});
   next_unused_ = std::max(next_unused_, index + 1);
   return static_cast<uint32_t>(index);
 }

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/check.h"
+
 namespace locus {
 
 class PackedNumbers {
@@ -16,10 +18,14 @@ class PackedNumbers {
   PackedNumbers(size_t count, uint32_t largest)
       : width_((static_cast<size_t>(std::bit_width(largest)) + 7) / 8), bytes_(count * width_) {}
 
+  // Sets an element; `value` must fit the bytes of the largest one.
   void set(size_t index, uint32_t value) {
+    LOCUS_DCHECK_LE((index + 1) * width_, bytes_.size());
+    LOCUS_DCHECK_LE(static_cast<size_t>(std::bit_width(value)), 8 * width_);
     for (size_t i = 0; i < width_; ++i) bytes_[index * width_ + i] = static_cast<uint8_t>(value >> (8 * i));
   }
   uint32_t operator[](size_t index) const {
+    LOCUS_DCHECK_LE((index + 1) * width_, bytes_.size());
     uint32_t value = 0;
     for (size_t i = 0; i < width_; ++i) value |= uint32_t{bytes_[index * width_ + i]} << (8 * i);
     return value;

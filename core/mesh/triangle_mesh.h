@@ -39,6 +39,8 @@ class TriangleMesh {
 
  private:
   TriangleMesh() = default;
+  // Checks the sizes and the bounds. O(1).
+  void check_invariants() const;
 
   std::vector<float> vertices_;
   std::vector<uint32_t> indices_;
