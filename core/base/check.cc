@@ -5,8 +5,8 @@
 
 namespace locus::internal {
 
-void check_failed(const char* file, int line, const char* what, const std::string& operands) {
-  std::fprintf(stderr, "%s:%d: check failed: %s%s%s\n", file, line, what, operands.empty() ? "" : " with ",
+void check_failed(const char* file, int line, const char* condition, const std::string& operands) {
+  std::fprintf(stderr, "%s:%d: check failed: %s%s%s\n", file, line, condition, operands.empty() ? "" : " with ",
                operands.c_str());
   std::abort();
 }

@@ -1,6 +1,6 @@
-// Checks of what the program itself promises. A failed check is a bug in locus, never a user's mistake: it prints both
-// operands and the place, then aborts. Operating errors are absl::Status instead. LOCUS_DCHECK* vanish in release
-// builds.
+// Assertions of invariants and preconditions. A failed check is a bug in locus, never a user's mistake: it prints the
+// condition, both operands, file and line, and aborts. Operating errors are absl::Status instead. LOCUS_DCHECK* cost
+// nothing in release builds. Any thread.
 #ifndef LOCUS_CORE_BASE_CHECK_H_
 #define LOCUS_CORE_BASE_CHECK_H_
 
@@ -9,13 +9,14 @@
 
 namespace locus::internal {
 
-[[noreturn]] void check_failed(const char* file, int line, const char* what, const std::string& operands);
+// Prints the failed check to stderr and aborts. `operands` may be empty.
+[[noreturn]] void check_failed(const char* file, int line, const char* condition, const std::string& operands);
 
 template <class A, class B>
-[[noreturn]] void check_failed_op(const char* file, int line, const char* what, const A& a, const B& b) {
+[[noreturn]] void check_failed_op(const char* file, int line, const char* condition, const A& a, const B& b) {
   std::ostringstream operands;
   operands << a << " and " << b;
-  check_failed(file, line, what, operands.str());
+  check_failed(file, line, condition, operands.str());
 }
 
 }  // namespace locus::internal
@@ -34,9 +35,9 @@ template <class A, class B>
 #define LOCUS_CHECK_LE(a, b) LOCUS_CHECK_OP_(a, <=, b)
 #define LOCUS_CHECK_LT(a, b) LOCUS_CHECK_OP_(a, <, b)
 
-// Whether LOCUS_DCHECK* and check_invariants() do anything: in debug builds and under the sanitizers. A class whose
-// comment names an invariant has a member check_invariants(), called at the end of every member that changes it; its
-// body stands inside `if constexpr (kDebugChecks)`, and it costs no more than the change it follows.
+// True in debug and sanitizer builds, where LOCUS_DCHECK* and check_invariants() are evaluated. A class whose comment
+// names an invariant has a member check_invariants(), called at the end of each mutating public member. Its body is
+// inside `if constexpr (kDebugChecks)`, and its cost is at most that of the change before it.
 namespace locus {
 #ifdef NDEBUG
 inline constexpr bool kDebugChecks = false;

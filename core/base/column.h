@@ -1,4 +1,5 @@
-// Reading packed columns: one value or one point after the other, one entry for each item, one for all, or none.
+// Readers and length checks of packed columns: scalars or points stored one after the other, with one entry per item,
+// one entry for all items, or none. Const access; any thread.
 #ifndef LOCUS_CORE_BASE_COLUMN_H_
 #define LOCUS_CORE_BASE_COLUMN_H_
 
@@ -7,18 +8,26 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 
 namespace locus {
 
-// A borrowed column whose length check_column() has accepted. `width` numbers make one entry.
+// Borrowed column whose length check_column() has accepted. An entry consists of `width` values.
 template <class T>
 class ColumnReader {
  public:
-  ColumnReader(absl::Span<const T> values, size_t width) : values_(values), width_(width) {}
+  ColumnReader(absl::Span<const T> values, size_t width) : values_(values), width_(width) {
+    LOCUS_DCHECK_GT(width_, 0u);
+    LOCUS_DCHECK_EQ(values_.size() % width_, 0u);
+  }
 
   bool given() const { return !values_.empty(); }
-  // First number of item i's entry. Only for a given column.
-  const T* entry(size_t i) const { return values_.data() + (values_.size() == width_ ? 0 : i * width_); }
+  // Returns the first value of item i's entry. Precondition: given().
+  const T* entry(size_t i) const {
+    LOCUS_DCHECK(given());
+    LOCUS_DCHECK(values_.size() == width_ || i < values_.size() / width_);
+    return values_.data() + (values_.size() == width_ ? 0 : i * width_);
+  }
   T value(size_t i, T fallback) const { return given() ? *entry(i) : fallback; }
 
  private:
@@ -26,11 +35,13 @@ class ColumnReader {
   size_t width_;
 };
 
+// Numbers of entries that a column may have: one per item; or one for all items as well; or none as well.
 enum class ColumnNeed { kEach, kEachOrOne, kOptional };
 
-// INVALID_ARGUMENT COLUMN_LENGTH naming `field`, what it holds and what it may hold, unless `numbers` numbers are as
-// many as `items` entries of `width` (kEach), or one entry as well (kEachOrOne), or none as well (kOptional).
-absl::Status check_column(size_t numbers, size_t width, size_t items, ColumnNeed need, absl::string_view field);
+// Returns OK if a column of `value_count` values holds `items` entries of `width` values (kEach), or one entry
+// (kEachOrOne, kOptional), or none (kOptional). Otherwise INVALID_ARGUMENT COLUMN_LENGTH, naming `field`, the count and
+// the accepted counts.
+absl::Status check_column(size_t value_count, size_t width, size_t items, ColumnNeed need, absl::string_view field);
 
 }  // namespace locus
 

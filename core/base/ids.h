@@ -1,5 +1,5 @@
-// The names of things in a scene. Objects and instances share one id space per scene, chosen by the caller; 0 names
-// nothing. An instance placed without an id gets one with bit 63 set.
+// Identifiers of the things in a scene. Objects and instances share one id space per scene. The caller chooses the ids;
+// 0 is never an id. An instance placed without an id gets one with bit 63 set.
 #ifndef LOCUS_CORE_BASE_IDS_H_
 #define LOCUS_CORE_BASE_IDS_H_
 
@@ -7,10 +7,10 @@
 
 namespace locus {
 
-using Id = uint64_t;     // an object or an instance
-using Group = uint64_t;  // a player, a vehicle; 0 = none
-using Tag = uint64_t;    // the user's own, returned on request
-using Layers = uint32_t;
+using Id = uint64_t;      // object or instance
+using Group = uint64_t;   // such as a player or a vehicle; 0 = none
+using Tag = uint64_t;     // any value of the user, returned on request
+using Layers = uint32_t;  // bit mask
 
 inline constexpr Id kNoId = 0;
 inline constexpr Id kChosenIdBit = Id{1} << 63;

@@ -19,7 +19,7 @@ std::vector<InstructionSet> available() {
   return sets;
 }
 
-// Written by use_instruction_set() only.
+// Returns the instruction set in use. Written only by use_instruction_set().
 InstructionSet& active() {
   static InstructionSet set = available().front();
   return set;

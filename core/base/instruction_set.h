@@ -1,5 +1,5 @@
-// Which instruction set the vector code of this process uses: the widest the processor has, unless one is named. The
-// choice is made once; answers do not depend on it.
+// Instruction set of the vector code of this process: the widest that the processor supports, unless the configuration
+// names one. It is chosen once at the start; answers do not depend on it.
 #ifndef LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 #define LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 
@@ -13,20 +13,21 @@ namespace locus {
 
 enum class InstructionSet : uint8_t { kPortable, kSse4, kAvx2 };
 
-// The name of the code that runs on any processor.
+// Name of the instruction set that runs on any processor.
 inline constexpr char kPortable[] = "portable";
 
-// "avx2", "sse4", "portable".
+// Returns "avx2", "sse4" or "portable".
 absl::string_view instruction_set_name(InstructionSet set);
 
-// What this processor can run, the widest first; kPortable is the last. Thread-safe.
+// Returns the names of the instruction sets that this processor supports, the widest first and kPortable last.
+// Thread-safe.
 std::vector<std::string> instruction_sets();
 
-// From now on that instruction set serves; empty = the widest. INVALID_ARGUMENT naming those there are. For the start
-// of a program and for tests: not while queries run.
+// Selects the instruction set `name`, or the widest one if `name` is empty. INVALID_ARGUMENT, listing the supported
+// ones, if the processor does not support it. Call at the start of a program or in tests, never while queries run.
 absl::Status use_instruction_set(absl::string_view name);
 
-// The one in use. Thread-safe.
+// Returns the instruction set in use. Thread-safe.
 InstructionSet active_instruction_set();
 inline absl::string_view instruction_set() { return instruction_set_name(active_instruction_set()); }
 

@@ -1,5 +1,5 @@
-// std::mutex and std::condition_variable with Clang's thread-safety annotations. ThreadSanitizer understands these and
-// reports Debian's absl::Mutex on correct code, so every lock of ours is one of these.
+// std::mutex and std::condition_variable with Clang's thread-safety annotations. All locks of locus are of these types:
+// ThreadSanitizer reports false races for Debian's absl::Mutex, but none for std::mutex.
 #ifndef LOCUS_CORE_BASE_MUTEX_H_
 #define LOCUS_CORE_BASE_MUTEX_H_
 
@@ -42,11 +42,12 @@ class LOCUS_SCOPED_CAPABILITY MutexLock {
   Mutex& mutex_;
 };
 
-// Waits release and retake the mutex, which the caller holds through a MutexLock. Wake-ups may be spurious: loop.
+// Condition variable of a Mutex. A wait releases the mutex, which the caller holds by a MutexLock, and acquires it
+// again before it returns. Wake-ups may be spurious: wait in a loop.
 class ConditionVariable {
  public:
   void wait(Mutex& mutex) LOCUS_REQUIRES(mutex) { condition_.wait(mutex); }
-  // False when the deadline passed.
+  // Returns false if the deadline has passed.
   bool wait_until(Mutex& mutex, std::chrono::steady_clock::time_point deadline) LOCUS_REQUIRES(mutex) {
     return condition_.wait_until(mutex, deadline) == std::cv_status::no_timeout;
   }

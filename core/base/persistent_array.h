@@ -1,12 +1,14 @@
-// An array whose copy costs O(1): copies share their leaves, and a write replaces only the leaf it falls into and, once
-// after each copy, the list of leaves. For the one writer of a scene, whose readers keep copies of earlier revisions.
+// Persistent array: a snapshot costs O(1), since snapshots share their leaves. A write copies only the leaf that
+// contains the index and, once after each snapshot, the list of leaves. Used by the only writer of a scene, whose
+// readers keep snapshots of earlier revisions.
 //
-// Threads: as for a standard container, each array object by itself; arrays that share leaves are independent of each
-// other in every way: any thread may write to, copy or drop its own while others read theirs.
+// Threads: each array object is like a standard container. Arrays that share leaves are independent: a thread may
+// write, copy or destroy its own array while other threads read theirs.
 //
-// Invariants: a leaf or list reachable from two arrays is never changed again. Each names the owner that made it; an
-// array changes in place only what its present owner made, and snapshot() forgets its owner: no reference count is ever
-// asked. Source of owners: Clojure's transient collections (Hickey).
+// Invariants: a leaf or list that two arrays share is immutable. Each leaf and list stores the owner that created it.
+// An array changes in place only the leaves and the list of its current owner, and snapshot() resets that owner, so
+// reference counts are never read. There are just enough leaves for size(). Source of owners: Clojure's transient
+// collections (Hickey).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
@@ -24,9 +26,9 @@
 namespace locus {
 
 namespace internal {
-// Who may change a leaf in place.
+// "No owner": such leaves and lists are never changed in place.
 inline constexpr uint64_t kNoOwner = 0;
-// Never kNoOwner and never the same twice.
+// Returns a new owner, unique in the process and never kNoOwner. Thread-safe.
 inline uint64_t new_owner() {
   static std::atomic<uint64_t> last{kNoOwner};
   return last.fetch_add(1, std::memory_order_relaxed) + 1;
@@ -39,29 +41,34 @@ class PersistentArray {
   PersistentArray() : list_(std::make_shared<List>()) {}
   PersistentArray(PersistentArray&&) noexcept = default;
   PersistentArray& operator=(PersistentArray&&) noexcept = default;
-  // Only of a snapshot that was not written to: whoever writes says snapshot() instead.
+  // Copies a snapshot that was never written to. A written array is copied by snapshot() instead.
   PersistentArray(const PersistentArray& other) : list_(other.list_) {
     LOCUS_CHECK_EQ(other.owner_, internal::kNoOwner);
   }
   PersistentArray& operator=(const PersistentArray& other) { return *this = PersistentArray(other); }
 
-  // What a reader keeps. O(1).
+  // Returns a snapshot for readers. O(1).
   PersistentArray snapshot() {
     owner_ = internal::kNoOwner;
+    check_invariants();
     return PersistentArray(list_);
   }
 
-  // One more than the highest place that was ever set.
+  // Returns one more than the highest index that was ever set.
   size_t size() const { return list_->size; }
-  // `place` is below size(). A place that was never set holds T().
-  const T& operator[](size_t place) const { return list_->leaves[place / kLeafSize]->values[place % kLeafSize]; }
-  // O(1), or one copy of a leaf; after a snapshot one copy of the list of leaves.
-  void set(size_t place, T value);
+  // Returns the value at `index` < size(): T() if it was never set.
+  const T& operator[](size_t index) const {
+    LOCUS_DCHECK_LT(index, size());
+    return list_->leaves[index / kLeafSize]->values[index % kLeafSize];
+  }
+  // Sets the value at `index` and extends the array if necessary. O(1); after a snapshot also a copy of the leaf and,
+  // once, of the list of leaves.
+  void set(size_t index, T value);
 
-  // Bytes of leaves and of the list that `other` does not share. O(leaves).
+  // Returns the bytes of the leaves and of the list that `other` does not share. O(leaves).
   size_t unshared_bytes(const PersistentArray& other) const;
-  // fn(value, other's value) for each place whose leaf `other` does not share; null where it has no such place.
-  // O(leaves and places handed over).
+  // Calls fn(value, pointer to other's value) for each index whose leaf `other` does not share; the pointer is null
+  // from other.size() on. O(leaves + calls).
   template <class Fn>
   void for_each_apart_from(const PersistentArray& other, const Fn& fn) const;
 
@@ -77,14 +84,22 @@ class PersistentArray {
   };
 
   explicit PersistentArray(std::shared_ptr<List> list) : list_(std::move(list)) {}
+  // Checks the leaf count and the owner of the list. O(1).
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      LOCUS_CHECK_EQ(list_->leaves.size(), (list_->size + kLeafSize - 1) / kLeafSize);
+      LOCUS_CHECK(owner_ == internal::kNoOwner || list_->owner == owner_);
+    }
+  }
+  // Chooses an owner if there is none, and copies the list if another owner created it.
   void make_list_writable();
-  // Of leaf number `leaf`.
+  // Returns whether both arrays share leaf `leaf`.
   bool shares_leaf(const PersistentArray& other, size_t leaf) const {
     return leaf < other.list_->leaves.size() && list_->leaves[leaf] == other.list_->leaves[leaf];
   }
 
   std::shared_ptr<List> list_;
-  uint64_t owner_ = internal::kNoOwner;  // whose leaves may be changed in place
+  uint64_t owner_ = internal::kNoOwner;  // owner of the leaves that may be changed in place
 };
 
 template <class T, size_t kLeafSize>
@@ -96,21 +111,24 @@ void PersistentArray<T, kLeafSize>::make_list_writable() {
 }
 
 template <class T, size_t kLeafSize>
-void PersistentArray<T, kLeafSize>::set(size_t place, T value) {
+void PersistentArray<T, kLeafSize>::set(size_t index, T value) {
   make_list_writable();
   List& list = *list_;
-  if (place >= list.size) list.size = place + 1;
-  if (place / kLeafSize >= list.leaves.size()) {
+  if (index >= list.size) list.size = index + 1;
+  if (index / kLeafSize >= list.leaves.size()) {
     const size_t before = list.leaves.size();
-    list.leaves.resize(place / kLeafSize + 1);
+    list.leaves.resize(index / kLeafSize + 1);
     for (size_t leaf = before; leaf < list.leaves.size(); ++leaf) list.leaves[leaf] = std::make_shared<Leaf>();
   }
-  std::shared_ptr<Leaf>& leaf = list.leaves[place / kLeafSize];
+  std::shared_ptr<Leaf>& leaf = list.leaves[index / kLeafSize];
   if (leaf->owner != owner_) {
     leaf = std::make_shared<Leaf>(*leaf);
     leaf->owner = owner_;
   }
-  leaf->values[place % kLeafSize] = std::move(value);
+  LOCUS_DCHECK_EQ(leaf.use_count(), 1);
+  leaf->values[index % kLeafSize] = std::move(value);
+  LOCUS_DCHECK_LT(index, size());
+  check_invariants();
 }
 
 template <class T, size_t kLeafSize>
@@ -128,8 +146,8 @@ void PersistentArray<T, kLeafSize>::for_each_apart_from(const PersistentArray& o
   if (list_ == other.list_) return;
   for (size_t leaf = 0; leaf < list_->leaves.size(); ++leaf) {
     if (shares_leaf(other, leaf)) continue;
-    for (size_t place = leaf * kLeafSize; place < std::min(size(), (leaf + 1) * kLeafSize); ++place)
-      fn((*this)[place], place < other.size() ? &other[place] : nullptr);
+    for (size_t index = leaf * kLeafSize; index < std::min(size(), (leaf + 1) * kLeafSize); ++index)
+      fn((*this)[index], index < other.size() ? &other[index] : nullptr);
   }
 }
 

@@ -1,15 +1,16 @@
-// Finds small numbers by 64-bit ids: a hash table of open addressing whose copy costs O(1). Copies share their leaves,
-// and a write replaces only the leaf it falls into. For the one writer of a scene, whose readers keep copies of earlier
-// revisions: both ask the same table.
+// Persistent hash table from 64-bit ids to 32-bit values, with open addressing: a snapshot costs O(1), since snapshots
+// share their leaves, and a write copies only the leaf that it changes. Used by the only writer of a scene, whose
+// readers keep snapshots of earlier revisions.
 //
-// Threads: as for a standard container, each table by itself: const members may run concurrently, others need exclusive
-// use. Tables that share leaves are independent of each other in every way.
+// Threads: each table is like a standard container: const members may run concurrently, others need exclusive access.
+// Tables that share leaves are independent of each other.
 //
-// Invariants: a bucket is one cache line. An id lies in the first bucket from its own on that had room when it came,
-// and each bucket counts the ids that passed it so: a search ends where none has passed, and erasing leaves nothing
-// behind. At most three of five places are taken. A leaf that two tables hold is never changed again: each names the
-// owner that made it, as in PersistentArray. Source: Knuth, The Art of Computer Programming 3, 6.4 (linear probing,
-// buckets); Bronson and Shi, Open-sourcing F14, 2019 (counts of what passed).
+// Invariants: a bucket is one cache line. An id lies in the first bucket, from its home bucket on, that had a free slot
+// when the id was inserted. Each full bucket that an insertion skipped counts that id in `overflow`: a search ends at
+// the first bucket with an overflow of 0, and erase() decrements the counts, so no tombstones are needed. On average,
+// at most three of the five slots of a bucket are used. A leaf that two tables share is immutable: each leaf stores the
+// owner that created it, as in PersistentArray. Source: Knuth, The Art of Computer Programming 3, 6.4 (linear probing,
+// buckets); Bronson and Shi, Open-sourcing F14, 2019 (overflow counts).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 
@@ -30,72 +31,76 @@
 
 namespace locus {
 
-// Hash()(id): 64 bits, of which the upper ones choose the bucket.
+// Hash()(id) returns 64 bits, of which the upper ones choose the home bucket.
 template <class Hash = SeededHash>
 class PersistentIdTable {
  public:
+  // Result of find() for an absent id; never a stored value.
   static constexpr uint32_t kNone = ~0u;
 
   PersistentIdTable() = default;
 
-  // What a reader keeps. O(1).
+  // Returns a snapshot for readers. O(1).
   PersistentIdTable snapshot() {
     owner_ = internal::kNoOwner;
+    check_invariants();
     return {leaves_.snapshot(), bucket_count_, size_, hash_};
   }
 
   size_t size() const { return size_; }
-  // kNone for an id that is not here, and for kNoId. O(1).
+  // Returns the value of `id`, or kNone if `id` is absent or kNoId. O(1).
   uint32_t find(Id id) const { return bucket_count_ == 0 ? kNone : find_from(bucket(home(id)), id); }
-  // Many at once, numbers[i] for ids[i]: their memory is asked for before it is needed.
-  void find(absl::Span<const Id> ids, absl::Span<uint32_t> numbers) const;
-  // Asks for the memory of find(), some time before it is needed. GCC would drop calls of what only prefetches, as if
-  // it had no effect, unless they are inlined early.
+  // Writes the value of ids[i] to values[i]; `values` must be at least as long. Faster than single calls, since it
+  // prefetches the buckets.
+  void find(absl::Span<const Id> ids, absl::Span<uint32_t> values) const;
+  // Prefetches the bucket that find(id) reads first. Must be inlined early: GCC drops calls of a function that only
+  // prefetches, since it sees no effect.
   [[gnu::always_inline]] void prefetch(Id id) const {
     if (bucket_count_ != 0) __builtin_prefetch(&bucket(home(id)));
   }
 
-  // Inserts or replaces; true when the id is new. `id` is not kNoId, `number` not kNone. O(1): copies few leaves at
-  // most; the whole table when it is full.
-  bool set(Id id, uint32_t number);
-  // False when absent. O(1), as set(). Memory goes with fit() only.
+  // Inserts or replaces the value of `id`; returns true if the id is new. `id` must not be kNoId nor `value` kNone.
+  // O(1), with copies of a few leaves at most; O(size) when the table is full and grows.
+  bool set(Id id, uint32_t value);
+  // Removes `id`; returns false if it is absent. O(1), with copies like set(). Only fit() frees memory.
   bool erase(Id id);
-  // For so many ids, not fewer than there are: makes room for them, or gives back what they leave unused where that is
-  // most of the table. O(size) when it does either.
+  // Resizes the table for `ids` ids, at least size(): grows if they do not fit, shrinks if they leave most of the table
+  // unused. O(size) if it resizes, else O(1).
   void fit(size_t ids);
 
-  // Of leaves that snapshots may hold and this table does not any more, since this was last asked.
+  // Returns the bytes of the leaves that were replaced since the last call, which only snapshots still hold; resets the
+  // count.
   size_t take_replaced_bytes() { return std::exchange(replaced_bytes_, 0); }
   size_t bytes() const { return unshared_bytes(PersistentIdTable()); }
-  // Of what `other` does not share. O(leaves).
+  // Returns the bytes that `other` does not share. O(leaves).
   size_t unshared_bytes(const PersistentIdTable& other) const;
 
  private:
-  static constexpr size_t kSlots = 5;         // of a bucket
-  static constexpr size_t kIdsPerBucket = 3;  // on the average, when the table is full
+  static constexpr size_t kSlots = 5;         // per bucket
+  static constexpr size_t kIdsPerBucket = 3;  // on average in a full table
   static constexpr size_t kBucketsPerLeaf = 64;
   static constexpr size_t kIdsPerLeaf = kBucketsPerLeaf * kIdsPerBucket;
   static constexpr size_t kLeavesPerPage = 64;
-  static constexpr size_t kFoundAtOnce = 64;
+  static constexpr size_t kFindBatch = 64;
 
-  // An empty place holds kNoId and kNone.
+  // Slots of a cache line. An empty slot holds kNoId and kNone.
   struct alignas(64) Bucket {
-    Bucket() { numbers.fill(kNone); }
+    Bucket() { values.fill(kNone); }
     std::array<Id, kSlots> ids{};
-    std::array<uint32_t, kSlots> numbers;
-    uint32_t passed = 0;
+    std::array<uint32_t, kSlots> values;
+    uint32_t overflow = 0;  // ids in later buckets that skipped this one when they were inserted
   };
   static_assert(sizeof(Bucket) == 64);
   struct Leaf {
-    explicit Leaf(uint64_t maker) : owner(maker) {}
-    Leaf(const Leaf& other, uint64_t maker) : buckets(other.buckets), owner(maker) {}
+    explicit Leaf(uint64_t creator) : owner(creator) {}
+    Leaf(const Leaf& other, uint64_t creator) : buckets(other.buckets), owner(creator) {}
     std::array<Bucket, kBucketsPerLeaf> buckets;
     const uint64_t owner;
   };
   using LeafArray = PersistentArray<std::shared_ptr<Leaf>, kLeavesPerPage>;
-  struct Found {
+  struct Position {
     size_t bucket;
-    int place;  // -1: nowhere
+    int slot;  // -1 = absent
   };
 
   PersistentIdTable(LeafArray leaves, size_t bucket_count, size_t size, const Hash& hash)
@@ -105,122 +110,151 @@ class PersistentIdTable {
   size_t leaf_count() const { return bucket_count_ / kBucketsPerLeaf; }
   size_t capacity() const { return leaf_count() * kIdsPerLeaf; }
 
-  // The hash as a fraction of all buckets: the order of homes stays when their number changes.
+  // Returns the home bucket: the hash as a fraction of all buckets, so that the order of homes is the same for any
+  // bucket count.
   size_t home(Id id) const { return absl::Uint128High64(absl::uint128(hash_(id)) * bucket_count_); }
   size_t next(size_t bucket) const { return bucket + 1 == bucket_count_ ? 0 : bucket + 1; }
-  const Bucket& bucket(size_t number) const {
-    return leaves_[number / kBucketsPerLeaf]->buckets[number % kBucketsPerLeaf];
+  const Bucket& bucket(size_t index) const {
+    LOCUS_DCHECK_LT(index, bucket_count_);
+    return leaves_[index / kBucketsPerLeaf]->buckets[index % kBucketsPerLeaf];
   }
-  // Where of the bucket the id is, or a negative number. Without branches: the place cannot be foretold.
-  static int place_of(const Bucket& bucket, Id id) {
-    uint32_t places = 0;
-    for (size_t place = 0; place < kSlots; ++place) places |= (bucket.ids[place] == id ? 1u : 0u) << place;
-    return places == 0 ? -1 : std::countr_zero(places);
+  // Returns the slot of `id` in `bucket`, or -1. Branch-free, since the slot is unpredictable.
+  static int slot_of(const Bucket& bucket, Id id) {
+    uint32_t matches = 0;
+    for (size_t slot = 0; slot < kSlots; ++slot) matches |= (bucket.ids[slot] == id ? 1u : 0u) << slot;
+    return matches == 0 ? -1 : std::countr_zero(matches);
   }
+  // Returns the value of `id`, whose home bucket is `first`.
   uint32_t find_from(const Bucket& first, Id id) const {
-    if (const int place = place_of(first, id); place >= 0) return first.numbers[static_cast<size_t>(place)];
-    if (first.passed == 0) return kNone;
-    const Found found = search(id);
-    return found.place < 0 ? kNone : bucket(found.bucket).numbers[static_cast<size_t>(found.place)];
+    if (const int slot = slot_of(first, id); slot >= 0) return first.values[static_cast<size_t>(slot)];
+    if (first.overflow == 0) return kNone;
+    const Position found = search(id);
+    return found.slot < 0 ? kNone : bucket(found.bucket).values[static_cast<size_t>(found.slot)];
   }
-  Found search(Id id) const;
+  // Probes from the home bucket of `id` on.
+  Position search(Id id) const;
 
   void claim_owner() {
     if (owner_ == internal::kNoOwner) owner_ = internal::new_owner();
   }
-  Bucket& writable_bucket(size_t number);
-  // A new id, where there is room.
-  void put(Id id, uint32_t number);
+  // Returns a bucket of a leaf of the current owner; copies the leaf if another owner created it.
+  Bucket& writable_bucket(size_t index);
+  // Inserts an absent id. Precondition: size() < capacity().
+  void put(Id id, uint32_t value);
+  // Inserts all ids into a new table of `leaf_count` leaves.
   void rebuild(size_t leaf_count);
+  // Checks the sizes. O(1).
+  void check_invariants() const;
+  // Checks a bucket: each slot is empty or full, and each id is reachable from its home bucket.
+  void check_bucket(size_t index) const;
+  // Checks all buckets and that they contain size() ids. O(size), so only after a rebuild.
+  void check_all_buckets() const;
 
   LeafArray leaves_;
   size_t bucket_count_ = 0;
   size_t size_ = 0;
   size_t replaced_bytes_ = 0;
   Hash hash_;
-  uint64_t owner_ = internal::kNoOwner;  // whose leaves may be changed in place
+  uint64_t owner_ = internal::kNoOwner;  // owner of the leaves that may be changed in place
 };
 
 template <class Hash>
-void PersistentIdTable<Hash>::find(absl::Span<const Id> ids, absl::Span<uint32_t> numbers) const {
-  if (bucket_count_ == 0) return std::fill(numbers.begin(), numbers.begin() + ids.size(), kNone);
-  std::array<const Bucket*, kFoundAtOnce> first;
-  for (size_t begin = 0; begin < ids.size(); begin += kFoundAtOnce) {
-    const size_t count = std::min(kFoundAtOnce, ids.size() - begin);
+void PersistentIdTable<Hash>::find(absl::Span<const Id> ids, absl::Span<uint32_t> values) const {
+  LOCUS_DCHECK_GE(values.size(), ids.size());
+  if (bucket_count_ == 0) return std::fill(values.begin(), values.begin() + ids.size(), kNone);
+  std::array<const Bucket*, kFindBatch> first;
+  for (size_t begin = 0; begin < ids.size(); begin += kFindBatch) {
+    const size_t count = std::min(kFindBatch, ids.size() - begin);
     for (size_t i = 0; i < count; ++i) {
       first[i] = &bucket(home(ids[begin + i]));
       __builtin_prefetch(first[i]);
     }
-    for (size_t i = 0; i < count; ++i) numbers[begin + i] = find_from(*first[i], ids[begin + i]);
+    for (size_t i = 0; i < count; ++i) values[begin + i] = find_from(*first[i], ids[begin + i]);
   }
 }
 
 template <class Hash>
-typename PersistentIdTable<Hash>::Found PersistentIdTable<Hash>::search(Id id) const {
-  size_t number = bucket_count_ == 0 ? 0 : home(id);
-  // Ids that came before others were erased may have passed every bucket there is.
-  for (size_t asked = 0; asked < bucket_count_; ++asked, number = next(number)) {
-    const Bucket& here = bucket(number);
-    if (const int place = place_of(here, id); place >= 0) return {number, place};
-    if (here.passed == 0) break;
+typename PersistentIdTable<Hash>::Position PersistentIdTable<Hash>::search(Id id) const {
+  size_t index = bucket_count_ == 0 ? 0 : home(id);
+  // After erasures the overflow counts of all buckets may be positive: probe each bucket once at most.
+  for (size_t probes = 0; probes < bucket_count_; ++probes, index = next(index)) {
+    const Bucket& current = bucket(index);
+    if (const int slot = slot_of(current, id); slot >= 0) return {index, slot};
+    if (current.overflow == 0) break;
   }
   return {0, -1};
 }
 
 template <class Hash>
-typename PersistentIdTable<Hash>::Bucket& PersistentIdTable<Hash>::writable_bucket(size_t number) {
+typename PersistentIdTable<Hash>::Bucket& PersistentIdTable<Hash>::writable_bucket(size_t index) {
   claim_owner();
-  const size_t leaf = number / kBucketsPerLeaf;
+  LOCUS_DCHECK_LT(index, bucket_count_);
+  const size_t leaf = index / kBucketsPerLeaf;
   if (leaves_[leaf]->owner != owner_) {
     leaves_.set(leaf, std::make_shared<Leaf>(*leaves_[leaf], owner_));
     replaced_bytes_ += sizeof(Leaf);
   }
-  return leaves_[leaf]->buckets[number % kBucketsPerLeaf];
+  LOCUS_DCHECK_EQ(leaves_[leaf]->owner, owner_);
+  return leaves_[leaf]->buckets[index % kBucketsPerLeaf];
 }
 
 template <class Hash>
-void PersistentIdTable<Hash>::put(Id id, uint32_t number) {
-  for (size_t at = home(id);; at = next(at)) {
-    Bucket& here = writable_bucket(at);
-    if (const int place = place_of(here, kNoId); place >= 0) {
-      here.ids[static_cast<size_t>(place)] = id;
-      here.numbers[static_cast<size_t>(place)] = number;
+void PersistentIdTable<Hash>::put(Id id, uint32_t value) {
+  LOCUS_DCHECK_LT(size_, capacity());
+  for (size_t index = home(id);; index = next(index)) {
+    Bucket& current = writable_bucket(index);
+    if (const int slot = slot_of(current, kNoId); slot >= 0) {
+      current.ids[static_cast<size_t>(slot)] = id;
+      current.values[static_cast<size_t>(slot)] = value;
       return;
     }
-    ++here.passed;
+    ++current.overflow;
   }
 }
 
 template <class Hash>
-bool PersistentIdTable<Hash>::set(Id id, uint32_t number) {
-  LOCUS_DCHECK(id != kNoId && number != kNone);
-  if (const Found found = search(id); found.place >= 0) {
-    writable_bucket(found.bucket).numbers[static_cast<size_t>(found.place)] = number;
+bool PersistentIdTable<Hash>::set(Id id, uint32_t value) {
+  LOCUS_DCHECK_NE(id, kNoId);
+  LOCUS_DCHECK_NE(value, kNone);
+  if (const Position found = search(id); found.slot >= 0) {
+    writable_bucket(found.bucket).values[static_cast<size_t>(found.slot)] = value;
+    check_invariants();
     return false;
   }
   if (size_ == capacity()) fit(size_ + 1);
-  put(id, number);
+  put(id, value);
   ++size_;
+  if constexpr (kDebugChecks) check_bucket(search(id).bucket);
+  check_invariants();
   return true;
 }
 
 template <class Hash>
 bool PersistentIdTable<Hash>::erase(Id id) {
-  const Found found = id == kNoId ? Found{0, -1} : search(id);
-  if (found.place < 0) return false;
-  for (size_t passed = home(id); passed != found.bucket; passed = next(passed)) --writable_bucket(passed).passed;
+  const Position found = id == kNoId ? Position{0, -1} : search(id);
+  if (found.slot < 0) return false;
+  for (size_t index = home(id); index != found.bucket; index = next(index)) {
+    Bucket& skipped = writable_bucket(index);
+    LOCUS_DCHECK_GT(skipped.overflow, 0u);
+    --skipped.overflow;
+  }
   Bucket& bucket = writable_bucket(found.bucket);
-  bucket.ids[static_cast<size_t>(found.place)] = kNoId;
-  bucket.numbers[static_cast<size_t>(found.place)] = kNone;
+  bucket.ids[static_cast<size_t>(found.slot)] = kNoId;
+  bucket.values[static_cast<size_t>(found.slot)] = kNone;
+  LOCUS_DCHECK_GT(size_, 0u);
   --size_;
+  if constexpr (kDebugChecks) check_bucket(found.bucket);
+  check_invariants();
   return true;
 }
 
 template <class Hash>
 void PersistentIdTable<Hash>::fit(size_t ids) {
-  LOCUS_DCHECK(ids >= size_);
+  LOCUS_DCHECK_GE(ids, size_);
   if (ids > capacity()) rebuild(std::max(leaves_for(ids), leaf_count() + leaf_count() / 2));
   if (ids * 4 <= capacity() && leaves_for(2 * ids) < leaf_count()) rebuild(leaves_for(2 * ids));
+  LOCUS_DCHECK_GE(capacity(), ids);
+  check_invariants();
 }
 
 template <class Hash>
@@ -232,8 +266,45 @@ void PersistentIdTable<Hash>::rebuild(size_t leaf_count) {
   for (size_t leaf = 0; leaf < before.size(); ++leaf) {
     if (before[leaf]->owner != owner_) replaced_bytes_ += sizeof(Leaf);
     for (const Bucket& bucket : before[leaf]->buckets)
-      for (size_t place = 0; place < kSlots; ++place)
-        if (bucket.ids[place] != kNoId) put(bucket.ids[place], bucket.numbers[place]);
+      for (size_t slot = 0; slot < kSlots; ++slot)
+        if (bucket.ids[slot] != kNoId) put(bucket.ids[slot], bucket.values[slot]);
+  }
+  check_all_buckets();
+}
+
+template <class Hash>
+void PersistentIdTable<Hash>::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(size_, capacity());
+    LOCUS_CHECK_EQ(bucket_count_ % kBucketsPerLeaf, 0u);
+    LOCUS_CHECK_EQ(leaves_.size(), leaf_count());
+  }
+}
+
+template <class Hash>
+void PersistentIdTable<Hash>::check_bucket(size_t index) const {
+  if constexpr (kDebugChecks) {
+    const Bucket& checked = bucket(index);
+    for (size_t slot = 0; slot < kSlots; ++slot) {
+      const Id id = checked.ids[slot];
+      LOCUS_CHECK_EQ(id == kNoId, checked.values[slot] == kNone);
+      if (id == kNoId) continue;
+      const Position found = search(id);
+      LOCUS_CHECK_EQ(found.slot, static_cast<int>(slot));
+      LOCUS_CHECK_EQ(found.bucket, index);
+    }
+  }
+}
+
+template <class Hash>
+void PersistentIdTable<Hash>::check_all_buckets() const {
+  if constexpr (kDebugChecks) {
+    size_t ids = 0;
+    for (size_t index = 0; index < bucket_count_; ++index) {
+      check_bucket(index);
+      for (const Id id : bucket(index).ids) ids += id != kNoId ? 1 : 0;
+    }
+    LOCUS_CHECK_EQ(ids, size_);
   }
 }
 

@@ -1,5 +1,6 @@
-// Known bugs that tests can plant to prove that the suite would catch them. Outside the library built for those tests
-// (LOCUS_PLANT_BUGS) planted() is constant false and costs nothing.
+// Mutation testing: known bugs that a test switches on to prove that the test suite detects them. Only the library that
+// is built for those tests defines LOCUS_PLANT_BUGS; elsewhere planted() is a constant false and costs nothing. Set
+// `planted_bug` while no other thread runs.
 #ifndef LOCUS_CORE_BASE_PLANTED_BUG_H_
 #define LOCUS_CORE_BASE_PLANTED_BUG_H_
 
@@ -7,47 +8,47 @@ namespace locus {
 
 enum class PlantedBug {
   kNone,
-  kDropCell,           // the grid forgets one occupied cell of a query's range
-  kStrictTie,          // < for <= where a touching or equal hit decides
-  kStaleSnapshot,      // a published snapshot keeps the objects of the revision before
+  kDropCell,           // the grid skips one occupied cell in the range of a query
+  kStrictTie,          // < instead of <= where touching or equal distances decide
+  kStaleSnapshot,      // a published snapshot has the objects of the previous revision
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
-  kUnsignedCellIndex,  // cell indices truncate towards zero instead of flooring
-  kRewindReach,        // between two ticks objects are looked for only where they were at the first
-  kRewindFastBox,      // the way of an object that moved far leaves out its later, shorter moves of the tick
-  kUnpaddedNear,       // the near side of the slab test of tree nodes goes without its pad
-  kEdgeOnInDouble,     // triangles nearly edge-on are decided in double, like all others
-  kGridBallMargin,     // float culls what balls reach without its error bound
-  kNearestLimit,       // boxes as far as the farthest thing found near a point are left out
-  kNearestTreePad,     // float decides distances to the boxes of triangles without its pad
-  kWidePlacedBounds,   // bounds of placed triangles are grown by what float rounds by
-  kPlacedBoundsAlone,  // balls and boxes meet placed bounds alone, not what rounding puts beside them
+  kUnsignedCellIndex,  // cell indices are truncated towards zero, not rounded down
+  kRewindReach,        // a query between two ticks searches only the positions at the first tick
+  kRewindFastBox,      // the box of an object that moved far leaves out its later, shorter moves of the tick
+  kUnpaddedNear,       // the slab test of tree nodes does not pad the near side
+  kEdgeOnInDouble,     // nearly edge-on triangles are decided in double, like all others
+  kGridBallMargin,     // the grid culls balls in float without the error bound
+  kNearestLimit,       // a nearest query prunes boxes exactly as far as its farthest result
+  kNearestTreePad,     // distances to boxes of triangles are compared in float without the pad
+  kWidePlacedBounds,   // bounds of placed triangles are grown by the rounding of float
+  kPlacedBoundsAlone,  // conservative balls and boxes meet placed bounds alone, without the exact results beside them
   // The ray kernels:
-  kKernelEdgeBound,         // float decides edges without its error bound
-  kKernelTBound,            // float decides t without its error bound
-  kKernelTreePad,           // boxes of nodes go without their pad
-  kKernelEdgeOn,            // triangles seen nearly edge-on are left out instead of decided in double
-  kKernelFloatAxis,         // float chooses the axis of projection, ties and all
-  kKernelWinding,           // rays backwards along their axis see triangles turned over
-  kKernelCull,              // culling takes every triangle for one seen from its front
+  kKernelEdgeBound,         // edge functions are decided in float without the error bound
+  kKernelTBound,            // t is decided in float without the error bound
+  kKernelTreePad,           // boxes of nodes are not padded
+  kKernelEdgeOn,            // nearly edge-on triangles are dropped instead of decided in double
+  kKernelFloatAxis,         // the axis of projection is chosen in float, including ties
+  kKernelWinding,           // rays in the negative direction of their axis see the reversed winding
+  kKernelCull,              // culling treats every triangle as front-facing
   kKernelLimit,             // a hit exactly at the limit is lost
-  kKernelTie,               // of equal hits the highest number wins
-  kKernelPruneEqual,        // boxes that start exactly at the best hit are left out
-  kKernelRowTie,            // of hits as far as the last row kept the lowest number does not push it out
-  kKernelHitAfterGivingUp,  // what a packet meets last answers a ray that it left undecided
+  kKernelTie,               // among equal hits the highest triangle number wins
+  kKernelPruneEqual,        // boxes that begin exactly at the best hit are pruned
+  kKernelRowTie,            // a hit as far as the last kept row does not replace it if its number is lower
+  kKernelHitAfterGivingUp,  // the last hit of a packet is returned for a ray that the packet left undecided
   // The region kernels:
-  kRegionReach,       // boxes of nodes are held against the ball without a pad
-  kRegionInside,      // float decides what is inside the ball without its error bound
-  kRegionBeyond,      // float parts ball and triangle by a plane without its error bound
-  kRegionNear,        // float decides the distance to edges without its error bound
-  kRegionPlane,       // float decides the distance to planes without its error bound
-  kRegionWeight,      // float decides whether a foot lies inside without its error bound
-  kRegionOwnBounds,   // the bounds of a triangle's own are forgotten
+  kRegionReach,       // boxes of nodes are tested against the ball without a pad
+  kRegionInside,      // points inside the ball are decided in float without the error bound
+  kRegionBeyond,      // separation by a plane is decided in float without the error bound
+  kRegionNear,        // distances to edges are decided in float without the error bound
+  kRegionPlane,       // distances to planes are decided in float without the error bound
+  kRegionWeight,      // a projected point inside the triangle is decided in float without the error bound
+  kRegionOwnBounds,   // the test of the triangle's own bounds is skipped
   kRegionFloor,       // squares and products that underflow are trusted
-  kRegionHalf,        // half extents go without their error bound
-  kRegionBoxPlane,    // float decides shadows on normals without their error bound
-  kRegionEdgeScale,   // products of edges may underflow
-  kRegionRange,       // coordinates of which products underflow are decided in float
-  kRegionTurnedNode,  // boxes of nodes are held against a turned box without a pad
+  kRegionHalf,        // half extents are used without their error bound
+  kRegionBoxPlane,    // projections on normals are decided in float without their error bound
+  kRegionEdgeScale,   // products of edge components may underflow
+  kRegionRange,       // coordinates whose products underflow are decided in float
+  kRegionTurnedNode,  // boxes of nodes are tested against a rotated box without a pad
 };
 
 #ifdef LOCUS_PLANT_BUGS

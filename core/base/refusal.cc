@@ -4,15 +4,17 @@
 #include <vector>
 
 #include "absl/strings/cord.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/check.h"
 
 namespace locus {
 namespace {
 
 constexpr absl::string_view kPayloadType = "locus/refusal";
-// Fields of a payload are separated by a character that no field path or limit name contains.
+// Separator of the payload's fields: a character that no field path or limit name contains.
 constexpr char kSeparator = '\x1f';
 constexpr size_t kFieldCount = 7;
 
@@ -22,15 +24,16 @@ constexpr std::array<absl::string_view, 18> kReasonNames = {
     "MALFORMED",    "BATCH_GAP",       "IN_USE",     "HASH_MISMATCH", "RECOVERING",     "DAMAGED"};
 static_assert(kReasonNames.size() == static_cast<size_t>(kLastReason) + 1 && !kReasonNames.back().empty());
 
-// Whole numbers without an exponent, as limits are.
-std::string number(double value) {
+// Formats a value, integers without an exponent.
+std::string formatted(double value) {
   constexpr double kExactIntegers = 9007199254740992.0;
   if (value >= -kExactIntegers && value <= kExactIntegers && value == static_cast<double>(static_cast<int64_t>(value)))
     return absl::StrCat(static_cast<int64_t>(value));
   return absl::StrCat(value);
 }
 
-std::string place(const Refusal& refusal) {
+// Returns the prefix of a message: "field[index]: ".
+std::string location(const Refusal& refusal) {
   if (refusal.field.empty()) return "";
   if (!refusal.index) return absl::StrCat(refusal.field, ": ");
   return absl::StrCat(refusal.field, "[", *refusal.index, "]: ");
@@ -45,25 +48,29 @@ absl::Status over_limit(absl::StatusCode code, absl::string_view field, absl::st
   refusal.limit_value = limit_value;
   refusal.asked = asked;
   refusal.retry_after_ms = retry_after_ms;
-  return refuse(code, absl::StrCat("limit ", limit, " is ", number(limit_value), ", asked for ", number(asked)),
+  return refuse(code, absl::StrCat("limit ", limit, " is ", formatted(limit_value), ", asked for ", formatted(asked)),
                 refusal);
 }
 
 }  // namespace
 
 absl::string_view reason_name(Reason reason) {
-  const auto number = static_cast<size_t>(reason);
-  return number < kReasonNames.size() ? kReasonNames[number] : "UNKNOWN_REASON";
+  const auto value = static_cast<size_t>(reason);
+  return value < kReasonNames.size() ? kReasonNames[value] : "UNKNOWN_REASON";
 }
 
 absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal) {
-  absl::Status status(code, absl::StrCat(place(refusal), message));
+  LOCUS_DCHECK(code != absl::StatusCode::kOk);
+  LOCUS_DCHECK(!absl::StrContains(refusal.field, kSeparator));
+  LOCUS_DCHECK(!absl::StrContains(refusal.limit, kSeparator));
+  absl::Status status(code, absl::StrCat(location(refusal), message));
   const std::string index = refusal.index ? absl::StrCat(*refusal.index) : "";
   const std::string separator(1, kSeparator);
-  status.SetPayload(kPayloadType, absl::Cord(absl::StrCat(static_cast<int>(refusal.reason), separator, refusal.field,
-                                                          separator, index, separator, refusal.limit, separator) +
-                                             absl::StrCat(number(refusal.limit_value), separator, number(refusal.asked),
-                                                          separator, refusal.retry_after_ms)));
+  status.SetPayload(kPayloadType,
+                    absl::Cord(absl::StrCat(static_cast<int>(refusal.reason), separator, refusal.field, separator,
+                                            index, separator, refusal.limit, separator) +
+                               absl::StrCat(formatted(refusal.limit_value), separator, formatted(refusal.asked),
+                                            separator, refusal.retry_after_ms)));
   return status;
 }
 

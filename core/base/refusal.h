@@ -1,6 +1,6 @@
-// A refusal that a program can act on: what was wrong, in which field and item, which limit, and what was asked. It
-// travels inside absl::Status as a payload, so that rooms pass it on without knowing it and the server's one error map
-// turns it into the protocol's Error.
+// Structured errors that a program can act on: reason, field, item, limit and requested value. A Refusal is a payload
+// of absl::Status: intermediate layers pass it on unread, and the server converts it to the protocol's Error in one
+// place. Pure functions; any thread.
 #ifndef LOCUS_CORE_BASE_REFUSAL_H_
 #define LOCUS_CORE_BASE_REFUSAL_H_
 
@@ -13,7 +13,7 @@
 
 namespace locus {
 
-// Numbers equal those of the protocol's Reason.
+// Values equal those of the protocol's Reason.
 enum class Reason : uint8_t {
   kUnspecified = 0,
   kNotFinite = 1,
@@ -36,36 +36,38 @@ enum class Reason : uint8_t {
 };
 inline constexpr Reason kLastReason = Reason::kDamaged;
 
-// "NOT_FINITE" and so on: how messages and the command line print a reason.
+// Returns the name of a reason as in the protocol, such as "NOT_FINITE".
 absl::string_view reason_name(Reason reason);
 
+// Details of a refused request.
 struct Refusal {
   Reason reason = Reason::kUnspecified;
-  std::string field;              // path, for example blocks[2].rays.directions; empty = the whole request
-  std::optional<uint32_t> index;  // item within the field
-  std::string limit;              // name of the limit hit, empty if none
+  std::string field;              // path, such as blocks[2].rays.directions; empty = the request as a whole
+  std::optional<uint32_t> index;  // item of the field
+  std::string limit;              // name of the exceeded limit; empty = none
   double limit_value = 0;
-  double asked = 0;
+  double asked = 0;             // requested value
   uint32_t retry_after_ms = 0;  // 0 = do not retry unchanged
 };
 
-// A status of `code` that carries `refusal`. The message should say what to do next; field and index are put in front
-// of it as `field[index]: `.
+// Returns a status of `code` that carries `refusal`. `message` should state what to do next; it is prefixed by
+// `field[index]: `.
 absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal);
 
-// The common case: INVALID_ARGUMENT for one field, and one item where `index` is given.
+// Returns INVALID_ARGUMENT for a field, or for one item of it if `index` is given.
 absl::Status refuse_argument(Reason reason, absl::string_view field, std::optional<uint32_t> index,
                              absl::string_view message);
 
-// A request that is over a limit all by itself: INVALID_ARGUMENT naming the limit, its value and what was asked.
+// Returns INVALID_ARGUMENT naming the limit, its value and the requested value. For a request that exceeds a limit by
+// itself, whatever the load.
 absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked);
 
-// The server or scene is full now: RESOURCE_EXHAUSTED naming the limit. The same request may pass once something is
-// freed; `retry_after_ms` is 0 where waiting alone frees nothing.
+// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value. For a server or scene that is full
+// now: the same request may succeed later. `retry_after_ms` is 0 if waiting alone frees nothing.
 absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
                          uint32_t retry_after_ms);
 
-// What refuse() attached; nothing for a status made without it.
+// Returns the refusal that refuse() attached; nullopt if there is none.
 std::optional<Refusal> refusal_of(const absl::Status& status);
 
 }  // namespace locus

@@ -1,20 +1,24 @@
-// Vectors that a writer keeps from batch to batch, so that small batches ask for no memory: what a large one made of
-// them is given back, so that a scene at rest holds what it is and no more.
+// Reusable buffers: a writer keeps them between batches, so that small batches allocate nothing. A buffer that grew
+// above kKeptScratch bytes is freed, so that an idle scene keeps no memory of its largest batch. Any thread.
 #ifndef LOCUS_CORE_BASE_SCRATCH_H_
 #define LOCUS_CORE_BASE_SCRATCH_H_
 
 #include <cstddef>
 #include <vector>
 
+#include "core/base/check.h"
+
 namespace locus {
 
-inline constexpr size_t kKeptScratch = size_t{1} << 18;  // bytes
+inline constexpr size_t kKeptScratch = size_t{1} << 18;  // largest capacity that is kept, in bytes
 
-// Empties it; its memory goes if it is more than kKeptScratch.
+// Clears `scratch`; frees its memory if its capacity is more than kKeptScratch bytes.
 template <class T>
 void clear_scratch(std::vector<T>& scratch) {
   scratch.clear();
   if (scratch.capacity() * sizeof(T) > kKeptScratch) std::vector<T>().swap(scratch);
+  LOCUS_DCHECK(scratch.empty());
+  LOCUS_DCHECK_LE(scratch.capacity() * sizeof(T), kKeptScratch);
 }
 
 }  // namespace locus

@@ -4,12 +4,12 @@
 
 namespace locus {
 
-const SeededHash::Seed& SeededHash::of_process() {
+const SeededHash::Seed& SeededHash::process_seed() {
   static const Seed seed = [] {
     std::random_device device;
-    std::uniform_int_distribution<uint64_t> numbers;
-    const uint64_t mask = numbers(device);
-    return Seed{mask, numbers(device)};
+    std::uniform_int_distribution<uint64_t> distribution;
+    const uint64_t mask = distribution(device);
+    return Seed{mask, distribution(device)};
   }();
   return seed;
 }

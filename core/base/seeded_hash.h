@@ -1,8 +1,8 @@
-// A hash of ids that others choose: fast, and seeded anew in every process, so that nobody can choose ids that meet in
-// a table. No answer may depend on it. A value type; any thread.
+// Fast hash of ids that clients choose. It is seeded at random in every process, so that clients cannot choose ids that
+// collide in a table. No answer may depend on it. A value type; any thread.
 //
-// Its upper bits are as good as its lower ones. Source: products folded into 64 bits as in Yi, wyhash; the secret
-// multiplier as in Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997.
+// The upper bits are distributed as well as the lower ones. Source: products folded into 64 bits as in Yi, wyhash; the
+// secret multiplier as in Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997.
 #ifndef LOCUS_CORE_BASE_SEEDED_HASH_H_
 #define LOCUS_CORE_BASE_SEEDED_HASH_H_
 
@@ -19,21 +19,24 @@ class SeededHash {
     uint64_t multiplier;
   };
 
-  SeededHash() : SeededHash(of_process()) {}
+  // Uses the random seed of this process.
+  SeededHash() : SeededHash(process_seed()) {}
   explicit SeededHash(const Seed& seed) : mask_(seed.mask), multiplier_(seed.multiplier | 1) {}
 
   uint64_t operator()(uint64_t key) const { return folded_product(folded_product(key ^ mask_, multiplier_), kMixer); }
 
  private:
-  // Both halves of the product: what the lower one loses of the upper bits of keys is in the other.
+  // Returns the exclusive or of both halves of a * b: the upper half contains the upper bits of keys that the lower one
+  // loses.
   static uint64_t folded_product(uint64_t a, uint64_t b) {
     const absl::uint128 product = absl::uint128(a) * b;
     return absl::Uint128Low64(product) ^ absl::Uint128High64(product);
   }
-  // Random, and the same until the process ends.
-  static const Seed& of_process();
+  // Returns a random seed, which stays the same until the process ends.
+  static const Seed& process_seed();
 
-  // Any odd number without a pattern, here of the golden ratio: spreads what an unlucky multiplier left together.
+  // Odd number without a regular bit pattern (fraction of the golden ratio): mixes keys that a bad random multiplier
+  // left close to each other.
   static constexpr uint64_t kMixer = 0x9E3779B97F4A7C15;
 
   uint64_t mask_;

@@ -1,5 +1,5 @@
-// Passing errors on: RETURN_IF_ERROR and ASSIGN_OR_RETURN, for sources only. A header that others install or include
-// does not include this one.
+// Macros that return an error to the caller: RETURN_IF_ERROR and ASSIGN_OR_RETURN. Include this file in .cc files only,
+// so that its unprefixed macro names never spread.
 #ifndef LOCUS_CORE_BASE_STATUS_MACROS_H_
 #define LOCUS_CORE_BASE_STATUS_MACROS_H_
 
@@ -16,7 +16,7 @@
 
 // Evaluates an expression of type absl::StatusOr<T>; returns its status from the calling function unless it is OK, and
 // otherwise moves the value into `declaration`, as in ASSIGN_OR_RETURN(const Level level, read_level(path)). It expands
-// to several statements, so it stands in a block of its own and never behind an `if` without braces.
+// to several statements, so the body of an `if` or a loop needs braces around it.
 #define ASSIGN_OR_RETURN(declaration, ...) \
   LOCUS_ASSIGN_OR_RETURN_(LOCUS_JOIN_(locus_status_or_, __LINE__), declaration, __VA_ARGS__)
 

@@ -1,10 +1,11 @@
-// An axis-aligned bounding box, closed: touching counts. Plain data; `empty()` boxes contain nothing and are the
-// neutral element of merge().
+// Axis-aligned bounding boxes. A box is closed: boxes that touch overlap. Plain data; an empty() box contains nothing
+// and is the neutral element of merge(). Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_AABB_H_
 #define LOCUS_CORE_GEOMETRY_AABB_H_
 
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/vec3.h"
 
@@ -25,6 +26,7 @@ struct Aabb {
 using Aabbf = Aabb<float>;
 using Aabbd = Aabb<double>;
 
+// Returns the smallest box that contains both arguments.
 template <class S>
 constexpr Aabb<S> merge(const Aabb<S>& a, const Aabb<S>& b) {
   return {min(a.min, b.min), max(a.max, b.max)};
@@ -52,7 +54,7 @@ constexpr bool contains(const Aabb<S>& box, Vec3<S> point) {
   return contains(box, Aabb<S>{point, point});
 }
 
-// Half the surface area: what the surface area heuristic compares. 0 for an empty box.
+// Returns half the surface area, the cost measure of the surface area heuristic; 0 for an empty box.
 template <class S>
 constexpr S half_area(const Aabb<S>& box) {
   if (box.empty()) return S{0};
@@ -60,36 +62,39 @@ constexpr S half_area(const Aabb<S>& box) {
   return e.x * e.y + e.y * e.z + e.z * e.x;
 }
 
-// The largest |coordinate| of any point of the box. A superset never has a smaller one.
+// Returns the largest |coordinate| of any point of the box. It is never smaller for a superset of the box.
 template <class S>
 S magnitude(const Aabb<S>& box) {
   return std::max(max_component(abs(box.min)), max_component(abs(box.max)));
 }
 
-// Squared distance from `point` to the box, 0 inside. Every step rounds monotonically, so a superset box is never
-// farther.
+// Returns the squared distance from `point` to the box, 0 inside. Each step rounds monotonically, so the result is
+// never larger for a superset of the box.
 template <class S>
 constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
   const Vec3<S> gap = max(max(box.min - point, point - box.max), Vec3<S>{});
   return squared_length(gap);
 }
 
-// The distance up to which boxes are wanted, squared: beyond it squared_distance() has a root that rounds to more.
+// Returns the largest squared_distance() whose rounded square root can be at most `distance`, rounded up: boxes beyond
+// it can be pruned.
 inline double squared_limit(double distance) {
+  LOCUS_DCHECK_GE(distance, 0.0);
   if (planted(PlantedBug::kNearestLimit)) return distance * distance * (1 - 0x1p-50);
   return distance * distance * (1 + 0x1p-50);
 }
 
-// The point of the box nearest to `point`, which is `point` itself inside. Not for an empty box.
+// Returns the point of the box nearest to `point`: `point` itself if it is inside. The box must not be empty.
 template <class S>
 constexpr Vec3<S> nearest_in(Vec3<S> point, const Aabb<S>& box) {
   return min(max(point, box.min), box.max);
 }
 
+// Returns the box with all six faces moved outwards by `by`.
 template <class S>
 Aabb<S> grown(const Aabb<S>& box, S by) {
-  const Vec3<S> margin{by, by, by};
-  return {box.min - margin, box.max + margin};
+  const Vec3<S> offset{by, by, by};
+  return {box.min - offset, box.max + offset};
 }
 
 template <class S>

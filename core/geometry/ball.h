@@ -1,9 +1,11 @@
-// A closed ball: points at distance <= radius from the centre. A radius of zero is legal.
+// Closed balls: all points at distance <= radius from the centre. A radius of zero is legal. Plain data and pure
+// functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_BALL_H_
 #define LOCUS_CORE_GEOMETRY_BALL_H_
 
 #include <type_traits>
 
+#include "core/base/check.h"
 #include "core/geometry/aabb.h"
 
 namespace locus {
@@ -11,26 +13,29 @@ namespace locus {
 template <class S>
 struct Ball {
   Vec3<S> center;
-  S radius{};
+  S radius{};  // >= 0
 };
 
 using Ballf = Ball<float>;
 using Balld = Ball<double>;
 
-// Whether the ball comes as near as the box: the one culling rule of balls. Decided in double for both scalar types and
-// monotone in the box, so that a verdict which includes it for the primitive's own box may be culled by any superset.
+// Returns whether the ball overlaps the box: the only culling test of balls. It is computed in double for both scalar
+// types and monotone in the box. Every verdict includes it for the primitive's own box, so a primitive may be culled by
+// any superset of that box.
 template <class S>
 constexpr bool reaches(const Ball<S>& ball, const Aabb<S>& box) {
   const double radius = ball.radius;
   return squared_distance(to_double(ball.center), to_double(box)) <= radius * radius;
 }
 
-// Grown by 2^-40 (double) or 2^-20 (float) of the magnitudes: every box that the ball reaches() overlaps these bounds.
+// Returns bounds of the ball, grown by 2^-40 (double) or 2^-20 (float) of the magnitudes. They overlap every box for
+// which reaches() is true.
 template <class S>
 Aabb<S> bounds_of(const Ball<S>& ball) {
-  constexpr S kMargin = static_cast<S>(std::is_same_v<S, double> ? 0x1p-40 : 0x1p-20);
-  const S margin = kMargin * (max_component(abs(ball.center)) + ball.radius);
-  return grown(Aabb<S>{ball.center, ball.center}, ball.radius + margin);
+  LOCUS_DCHECK_GE(ball.radius, S{0});
+  constexpr S kEpsilon = static_cast<S>(std::is_same_v<S, double> ? 0x1p-40 : 0x1p-20);
+  const S epsilon = kEpsilon * (max_component(abs(ball.center)) + ball.radius);
+  return grown(Aabb<S>{ball.center, ball.center}, ball.radius + epsilon);
 }
 
 }  // namespace locus

@@ -1,5 +1,5 @@
-// The part of a whole line within a convex solid, in the solid's own axes: what every ray predicate of solids computes
-// before the rules about origins inside are applied. Plain data.
+// Chord of a line: its part within a convex solid, in the solid's own axes. The ray predicates of all solids compute
+// the chord first and then apply the rules for rays that start inside. Plain data.
 #ifndef LOCUS_CORE_GEOMETRY_CHORD_H_
 #define LOCUS_CORE_GEOMETRY_CHORD_H_
 
@@ -7,16 +7,18 @@
 
 namespace locus {
 
-// Points origin + t * direction for every real t. `direction` is not zero and its largest component lies within a few
-// powers of two of 1, so that no product over- or underflows.
+// Infinite line: the points origin + t * direction for every real t. `direction` is not zero and its largest component
+// lies within a few powers of two of 1, so that no product over- or underflows.
 struct Line {
   Vec3d origin;  // relative to the solid's centre
   Vec3d direction;
 };
 
+// Interval of t and the normals at its ends.
 struct Chord {
   double near, far;  // near <= far, in units of the line's direction
-  // Outward normals there, of any positive length. Against and along the direction where the solid has no thickness.
+  // Outward normals at both ends, of any positive length. If the solid has no thickness there: minus the direction and
+  // the direction.
   Vec3d near_normal, far_normal;
 };
 

@@ -1,23 +1,29 @@
-// A number as the sum of two doubles: about 106 bits, the same on every processor that has IEEE doubles, which long
-// double is not. For the few verdicts that double is too coarse for. Plain value; no overflow below 2^990.
+// Extended precision: a number of about 106 bits, stored as the sum of two doubles. Results are equal on all processors
+// with IEEE doubles, unlike those of long double. Used for the few verdicts for which double is not precise enough.
+// Plain value; any thread; no overflow below 2^990.
 //
 // Sources: Dekker, A Floating-Point Technique for Extending the Available Precision, 1971 (product and split); Knuth,
-// The Art of Computer Programming, volume 2 (sum). Both take every operation to be rounded by itself: no fused product.
+// The Art of Computer Programming, volume 2 (sum). Both require that each operation is rounded separately: no fused
+// multiply-add.
 #ifndef LOCUS_CORE_GEOMETRY_DOUBLE_DOUBLE_H_
 #define LOCUS_CORE_GEOMETRY_DOUBLE_DOUBLE_H_
 
+#include "core/base/check.h"
+
 namespace locus {
 
+// Invariant: |low_| is at most half a unit in the last place of high_.
 class DoubleDouble {
  public:
   constexpr DoubleDouble() = default;
   constexpr DoubleDouble(double value) : high_(value) {}  // NOLINT(google-explicit-constructor): no bit is lost
 
+  // Returns the nearest double.
   constexpr double rounded() const { return high_; }
-  // -1, 0 or 1.
+  // Returns -1, 0 or 1.
   constexpr int sign() const { return (high_ > 0) - (high_ < 0); }
 
-  // Off by less than 2^-102 of the result, exact where 106 bits hold it.
+  // Returns the sum with a relative error below 2^-102; it is exact if 106 bits suffice.
   friend constexpr DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
     const DoubleDouble high = sum(a.high_, b.high_), low = sum(a.low_, b.low_);
     const DoubleDouble first = ordered_sum(high.high_, high.low_ + low.high_);
@@ -25,7 +31,7 @@ class DoubleDouble {
   }
   friend constexpr DoubleDouble operator-(DoubleDouble a) { return {-a.high_, -a.low_}; }
   friend constexpr DoubleDouble operator-(DoubleDouble a, DoubleDouble b) { return a + -b; }
-  // Off by less than 2^-102 of the result; of two doubles exact.
+  // Returns the product with a relative error below 2^-102; the product of two doubles is exact.
   friend constexpr DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
     const DoubleDouble high = product(a.high_, b.high_);
     return ordered_sum(high.high_, high.low_ + (a.high_ * b.low_ + a.low_ * b.high_));
@@ -33,30 +39,30 @@ class DoubleDouble {
   friend constexpr bool operator==(const DoubleDouble&, const DoubleDouble&) = default;
 
  private:
-  constexpr DoubleDouble(double high, double low) : high_(high), low_(low) {}
+  constexpr DoubleDouble(double high, double low) : high_(high), low_(low) { LOCUS_DCHECK_EQ(high_ + low_, high_); }
 
-  // Exact.
+  // Returns a + b exactly.
   static constexpr DoubleDouble sum(double a, double b) {
-    const double s = a + b, of_b = s - a;
-    return {s, (a - (s - of_b)) + (b - of_b)};
+    const double s = a + b, b_part = s - a;
+    return {s, (a - (s - b_part)) + (b - b_part)};
   }
-  // Exact where a is zero or not smaller than b.
+  // Returns a + b exactly if a is 0 or |a| >= |b|.
   static constexpr DoubleDouble ordered_sum(double a, double b) {
     const double s = a + b;
     return {s, b - (s - a)};
   }
-  // The upper 26 bits; the rest needs no more than 26 either.
+  // Returns the upper 26 bits of `a`; the remainder fits 26 bits too.
   static constexpr double upper_half(double a) {
     const double c = 0x8000001p0 * a;
     return c - (c - a);
   }
-  // Exact.
+  // Returns a * b exactly.
   static constexpr DoubleDouble product(double a, double b) {
     const double p = a * b, a1 = upper_half(a), b1 = upper_half(b), a2 = a - a1, b2 = b - b1;
     return {p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2};
   }
 
-  double high_ = 0, low_ = 0;  // low: at most half a unit in the last place of high
+  double high_ = 0, low_ = 0;
 };
 
 }  // namespace locus

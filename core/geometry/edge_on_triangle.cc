@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/geometry/double_double.h"
 
 namespace locus {
@@ -15,8 +16,8 @@ Vec3x exactly(Vec3d v) { return {v.x, v.y, v.z}; }
 Vec3x exactly(Vec3f v) { return exactly(to_double(v)); }
 Vec3d rounded(Vec3x v) { return {v.x.rounded(), v.y.rounded(), v.z.rounded()}; }
 
-// |q|^2 times v, turned back by q: (w^2 - |u|^2) v + 2 (u . v) u - 2 w (u x v), with q = (u, w).
-Vec3x turned_back(const Quaternion& q, Vec3x v) {
+// Returns |q|^2 * v, rotated by the inverse of q: (w^2 - |u|^2) v + 2 (u . v) u - 2 w (u x v), with q = (u, w).
+Vec3x rotated_back(const Quaternion& q, Vec3x v) {
   const Vec3x u = exactly(Vec3f{q.x, q.y, q.z});
   const DoubleDouble w = double{q.w}, two = 2.0;
   return v * (w * w - dot(u, u)) + u * (two * dot(u, v)) - cross(u, v) * (two * w);
@@ -27,24 +28,25 @@ DoubleDouble squared_length(const Quaternion& q) {
   return dot(u, u) + DoubleDouble(double{q.w}) * double{q.w};
 }
 
-// A corner seen along the ray: from the ray's origin, sheared.
+// Corner of a triangle relative to the ray's origin, sheared so that the ray is the depth axis.
 struct Corner {
   DoubleDouble x, y;
   double depth;
 };
 
-// Lengths are multiplied by `unit`, so that nothing needs a quotient; sheared ones once more by the direction's.
+// Projection along the ray. Lengths are multiplied by unit(), so that no quotient is needed; x and y of a corner also
+// by the direction's largest component.
 class Projection {
  public:
   explicit Projection(const StoredRay& ray)
       : unit_(DoubleDouble(double{ray.scale}) * squared_length(ray.quaternion)),
-        origin_(turned_back(ray.quaternion, exactly(ray.origin) - exactly(ray.translation))),
-        direction_(turned_back(ray.quaternion, exactly(ray.direction))) {
+        origin_(rotated_back(ray.quaternion, exactly(ray.origin) - exactly(ray.translation))),
+        direction_(rotated_back(ray.quaternion, exactly(ray.direction))) {
     const Vec3d size = abs(rounded(direction_));
     z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     x_ = (z_ + 1) % 3;
     y_ = (z_ + 2) % 3;
-    // Keeps the winding, as in TriangleRay.
+    // Preserves the winding, as in TriangleRay.
     if (direction_[z_].sign() < 0) std::swap(x_, y_);
   }
 
@@ -67,45 +69,47 @@ DoubleDouble edge_function(const Corner& from, const Corner& to) { return from.x
 
 bool culled(Cull cull, int side) { return (cull == Cull::kBack && side <= 0) || (cull == Cull::kFront && side >= 0); }
 
-// A place of an edge, `share` of the way from its first corner to its second.
-struct Place {
+// Point of an edge: `fraction` of the edge from its first corner.
+struct EdgePoint {
   double squared_distance;  // from the ray
   double t;
-  double share;
+  double fraction;
 };
 
-// The nearest to the ray of those with t >= 0.
-std::optional<Place> nearest_place(const Corner& from, const Corner& to, double along) {
+// Returns the point of the edge nearest to the ray among those with t >= 0.
+std::optional<EdgePoint> nearest_edge_point(const Corner& from, const Corner& to, double along) {
   const double x = from.x.rounded(), y = from.y.rounded();
-  const double way_x = (to.x - from.x).rounded(), way_y = (to.y - from.y).rounded();
-  const double t = from.depth / along, way_t = to.depth / along - t;
-  if (t < 0 && t + way_t < 0) return std::nullopt;
-  const double square = way_x * way_x + way_y * way_y;
-  double share = square == 0 ? 0 : std::clamp(-(x * way_x + y * way_y) / square, 0.0, 1.0);
-  if (t < 0) share = std::max(share, -t / way_t);
-  if (t + way_t < 0) share = std::min(share, -t / way_t);
-  const double off_x = x + share * way_x, off_y = y + share * way_y;
-  return Place{off_x * off_x + off_y * off_y, std::max(t + share * way_t, 0.0), share};
+  const double edge_x = (to.x - from.x).rounded(), edge_y = (to.y - from.y).rounded();
+  const double t = from.depth / along, edge_t = to.depth / along - t;
+  if (t < 0 && t + edge_t < 0) return std::nullopt;
+  const double square = edge_x * edge_x + edge_y * edge_y;
+  double fraction = square == 0 ? 0 : std::clamp(-(x * edge_x + y * edge_y) / square, 0.0, 1.0);
+  if (t < 0) fraction = std::max(fraction, -t / edge_t);
+  if (t + edge_t < 0) fraction = std::min(fraction, -t / edge_t);
+  const double distance_x = x + fraction * edge_x, distance_y = y + fraction * edge_y;
+  return EdgePoint{distance_x * distance_x + distance_y * distance_y, std::max(t + fraction * edge_t, 0.0), fraction};
 }
 
-std::optional<EdgeOnHit> hit_at_border(const Corner& a, const Corner& b, const Corner& c, double along, double most) {
+// Returns the nearest point of the border, if its squared distance is at most `limit`.
+std::optional<EdgeOnHit> hit_at_border(const Corner& a, const Corner& b, const Corner& c, double along, double limit) {
   std::optional<EdgeOnHit> hit;
-  const auto offer = [&](const std::optional<Place>& place, auto weights_at) {
-    if (!place || !(place->squared_distance <= most)) return;
-    most = place->squared_distance;
-    const auto [u, v] = weights_at(place->share);
-    hit = EdgeOnHit{place->t, u, v};
+  const auto offer = [&](const std::optional<EdgePoint>& point, auto weights_at) {
+    if (!point || !(point->squared_distance <= limit)) return;
+    limit = point->squared_distance;
+    const auto [u, v] = weights_at(point->fraction);
+    hit = EdgeOnHit{point->t, u, v};
   };
-  offer(nearest_place(a, b, along), [](double share) { return std::pair(share, 0.0); });
-  offer(nearest_place(b, c, along), [](double share) { return std::pair(1 - share, share); });
-  offer(nearest_place(c, a, along), [](double share) { return std::pair(0.0, 1 - share); });
+  offer(nearest_edge_point(a, b, along), [](double fraction) { return std::pair(fraction, 0.0); });
+  offer(nearest_edge_point(b, c, along), [](double fraction) { return std::pair(1 - fraction, fraction); });
+  offer(nearest_edge_point(c, a, along), [](double fraction) { return std::pair(0.0, 1 - fraction); });
   return hit;
 }
 
 }  // namespace
 
 std::optional<EdgeOnHit> edge_on_hit(const StoredRay& ray, const Triangle& triangle, Cull cull,
-                                     EdgeOnVerdict in_double) {
+                                     EdgeOnVerdict double_verdict) {
+  LOCUS_DCHECK_GE(double_verdict.corner_error, 0.0);
   const Projection projection(ray);
   const Corner a = projection.corner(triangle.a), b = projection.corner(triangle.b), c = projection.corner(triangle.c);
   const DoubleDouble weight_a = edge_function(c, b), weight_b = edge_function(a, c), weight_c = edge_function(b, a);
@@ -113,14 +117,14 @@ std::optional<EdgeOnHit> edge_on_hit(const StoredRay& ray, const Triangle& trian
   const int side = determinant.sign();
   if (culled(cull, side)) return std::nullopt;
   if (side != 0 && weight_a.sign() * side >= 0 && weight_b.sign() * side >= 0 && weight_c.sign() * side >= 0) {
-    const double of_a = weight_a.rounded(), of_b = weight_b.rounded(), of_c = weight_c.rounded();
+    const double wa = weight_a.rounded(), wb = weight_b.rounded(), wc = weight_c.rounded();
     const double sum = determinant.rounded();
-    const double t = (of_a * a.depth + of_b * b.depth + of_c * c.depth) / (sum * projection.along());
-    if (t >= -in_double.blur) return EdgeOnHit{std::max(t, 0.0), of_b / sum, of_c / sum};
+    const double t = (wa * a.depth + wb * b.depth + wc * c.depth) / (sum * projection.along());
+    if (t >= -double_verdict.corner_error) return EdgeOnHit{std::max(t, 0.0), wb / sum, wc / sum};
   }
-  if (!in_double.hit) return std::nullopt;
-  const double most = in_double.blur * projection.unit() * projection.unit();
-  return hit_at_border(a, b, c, projection.along(), most * most);
+  if (!double_verdict.hit) return std::nullopt;
+  const double limit = double_verdict.corner_error * projection.unit() * projection.unit();
+  return hit_at_border(a, b, c, projection.along(), limit * limit);
 }
 
 }  // namespace locus

@@ -1,7 +1,7 @@
-// Ray against a triangle that is seen nearly edge-on. There a hit is moved, by as much as the sine of the angle is
-// small, by every rounding on the way into mesh axes and in the edge functions: at 2^-28 by more than the product
-// allows. So everything is done again with twice double's precision, from the stored values on; no quotient and no
-// root is needed before t itself. Functions without state.
+// Ray against a triangle that is nearly edge-on. The rounding errors of the transform to mesh axes and of the edge
+// functions move a hit by the error divided by the sine of the angle between ray and plane: for a sine of 2^-28 by more
+// than the product allows. So the test is repeated in DoubleDouble, from the stored values on; t is the first value
+// that needs a quotient, and no square root is needed. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_EDGE_ON_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_EDGE_ON_TRIANGLE_H_
 
@@ -13,27 +13,29 @@
 
 namespace locus {
 
+// Hit and its barycentric weights.
 struct EdgeOnHit {
-  double t;  // >= 0, in units of the given direction
-  double u, v;
+  double t;     // >= 0, in units of the given direction
+  double u, v;  // weights of the second and the third vertex
 };
 
-// What double can tell of the pair.
+// Result of the test in double for a ray and a triangle.
 struct EdgeOnVerdict {
-  bool hit;     // by the signs of the edge functions, whatever t
-  double blur;  // how far rounding may move a corner of the triangle across the ray: a length in mesh axes
+  bool hit;             // by the signs of the edge functions, for any t
+  double corner_error;  // largest rounding error of a corner perpendicular to the ray, a length in mesh axes
 };
 
-// The hit where the ray meets the triangle as precisely as that, at t >= 0 or less than the blur behind its start.
+// Returns the hit in extended precision if the ray meets the triangle at t >= 0, or at most the corner error before its
+// origin.
 //
-// Where it does not, but double says that it hits, the hit is the place of the triangle's border that is nearest to the
-// ray and not behind it, if it is nearer than the blur. So no ray slips out between this triangle and a neighbour that
-// is not edge-on and decided in double: what double alone accepts is accepted here too. Only the side that is seen,
-// which culling asks for, is never taken from double; a triangle that is exactly edge-on has none.
+// If the ray misses in extended precision but hits in double, returns the point of the triangle's border nearest to the
+// ray with t >= 0, provided that it is within the corner error. So no ray leaks between this triangle and a neighbour
+// that is not edge-on and therefore decided in double: every hit in double is also a hit here. Only the visible side,
+// which decides culling, is never taken from double; a triangle that is exactly edge-on has no visible side.
 //
-// `ray`: its direction so long that the largest component in mesh axes lies within [0.5, 1).
+// Precondition: the largest component of the direction of `ray` in mesh axes lies within [0.5, 1).
 std::optional<EdgeOnHit> edge_on_hit(const StoredRay& ray, const Triangle& triangle, Cull cull,
-                                     EdgeOnVerdict in_double);
+                                     EdgeOnVerdict double_verdict);
 
 }  // namespace locus
 

@@ -1,5 +1,5 @@
-// The next larger float, inline: std::nextafter() is a call of the C library, which is felt where every ray needs some.
-// Pure functions; any thread.
+// Inline replacement of std::nextafter(): the call of the C library is measurable in code that needs it several times
+// per ray. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_FLOAT_STEP_H_
 #define LOCUS_CORE_GEOMETRY_FLOAT_STEP_H_
 
@@ -9,7 +9,7 @@
 
 namespace locus {
 
-// std::nextafter(value, infinity), bit for bit; of NaN some NaN.
+// Returns std::nextafter(value, infinity), bit for bit; a NaN for a NaN.
 inline float next_above(float value) {
   if (!(value < std::numeric_limits<float>::infinity())) return value;
   if (value == 0) return std::numeric_limits<float>::denorm_min();

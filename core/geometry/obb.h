@@ -1,5 +1,5 @@
-// An oriented box, closed: centre, half extents along its own axes and the rotation from them. Zero extents are legal.
-// The identity rotation makes it axis-aligned, exactly.
+// Oriented boxes: centre, half extents along the box's own axes, and the rotation from these axes. A box is closed;
+// zero extents are legal. With the identity rotation it is exactly axis-aligned. Plain data; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_OBB_H_
 #define LOCUS_CORE_GEOMETRY_OBB_H_
 
@@ -18,7 +18,7 @@ struct Obb {
 using Obbf = Obb<float>;
 using Obbd = Obb<double>;
 
-// Axis-aligned bounds in double, grown by 2^-40 of the magnitudes when the box is turned.
+// Returns axis-aligned bounds in double, grown by 2^-40 of the magnitudes if the box is rotated.
 template <class S>
 Aabbd bounds_of(const Obb<S>& box);
 

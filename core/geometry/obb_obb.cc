@@ -3,12 +3,12 @@
 namespace locus {
 namespace {
 
-// Two boxes in the axes of the first.
+// Pair of boxes in the axes of the first.
 struct Pair {
   Vec3d offset;  // from the first centre to the second
   Vec3d half_a, half_b;
   Vec3d axes_b[3];
-  double tolerance;  // of a projection on an axis of length 1
+  double tolerance;  // for a projection on an axis of length 1
 };
 
 double manhattan(Vec3d v) {
@@ -22,15 +22,15 @@ Pair pair_of(const Obbd& a, const Obbd& b) {
   pair.half_a = a.half;
   pair.half_b = b.half;
   for (int axis = 0; axis < 3; ++axis) pair.axes_b[axis] = a.rotation.to_local(b.rotation.column(axis));
-  const bool turned = !(a.rotation == Rotation{} && b.rotation == Rotation{});
-  pair.tolerance = turned ? 0x1p-49 * (manhattan(pair.offset) + manhattan(a.half) + manhattan(b.half)) : 0;
+  const bool rotated = !(a.rotation == Rotation{} && b.rotation == Rotation{});
+  pair.tolerance = rotated ? 0x1p-49 * (manhattan(pair.offset) + manhattan(a.half) + manhattan(b.half)) : 0;
   return pair;
 }
 
 bool separated_along(const Pair& pair, Vec3d axis) {
-  double reach = dot(abs(axis), pair.half_a);
-  for (int j = 0; j < 3; ++j) reach += pair.half_b[j] * std::abs(dot(pair.axes_b[j], axis));
-  return std::abs(dot(pair.offset, axis)) > reach + pair.tolerance * manhattan(axis);
+  double extent = dot(abs(axis), pair.half_a);
+  for (int j = 0; j < 3; ++j) extent += pair.half_b[j] * std::abs(dot(pair.axes_b[j], axis));
+  return std::abs(dot(pair.offset, axis)) > extent + pair.tolerance * manhattan(axis);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Two oriented boxes share a point. Closed: touching counts.
+// Overlap test of two oriented boxes. Boxes are closed: touching counts. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_OBB_OBB_H_
 #define LOCUS_CORE_GEOMETRY_OBB_OBB_H_
 
@@ -6,10 +6,11 @@
 
 namespace locus {
 
-// Separating axis test over 15 axes. Two unturned boxes are compared without tolerance, so that touching is exact for
-// exact sums; otherwise boxes closer than 2^-49 of the magnitudes count as touching. An axis is any vector along which
-// both boxes are projected anew, so that the noise of nearly parallel edges picks a useless axis, never a false one.
-// Source: Gottschalk, Lin, Manocha, OBBTree: A Hierarchical Structure for Rapid Interference Detection, 1996.
+// Returns whether the boxes share a point: separating axis test over 15 axes. Two axis-aligned boxes are compared
+// without tolerance, so that touching is exact if the sums are exact; otherwise boxes closer than 2^-49 of the
+// magnitudes count as touching. Both boxes are projected on each axis as rounded, so the rounding error of an axis (of
+// nearly parallel edges) can only make the axis useless; it never separates boxes that overlap. Source: Gottschalk,
+// Lin, Manocha, OBBTree: A Hierarchical Structure for Rapid Interference Detection, 1996.
 bool boxes_overlap(const Obbd& a, const Obbd& b);
 
 }  // namespace locus

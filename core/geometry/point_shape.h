@@ -1,5 +1,5 @@
-// From a point to the shapes of moving objects, closed solids in double: how far they are, and where their nearest
-// point lies. Pure functions: products, sums, quotients and square roots in a fixed order. O(1).
+// Distance from a point to the shape of a moving object, a closed solid, and the shape's nearest point. Pure functions
+// in double: products, sums, quotients and square roots in a fixed order. O(1); any thread.
 #ifndef LOCUS_CORE_GEOMETRY_POINT_SHAPE_H_
 #define LOCUS_CORE_GEOMETRY_POINT_SHAPE_H_
 
@@ -7,15 +7,17 @@
 
 namespace locus {
 
-// A ball is a core, its centre, grown by a radius; a capsule its inner segment; boxes and points are grown by nothing.
+// Returns the radius around a shape's core: a ball is its centre grown by the radius, a capsule its inner segment grown
+// by the radius; a box or a point is its own core, and the radius is 0.
 double core_radius(const Shape& shape);
+// Returns the squared distance from `point` to the core; 0 inside a box.
 double squared_distance_to_core(Vec3d point, const Shape& shape);
 
-// 0 inside and on the surface; else to the surface, and no nearer than the shape's own bounds: a box around them is
-// never farther.
+// Returns the distance to the surface, 0 inside. It is never less than the distance to the shape's own bounds, so a
+// shape may be culled by any box that contains them.
 double distance(Vec3d point, const Shape& shape);
 
-// The point of the solid that distance() measures to, up to rounding: `point` itself inside.
+// Returns the point of the solid nearest to `point`, up to rounding: `point` itself if it is inside.
 Vec3d nearest_on_shape(Vec3d point, const Shape& shape);
 
 }  // namespace locus

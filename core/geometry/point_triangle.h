@@ -1,6 +1,6 @@
-// From a point to a triangle, in double: how far it is, and where on it the nearest point lies. A triangle is a closed
-// surface; one without area is the segment or point that it is. Pure functions, products, sums and quotients in a fixed
-// order. O(1).
+// Distance from a point to a triangle, and the triangle's nearest point. A triangle is a closed surface; without area
+// it is a segment or a point. Pure functions in double: products, sums and quotients in a fixed order. O(1); any
+// thread.
 #ifndef LOCUS_CORE_GEOMETRY_POINT_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_POINT_TRIANGLE_H_
 
@@ -8,17 +8,19 @@
 
 namespace locus {
 
-// The least of three clamped segment distances and, where the foot of the perpendicular lies inside, of the distance to
-// the plane, by cross products and one division each: exact where the result is a small whole number. No cancellation
-// drops a sliver.
+// Returns the minimum of the squared distances to the three edges and, if the projection of `point` lies inside the
+// triangle, to its plane. Each takes cross products and one division, so results that are small integers are exact.
+// Sliver triangles are not lost by cancellation.
 double squared_distance(Vec3d point, Vec3d a, Vec3d b, Vec3d c);
 double squared_distance(Vec3d point, const Triangle& triangle);
 
-// The point of the triangle that squared_distance() measures to, up to rounding.
-// Source: Ericson, Real-Time Collision Detection, 2005, 5.1.5, without its regions, which triangles without area upset.
+// Returns the point of the triangle nearest to `point`, up to rounding.
+// Source: Ericson, Real-Time Collision Detection, 2005, 5.1.5, without its region tests, which fail for triangles
+// without area.
 Vec3d nearest_on_triangle(Vec3d point, Vec3d a, Vec3d b, Vec3d c);
 
-// As squared_distance(), and no nearer than the triangle's own box: a box around it is never farther.
+// Returns the distance, never less than that to the triangle's own bounds, so a triangle may be culled by any box that
+// contains them.
 double distance(Vec3d point, const Triangle& triangle);
 
 }  // namespace locus

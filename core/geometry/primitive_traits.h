@@ -1,18 +1,19 @@
-// What an index must know of the values it holds: the chapter's trait, as a C++20 concept. Values need no base class
-// and no member: specialise PrimitiveTraits for a type of yours or of somebody else's, and every structure under
-// core/index holds it. A missing member is one error that names the concept's line for it.
+// Requirements on the values of a spatial index, as C++20 concepts. Values need no base class and no member functions:
+// specialise PrimitiveTraits for any type, and every structure under core/index can store it. For a missing member the
+// compiler prints one error that names the concept's line. Pure functions; any thread.
 //
 //   Scalar     float or double: the type of bounds and distances
-//   RayQuery   a ray made ready: slabs() for culling, to_scaled(t) from distances to the slabs' unit, rounded up
-//   BallQuery, BoxQuery
-//   id         identity: lower wins a tie, remove() finds by it; unique within one index
-//   bounds     axis-aligned bounds; every test below includes them, so culling by any superset changes no verdict
-//   position   where a grid files the value: any point within the bounds, fixed for the value
-//   ray        distance >= 0 of the first hit, whatever ray's own end
-//   ball, box  closed solids share a point
-//   distance   from a point in double, 0 inside; only for whoever asks what is near
+//   RayQuery   a preprocessed ray: slabs() for culling, to_scaled(t) from distances to the slabs' unit, rounded up
+//   BallQuery, BoxQuery   query types of ball() and box()
+//   id         identity: the lower one wins a tie, remove() searches for it; unique within one index
+//   bounds     axis-aligned bounds; every test below includes them, so culling by any superset never changes a verdict
+//   position   point that selects the grid cell: any point within the bounds, fixed for the value
+//   ray        distance >= 0 of the first hit, also beyond the ray's t_max
+//   ball, box  whether the closed solids share a point
+//   distance   from a point, in double, 0 inside; needed for nearest queries only
 //
-// Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (PrimitiveKeyTrait and kin).
+// Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (PrimitiveKeyTrait and
+// related traits).
 #ifndef LOCUS_CORE_GEOMETRY_PRIMITIVE_TRAITS_H_
 #define LOCUS_CORE_GEOMETRY_PRIMITIVE_TRAITS_H_
 
@@ -32,7 +33,7 @@ struct PrimitiveTraits;
 template <class Value>
 using ScalarOf = typename PrimitiveTraits<Value>::Scalar;
 
-// Enough to be held and culled.
+// Values that an index can store and cull.
 template <class Value>
 concept Bounded = requires(const Value& value) {
   requires std::floating_point<ScalarOf<Value>>;
@@ -41,7 +42,7 @@ concept Bounded = requires(const Value& value) {
   { PrimitiveTraits<Value>::position(value) } -> std::same_as<Vec3<ScalarOf<Value>>>;
 };
 
-// Enough to be asked.
+// Values that an index can test against rays, balls and boxes.
 template <class Value>
 concept Primitive = Bounded<Value> &&
     requires(const Value& value, const typename PrimitiveTraits<Value>::RayQuery& ray,
@@ -54,7 +55,7 @@ concept Primitive = Bounded<Value> &&
   { PrimitiveTraits<Value>::box(value, box) } -> std::same_as<bool>;
 };
 
-// Enough to be asked how far it is.
+// Values that support nearest queries.
 template <class Value>
 concept Measurable = Bounded<Value> && requires(const Value& value, const Vec3d& point) {
   { PrimitiveTraits<Value>::distance(value, point) } -> std::same_as<double>;

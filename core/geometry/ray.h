@@ -1,15 +1,15 @@
-// Rays and their slab test against boxes. The test is the one culling rule of the house, so its rounding is part of
-// what the product promises:
+// Rays and their slab test against boxes. All structures cull rays by this test, so its rounding is such that no hit is
+// missed:
 //
 //   near = max over axes of  lo * rd - (o * rd + p)      far = min over axes of  hi * rd - (o * rd - p)
 //   p = pad * (max |o| + max |box|) * |rd|               (lo and hi swapped where d is negative)
 //
-// Every rounding step is monotone in the box, so a superset of a box never has a larger near or a smaller far: a
-// verdict that includes the slab test of the primitive's own box can be culled by any box around it and never changes.
-// The pads cover the rounding of the slab test itself, of a ray to float and of the way into mesh axes. A direction
-// component of zero is replaced by 1e-18 of the largest one, which no distance within the world makes visible behind
-// the pad. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs); Ize, Robust BVH Ray Traversal, 2013
-// (padding).
+// Every rounding step is monotone in the box, so a superset of a box never has a larger near or a smaller far. A
+// verdict includes the slab test of the primitive's own box, so culling by any superset of that box never changes it.
+// The pads cover the rounding errors of the slab test itself, of the conversion of a ray to float, and of the transform
+// to mesh axes. A direction component of zero is replaced by 1e-18 of the largest one; within the world the resulting
+// displacement is smaller than the pad. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs); Ize, Robust
+// BVH Ray Traversal, 2013 (padding).
 #ifndef LOCUS_CORE_GEOMETRY_RAY_H_
 #define LOCUS_CORE_GEOMETRY_RAY_H_
 
@@ -17,17 +17,18 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/geometry/aabb.h"
 
 namespace locus {
 
-// Which side of a triangle is invisible. A front is seen counter-clockwise by the uploaded winding.
+// Side of a triangle that rays ignore. The vertices of a front face are counter-clockwise, in the uploaded winding.
 enum class Cull : uint8_t { kNone, kBack, kFront };
-// What a closed solid answers to a ray that starts inside it: at t = 0, where the ray leaves, or nothing.
+// Hit of a ray that starts inside a closed solid: at t = 0 (kSolid), at its exit (kHollow), or none (kSkip).
 enum class Inside : uint8_t { kSolid, kHollow, kSkip };
 
-// Points origin + t * direction for 0 <= t <= t_max, both included. t is in units of the direction as given, which is
-// neither normalised nor zero.
+// Ray: the points origin + t * direction for 0 <= t <= t_max, both included. t is in units of the direction as given,
+// which is neither normalised nor zero.
 template <class S>
 struct Ray {
   Vec3<S> origin;
@@ -38,7 +39,7 @@ struct Ray {
 using Rayf = Ray<float>;
 using Rayd = Ray<double>;
 
-// The part of a ray within a box, possibly outside [0, t_max]. Empty when near > far.
+// Part of a line within a box, possibly outside [0, t_max]. Empty if near > far.
 template <class S>
 struct Interval {
   S near;
@@ -46,11 +47,11 @@ struct Interval {
 };
 
 // Pads of the slab test, relative to the magnitudes of origin and box.
-inline constexpr double kTrianglePad = 0x1p-21;  // float slabs: about eight roundings of 2^-24
-inline constexpr double kInstancePad = 0x1p-20;  // the way into mesh axes and one rounding to float, any rotation
-inline constexpr double kObjectPad = 0x1p-40;    // double predicates of moving objects
+inline constexpr double kTrianglePad = 0x1p-21;  // slab test in float: about eight roundings of 2^-24
+inline constexpr double kInstancePad = 0x1p-20;  // transform to mesh axes and one rounding to float, any rotation
+inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects in double
 
-// A ray made ready for many slab tests. Immutable; cheap to copy.
+// Ray preprocessed for many slab tests. Immutable; cheap to copy.
 template <class S>
 class SlabRay {
  public:
@@ -59,6 +60,8 @@ class SlabRay {
         direction_(ray.direction),
         pad_(static_cast<S>(pad)),
         magnitude_(max_component(abs(ray.origin))) {
+    LOCUS_DCHECK_GT(max_component(abs(ray.direction)), S{0});
+    LOCUS_DCHECK_GE(pad_, S{0});
     const S smallest = static_cast<S>(1e-18) * max_component(abs(ray.direction));
     for (int axis = 0; axis < 3; ++axis) {
       const S d = ray.direction[axis];
@@ -70,13 +73,14 @@ class SlabRay {
   const Vec3<S>& origin() const { return origin_; }
   const Vec3<S>& direction() const { return direction_; }
 
-  // How far outside a box of that magnitude a ray may pass and still meet it here.
+  // Returns the distance by which the test widens a box of the given magnitude.
   S margin(S box_magnitude) const { return pad_ * (magnitude_ + box_magnitude); }
 
-  // The box's own interval.
+  // Returns the interval of the ray in the padded box.
   Interval<S> interval(const Aabb<S>& box) const { return interval(box, locus::magnitude(box)); }
 
-  // As above with a magnitude of at least the box's: one for a whole tree, say. The interval can only grow by it.
+  // Returns the interval for a magnitude of at least that of the box, such as one for all boxes of a tree. A larger
+  // magnitude never makes the interval smaller.
   Interval<S> interval(const Aabb<S>& box, S box_magnitude) const {
     const S margin = this->margin(box_magnitude);
     Interval<S> result{-std::numeric_limits<S>::infinity(), std::numeric_limits<S>::infinity()};

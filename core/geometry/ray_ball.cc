@@ -1,5 +1,7 @@
 #include "core/geometry/ray_ball.h"
 
+#include "core/base/check.h"
+
 namespace locus {
 
 std::optional<Interval<double>> line_in_ball(const Line& line, double squared_radius) {
@@ -17,6 +19,7 @@ std::optional<Interval<double>> line_in_ball(const Line& line, double squared_ra
 }
 
 std::optional<Chord> chord_of_ball(const Line& line, double radius) {
+  LOCUS_DCHECK_GE(radius, 0.0);
   const std::optional<Interval<double>> t = line_in_ball(line, radius * radius);
   if (!t) return std::nullopt;
   if (radius == 0) return Chord{t->near, t->far, -line.direction, line.direction};

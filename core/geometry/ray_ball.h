@@ -1,4 +1,5 @@
-// A line against a ball around the origin of its axes. Closed: a tangent line has a chord of length zero.
+// Intersection of a line with a ball around the origin. The ball is closed: a tangent has a chord of length zero. Pure
+// functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_RAY_BALL_H_
 #define LOCUS_CORE_GEOMETRY_RAY_BALL_H_
 
@@ -9,11 +10,12 @@
 
 namespace locus {
 
-// Where |origin + t * direction|^2 <= squared_radius. The distance of the line is judged by its cross product, which is
-// exact for small whole numbers and loses no digits to a far origin as the difference b^2 - 4ac does. A zero direction
-// is legal: everything or nothing.
+// Returns the interval of t with |origin + t * direction|^2 <= squared_radius. The distance of the line is computed by
+// a cross product, which is exact for small integers and has no cancellation for far origins, unlike b^2 - 4ac. For a
+// zero direction, which is legal, the interval is infinite or empty.
 std::optional<Interval<double>> line_in_ball(const Line& line, double squared_radius);
 
+// Returns the chord of the line in the ball of the given radius.
 std::optional<Chord> chord_of_ball(const Line& line, double radius);
 
 bool ball_contains(double radius, Vec3d point);

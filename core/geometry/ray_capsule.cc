@@ -1,5 +1,6 @@
 #include "core/geometry/ray_capsule.h"
 
+#include "core/base/check.h"
 #include "core/geometry/ray_ball.h"
 #include "core/geometry/segment.h"
 
@@ -8,7 +9,7 @@ namespace {
 
 using Range = std::optional<Interval<double>>;
 
-// Where the line is between the planes through the two ends of the axis.
+// Returns the interval of the line between the planes through both ends of the axis.
 Range line_between_ends(const Line& line, Vec3d half_axis) {
   const double aa = squared_length(half_axis);
   const double o = dot(line.origin, half_axis);
@@ -18,17 +19,18 @@ Range line_between_ends(const Line& line, Vec3d half_axis) {
   return d > 0 ? Range({(-aa - o) / d, (aa - o) / d}) : Range({(aa - o) / d, (-aa - o) / d});
 }
 
-// The cross product with the axis turns distance from the axis into length, times that of the axis: a cylinder becomes
-// a ball and no division is needed.
+// Returns the interval of the line in the cylinder. The length of a vector's cross product with the axis is its
+// distance from the axis times the axis length, so the cylinder becomes a ball and no division is needed.
 Range line_in_cylinder(const Line& line, Vec3d half_axis, double radius) {
-  const Line turned = {cross(line.origin, half_axis), cross(line.direction, half_axis)};
-  const Range round = line_in_ball(turned, radius * radius * squared_length(half_axis));
+  const Line across = {cross(line.origin, half_axis), cross(line.direction, half_axis)};
+  const Range round = line_in_ball(across, radius * radius * squared_length(half_axis));
   const Range between = line_between_ends(line, half_axis);
   if (!round || !between) return std::nullopt;
   const Interval<double> both = {std::max(round->near, between->near), std::min(round->far, between->far)};
   return both.near <= both.far ? Range(both) : std::nullopt;
 }
 
+// Returns the smallest interval that contains both.
 Range merge(const Range& a, const Range& b) {
   if (!a || !b) return a ? a : b;
   return Range({std::min(a->near, b->near), std::max(a->far, b->far)});
@@ -37,6 +39,7 @@ Range merge(const Range& a, const Range& b) {
 }  // namespace
 
 std::optional<Chord> chord_of_capsule(const Line& line, Vec3d half_axis, double radius) {
+  LOCUS_DCHECK_GE(radius, 0.0);
   const double rr = radius * radius;
   Range range = merge(line_in_ball({line.origin - half_axis, line.direction}, rr),
                       line_in_ball({line.origin + half_axis, line.direction}, rr));

@@ -2,10 +2,12 @@
 
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
-// Unit vector of `axis` that points to the side where `sign` does.
+// Returns the unit vector of `axis` with the sign of `sign`.
 Vec3d axis_normal(int axis, double sign) {
   Vec3d normal;
   normal[axis] = sign < 0 ? -1 : 1;
@@ -15,6 +17,7 @@ Vec3d axis_normal(int axis, double sign) {
 }  // namespace
 
 std::optional<Chord> chord_of_box(const Line& line, Vec3d half) {
+  LOCUS_DCHECK(half.x >= 0 && half.y >= 0 && half.z >= 0);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Chord chord{-kInfinity, kInfinity, -line.direction, line.direction};
   for (int axis = 0; axis < 3; ++axis) {

@@ -1,5 +1,5 @@
-// A line against a box around the origin of its axes, which are the box's own. Closed: a line within the plane of a
-// face, along an edge or through a corner touches.
+// Intersection of a line with a box around the origin, in the box's own axes. The box is closed: a line in the plane of
+// a face, along an edge or through a corner touches it. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_RAY_OBB_H_
 #define LOCUS_CORE_GEOMETRY_RAY_OBB_H_
 
@@ -9,9 +9,9 @@
 
 namespace locus {
 
-// `half` >= 0. Two planes met at the same real t give the same rounded quotient, so that touching a corner or an edge
-// is judged exactly wherever the differences to the planes are. Where several faces are met at once the normal is that
-// of the lowest axis.
+// Returns the chord of the line in the box of half extents `half` >= 0. Planes that are crossed at the same real t give
+// the same rounded quotient, so touching a corner or an edge is exact if the differences to the planes are exact. If
+// several faces are crossed at the same t, the normal is that of the lowest axis.
 std::optional<Chord> chord_of_box(const Line& line, Vec3d half);
 
 bool box_contains(Vec3d half, Vec3d point);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/edge_on_triangle.h"
 #include "core/geometry/float_step.h"
@@ -26,52 +27,53 @@ bool culled(Cull cull, double determinant) {
   return cull == Cull::kBack ? !front : front;
 }
 
-// A corner of a triangle, seen along the ray: from the ray's origin, sheared, times the direction's z; z itself is a
-// depth.
+// Corner of a triangle relative to the ray's origin. x and y are sheared along the ray and multiplied by the
+// direction's z; z is the depth.
 struct Corner {
   double x, y, z;
 };
 
-double size_of(Corner corner) { return std::max(std::abs(corner.x), std::abs(corner.y)); }
-double least_of(double a, double b, double c) { return std::min(a, std::min(b, c)); }
-double most_of(double a, double b, double c) { return std::max(a, std::max(b, c)); }
+double max_offset(Corner corner) { return std::max(std::abs(corner.x), std::abs(corner.y)); }
+double min3(double a, double b, double c) { return std::min(a, std::min(b, c)); }
+double max3(double a, double b, double c) { return std::max(a, std::max(b, c)); }
 
-// The sum turns -0 into 0, so that equal answers have equal bytes.
+// Returns the hit in float. Adding 0.0f converts -0 to 0, so that equal answers have equal bytes.
 TriangleHit hit_of(double t, double u, double v) {
   return {static_cast<float>(t) + 0.0f, static_cast<float>(u), static_cast<float>(v)};
 }
 
 }  // namespace
 
-// What double sees of a triangle along the ray. Its error, with u = 2^-53 and R = max |origin| + max |vertex|:
+// Projection of a triangle along the ray, in double. Error bounds, with u = 2^-53 and R = max |origin| + max |vertex|:
 //
-// - The way into mesh axes, matrix included, rounds origin and direction by less than 74 u of them. So a sheared
-//   coordinate is off by less than 300 u R, and an edge function, two products of coordinates up to S, by less than
-//   N = 2^-42 R (S + 2^-44 R).
-// - The depth of a hit is an average of the corners' with the edge functions as weights. It is off by less than
-//   3 N span / |determinant| where that is more than 8 N; the hit itself by sqrt(3) of it.
-struct TriangleRay::Seen {
+// - The transform to mesh axes, including the rounding of the matrix, has a relative error below 74 u in origin and
+//   direction. So the error of a sheared coordinate is below 300 u R, and that of an edge function, two products of
+//   coordinates up to S, below N = 2^-42 R (S + 2^-44 R).
+// - The depth of a hit is the average of the corners' depths, weighted by the edge functions. If |determinant| > 8 N,
+//   its error is below 3 N depth_span / |determinant|, and the error of the hit below sqrt(3) times that.
+struct TriangleRay::Projected {
   Corner a, b, c;
   double weight_a, weight_b, weight_c;  // the edge functions
-  double least, most;                   // of them
+  double min_weight, max_weight;
   double determinant;
-  double size;   // S
-  double span;   // of the depths
-  double reach;  // R at least: a vertex is no farther from the origin than 2 S + max |depth|
+  double size;        // S
+  double depth_span;  // largest minus smallest depth
+  double magnitude;   // upper bound of R: no vertex is farther from the origin than 2 S + max |depth|
 
-  // All others are hit within 2^-23 R of where they are.
+  // Returns whether double is not precise enough. For all other triangles the error of the hit is below 2^-23 R.
   bool is_nearly_edge_on() const {
-    return std::abs(determinant) <= (size + 0x1p-44 * reach) * (0x1p-16 * span + 0x1p-39 * reach);
+    return std::abs(determinant) <= (size + 0x1p-44 * magnitude) * (0x1p-16 * depth_span + 0x1p-39 * magnitude);
   }
-  bool is_beside() const { return least < 0 && most > 0; }
-  // How far a corner may be off: 2^-44.8 R in each coordinate.
-  double blur() const { return 0x1p-43 * reach; }
-  // Beside by more than any rounding.
-  bool is_far_beside() const {
-    const double noise = 0x1p-42 * reach * (size + 0x1p-44 * reach);
-    if (least < -noise && most > noise) return true;
-    return most_of(least_of(a.x, b.x, c.x), least_of(a.y, b.y, c.y), 0) > blur() ||
-           least_of(most_of(a.x, b.x, c.x), most_of(a.y, b.y, c.y), 0) < -blur();
+  // Returns whether the ray passes outside the triangle.
+  bool is_outside() const { return min_weight < 0 && max_weight > 0; }
+  // Returns an error bound of a corner; the error is below 2^-44.8 R in each coordinate.
+  double corner_error() const { return 0x1p-43 * magnitude; }
+  // Returns whether the ray passes outside by more than the error bounds.
+  bool is_clearly_outside() const {
+    const double weight_error = 0x1p-42 * magnitude * (size + 0x1p-44 * magnitude);
+    if (min_weight < -weight_error && max_weight > weight_error) return true;
+    return max3(min3(a.x, b.x, c.x), min3(a.y, b.y, c.y), 0) > corner_error() ||
+           min3(max3(a.x, b.x, c.x), max3(a.y, b.y, c.y), 0) < -corner_error();
   }
 };
 
@@ -87,14 +89,16 @@ TriangleRay::TriangleRay(const StoredRay& stored, Vec3d origin, Vec3d direction,
       exponent_(exponent_of(direction)),
       origin_(origin),
       direction_(scaled(direction, exponent_)),
-      start_(max_component(abs(origin))),
+      origin_magnitude_(max_component(abs(origin))),
       slabs_({to_float(origin_), to_float(direction_)}, kTrianglePad),
       cull_(cull) {
   const Vec3d size = abs(direction_);
+  LOCUS_DCHECK_GE(max_component(size), 0.5);
+  LOCUS_DCHECK_LT(max_component(size), 1.0);
   axis_z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   axis_x_ = (axis_z_ + 1) % 3;
   axis_y_ = (axis_z_ + 2) % 3;
-  // Keeps the winding: seen along the ray, x to y always turns the same way.
+  // Preserves the winding: projected along the ray, the rotation from x to y always has the same sense.
   if (direction_[axis_z_] < 0) std::swap(axis_x_, axis_y_);
 }
 
@@ -114,38 +118,40 @@ float TriangleRay::to_scaled(float t) const {
   return next_above(static_cast<float>(scaled));
 }
 
-// Bounds the rounding of `depth` in edge_test(): under 264 roundings of 2^-53 of reach^3 on the way from the vertices,
-// and 72 of 2^-51 of |origin| reach^2 for the origin's own way into mesh axes.
-double TriangleRay::depth_noise(const Triangle& triangle) const {
-  double reach = 0;
+// Returns an error bound of `depth` in edge_test(): less than 264 roundings of 2^-53 distance^3 in the computation from
+// the vertices, and 72 of 2^-51 |origin| distance^2 in the transform of the origin to mesh axes.
+double TriangleRay::depth_error(const Triangle& triangle) const {
+  double distance = 0;
   for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
-    reach = std::max(reach, max_component(abs(to_double(vertex) - origin_)));
-  return 0x1p-44 * reach * reach * (reach + start_);
+    distance = std::max(distance, max_component(abs(to_double(vertex) - origin_)));
+  return 0x1p-44 * distance * distance * (distance + origin_magnitude_);
 }
 
-TriangleRay::Seen TriangleRay::see(const Triangle& triangle) const {
+TriangleRay::Projected TriangleRay::project(const Triangle& triangle) const {
   const double dx = direction_[axis_x_], dy = direction_[axis_y_], dz = direction_[axis_z_];
   const auto corner = [&](Vec3f vertex) {
     const Vec3d from = to_double(vertex) - origin_;
     const double z = from[axis_z_];
     return Corner{from[axis_x_] * dz - z * dx, from[axis_y_] * dz - z * dy, z};
   };
-  Seen seen;
-  const Corner a = seen.a = corner(triangle.a), b = seen.b = corner(triangle.b), c = seen.c = corner(triangle.c);
-  seen.weight_a = c.x * b.y - c.y * b.x;
-  seen.weight_b = a.x * c.y - a.y * c.x;
-  seen.weight_c = b.x * a.y - b.y * a.x;
-  seen.least = least_of(seen.weight_a, seen.weight_b, seen.weight_c);
-  seen.most = most_of(seen.weight_a, seen.weight_b, seen.weight_c);
-  seen.determinant = seen.weight_a + seen.weight_b + seen.weight_c;
-  seen.size = most_of(size_of(a), size_of(b), size_of(c));
-  const double nearest = least_of(a.z, b.z, c.z), farthest = most_of(a.z, b.z, c.z);
-  seen.span = farthest - nearest;
-  seen.reach = 2 * (start_ + seen.size + std::max(-nearest, farthest));
-  return seen;
+  Projected projected;
+  const Corner a = projected.a = corner(triangle.a), b = projected.b = corner(triangle.b),
+               c = projected.c = corner(triangle.c);
+  projected.weight_a = c.x * b.y - c.y * b.x;
+  projected.weight_b = a.x * c.y - a.y * c.x;
+  projected.weight_c = b.x * a.y - b.y * a.x;
+  projected.min_weight = min3(projected.weight_a, projected.weight_b, projected.weight_c);
+  projected.max_weight = max3(projected.weight_a, projected.weight_b, projected.weight_c);
+  projected.determinant = projected.weight_a + projected.weight_b + projected.weight_c;
+  projected.size = max3(max_offset(a), max_offset(b), max_offset(c));
+  const double nearest = min3(a.z, b.z, c.z), farthest = max3(a.z, b.z, c.z);
+  projected.depth_span = farthest - nearest;
+  projected.magnitude = 2 * (origin_magnitude_ + projected.size + std::max(-nearest, farthest));
+  return projected;
 }
 
-// In a plane across an axis, along which the ray does not go at all: where nothing has turned the ray, certainly.
+// Returns whether triangle and ray lie in planes perpendicular to the same axis. Only for meshes that are not rotated,
+// whose rays have exact zero components.
 bool TriangleRay::is_exactly_edge_on(const Triangle& triangle) const {
   if (!stored_.quaternion.is_identity()) return false;
   for (int axis = 0; axis < 3; ++axis) {
@@ -155,31 +161,32 @@ bool TriangleRay::is_exactly_edge_on(const Triangle& triangle) const {
   return false;
 }
 
-// What twice the precision says, where double is too coarse.
-std::optional<TriangleHit> TriangleRay::edge_on_test(const Triangle& triangle, const Seen& seen) const {
-  if (is_exactly_edge_on(triangle) || seen.is_far_beside()) return std::nullopt;
-  // Rounding on the way into the projection may open a triangle without area.
+// Returns the verdict in extended precision, for triangles that are nearly edge-on.
+std::optional<TriangleHit> TriangleRay::edge_on_test(const Triangle& triangle, const Projected& projected) const {
+  if (is_exactly_edge_on(triangle) || projected.is_clearly_outside()) return std::nullopt;
+  // Rounding errors of the projection may give a triangle without area a nonzero one.
   if (area_normal(triangle) == Vec3d{}) return std::nullopt;
   StoredRay ray = stored_;
   ray.direction = scaled(ray.direction, exponent_);
-  const bool hit_in_double = !seen.is_beside() && seen.determinant != 0;
-  const std::optional<EdgeOnHit> hit = edge_on_hit(ray, triangle, cull_, {hit_in_double, seen.blur()});
+  const bool hit_in_double = !projected.is_outside() && projected.determinant != 0;
+  const std::optional<EdgeOnHit> hit = edge_on_hit(ray, triangle, cull_, {hit_in_double, projected.corner_error()});
   if (!hit) return std::nullopt;
   return hit_of(hit->t, hit->u, hit->v);
 }
 
 std::optional<TriangleHit> TriangleRay::edge_test(const Triangle& triangle) const {
-  const Seen seen = see(triangle);
-  if (seen.is_nearly_edge_on() && !planted(PlantedBug::kEdgeOnInDouble)) return edge_on_test(triangle, seen);
-  if (seen.is_beside() || culled(cull_, seen.determinant)) return std::nullopt;
-  const double depth = seen.weight_a * seen.a.z + seen.weight_b * seen.b.z + seen.weight_c * seen.c.z;
-  double t = depth / (seen.determinant * direction_[axis_z_]);
+  const Projected projected = project(triangle);
+  if (projected.is_nearly_edge_on() && !planted(PlantedBug::kEdgeOnInDouble)) return edge_on_test(triangle, projected);
+  if (projected.is_outside() || culled(cull_, projected.determinant)) return std::nullopt;
+  const double depth =
+      projected.weight_a * projected.a.z + projected.weight_b * projected.b.z + projected.weight_c * projected.c.z;
+  double t = depth / (projected.determinant * direction_[axis_z_]);
   if (!(t >= 0)) {
-    // Whether a ray from the triangle's own plane starts before it or behind it is rounding: it starts on it.
-    if (!(std::abs(depth) <= depth_noise(triangle))) return std::nullopt;
+    // A depth within its error bound counts as 0: the ray starts on the triangle.
+    if (!(std::abs(depth) <= depth_error(triangle))) return std::nullopt;
     t = 0;
   }
-  return hit_of(t, seen.weight_b / seen.determinant, seen.weight_c / seen.determinant);
+  return hit_of(t, projected.weight_b / projected.determinant, projected.weight_c / projected.determinant);
 }
 
 std::optional<TriangleHit> TriangleRay::hit(const Triangle& triangle) const {
@@ -188,6 +195,7 @@ std::optional<TriangleHit> TriangleRay::hit(const Triangle& triangle) const {
   const Interval<float> own = slabs_.interval(bounds_of(triangle));
   if (!(own.near <= own.far) || own.far < 0) return std::nullopt;
   result->t = std::min(std::max(result->t, own.near), own.far);
+  LOCUS_DCHECK_GE(result->t, 0.0f);
   return result;
 }
 

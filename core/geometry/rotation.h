@@ -1,5 +1,6 @@
-// Rotations: a stored unit quaternion (x, y, z, w) and the double matrix it stands for. The matrix is computed by
-// products and sums in a fixed order, so that every part of the house turns a vector into the same numbers.
+// Rotations: a stored unit quaternion (x, y, z, w) and its matrix in double. The matrix is computed by products and
+// sums in a fixed order, so that all code rotates a vector to the same bits. Plain values and pure functions; any
+// thread.
 #ifndef LOCUS_CORE_GEOMETRY_ROTATION_H_
 #define LOCUS_CORE_GEOMETRY_ROTATION_H_
 
@@ -10,21 +11,22 @@ namespace locus {
 struct Quaternion {
   float x = 0, y = 0, z = 0, w = 1;
 
+  // Returns whether the rotation is the identity; w may be negative.
   constexpr bool is_identity() const { return x == 0 && y == 0 && z == 0; }
   friend constexpr bool operator==(const Quaternion&, const Quaternion&) = default;
 };
 
-// | |q| - 1 |, in double.
+// Returns | |q| - 1 |, in double.
 double unit_deviation(const Quaternion& q);
-// Scaled to unit length in double, rounded once; kept bit for bit where it is of unit length as far as float can tell,
-// so that normalising again changes nothing. Not for a zero quaternion.
+// Returns q scaled to unit length in double and rounded once. If q has unit length within float precision, returns it
+// bit for bit, so that normalising again changes nothing. q must not be zero.
 Quaternion normalized(const Quaternion& q);
 
-// Part `weight`, 0 to 1, of the way from one unit quaternion to another, by the shorter arc: normalised linear
-// interpolation in double, rounded once. `from` itself, bit for bit, where both are the same.
+// Interpolates between two unit quaternions on the shorter arc, with `weight` from 0 (`from`) to 1 (`to`): normalised
+// linear interpolation in double, rounded once. Returns `from`, bit for bit, if both are equal.
 Quaternion blended(const Quaternion& from, const Quaternion& to, double weight);
 
-// Rows of a rotation matrix; `to_world` is matrix * vector, `to_local` its transpose * vector.
+// Rotation matrix by rows; `to_world` is matrix * vector, `to_local` its transpose * vector.
 struct Rotation {
   Vec3d row_x{1, 0, 0}, row_y{0, 1, 0}, row_z{0, 0, 1};
 
@@ -34,15 +36,15 @@ struct Rotation {
             row_x.z * v.x + row_y.z * v.y + row_z.z * v.z};
   }
   constexpr Vec3d column(int axis) const { return {row_x[axis], row_y[axis], row_z[axis]}; }
-  // Entrywise absolute value times `half`: half extents of the axis-aligned bounds of a turned box.
+  // Return the half extents of the axis-aligned bounds of a rotated box: the matrix of absolute values times `half`.
   Vec3d extent_to_world(Vec3d half) const;
   Vec3d extent_to_local(Vec3d half) const;
   friend constexpr bool operator==(const Rotation&, const Rotation&) = default;
 };
 
-// Normalises in double first; the identity quaternion gives the exact identity.
+// Returns the matrix of q, which is normalised in double first. The identity quaternion gives the exact identity.
 Rotation rotation_of(const Quaternion& q);
-// The rotation `first`, then `second`: as matrices, second * first.
+// Returns the rotation by `first`, then by `second`: the matrix product second * first.
 Rotation compose(const Rotation& second, const Rotation& first);
 Rotation inverse(const Rotation& r);
 

@@ -6,7 +6,7 @@
 namespace locus {
 namespace {
 
-// How far outside the box each coordinate is, with its sign; 0 inside.
+// Returns the signed distance of each coordinate from the box; 0 inside.
 Vec3d gap_to_box(Vec3d point, Vec3d half) {
   Vec3d gap;
   for (int axis = 0; axis < 3; ++axis)
@@ -14,27 +14,27 @@ Vec3d gap_to_box(Vec3d point, Vec3d half) {
   return gap;
 }
 
-// Places on the segment where a coordinate enters or leaves the box, and the two ends, ascending.
-std::array<double, 8> joints_of(Vec3d center, Vec3d half_axis, Vec3d half) {
-  std::array<double, 8> joints;
-  joints.fill(1);
-  joints[0] = -1;
+// Returns the values of s at which a coordinate enters or leaves the box, and both ends of the segment, ascending.
+std::array<double, 8> breakpoints_of(Vec3d center, Vec3d half_axis, Vec3d half) {
+  std::array<double, 8> breakpoints;
+  breakpoints.fill(1);
+  breakpoints[0] = -1;
   for (int axis = 0; axis < 3; ++axis) {
     const double a = half_axis[axis];
     if (a == 0) continue;
-    joints[2 * axis + 2] = std::min(std::max((half[axis] - center[axis]) / a, -1.0), 1.0);
-    joints[2 * axis + 1] = std::min(std::max((-half[axis] - center[axis]) / a, -1.0), 1.0);
+    breakpoints[2 * axis + 2] = std::min(std::max((half[axis] - center[axis]) / a, -1.0), 1.0);
+    breakpoints[2 * axis + 1] = std::min(std::max((-half[axis] - center[axis]) / a, -1.0), 1.0);
   }
-  std::sort(joints.begin(), joints.end());
-  return joints;
+  std::sort(breakpoints.begin(), breakpoints.end());
+  return breakpoints;
 }
 
-// The least value of the parabola that holds between two joints, if it is taken between them, else infinity. It is the
-// distance of a line from a corner, edge or face, judged by a cross product and one division, exact where the result is
-// a small whole number.
-double least_between(double from, double to, Vec3d center, Vec3d half_axis, Vec3d half) {
+// Returns the minimum of the parabola between two breakpoints if it lies between them, else infinity. It is the squared
+// distance of a line from a corner, edge or face, computed by a cross product and one division: exact if the result is
+// a small integer.
+double min_between(double from, double to, Vec3d center, Vec3d half_axis, Vec3d half) {
   const Vec3d gap = gap_to_box(center + half_axis * (0.5 * (from + to)), half);
-  Vec3d base, along;  // of the line, in the coordinates that are outside the box
+  Vec3d base, along;  // line in the coordinates that are outside the box
   for (int axis = 0; axis < 3; ++axis) {
     if (gap[axis] == 0) continue;
     base[axis] = center[axis] - std::copysign(half[axis], gap[axis]);
@@ -42,9 +42,9 @@ double least_between(double from, double to, Vec3d center, Vec3d half_axis, Vec3
   }
   const double aa = squared_length(along);
   if (aa == 0) return squared_length(base);
-  constexpr double kRounding = 1e-14;  // a minimum just at a joint must not fall between two parabolas
-  const double place = -dot(base, along) / aa;
-  if (place < from - kRounding || place > to + kRounding) return std::numeric_limits<double>::infinity();
+  constexpr double kRounding = 1e-14;  // so that a minimum at a breakpoint belongs to a parabola
+  const double s = -dot(base, along) / aa;
+  if (s < from - kRounding || s > to + kRounding) return std::numeric_limits<double>::infinity();
   return squared_length(cross(base, along)) / aa;
 }
 
@@ -79,14 +79,14 @@ bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half) {
 
 double squared_distance_segment_box(Vec3d center, Vec3d half_axis, Vec3d half) {
   if (segment_meets_box(center, half_axis, half)) return 0;
-  const std::array<double, 8> joints = joints_of(center, half_axis, half);
-  double least = std::numeric_limits<double>::infinity();
-  for (size_t i = 0; i < joints.size(); ++i) {
-    least = std::min(least, squared_length(gap_to_box(center + half_axis * joints[i], half)));
-    if (i + 1 == joints.size()) break;
-    least = std::min(least, least_between(joints[i], joints[i + 1], center, half_axis, half));
+  const std::array<double, 8> breakpoints = breakpoints_of(center, half_axis, half);
+  double result = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < breakpoints.size(); ++i) {
+    result = std::min(result, squared_length(gap_to_box(center + half_axis * breakpoints[i], half)));
+    if (i + 1 == breakpoints.size()) break;
+    result = std::min(result, min_between(breakpoints[i], breakpoints[i + 1], center, half_axis, half));
   }
-  return least;
+  return result;
 }
 
 }  // namespace locus

@@ -1,5 +1,5 @@
-// Distances to and from a segment given as the points s * half_axis, -1 <= s <= 1, in axes around its middle. A zero
-// half axis is a point.
+// Distances to and from a segment: the points s * half_axis, -1 <= s <= 1, relative to its midpoint. With a zero half
+// axis it is a point. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_SEGMENT_H_
 #define LOCUS_CORE_GEOMETRY_SEGMENT_H_
 
@@ -7,18 +7,19 @@
 
 namespace locus {
 
+// Returns the point of the segment nearest to `point`.
 Vec3d nearest_on_segment(Vec3d point, Vec3d half_axis);
 
-// Beside the segment the distance is judged by a cross product and one division: exact where the result is a small
-// whole number, and within a few roundings of |point| elsewhere.
+// Returns the squared distance from `point` to the segment. Between the ends it is computed by a cross product and one
+// division: exact if the result is a small integer, otherwise with an error of a few roundings of |point|.
 double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
 
-// Whether the segment around `center` meets the closed box of half extents `half` around the origin of its own axes,
-// by six separating axes without division.
+// Returns whether the segment around `center` meets the closed box of half extents `half` around the origin: separating
+// axis test over six axes, without division.
 bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
-// Squared distance of that segment to that box, 0 where they meet. The squared distance along the segment is a convex
-// chain of at most seven parabolas; the least value of each is found in closed form.
+// Returns the squared distance between that segment and that box, 0 if they meet. As a function of s, the squared
+// distance is convex and consists of at most seven parabolas; the minimum of each is computed in closed form.
 double squared_distance_segment_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
 }  // namespace locus

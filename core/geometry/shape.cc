@@ -1,5 +1,6 @@
 #include "core/geometry/shape.h"
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/obb_obb.h"
 #include "core/geometry/point_shape.h"
@@ -14,16 +15,16 @@ namespace {
 Obbd box_of(const Shape& shape) { return {shape.position, to_double(shape.size), rotation_of(shape.rotation)}; }
 
 Aabbd capsule_bounds(const Shape& shape) {
-  constexpr double kMargin = 0x1p-40;
+  constexpr double kEpsilon = 0x1p-40;
   const Vec3d axis = abs(rotation_of(shape.rotation).to_world(to_double(shape.size)));
-  const double margin = kMargin * (max_component(abs(shape.position)) + max_component(axis) + shape.radius);
-  return grown(Aabbd{shape.position - axis, shape.position + axis}, shape.radius + margin);
+  const double epsilon = kEpsilon * (max_component(abs(shape.position)) + max_component(axis) + shape.radius);
+  return grown(Aabbd{shape.position - axis, shape.position + axis}, shape.radius + epsilon);
 }
 
-// A ray's line in a solid's own axes.
+// Line of a ray in a solid's own axes.
 struct LocalRay {
   Line line;
-  int exponent;       // given direction = line direction * 2^exponent, turned
+  int exponent;       // given direction = line direction * 2^exponent, rotated to world
   Rotation rotation;  // to world
 };
 
@@ -32,6 +33,7 @@ LocalRay local_ray(const Rayd& ray, const Shape& shape) {
   (void)std::frexp(max_component(abs(ray.direction)), &local.exponent);
   const Vec3d direction = {std::ldexp(ray.direction.x, -local.exponent), std::ldexp(ray.direction.y, -local.exponent),
                            std::ldexp(ray.direction.z, -local.exponent)};
+  LOCUS_DCHECK_GE(max_component(abs(direction)), 0.5);
   if (shape.kind != ShapeKind::kBall) local.rotation = rotation_of(shape.rotation);
   local.line = {local.rotation.to_local(ray.origin - shape.position), local.rotation.to_local(direction)};
   return local;
@@ -70,14 +72,14 @@ ShapeHit hit_at(const LocalRay& local, double t, Vec3d normal) {
   return {std::ldexp(std::max(t, 0.0), -local.exponent), normalized(local.rotation.to_world(normal))};
 }
 
-// The verdict of the solid alone.
+// Returns the hit on the solid, without the test of its bounds.
 std::optional<ShapeHit> solid_hit(const ObjectRay& ray, const Shape& shape) {
   const LocalRay local = local_ray(ray.ray(), shape);
   const bool inside = contains(shape, local.line.origin);
   if (inside && ray.inside() == Inside::kSkip) return std::nullopt;
   if (inside && ray.inside() == Inside::kSolid) return ShapeHit{0, Vec3d{} - normalized(ray.ray().direction)};
   const std::optional<Chord> chord = chord_of(shape, local.line);
-  // On the surface, within rounding, a line may have no chord: such a ray leaves at once.
+  // Within rounding of the surface a line may have no chord: such a ray exits at t = 0.
   if (inside) return chord ? hit_at(local, chord->far, chord->far_normal) : hit_at(local, 0, local.line.origin);
   if (!chord || chord->far < 0) return std::nullopt;
   return hit_at(local, chord->near, chord->near_normal);
@@ -109,13 +111,14 @@ std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape) {
 }
 
 bool ball_overlaps(const Balld& ball, const Shape& shape) {
-  const double reach = ball.radius + core_radius(shape);
+  const double radius_sum = ball.radius + core_radius(shape);
   const double distance = squared_distance_to_core(ball.center, shape);
-  const bool meets = planted(PlantedBug::kStrictTie) ? distance < reach * reach : distance <= reach * reach;
+  const bool meets =
+      planted(PlantedBug::kStrictTie) ? distance < radius_sum * radius_sum : distance <= radius_sum * radius_sum;
   if (!meets) return false;
-  // A ball's bounds are never farther than it is, but for rounding.
+  // Fast path: except for rounding, the bounds of a ball are never farther than the ball.
   const bool is_round = shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kPoint;
-  if (is_round && distance < reach * reach * (1 - 0x1p-38) && reach > 0x1p-256) return true;
+  if (is_round && distance < radius_sum * radius_sum * (1 - 0x1p-38) && radius_sum > 0x1p-256) return true;
   return reaches(ball, bounds_of(shape));
 }
 

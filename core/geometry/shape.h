@@ -1,5 +1,5 @@
-// The shapes of moving objects and their exact predicates: closed solids in double. Every function is a pure function
-// of its arguments: products, sums, divisions and square roots in a fixed order, no fused operation.
+// Shapes of moving objects and their exact predicates: closed solids in double. Pure functions: products, sums,
+// divisions and square roots in a fixed order, no fused operation. Any thread.
 #ifndef LOCUS_CORE_GEOMETRY_SHAPE_H_
 #define LOCUS_CORE_GEOMETRY_SHAPE_H_
 
@@ -13,9 +13,9 @@ namespace locus {
 
 enum class ShapeKind : uint8_t { kPoint, kBall, kBox, kCapsule };
 
-// kPoint uses neither `size` nor `radius`; kBall `radius`; kBox `size` as half extents along its axes; kCapsule `size`
-// as the half axis (centre to the end of the inner segment, in local axes) and `radius`. `rotation` turns local to
-// world.
+// Shape and its position. kPoint uses neither `size` nor `radius`. kBall uses `radius`. kBox uses `size` as half
+// extents along its axes. kCapsule uses `radius` and `size` as the half axis (from the centre to an end of the inner
+// segment, in local axes). `rotation` rotates local axes to world axes.
 struct Shape {
   ShapeKind kind = ShapeKind::kPoint;
   Vec3d position;  // centre
@@ -26,7 +26,7 @@ struct Shape {
   friend constexpr bool operator==(const Shape&, const Shape&) = default;
 };
 
-// A ray in world axes, ready for slab tests and object predicates in double. Immutable; cheap to copy.
+// Ray in world axes, preprocessed for slab tests and object predicates in double. Immutable; cheap to copy.
 class ObjectRay {
  public:
   explicit ObjectRay(const Rayd& ray, Inside inside = Inside::kSolid)
@@ -35,7 +35,7 @@ class ObjectRay {
   const Rayd& ray() const { return ray_; }
   const SlabRay<double>& slabs() const { return slabs_; }
   Inside inside() const { return inside_; }
-  // Distances of the slab test and of hits count in the same unit here.
+  // Returns t: slab tests and hits have the same unit here.
   double to_scaled(double t) const { return t; }
 
  private:
@@ -44,19 +44,23 @@ class ObjectRay {
   Inside inside_;
 };
 
+// Hit of a ray on a shape.
 struct ShapeHit {
   double t;      // in units of the ray's direction, >= 0
-  Vec3d normal;  // unit, outward, world axes; minus the ray's unit direction where the ray starts inside (kSolid)
+  Vec3d normal;  // unit, outward, world axes; minus the ray's unit direction if the ray starts inside (kSolid)
 };
 
-// World axis-aligned bounds, grown by 2^-40 of the magnitudes where rounding could leave part of the shape outside.
+// Returns axis-aligned bounds in world axes, grown by 2^-40 of the magnitudes if rounding could exclude a part of the
+// shape.
 Aabbd bounds_of(const Shape& shape);
 
-// First point of the closed solid on the ray, t >= 0, whatever ray.t_max. Points are never hit. Includes the slab test
-// of the shape's own bounds, to whose interval t is clamped: no structure can prune what a list reports.
+// Returns the first point of the closed solid on the ray with t >= 0, also beyond ray.t_max. Points are never hit. The
+// verdict includes the slab test of the shape's own bounds, and t is clamped to their interval, so no structure can
+// prune a hit that a list reports.
 std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape);
 
-// Closed solids share a point: touching counts. Both include the test of the shape's own bounds against the query's.
+// Return whether the closed solids share a point; touching counts. Both verdicts include the test of the shape's own
+// bounds against the query.
 bool ball_overlaps(const Balld& ball, const Shape& shape);
 bool box_overlaps(const Obbd& box, const Shape& shape);
 

@@ -1,5 +1,5 @@
-// A ray and how the mesh stands that it is asked against, as they are stored: what a ray in mesh axes is rounded from.
-// Plain data; immutable by use.
+// Ray in world axes together with the transform of the mesh, both as stored: the unrounded input from which a ray in
+// mesh axes is computed. Plain data.
 #ifndef LOCUS_CORE_GEOMETRY_STORED_RAY_H_
 #define LOCUS_CORE_GEOMETRY_STORED_RAY_H_
 
@@ -7,7 +7,8 @@
 
 namespace locus {
 
-// world = translation + scale * (rotation * mesh), with the rotation of quaternion / |quaternion|.
+// Transform of the mesh: world = translation + scale * (rotation * mesh), with the rotation of quaternion /
+// |quaternion|.
 struct StoredRay {
   Vec3d origin, direction;  // in world axes
   Vec3d translation;

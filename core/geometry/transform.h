@@ -1,5 +1,5 @@
-// How an instance stands in the world: world = translation + scale * (rotation * mesh). Queries go to mesh axes in
-// double; kernels then round once. Immutable after construction.
+// Transform of an instance: world = translation + scale * (rotation * mesh). Queries are transformed to mesh axes in
+// double; kernels then round once. Immutable after construction; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_TRANSFORM_H_
 #define LOCUS_CORE_GEOMETRY_TRANSFORM_H_
 
@@ -19,10 +19,11 @@ struct Transform {
   Vec3d point_to_world(Vec3d mesh) const { return translation + rotation.to_world(mesh) * double{scale}; }
 };
 
+// Returns the transform. `quaternion` must have unit length up to limits::kMaxQuaternionDeviation, `scale` be positive.
 Transform make_transform(Vec3d translation, const Quaternion& quaternion, float scale);
 
-// World bounds of a box given in mesh axes. Grown by 2^-40 of the magnitudes involved, which covers the rounding of
-// this function, so that bounds of a part always lie within the bounds of the whole up to that margin.
+// Returns world bounds of a box in mesh axes, grown by 2^-40 of the magnitudes. This covers the rounding of this
+// function: the bounds of a part lie within those of the mesh up to that error.
 Aabbd bounds_to_world(const Transform& transform, const Aabbf& mesh_box);
 
 }  // namespace locus

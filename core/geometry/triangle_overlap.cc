@@ -11,12 +11,13 @@ struct Range {
 
 Range range_of(double a, double b, double c) { return {std::min(a, std::min(b, c)), std::max(a, std::max(b, c))}; }
 
-// Whether the box of half extents `half` around the origin and the triangle have disjoint shadows on `axis`. Shadows of
-// all three vertices are taken anew: an axis spoilt by cancellation is a useless one, never a false one.
+// Returns whether the projections of triangle and box on `axis` are disjoint. The box has half extents `half` around
+// the origin. All three vertices are projected on the axis as rounded, so an axis with cancellation errors can only be
+// useless; it never separates a triangle from a box that it meets.
 bool separated_along(Vec3d axis, const Vec3d (&vertices)[3], Vec3d half) {
   const Range range = range_of(dot(vertices[0], axis), dot(vertices[1], axis), dot(vertices[2], axis));
-  const double reach = dot(abs(axis), half);
-  return range.low > reach || range.high < -reach;
+  const double extent = dot(abs(axis), half);
+  return range.low > extent || range.high < -extent;
 }
 
 bool triangle_meets_box(const Triangle& triangle, const Obbf& box) {

@@ -1,5 +1,5 @@
-// Triangles against balls and boxes in mesh axes, decided in double from the stored floats. A triangle is a closed
-// surface: touching counts, and triangles without area count as the segment or point they are.
+// Overlap tests of triangles with balls and boxes in mesh axes, computed in double from the stored floats. A triangle
+// is a closed surface: touching counts. A triangle without area is a segment or a point. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_TRIANGLE_OVERLAP_H_
 #define LOCUS_CORE_GEOMETRY_TRIANGLE_OVERLAP_H_
 
@@ -9,11 +9,11 @@
 
 namespace locus {
 
-// squared_distance() <= radius^2, and the triangle's own box is no farther than that either.
+// Returns whether squared_distance() <= radius^2 and the ball reaches() the triangle's own bounds.
 bool ball_overlaps(const Ballf& ball, const Triangle& triangle);
 
-// Separating axis test over 13 axes in the box's own axes, and the triangle's own box overlaps the bounds of `box`.
-// Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
+// Returns whether the triangle's own bounds overlap those of `box` and no axis separates triangle and box: separating
+// axis test over 13 axes, in the box's own axes. Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
 bool box_overlaps(const Obbf& box, const Triangle& triangle);
 
 }  // namespace locus

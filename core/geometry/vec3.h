@@ -1,5 +1,5 @@
-// Three numbers of one scalar type: a point or a direction. Vec3f is what meshes store, Vec3d what scenes store.
-// Plain values; no function here rounds more than once per component and operation.
+// Vectors of three components: points and directions. Meshes store Vec3f, scenes store Vec3d. Plain values and pure
+// functions; any thread. No function rounds more than once per component and operation.
 #ifndef LOCUS_CORE_GEOMETRY_VEC3_H_
 #define LOCUS_CORE_GEOMETRY_VEC3_H_
 
@@ -70,7 +70,8 @@ constexpr Vec3f to_float(Vec3d a) {
   return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
 }
 
-// Unit vector along `a`, which is not zero. Scaled first, so that no length over- or underflows.
+// Returns the unit vector along `a`, which must not be zero. Scales `a` first, so that its length never over- or
+// underflows.
 inline Vec3d normalized(Vec3d a) {
   const double scale = max_component(abs(a));
   const Vec3d scaled = {a.x / scale, a.y / scale, a.z / scale};

@@ -1,11 +1,14 @@
 #include "core/mesh/packed_indices.h"
 
 #include <algorithm>
+#include <limits>
+
+#include "core/base/check.h"
 
 namespace locus {
 namespace {
 
-// Seven bits a byte, the lowest first; the eighth says that more follow.
+// Continuation bit of a variable-length integer: seven bits per byte, the lowest first.
 constexpr uint64_t kMore = 0x80;
 
 }  // namespace
@@ -13,14 +16,14 @@ constexpr uint64_t kMore = 0x80;
 PackedIndices::PackedIndices(absl::Span<const uint32_t> indices) {
   std::vector<uint8_t> bytes;
   bytes.reserve(2 * indices.size());
-  int64_t unused = 0;
+  int64_t next_unused = 0;
   for (const uint32_t index : indices) {
-    const int64_t back = unused - int64_t{index};
-    // The sign goes into the lowest bit.
-    auto code = static_cast<uint64_t>(back < 0 ? -2 * back - 1 : 2 * back);
+    const int64_t difference = next_unused - int64_t{index};
+    // Zigzag encoding: the lowest bit is the sign.
+    auto code = static_cast<uint64_t>(difference < 0 ? -2 * difference - 1 : 2 * difference);
     for (; code >= kMore; code >>= 7) bytes.push_back(static_cast<uint8_t>(code | kMore));
     bytes.push_back(static_cast<uint8_t>(code));
-    unused = std::max(unused, int64_t{index} + 1);
+    next_unused = std::max(next_unused, int64_t{index} + 1);
   }
   bytes_.assign(bytes.begin(), bytes.end());
 }
@@ -31,10 +34,13 @@ uint32_t PackedIndices::Reader::next() {
     const uint64_t byte = *next_++;
     code |= (byte & (kMore - 1)) << shift;
     if ((byte & kMore) == 0) break;
+    LOCUS_DCHECK_LT(shift, 28);  // a code has at most 34 bits
   }
   const auto half = static_cast<int64_t>(code >> 1);
-  const int64_t index = unused_ - ((code & 1) != 0 ? -half - 1 : half);
-  unused_ = std::max(unused_, index + 1);
+  const int64_t index = next_unused_ - ((code & 1) != 0 ? -half - 1 : half);
+  LOCUS_DCHECK_GE(index, 0);
+  LOCUS_DCHECK_LE(index, int64_t{std::numeric_limits<uint32_t>::max()});
+  next_unused_ = std::max(next_unused_, index + 1);
   return static_cast<uint32_t>(index);
 }
 

@@ -1,6 +1,6 @@
-// An index list in few bytes, given back as it was: each index as its distance from the lowest that none was yet, one
-// byte or two where neighbours in the list use neighbouring vertices. Immutable after creation; safe to share between
-// threads, a reader is for one.
+// Compressed index list, without loss. Each index is stored as its difference from one more than the largest index so
+// far, in one or two bytes if triangles close in the list use vertices close in the mesh. Immutable after creation; any
+// thread. A Reader belongs to one thread.
 #ifndef LOCUS_CORE_MESH_PACKED_INDICES_H_
 #define LOCUS_CORE_MESH_PACKED_INDICES_H_
 
@@ -19,17 +19,17 @@ class PackedIndices {
 
   size_t bytes() const { return bytes_.capacity(); }
 
-  // Gives the list from its start. The list must outlive it unmoved.
+  // Sequential reader, from the start of the list. The list must outlive the reader and must not move.
   class Reader {
    public:
     explicit Reader(const PackedIndices& packed) : next_(packed.bytes_.data()) {}
 
-    // Not to be called more often than there are indices.
+    // Returns the next index. Call at most once per index of the list.
     uint32_t next();
 
    private:
     const uint8_t* next_;
-    int64_t unused_ = 0;  // the lowest index that none was yet
+    int64_t next_unused_ = 0;  // one more than the largest index so far
   };
 
  private:

@@ -1,4 +1,4 @@
-// An array of whole numbers in as many bytes each as the largest needs. Safe to read from any threads once filled.
+// Array of unsigned integers, each in as many bytes as the largest one needs. Any thread may read it once it is filled.
 #ifndef LOCUS_CORE_MESH_PACKED_NUMBERS_H_
 #define LOCUS_CORE_MESH_PACKED_NUMBERS_H_
 
@@ -7,27 +7,33 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/check.h"
+
 namespace locus {
 
 class PackedNumbers {
  public:
   PackedNumbers() = default;
-  // `count` zeros, each with room for 0 .. `largest`.
+  // Creates `count` zeros; each element can hold 0 to `largest`.
   PackedNumbers(size_t count, uint32_t largest)
       : width_((static_cast<size_t>(std::bit_width(largest)) + 7) / 8), bytes_(count * width_) {}
 
-  void set(size_t place, uint32_t number) {
-    for (size_t i = 0; i < width_; ++i) bytes_[place * width_ + i] = static_cast<uint8_t>(number >> (8 * i));
+  // Sets an element; `value` must fit the bytes of the largest one.
+  void set(size_t index, uint32_t value) {
+    LOCUS_DCHECK_LE((index + 1) * width_, bytes_.size());
+    LOCUS_DCHECK_LE(static_cast<size_t>(std::bit_width(value)), 8 * width_);
+    for (size_t i = 0; i < width_; ++i) bytes_[index * width_ + i] = static_cast<uint8_t>(value >> (8 * i));
   }
-  uint32_t operator[](size_t place) const {
-    uint32_t number = 0;
-    for (size_t i = 0; i < width_; ++i) number |= uint32_t{bytes_[place * width_ + i]} << (8 * i);
-    return number;
+  uint32_t operator[](size_t index) const {
+    LOCUS_DCHECK_LE((index + 1) * width_, bytes_.size());
+    uint32_t value = 0;
+    for (size_t i = 0; i < width_; ++i) value |= uint32_t{bytes_[index * width_ + i]} << (8 * i);
+    return value;
   }
   size_t bytes() const { return bytes_.capacity(); }
 
  private:
-  size_t width_ = 0;
+  size_t width_ = 0;  // bytes per element
   std::vector<uint8_t> bytes_;
 };
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
@@ -74,21 +75,34 @@ absl::StatusOr<TriangleMesh> TriangleMesh::create(std::vector<float> vertices, s
   mesh.vertices_ = std::move(vertices);
   mesh.indices_ = std::move(indices);
   mesh.parts_ = std::move(parts);
-  for (uint32_t number = 0; number < mesh.triangle_count(); ++number) {
-    const Triangle triangle = mesh.triangle(number);
+  for (uint32_t index = 0; index < mesh.triangle_count(); ++index) {
+    const Triangle triangle = mesh.triangle(index);
     mesh.bounds_ = merge(mesh.bounds_, bounds_of(triangle));
     if (area_normal(triangle) == Vec3d{}) ++mesh.zero_area_count_;
   }
+  mesh.check_invariants();
   return mesh;
 }
 
-Triangle TriangleMesh::triangle(uint32_t number) const {
-  const auto vertex = [this](uint32_t index) {
-    const float* p = &vertices_[size_t{3} * index];
+void TriangleMesh::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_EQ(vertices_.size() % 3, 0u);
+    LOCUS_CHECK_EQ(indices_.size() % 3, 0u);
+    LOCUS_CHECK_LT(0u, triangle_count());
+    LOCUS_CHECK_LE(zero_area_count_, triangle_count());
+    LOCUS_CHECK(!bounds_.empty());
+  }
+}
+
+Triangle TriangleMesh::triangle(uint32_t index) const {
+  LOCUS_DCHECK_LT(index, triangle_count());
+  const auto vertex = [this](uint32_t vertex_index) {
+    LOCUS_DCHECK_LT(size_t{3} * vertex_index, vertices_.size());
+    const float* p = &vertices_[size_t{3} * vertex_index];
     return Vec3f{p[0], p[1], p[2]};
   };
-  const uint32_t* corner = &indices_[size_t{3} * number];
-  return {vertex(corner[0]), vertex(corner[1]), vertex(corner[2]), number};
+  const uint32_t* corner = &indices_[size_t{3} * index];
+  return {vertex(corner[0]), vertex(corner[1]), vertex(corner[2]), index};
 }
 
 }  // namespace locus

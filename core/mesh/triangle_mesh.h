@@ -1,5 +1,5 @@
-// An uploaded triangle mesh, validated once and owned: finite vertices within the world, indices within the vertices,
-// at least one triangle. Immutable after creation; safe to share between threads.
+// Uploaded triangle mesh, validated at creation: vertices are finite and within the world, indices refer to existing
+// vertices, and there is at least one triangle. Immutable after creation; any thread.
 #ifndef LOCUS_CORE_MESH_TRIANGLE_MESH_H_
 #define LOCUS_CORE_MESH_TRIANGLE_MESH_H_
 
@@ -12,7 +12,7 @@
 
 namespace locus {
 
-// A named run of triangles, up to the next part's first.
+// Named range of triangles, up to the first triangle of the next part.
 struct MeshPart {
   std::string name;
   uint32_t first_triangle = 0;
@@ -26,24 +26,27 @@ absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles);
 
 class TriangleMesh {
  public:
-  // `vertices` holds 3V coordinates, `indices` 3T vertex numbers; the first of `parts`, if any, begins at 0. Refuses
-  // with INVALID_ARGUMENT naming `vertices` and the vertex, `indices` and the triangle, `parts` and the part, or the
-  // limit that was passed.
+  // Creates a mesh of 3V coordinates and 3T vertex indices. The first part, if any, must begin at triangle 0. Returns
+  // INVALID_ARGUMENT naming `vertices` and the vertex, `indices` and the triangle, `parts` and the part, or the
+  // exceeded limit. O(V + T).
   static absl::StatusOr<TriangleMesh> create(std::vector<float> vertices, std::vector<uint32_t> indices,
                                              std::vector<MeshPart> parts);
 
   uint32_t triangle_count() const { return static_cast<uint32_t>(indices_.size() / 3); }
-  // Triangles that no ray can hit; they keep their numbers.
+  // Returns the count of triangles without area, which no ray hits; they keep their numbers.
   uint32_t zero_area_count() const { return zero_area_count_; }
   const Aabbf& bounds() const { return bounds_; }
   const std::vector<float>& vertices() const { return vertices_; }
   const std::vector<uint32_t>& indices() const { return indices_; }
   const std::vector<MeshPart>& parts() const { return parts_; }
-  Triangle triangle(uint32_t number) const;
+  // Returns a triangle; `index` < triangle_count().
+  Triangle triangle(uint32_t index) const;
   uint64_t bytes() const { return vertices_.size() * sizeof(float) + indices_.size() * sizeof(uint32_t); }
 
  private:
   TriangleMesh() = default;
+  // Checks the sizes and the bounds. O(1).
+  void check_invariants() const;
 
   std::vector<float> vertices_;
   std::vector<uint32_t> indices_;

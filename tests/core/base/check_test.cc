@@ -7,7 +7,7 @@
 namespace locus {
 namespace {
 
-TEST(CheckDeathTest, AFailedComparisonPrintsBothOperandsAndThePlace) {
+TEST(CheckDeathTest, AFailedComparisonPrintsBothOperandsFileAndLine) {
   const int stored = 3, counted = 4;
   EXPECT_DEATH(LOCUS_CHECK_EQ(stored, counted), "check_test.cc:[0-9]+: check failed: stored == counted with 3 and 4");
   EXPECT_DEATH(LOCUS_CHECK_NE(stored, 3), "stored != 3 with 3 and 3");
@@ -15,12 +15,12 @@ TEST(CheckDeathTest, AFailedComparisonPrintsBothOperandsAndThePlace) {
   EXPECT_DEATH(LOCUS_CHECK_LT(stored, stored), "stored < stored with 3 and 3");
 }
 
-TEST(CheckDeathTest, AFailedConditionPrintsItself) {
+TEST(CheckDeathTest, AFailedCheckPrintsItsCondition) {
   const bool sorted = false;
   EXPECT_DEATH(LOCUS_CHECK(sorted), "check failed: sorted");
 }
 
-TEST(CheckTest, OperandsAreEvaluatedOnceAndTrueChecksAreSilent) {
+TEST(CheckTest, PassedChecksEvaluateOperandsOnceAndPrintNothing) {
   int calls = 0;
   const auto next = [&calls] { return ++calls; };
   LOCUS_CHECK_EQ(next(), 1);
@@ -29,15 +29,15 @@ TEST(CheckTest, OperandsAreEvaluatedOnceAndTrueChecksAreSilent) {
   EXPECT_EQ(calls, 3);
 }
 
-// A NaN compares false with everything, so it fails the check that should have kept it out.
-TEST(CheckDeathTest, NanFailsEveryOrder) {
+// NaN compares false with every value, so each ordered check of a NaN fails.
+TEST(CheckDeathTest, NanFailsEveryOrderedComparison) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_DEATH(LOCUS_CHECK_LE(nan, 1.0), "nan and 1");
   EXPECT_DEATH(LOCUS_CHECK_LE(1.0, nan), "1 and nan");
 }
 
-// Release builds compile the operands, so that they stay right, and evaluate nothing.
-TEST(CheckDeathTest, DebugChecksFailWhereTheyAreOnAndEvaluateNothingElsewhere) {
+// Release builds compile the operands but do not evaluate them.
+TEST(CheckDeathTest, DebugChecksAbortIfEnabledAndEvaluateNothingOtherwise) {
   int calls = 0;
   const auto next = [&calls] { return ++calls; };
   if constexpr (kDebugChecks) {

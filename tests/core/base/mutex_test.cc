@@ -24,7 +24,7 @@ TEST(MutexTest, OnlyOneThreadHoldsTheLock) {
   EXPECT_EQ(count, 40000);
 }
 
-TEST(MutexTest, AWaiterSeesWhatWasSetBeforeTheNotice) {
+TEST(MutexTest, AWaiterSeesWritesMadeBeforeTheNotification) {
   Mutex mutex;
   ConditionVariable changed;
   bool ready = false;
@@ -41,7 +41,7 @@ TEST(MutexTest, AWaiterSeesWhatWasSetBeforeTheNotice) {
   setter.join();
 }
 
-TEST(MutexTest, AWaitEndsAtItsDeadlineAndHoldsTheLockAgain) {
+TEST(MutexTest, AWaitEndsAtItsDeadlineWithTheLockHeld) {
   Mutex mutex;
   ConditionVariable never;
   const MutexLock lock(mutex);

@@ -13,27 +13,27 @@ using Array = PersistentArray<uint32_t, 4>;
 
 std::vector<uint32_t> values_of(const Array& array) {
   std::vector<uint32_t> values;
-  for (size_t place = 0; place < array.size(); ++place) values.push_back(array[place]);
+  for (size_t index = 0; index < array.size(); ++index) values.push_back(array[index]);
   return values;
 }
 
-TEST(PersistentArrayTest, PlacesThatWereNeverSetHoldTheDefault) {
+TEST(PersistentArrayTest, ElementsThatWereNeverSetHoldTheDefault) {
   Array array;
   EXPECT_EQ(array.size(), 0u);
   array.set(9, 7);
   EXPECT_EQ(values_of(array), (std::vector<uint32_t>{0, 0, 0, 0, 0, 0, 0, 0, 0, 7}));
 }
 
-TEST(PersistentArrayTest, SnapshotsKeepWhatTheyHeldWhileTheArrayGoesOn) {
+TEST(PersistentArrayTest, SnapshotsKeepTheirValuesWhileTheArrayChanges) {
   test::Random random(1);
   Array array;
   std::vector<uint32_t> model;
   std::vector<std::pair<Array, std::vector<uint32_t>>> kept;
   for (uint32_t step = 0; step < 2'000; ++step) {
-    const size_t place = random.below(model.size() + 3);
-    if (place >= model.size()) model.resize(place + 1);
-    model[place] = step;
-    array.set(place, step);
+    const size_t index = random.below(model.size() + 3);
+    if (index >= model.size()) model.resize(index + 1);
+    model[index] = step;
+    array.set(index, step);
     if (random.chance(0.1)) kept.emplace_back(array.snapshot(), model);
     if (model.size() > 60) break;
   }
@@ -42,7 +42,7 @@ TEST(PersistentArrayTest, SnapshotsKeepWhatTheyHeldWhileTheArrayGoesOn) {
   EXPECT_EQ(values_of(array), model);
 }
 
-TEST(PersistentArrayTest, AWrittenSnapshotLeavesTheOthersAlone) {
+TEST(PersistentArrayTest, AWriteToASnapshotDoesNotChangeTheOthers) {
   Array array;
   array.set(0, 1);
   Array first = array.snapshot();
@@ -54,15 +54,15 @@ TEST(PersistentArrayTest, AWrittenSnapshotLeavesTheOthersAlone) {
   EXPECT_EQ(array[0], 3u);
 }
 
-TEST(PersistentArrayDeathTest, CopyingWhatIsBeingWrittenIsAProgrammersError) {
+TEST(PersistentArrayDeathTest, CopyingAWrittenArrayFailsACheck) {
   Array array;
   array.set(0, 1);
   EXPECT_DEATH(Array copy(array), "owner");
 }
 
-TEST(PersistentArrayTest, WhatIsApartIsWhatWasWrittenSince) {
+TEST(PersistentArrayTest, OnlyLeavesWrittenSinceTheSnapshotAreUnshared) {
   Array array;
-  for (uint32_t place = 0; place < 1000; ++place) array.set(place, 1);
+  for (uint32_t index = 0; index < 1000; ++index) array.set(index, 1);
   const Array before = array.snapshot();
   EXPECT_EQ(before.unshared_bytes(before), 0u);
   array.set(500, 2);

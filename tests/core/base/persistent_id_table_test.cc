@@ -19,7 +19,7 @@ struct FewHashes {
 struct LastHash {
   uint64_t operator()(Id) const { return ~uint64_t{0}; }
 };
-// The low bits of an id choose one of the 64 buckets of a table of one leaf.
+// Hash by the low bits of an id, which choose one of the 64 buckets of a table of one leaf.
 struct LowBits {
   uint64_t operator()(Id id) const { return id << 58; }
 };
@@ -29,18 +29,18 @@ void expect_equal(const Table& table, const Model& model, Id ids) {
   ASSERT_EQ(table.size(), model.size());
   std::vector<Id> all(ids + 1);
   std::iota(all.begin(), all.end(), Id{0});
-  std::vector<uint32_t> numbers(all.size());
-  table.find(all, absl::MakeSpan(numbers));
+  std::vector<uint32_t> values(all.size());
+  table.find(all, absl::MakeSpan(values));
   for (const Id id : all) {
     const auto known = model.find(id);
     const uint32_t expected = known == model.end() ? Table::kNone : known->second;
     EXPECT_EQ(table.find(id), expected) << id;
-    EXPECT_EQ(numbers[id], expected) << id;
+    EXPECT_EQ(values[id], expected) << id;
   }
 }
 
-// Random writes to a table and its model, where every snapshot kept along the way must stay what it was. Mostly inserts
-// first, mostly erases in the end.
+// Writes at random to a table and its model; every snapshot taken on the way must stay unchanged. Mostly inserts in the
+// first half, mostly erases in the second.
 template <class Hash>
 void check_against_model(Id ids, uint32_t steps, uint64_t seed) {
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -70,16 +70,16 @@ TEST(PersistentIdTableTest, AnEmptyTableFindsAndErasesNothing) {
   expect_equal(table, {}, 10);
 }
 
-TEST(PersistentIdTableTest, EqualsAMapAndSoDoesEverySnapshotKept) {
+TEST(PersistentIdTableTest, TableAndSnapshotsEqualAMap) {
   for (uint64_t seed = 1; seed <= 4; ++seed) check_against_model<SeededHash>(Id{50} << (2 * seed), 20'000, seed);
 }
 
-TEST(PersistentIdTableTest, IdsOfEqualHashesAreToldApart) {
+TEST(PersistentIdTableTest, IdsWithEqualHashesAreDistinguished) {
   check_against_model<FewHashes>(500, 5'000, 5);
   check_against_model<LastHash>(500, 5'000, 6);
 }
 
-TEST(PersistentIdTableTest, TheIdOfNothingIsNeverFoundNorErased) {
+TEST(PersistentIdTableTest, TheNullIdIsNeverFoundNorErased) {
   PersistentIdTable<> table;
   table.set(1, 10);
   EXPECT_EQ(table.find(kNoId), PersistentIdTable<>::kNone);
@@ -87,10 +87,10 @@ TEST(PersistentIdTableTest, TheIdOfNothingIsNeverFoundNorErased) {
   EXPECT_EQ(table.size(), 1u);
 }
 
-TEST(PersistentIdTableTest, ASearchEndsThoughIdsPassedEveryBucket) {
+TEST(PersistentIdTableTest, ASearchEndsAlthoughEveryBucketHasOverflowed) {
   PersistentIdTable<LowBits> table;
   Model model;
-  // Six ids of each bucket, of which one passes it; then those that were before it go.
+  // Insert six ids per bucket, of which one overflows; then erase the other five.
   for (Id bucket = 0; bucket < 64; ++bucket) {
     for (Id i = 1; i <= 6; ++i) table.set(i << 6 | bucket, 7);
     for (Id i = 1; i <= 5; ++i) ASSERT_TRUE(table.erase(i << 6 | bucket));
@@ -100,7 +100,7 @@ TEST(PersistentIdTableTest, ASearchEndsThoughIdsPassedEveryBucket) {
   EXPECT_FALSE(table.erase(5));
 }
 
-TEST(PersistentIdTableTest, TakesFewBytesAnIdAndGivesBackWhatIsUnused) {
+TEST(PersistentIdTableTest, TakesFewBytesPerIdAndFreesUnusedMemory) {
   constexpr size_t kIds = 100'000;
   PersistentIdTable<> table;
   table.fit(kIds);
@@ -120,7 +120,7 @@ TEST(PersistentIdTableTest, TakesFewBytesAnIdAndGivesBackWhatIsUnused) {
   EXPECT_LT(table.bytes(), 100u);
 }
 
-TEST(PersistentIdTableTest, WhatIsApartIsWhatWasWrittenSince) {
+TEST(PersistentIdTableTest, OnlyLeavesWrittenSinceTheSnapshotAreUnshared) {
   PersistentIdTable<> table;
   for (Id id = 1; id <= 10'000; ++id) table.set(id, 1);
   const PersistentIdTable<> before = table.snapshot();
@@ -133,7 +133,7 @@ TEST(PersistentIdTableTest, WhatIsApartIsWhatWasWrittenSince) {
   EXPECT_EQ(after.find(500), 2u);
 }
 
-TEST(PersistentIdTableTest, CountsWhatOnlySnapshotsHoldFromNowOn) {
+TEST(PersistentIdTableTest, ReplacedBytesCountLeavesThatOnlySnapshotsHold) {
   PersistentIdTable<> table;
   for (Id id = 1; id <= 10'000; ++id) table.set(id, 1);
   table.take_replaced_bytes();
@@ -148,7 +148,7 @@ TEST(PersistentIdTableTest, CountsWhatOnlySnapshotsHoldFromNowOn) {
   EXPECT_GT(table.take_replaced_bytes() * 10, before.bytes() * 9);
 }
 
-TEST(PersistentIdTableTest, TwoCopiesWrittenAlternatelyDoNotSeeEachOther) {
+TEST(PersistentIdTableTest, TwoCopiesWrittenAlternatelyAreIndependent) {
   PersistentIdTable<> left;
   for (Id id = 1; id <= 100; ++id) left.set(id, 0);
   PersistentIdTable<> right = left.snapshot();

@@ -1,4 +1,5 @@
-// Readers of snapshots beside the writer of a table: for ThreadSanitizer, and for what they see.
+// Readers of snapshots concurrent with the writer of a table: checks their values, and data races under
+// ThreadSanitizer.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -13,12 +14,12 @@ namespace {
 constexpr Id kIds = 2'000;
 constexpr int kReads = 50;
 
-// The last snapshot that was published.
+// Latest published snapshot.
 class Published {
  public:
   void put(PersistentIdTable<> table) {
     const std::lock_guard lock(mutex_);
-    std::swap(table_, table);  // the one before may die here or in a reader
+    std::swap(table_, table);  // frees the previous snapshot here or in a reader
   }
   PersistentIdTable<> get() const {
     const std::lock_guard lock(mutex_);
@@ -30,9 +31,9 @@ class Published {
   PersistentIdTable<> table_;
 };
 
-// The writer replaces every number of a generation by the next, some ids by erasing them first; nobody may see two
-// generations in one snapshot.
-TEST(PersistentIdTableTest, ReadersOfSnapshotsNeverSeeTheWriter) {
+// The writer replaces all values of a generation by the next, some after erasing their ids. No snapshot may contain two
+// generations.
+TEST(PersistentIdTableTest, ReadersOfSnapshotsNeverSeeConcurrentWrites) {
   Published published;
   std::atomic<int> reads{0};
   const auto read = [&] {

@@ -5,7 +5,7 @@
 namespace locus {
 namespace {
 
-TEST(RefusalTest, EveryFieldSurvivesTheWayThroughAStatus) {
+TEST(RefusalTest, AStatusCarriesEveryField) {
   Refusal refusal;
   refusal.reason = Reason::kBatchGap;
   refusal.field = "blocks[2].rays.directions";
@@ -28,17 +28,17 @@ TEST(RefusalTest, EveryFieldSurvivesTheWayThroughAStatus) {
   EXPECT_EQ(back->retry_after_ms, refusal.retry_after_ms);
 }
 
-TEST(RefusalTest, AnIndexOfZeroIsNotTheSameAsNone) {
+TEST(RefusalTest, AnIndexOfZeroDiffersFromNoIndex) {
   const absl::Status first = refuse_argument(Reason::kNotFinite, "positions", 0, "is not finite");
   EXPECT_EQ(first.message(), "positions[0]: is not finite");
   EXPECT_EQ(refusal_of(first)->index, std::optional<uint32_t>(0));
-  const absl::Status whole = refuse_argument(Reason::kColumnLength, "positions", std::nullopt, "has 5 entries");
-  EXPECT_EQ(whole.message(), "positions: has 5 entries");
-  EXPECT_EQ(refusal_of(whole)->index, std::nullopt);
-  EXPECT_EQ(whole.code(), absl::StatusCode::kInvalidArgument);
+  const absl::Status request = refuse_argument(Reason::kColumnLength, "positions", std::nullopt, "has 5 entries");
+  EXPECT_EQ(request.message(), "positions: has 5 entries");
+  EXPECT_EQ(refusal_of(request)->index, std::nullopt);
+  EXPECT_EQ(request.code(), absl::StatusCode::kInvalidArgument);
 }
 
-TEST(RefusalTest, ALimitIsNamedWithItsValueAndWhatWasAsked) {
+TEST(RefusalTest, ALimitErrorNamesTheLimitItsValueAndTheRequestedValue) {
   const absl::Status status = refuse_limit("blocks", "max_blocks", 256, 257);
   EXPECT_NE(status.message().find("blocks: "), absl::string_view::npos);
   EXPECT_NE(status.message().find("max_blocks"), absl::string_view::npos);
@@ -52,7 +52,7 @@ TEST(RefusalTest, ALimitIsNamedWithItsValueAndWhatWasAsked) {
   EXPECT_EQ(refusal->asked, 257);
 }
 
-TEST(RefusalTest, LargeWholeLimitsArePrintedWithoutAnExponent) {
+TEST(RefusalTest, LargeIntegersArePrintedWithoutAnExponent) {
   const absl::Status status = refuse_limit("", "max_bytes", 4e9, 5e9);
   EXPECT_NE(status.message().find("4000000000"), absl::string_view::npos) << status.message();
   EXPECT_EQ(refusal_of(status)->limit_value, 4e9);

@@ -7,7 +7,7 @@
 namespace locus {
 namespace {
 
-TEST(ScratchTest, ASmallVectorKeepsItsMemoryAndALargeOneGivesItBack) {
+TEST(ScratchTest, ClearKeepsTheMemoryOfASmallVectorAndFreesThatOfALargeOne) {
   std::vector<uint64_t> small(100), large(kKeptScratch / sizeof(uint64_t) + 1);
   clear_scratch(small);
   clear_scratch(large);

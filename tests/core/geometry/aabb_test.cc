@@ -35,7 +35,7 @@ TEST(AabbTest, AGapOnAnyAxisSeparates) {
   }
 }
 
-TEST(AabbTest, EmptyIsNeutralForMergeAndMeetsNothing) {
+TEST(AabbTest, AnEmptyBoxIsNeutralForMergeAndOverlapsNothing) {
   const Aabbd empty;
   EXPECT_TRUE(empty.empty());
   EXPECT_FALSE(kUnit.empty());
@@ -46,7 +46,7 @@ TEST(AabbTest, EmptyIsNeutralForMergeAndMeetsNothing) {
   EXPECT_EQ(half_area(empty), 0);
 }
 
-TEST(AabbTest, MergeContainsBothAndNothingMoreThanNeeded) {
+TEST(AabbTest, MergeIsTheSmallestBoxThatContainsBoth) {
   EXPECT_EQ(merge(kUnit, Vec3d{2, -1, 0.5}), (Aabbd{{0, -1, 0}, {2, 1, 1}}));
   EXPECT_TRUE(contains(merge(kUnit, Vec3d{2, -1, 0.5}), kUnit));
   EXPECT_TRUE(contains(kUnit, Vec3d{1, 1, 1}));
@@ -59,7 +59,7 @@ TEST(AabbTest, SquaredDistanceIsZeroInsideAndExactOutside) {
   EXPECT_EQ(squared_distance(Vec3d{-3, 0.5, -4}, kUnit), 25);
 }
 
-// What makes culling by any superset safe.
+// This property makes culling by any superset safe.
 TEST(AabbTest, ASupersetIsNeverFartherNorSmaller) {
   constexpr uint64_t kSeed = 71;
   test::Random random(kSeed);
@@ -74,17 +74,17 @@ TEST(AabbTest, ASupersetIsNeverFartherNorSmaller) {
   }
 }
 
-TEST(BallTest, WhatABallReachesOverlapsItsBounds) {
+TEST(BallTest, ABoxThatTheBallReachesOverlapsItsBounds) {
   constexpr uint64_t kSeed = 72;
   test::Random random(kSeed);
   int reached = 0;
   for (int i = 0; i < 100000; ++i) {
     const Ballf ball{random.float_vector(random.magnitude(-10, 20)), static_cast<float>(random.magnitude(-10, 10))};
-    // A box whose nearest point is on the surface as nearly as floats can say.
+    // A box whose nearest point is on the surface up to float rounding.
     Vec3d toward = random.unit_vector();
     if (random.chance(0.5)) toward = {random.chance(0.5) ? 1.0 : -1.0, 0, 0};
-    const Vec3f place = to_float(to_double(ball.center) + toward * double{ball.radius});
-    const Aabbf box = {place, place};
+    const Vec3f point = to_float(to_double(ball.center) + toward * double{ball.radius});
+    const Aabbf box = {point, point};
     if (!reaches(ball, box)) continue;
     ++reached;
     ASSERT_TRUE(overlaps(bounds_of(ball), box)) << "seed " << kSeed << " case " << i;

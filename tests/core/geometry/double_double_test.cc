@@ -37,22 +37,22 @@ TEST(DoubleDoubleTest, SumsOfTwoDoublesAreExact) {
   }
 }
 
-TEST(DoubleDoubleTest, SumsOfProductsAreOffByLessThanTwoToTheMinus100) {
+TEST(DoubleDoubleTest, SumsOfProductsHaveARelativeErrorBelowTwoToTheMinus100) {
   Random random(kSeed + 2);
   for (int i = 0; i < 100000; ++i) {
     const double a = any(random), b = any(random), c = any(random), d = any(random), e = any(random);
     const DoubleDouble result = (DoubleDouble(a) * b + c) * (DoubleDouble(d) - e);
     const Quad exact = (Quad{a} * b + c) * (Quad{d} - e);
     const Quad found = Quad{result.rounded()} + (result - result.rounded()).rounded();
-    // Where the first factor all but cancels, what is left of it has fewer bits.
+    // The bound is relative to the operands: if the first factor almost cancels, its result has fewer bits.
     const Quad size = (std::abs(a * b) + std::abs(c)) * (std::abs(d) + std::abs(e));
     ASSERT_LE(std::abs(static_cast<double>(found - exact)), 0x1p-100 * static_cast<double>(size))
         << "seed " << kSeed + 2 << " case " << i;
   }
 }
 
-// On this stands that neighbours see their common edge alike.
-TEST(DoubleDoubleTest, ADifferenceOfProductsTurnsItsSignAndNothingElseWithItsOrder) {
+// Watertightness depends on this: both triangles at an edge get the same edge function except for its sign.
+TEST(DoubleDoubleTest, SwappingTheProductsOfADifferenceOnlyFlipsItsSign) {
   Random random(kSeed + 3);
   for (int i = 0; i < 100000; ++i) {
     const DoubleDouble a = DoubleDouble(any(random)) + any(random), b = DoubleDouble(any(random)) + any(random);
@@ -61,7 +61,7 @@ TEST(DoubleDoubleTest, ADifferenceOfProductsTurnsItsSignAndNothingElseWithItsOrd
   }
 }
 
-TEST(DoubleDoubleTest, SignTellsWhatDoubleWouldLose) {
+TEST(DoubleDoubleTest, SignIsExactWhereDoubleRoundsToZero) {
   const DoubleDouble one = 1.0;
   EXPECT_EQ((one + 0x1p-100 - one).sign(), 1);
   EXPECT_EQ((one - 0x1p-100 - one).sign(), -1);

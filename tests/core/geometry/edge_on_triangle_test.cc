@@ -14,16 +14,16 @@ using test::Quad;
 using test::Random;
 using test::Vec3q;
 
-TEST(EdgeOnTriangleTest, WhatTheProofFoundIsAnsweredAsTheReferenceDoes) { EXPECT_EQ(test::edge_on_difference(), ""); }
+TEST(EdgeOnTriangleTest, CasesFoundByTheProofAgreeWithTheReference) { EXPECT_EQ(test::edge_on_difference(), ""); }
 
-// A triangle, how it stands, and a ray that runs all but within its plane, at any sine down to 2^-60.
+// Triangle, its transform and a ray almost within its plane, with a sine of the angle down to 2^-60.
 struct Grazing {
   Triangle triangle;
   Transform transform;
   Vec3d origin, direction;
 };
 
-Vec3d place_in(const Triangle& triangle, Random& random) {
+Vec3d random_point_in(const Triangle& triangle, Random& random) {
   const double u = random.unit(), v = random.unit() * (1 - u);
   return to_double(triangle.a) * (1 - u - v) + to_double(triangle.b) * u + to_double(triangle.c) * v;
 }
@@ -38,14 +38,15 @@ Grazing any_grazing(Random& random) {
   const double size = random.magnitude(-8, 8);
   Grazing grazing{any_triangle(size, random), {}, {}, {}};
   Triangle& triangle = grazing.triangle;
-  // In a plane across an axis of an instance that is not turned, floats come as near to edge-on as one likes.
+  // In a plane perpendicular to an axis of an instance that is not rotated, floats can be arbitrarily close to edge-on.
   const bool across = random.chance(0.5);
   const auto axis = static_cast<int>(random.below(3));
   if (across) triangle.b[axis] = triangle.c[axis] = triangle.a[axis];
-  const Quaternion turn = across ? Quaternion{} : random.rotation();
-  grazing.transform = make_transform(random.chance(0.3) ? Vec3d{} : random.vector(random.magnitude(-5, 20)), turn,
+  const Quaternion rotation = across ? Quaternion{} : random.rotation();
+  grazing.transform = make_transform(random.chance(0.3) ? Vec3d{} : random.vector(random.magnitude(-5, 20)), rotation,
                                      random.chance(0.5) ? 1.0f : static_cast<float>(random.magnitude(-10, 10)));
-  const Vec3d target = place_in(triangle, random), along = normalized(place_in(triangle, random) - target);
+  const Vec3d target = random_point_in(triangle, random);
+  const Vec3d along = normalized(random_point_in(triangle, random) - target);
   const Vec3d aside = normalized(area_normal(triangle));
   const double back = size * (random.chance(0.2) ? -0.1 : random.magnitude(-4, 6));
   const Vec3d way = along + aside * random.magnitude(-50, -10);
@@ -57,8 +58,8 @@ Grazing any_grazing(Random& random) {
   return grazing;
 }
 
-// PRODUCT's definition of a miss, and that no hit is farther than that from its triangle, for one triangle.
-TEST(EdgeOnTriangleTest, NoAngleIsTooFlatForTheAllowance) {
+// Tests the definition of a miss for one triangle, and that no hit is farther from its triangle than that tolerance.
+TEST(EdgeOnTriangleTest, HitsAreWithinTheToleranceAtEveryAngle) {
   constexpr uint64_t kSeed = 92;
   Random random(kSeed);
   int hits = 0, flat = 0;
@@ -91,7 +92,7 @@ TEST(EdgeOnTriangleTest, NoAngleIsTooFlatForTheAllowance) {
   EXPECT_GT(flat, static_cast<int>(test::scaled_count(40'000) / 400));
 }
 
-// A wall all but across x whose border lies 2^-60 beside the ray along z, which double cannot know.
+// Wall almost perpendicular to x whose border is 2^-60 beside the ray along z, a distance that double cannot resolve.
 class BesideTheBorderTest : public ::testing::Test {
  protected:
   std::optional<EdgeOnHit> hit(bool hit_in_double, Cull cull = Cull::kNone, double depth = 0) const {
@@ -100,9 +101,9 @@ class BesideTheBorderTest : public ::testing::Test {
   }
 };
 
-TEST_F(BesideTheBorderTest, ItIsMissedWhereDoubleSaysSo) { EXPECT_FALSE(hit(false)); }
+TEST_F(BesideTheBorderTest, AMissInDoubleIsAMiss) { EXPECT_FALSE(hit(false)); }
 
-TEST_F(BesideTheBorderTest, ItIsHitWhereDoubleSaysSoAtThatPlaceOfTheBorder) {
+TEST_F(BesideTheBorderTest, AHitInDoubleIsAHitAtTheNearestPointOfTheBorder) {
   const std::optional<EdgeOnHit> found = hit(true);
   ASSERT_TRUE(found.has_value());
   EXPECT_GE(found->t, 4);
@@ -110,13 +111,13 @@ TEST_F(BesideTheBorderTest, ItIsHitWhereDoubleSaysSoAtThatPlaceOfTheBorder) {
   EXPECT_EQ(found->v, 0);
 }
 
-TEST_F(BesideTheBorderTest, ItIsNotHitBehindTheStart) { EXPECT_FALSE(hit(true, Cull::kNone, 5)); }
+TEST_F(BesideTheBorderTest, ABorderBehindTheOriginIsMissed) { EXPECT_FALSE(hit(true, Cull::kNone, 5)); }
 
-TEST_F(BesideTheBorderTest, OnlyTheSideThatIsAskedForIsHit) {
+TEST_F(BesideTheBorderTest, CullingHidesExactlyOneSide) {
   EXPECT_NE(hit(true, Cull::kBack).has_value(), hit(true, Cull::kFront).has_value());
 }
 
-TEST(EdgeOnTriangleTest, WhatIsExactlyEdgeOnHasNoSide) {
+TEST(EdgeOnTriangleTest, AnExactlyEdgeOnTriangleHasNoVisibleSide) {
   const StoredRay ray = {{0, 0, 0}, {0, 0, 0.5}, {}, {}, 1};
   const Triangle wall = {{0, -1, 2}, {0, 1, 2}, {0, 0, 4}, 0};
   EXPECT_FALSE(edge_on_hit(ray, wall, Cull::kNone, {false, 0x1p-40}));

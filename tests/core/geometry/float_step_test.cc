@@ -21,14 +21,14 @@ void expect_as_nextafter(uint32_t bits) {
       << bits;
 }
 
-TEST(FloatStepTest, StepsAtTheEndsOfEveryExponentAreThoseOfNextafter) {
+TEST(FloatStepTest, StepsAtTheEndsOfEveryExponentEqualNextafter) {
   for (uint32_t high = 0; high < 512; ++high) {
     for (const uint32_t low : {0u, 1u, 2u, 0x3FFFFFu, 0x400000u, 0x7FFFFEu, 0x7FFFFFu})
       expect_as_nextafter(high << 23 | low);
   }
 }
 
-TEST(FloatStepTest, AMillionRandomStepsAreThoseOfNextafter) {
+TEST(FloatStepTest, AMillionRandomStepsEqualNextafter) {
   Random random(1);
   for (int i = 0; i < 1'000'000; ++i) expect_as_nextafter(static_cast<uint32_t>(random.next() >> 32));
 }

@@ -11,23 +11,23 @@ using test::Random;
 using test::Real;
 using test::to_real;
 
-Obbd unturned(Vec3d center, Vec3d half) { return {center, half, {}}; }
+Obbd axis_aligned(Vec3d center, Vec3d half) { return {center, half, {}}; }
 
 TEST(ObbObbTest, TouchingFacesEdgesAndCornersOverlapAndGapsDoNot) {
-  const Obbd a = unturned({0, 0, 0}, {1, 2, 3});
+  const Obbd a = axis_aligned({0, 0, 0}, {1, 2, 3});
   for (int x = -1; x <= 1; ++x)
     for (int y = -1; y <= 1; ++y)
       for (int z = -1; z <= 1; ++z) {
         if (x == 0 && y == 0 && z == 0) continue;
         const Vec3d touching = {2.0 * x, 3.0 * y, 4.0 * z};
-        EXPECT_TRUE(boxes_overlap(a, unturned(touching, {1, 1, 1})));
-        EXPECT_FALSE(boxes_overlap(a, unturned(touching * (1 + 0x1p-50), {1, 1, 1})));
+        EXPECT_TRUE(boxes_overlap(a, axis_aligned(touching, {1, 1, 1})));
+        EXPECT_FALSE(boxes_overlap(a, axis_aligned(touching * (1 + 0x1p-50), {1, 1, 1})));
       }
 }
 
-TEST(ObbObbTest, OnlyACrossAxisSeparatesTwoCrossedNeedles) {
-  // Needles along x and, turned around z by small angles, one above the other: no face axis of a box turned around its
-  // own needle tells them apart.
+TEST(ObbObbTest, CrossedNeedlesAreSeparatedByACrossProductAxis) {
+  // Two needles, one above the other, the second rotated around z by a small angle. Each is also rolled around itself,
+  // so that no face axis separates them.
   constexpr uint64_t kSeed = 111;
   Random random(kSeed);
   for (int i = 0; i < 2000; ++i) {
@@ -72,16 +72,16 @@ TEST(ObbObbTest, NearlyParallelEdgesNeverSeparateWhatOverlaps) {
   }
 }
 
-TEST(ObbObbTest, TurnedBoxesThatTouchCount) {
+TEST(ObbObbTest, RotatedBoxesThatTouchOverlap) {
   const float s = std::sqrt(0.5f);
   const Rotation quarter = rotation_of({0, 0, s, s});
-  EXPECT_TRUE(boxes_overlap({{0, 0, 0}, {1, 2, 3}, quarter}, unturned({3, 0, 0}, {1, 1, 1})));
-  EXPECT_FALSE(boxes_overlap({{0, 0, 0}, {1, 2, 3}, quarter}, unturned({3.000001, 0, 0}, {1, 1, 1})));
+  EXPECT_TRUE(boxes_overlap({{0, 0, 0}, {1, 2, 3}, quarter}, axis_aligned({3, 0, 0}, {1, 1, 1})));
+  EXPECT_FALSE(boxes_overlap({{0, 0, 0}, {1, 2, 3}, quarter}, axis_aligned({3.000001, 0, 0}, {1, 1, 1})));
 }
 
-TEST(ObbObbTest, EmptyExtentsArePointsSegmentsAndPlates) {
-  EXPECT_TRUE(boxes_overlap(unturned({1, 1, 1}, {0, 0, 0}), unturned({0, 0, 0}, {1, 1, 1})));
-  EXPECT_FALSE(boxes_overlap(unturned({1, 1, 1.0000001}, {0, 0, 0}), unturned({0, 0, 0}, {1, 1, 1})));
+TEST(ObbObbTest, BoxesWithZeroExtentsArePointsSegmentsAndPlates) {
+  EXPECT_TRUE(boxes_overlap(axis_aligned({1, 1, 1}, {0, 0, 0}), axis_aligned({0, 0, 0}, {1, 1, 1})));
+  EXPECT_FALSE(boxes_overlap(axis_aligned({1, 1, 1.0000001}, {0, 0, 0}), axis_aligned({0, 0, 0}, {1, 1, 1})));
   const Rotation turned = rotation_of(normalized(Quaternion{0.1f, 0.2f, 0.3f, 0.9f}));
   EXPECT_TRUE(boxes_overlap({{0, 0, 0}, {5, 0, 0}, turned}, {{0, 0, 0}, {0, 5, 5}, turned}));
   EXPECT_TRUE(boxes_overlap({{0, 0, 0}, {0, 0, 0}, turned}, {{0, 0, 0}, {0, 0, 0}, {}}));

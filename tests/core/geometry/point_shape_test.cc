@@ -34,8 +34,8 @@ TEST_P(PointShapeTest, DistanceAgreesWithTheReference) {
     const Vec3d point = shape.position + random.vector(1) * (size * random.magnitude(-3, 3));
     const double actual = distance(point, shape);
     const Real expected = reference_distance(point, shape);
-    const double slack = 1e-12 * (static_cast<double>(expected) + size) + 1e-15 * max_component(abs(point));
-    ASSERT_NEAR(actual, static_cast<double>(expected), slack) << "seed " << kSeed << " case " << i;
+    const double epsilon = 1e-12 * (static_cast<double>(expected) + size) + 1e-15 * max_component(abs(point));
+    ASSERT_NEAR(actual, static_cast<double>(expected), epsilon) << "seed " << kSeed << " case " << i;
     inside += actual == 0;
   }
   EXPECT_EQ(inside > 1000, GetParam() != ShapeKind::kPoint);
@@ -57,7 +57,7 @@ TEST_P(PointShapeTest, DistancesOnALatticeAreTheNearestFloats) {
   EXPECT_GT(touching, 10);
 }
 
-TEST_P(PointShapeTest, TheNearestPointIsOfTheSolidAndAsFarAsSaid) {
+TEST_P(PointShapeTest, TheNearestPointIsInTheSolidAtTheDistance) {
   constexpr uint64_t kSeed = 53;
   Random random(kSeed + static_cast<uint64_t>(GetParam()));
   for (int i = 0; i < 50000; ++i) {
@@ -65,14 +65,14 @@ TEST_P(PointShapeTest, TheNearestPointIsOfTheSolidAndAsFarAsSaid) {
     const double size = test::largest_size(shape);
     const Vec3d point = shape.position + random.vector(1) * (size * random.magnitude(-3, 3));
     const Vec3d nearest = nearest_on_shape(point, shape);
-    const double apart = std::sqrt(squared_length(point - nearest));
-    const double slack = 1e-12 * (apart + size) + 1e-14;
-    ASSERT_NEAR(apart, distance(point, shape), slack) << "seed " << kSeed << " case " << i;
-    ASSERT_LE(static_cast<double>(reference_distance(nearest, shape)), slack) << "seed " << kSeed << " case " << i;
+    const double gap = std::sqrt(squared_length(point - nearest));
+    const double epsilon = 1e-12 * (gap + size) + 1e-14;
+    ASSERT_NEAR(gap, distance(point, shape), epsilon) << "seed " << kSeed << " case " << i;
+    ASSERT_LE(static_cast<double>(reference_distance(nearest, shape)), epsilon) << "seed " << kSeed << " case " << i;
   }
 }
 
-TEST_P(PointShapeTest, AShapeIsNeverNearerThanItsBounds) {
+TEST_P(PointShapeTest, TheDistanceIsNeverLessThanThatToTheBounds) {
   constexpr uint64_t kSeed = 54;
   Random random(kSeed);
   for (int i = 0; i < 50000; ++i) {
@@ -94,7 +94,7 @@ TEST(PointShapeValueTest, APointInsideASolidIsItsOwnNearestPoint) {
   }
 }
 
-TEST(PointShapeValueTest, ThreeFourFiveIsExactFarFromTheOriginToo) {
+TEST(PointShapeValueTest, A345TriangleIsExactFarFromTheOrigin) {
   const Vec3d far = {1e9, -1e9, 5e8};
   const Vec3d point = far + Vec3d{4, 5, 0};
   EXPECT_EQ(distance(point, {ShapeKind::kBox, far, {}, {1, 1, 1}, 0}), 5);

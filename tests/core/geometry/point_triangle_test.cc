@@ -45,7 +45,7 @@ TEST(PointTriangleTest, DistanceToHairlinesAgreesWithTheSearch) {
   }
 }
 
-// Of small whole numbers every squared distance is a fraction of whole numbers.
+// Integer points: every squared distance is a fraction of integers.
 using Whole = Vec3<int64_t>;
 
 struct Fraction {
@@ -71,31 +71,31 @@ Fraction whole_distance(Whole p, Whole a, Whole b, Whole c) {
   return std::min(edges, {height * height, squared_length(n)});
 }
 
-Whole lattice_point(int number, int side, int64_t from) {
-  return {number % side + from, number / side % side + from, number / side / side + from};
+Whole lattice_point(int index, int side, int64_t from) {
+  return {index % side + from, index / side % side + from, index / side / side + from};
 }
 
 Vec3d to_vec(Whole v) { return {double(v.x), double(v.y), double(v.z)}; }
 Vec3f to_vec3f(Whole v) { return to_float(to_vec(v)); }
 
-// Every triangle of a lattice, most of them turned and many without area, and every point in and around it.
+// Tests every triangle of a lattice, most of them oblique and many without area, with every point in and around it.
 TEST(PointTriangleTest, DistancesOnALatticeAreTheNearestFloats) {
   for (int corners = 0; corners < 27 * 27 * 27; ++corners) {
     const Whole a = lattice_point(corners % 27, 3, 0), b = lattice_point(corners / 27 % 27, 3, 0),
                 c = lattice_point(corners / 27 / 27, 3, 0);
     const Triangle triangle{to_vec3f(a), to_vec3f(b), to_vec3f(c), 0};
-    for (int number = 0; number < 125; ++number) {
-      const Whole p = lattice_point(number, 5, -1);
+    for (int index = 0; index < 125; ++index) {
+      const Whole p = lattice_point(index, 5, -1);
       const Fraction exact = whole_distance(p, a, b, c);
       const Real expected = std::sqrt(Real(exact.above) / Real(exact.below));
       ASSERT_EQ(static_cast<float>(distance(to_vec(p), triangle)), static_cast<float>(expected))
-          << "corners " << corners << " point " << number;
-      ASSERT_EQ(exact.above == 0, distance(to_vec(p), triangle) == 0) << "corners " << corners << " point " << number;
+          << "corners " << corners << " point " << index;
+      ASSERT_EQ(exact.above == 0, distance(to_vec(p), triangle) == 0) << "corners " << corners << " point " << index;
     }
   }
 }
 
-TEST(PointTriangleTest, TheNearestPointIsOfTheTriangleAndAsFarAsSaid) {
+TEST(PointTriangleTest, TheNearestPointIsOnTheTriangleAtTheDistance) {
   constexpr uint64_t kSeed = 46;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
@@ -103,14 +103,14 @@ TEST(PointTriangleTest, TheNearestPointIsOfTheTriangleAndAsFarAsSaid) {
     const double size = size_of(t) + 1e-6;
     const Vec3d point = to_double(t.a) + random.vector(size * random.magnitude(-8, 3));
     const Vec3d nearest = nearest_on_triangle(point, to_double(t.a), to_double(t.b), to_double(t.c));
-    const double apart = std::sqrt(squared_length(point - nearest));
-    const double slack = 1e-9 * (size + apart);
-    ASSERT_NEAR(apart, std::sqrt(squared_distance(point, t)), slack) << "seed " << kSeed << " case " << i;
-    ASSERT_LE(reference_distance(to_real(nearest), t), slack) << "seed " << kSeed << " case " << i;
+    const double gap = std::sqrt(squared_length(point - nearest));
+    const double epsilon = 1e-9 * (size + gap);
+    ASSERT_NEAR(gap, std::sqrt(squared_distance(point, t)), epsilon) << "seed " << kSeed << " case " << i;
+    ASSERT_LE(reference_distance(to_real(nearest), t), epsilon) << "seed " << kSeed << " case " << i;
   }
 }
 
-TEST(PointTriangleTest, ATriangleIsNeverNearerThanItsBox) {
+TEST(PointTriangleTest, TheDistanceIsNeverLessThanThatToTheBounds) {
   constexpr uint64_t kSeed = 47;
   Random random(kSeed);
   for (int i = 0; i < 100000; ++i) {
@@ -121,7 +121,7 @@ TEST(PointTriangleTest, ATriangleIsNeverNearerThanItsBox) {
   }
 }
 
-TEST(PointTriangleTest, OrderOfCornersChangesTheDistanceByRoundingAtMost) {
+TEST(PointTriangleTest, TheOrderOfCornersChangesTheDistanceOnlyByRounding) {
   const std::array<Vec3d, 3> v = {Vec3d{0, 0, 0}, Vec3d{3, 1, 0}, Vec3d{1, 4, 2}};
   const Vec3d point = {0.3, 0.2, 5};
   const double first = squared_distance(point, v[0], v[1], v[2]);

@@ -1,4 +1,4 @@
-// The trait fits types that know nothing of it, and a missing member is one error that names it.
+// PrimitiveTraits supports types that are independent of it; a missing member is a single error that names the member.
 #include "core/geometry/primitive_traits.h"
 
 #include <unistd.h>
@@ -13,7 +13,7 @@
 #include "core/index/list/list_index.h"
 #include "gtest/gtest.h"
 
-// Somebody else's type, in somebody else's namespace.
+// Type of another library, in its own namespace.
 namespace game {
 struct Crate {
   uint32_t serial;
@@ -36,7 +36,7 @@ struct PrimitiveTraits<ArrayBall> {
   static Shape shape(const ArrayBall& b) {
     return {ShapeKind::kBall, {b[0], b[1], b[2]}, {}, {}, static_cast<float>(b[3])};
   }
-  static uint64_t id(const ArrayBall& b) { return static_cast<uint64_t>(b[3]); }  // told apart by radius
+  static uint64_t id(const ArrayBall& b) { return static_cast<uint64_t>(b[3]); }  // identified by radius
   static Aabbd bounds(const ArrayBall& b) { return bounds_of(shape(b)); }
   static Vec3d position(const ArrayBall& b) { return {b[0], b[1], b[2]}; }
   static std::optional<double> ray(const ArrayBall& b, const ObjectRay& ray) {
@@ -81,7 +81,7 @@ ObjectRay ray_along_x() {
   return ObjectRay(ray);
 }
 
-TEST(PrimitiveTraitsTest, AStandardArrayCanBeHeldAndAsked) {
+TEST(PrimitiveTraitsTest, AStandardArrayCanBeStoredAndQueried) {
   ListIndex<ArrayBall> index;
   index.insert({10, 0, 0, 1});
   index.insert({20, 0, 0, 2});
@@ -95,7 +95,7 @@ TEST(PrimitiveTraitsTest, AStandardArrayCanBeHeldAndAsked) {
   EXPECT_EQ(result, (std::vector<ArrayBall>{{10, 0, 0, 1}}));
 }
 
-TEST(PrimitiveTraitsTest, AStructOfAnotherNamespaceCanBeHeldAndAsked) {
+TEST(PrimitiveTraitsTest, AStructOfAnotherNamespaceCanBeStoredAndQueried) {
   ListIndex<game::Crate> index;
   index.insert({7, 5, 0, 0, 2});
   std::vector<game::Crate> result;
@@ -119,7 +119,7 @@ TEST(PrimitiveTraitsTest, TheNearerOfTwoOverlappingPrimitivesWinsInEitherOrder) 
   }
 }
 
-// What the compiler says of a trait without position(), from a program of a dozen lines.
+// Returns the output of the compiler for a small program whose trait lacks position().
 std::string compiler_output() {
   const std::string source = testing::TempDir() + "trait_without_position_" + std::to_string(getpid()) + ".cc";
   const std::string output = source + ".txt";

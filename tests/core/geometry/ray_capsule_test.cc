@@ -11,7 +11,7 @@ Shape capsule_at(Vec3d center, Vec3f half_axis, float radius) {
   return {ShapeKind::kCapsule, center, {}, half_axis, radius};
 }
 
-TEST(RayCapsuleTest, SideEndAndAxisAreHitWhereTheyAre) {
+TEST(RayCapsuleTest, SideAndEndsAreHitAtTheExactDistance) {
   const Shape capsule = capsule_at({0, 0, 0}, {0, 0, 4}, 1);
   const auto side = ray_hit(test::ray_from({-3, 0, 3}, {1, 0, 0}), capsule);
   EXPECT_EQ(side->t, 2);

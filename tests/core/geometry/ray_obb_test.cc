@@ -29,7 +29,7 @@ struct Fraction {  // denominator > 0
   friend bool operator<(Fraction a, Fraction b) { return a.numerator * b.denominator < b.numerator * a.denominator; }
 };
 
-// The slab test in whole numbers, where nothing rounds.
+// Slab test in integer arithmetic, without rounding.
 bool exact_hit(const int64_t (&o)[3], const int64_t (&d)[3], const int64_t (&half)[3]) {
   Fraction near{-1000000, 1}, far{1000000, 1};
   for (int axis = 0; axis < 3; ++axis) {
@@ -61,7 +61,7 @@ TEST(RayObbTest, CornersAndEdgesAreTouchedFromAll26Directions) {
   }
 }
 
-TEST(RayObbTest, WholeNumberRaysAreJudgedAsInExactArithmetic) {
+TEST(RayObbTest, VerdictsOnIntegerRaysAreExact) {
   constexpr uint64_t kSeed = 11;
   test::Random random(kSeed);
   int hits = 0;
@@ -84,7 +84,7 @@ TEST(RayObbTest, WholeNumberRaysAreJudgedAsInExactArithmetic) {
   EXPECT_GT(hits, 5000);
 }
 
-TEST(RayObbTest, RayWithinTheFacePlaneTouchesAndBesideItDoesNot) {
+TEST(RayObbTest, ARayInAFacePlaneTouchesAndOneBesideItDoesNot) {
   const Shape box = box_of({0, 0, 0}, {1, 1, 1});
   const auto hit = ray_hit(test::ray_from({-4, 1, 0}, {1, 0, 0}), box);
   ASSERT_TRUE(hit.has_value());
@@ -94,7 +94,7 @@ TEST(RayObbTest, RayWithinTheFacePlaneTouchesAndBesideItDoesNot) {
   EXPECT_FALSE(ray_hit(test::ray_from({-4, std::nextafter(1.0, 2.0), 0}, {1, 0, 0}), box).has_value());
 }
 
-TEST(RayObbTest, ModesAnswerFromInside) {
+TEST(RayObbTest, EachInsideModeHasItsAnswerFromInside) {
   const Shape box = box_of({0, 0, 0}, {1, 2, 3});
   const Rayd ray = {{0, 1, 0}, {0, -2, 0}};
   const auto solid = ray_hit(ObjectRay(ray), box);
@@ -106,16 +106,16 @@ TEST(RayObbTest, ModesAnswerFromInside) {
   EXPECT_FALSE(ray_hit(ObjectRay(ray, Inside::kSkip), box).has_value());
 }
 
-TEST(RayObbTest, TurnedBoxIsHitOnItsTurnedFace) {
-  const float half_turn = std::sqrt(0.5f);  // a quarter turn around z
-  const Shape box = box_of({10, 0, 0}, {1, 2, 3}, {0, 0, half_turn, half_turn});
+TEST(RayObbTest, ARotatedBoxIsHitOnItsRotatedFace) {
+  const float sin_45 = std::sqrt(0.5f);  // a rotation of 90 degrees around z
+  const Shape box = box_of({10, 0, 0}, {1, 2, 3}, {0, 0, sin_45, sin_45});
   const auto hit = ray_hit(test::ray_from({0, 0, 0}, {1, 0, 0}), box);
   ASSERT_TRUE(hit.has_value());
   EXPECT_NEAR(hit->t, 8, 1e-14);
   EXPECT_NEAR(hit->normal.x, -1, 1e-15);
 }
 
-TEST(RayObbTest, FlatAndEmptyBoxesAreHit) {
+TEST(RayObbTest, FlatAndZeroSizeBoxesAreHit) {
   EXPECT_EQ(ray_hit(test::ray_from({0, 0, 0}, {1, 1, 0}), box_of({4, 4, 0}, {0, 1, 1}))->t, 4);
   const auto hit = ray_hit(test::ray_from({0, 0, 0}, {1, 2, 3}), box_of({2, 4, 6}, {0, 0, 0}));
   ASSERT_TRUE(hit.has_value());

@@ -1,4 +1,4 @@
-// The slab test: monotone in the box, and never past a point that the ray has in the box.
+// Slab test: it is monotone in the box, and its interval contains every point of the ray in the box.
 #include "core/geometry/ray.h"
 
 #include "gtest/gtest.h"
@@ -15,7 +15,7 @@ Vec3<S> cast(Vec3d v) {
   return {static_cast<S>(v.x), static_cast<S>(v.y), static_cast<S>(v.z)};
 }
 
-// Degenerate as often as not: flat boxes, directions along axes, origins on the planes of the box.
+// Random ray and box, often degenerate: flat boxes, directions along axes, origins on the planes of the box.
 template <class S>
 struct SlabCase {
   Ray<S> ray;
@@ -66,9 +66,9 @@ TYPED_TEST(SlabRayTest, ASupersetHasNoLargerNearAndNoSmallerFar) {
     const Interval<S> a = slabs.interval(c.box), b = slabs.interval(outer);
     ASSERT_LE(b.near, a.near) << "seed " << kSeed << " case " << i;
     ASSERT_GE(b.far, a.far) << "seed " << kSeed << " case " << i;
-    const Interval<S> whole_tree = slabs.interval(c.box, magnitude(outer));
-    ASSERT_LE(whole_tree.near, a.near) << "seed " << kSeed << " case " << i;
-    ASSERT_GE(whole_tree.far, a.far) << "seed " << kSeed << " case " << i;
+    const Interval<S> larger = slabs.interval(c.box, magnitude(outer));
+    ASSERT_LE(larger.near, a.near) << "seed " << kSeed << " case " << i;
+    ASSERT_GE(larger.far, a.far) << "seed " << kSeed << " case " << i;
   }
 }
 
@@ -78,11 +78,11 @@ TYPED_TEST(SlabRayTest, PointsOfTheRayInTheBoxLieInTheInterval) {
   Random random(kSeed);
   for (int i = 0; i < 200000; ++i) {
     SlabCase<S> c(random);
-    // The box is given a corner on the ray, as nearly as S can say; the pad must cover the rest.
+    // The box gets a corner on the ray up to the rounding of S; the pad must cover the rounding.
     const auto t =
         static_cast<test::Real>(random.between(0, 1)) * (magnitude(c.box) + max_component(abs(c.ray.origin)));
-    const test::Vec3r place = test::to_real(c.ray.origin) + test::to_real(c.ray.direction) * t;
-    const Vec3<S> corner = {static_cast<S>(place.x), static_cast<S>(place.y), static_cast<S>(place.z)};
+    const test::Vec3r point = test::to_real(c.ray.origin) + test::to_real(c.ray.direction) * t;
+    const Vec3<S> corner = {static_cast<S>(point.x), static_cast<S>(point.y), static_cast<S>(point.z)};
     const Aabb<S> box = random.chance(0.5) ? merge(c.box, corner) : Aabb<S>{corner, corner};
     const Interval<S> interval = SlabRay<S>(c.ray, pad<S>()).interval(box);
     ASSERT_LE(interval.near, static_cast<S>(t)) << "seed " << kSeed << " case " << i;
@@ -104,7 +104,7 @@ TYPED_TEST(SlabRayTest, BoxesClearlyBesideTheRayAreMissed) {
   EXPECT_LT(behind.far, 0);
 }
 
-TYPED_TEST(SlabRayTest, ZeroComponentsGiveNoNan) {
+TYPED_TEST(SlabRayTest, ZeroDirectionComponentsGiveNoNan) {
   using S = TypeParam;
   for (const S zero : {S{0}, -S{0}}) {
     const Ray<S> ray = {{1, 1, 1}, {zero, S{1}, zero}};

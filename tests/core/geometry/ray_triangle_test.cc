@@ -16,7 +16,7 @@ using test::Vec3r;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Where the ray meets the triangle's plane, and how far inside the edges that is: negative outside.
+// Intersection of the ray with the triangle's plane, and its distance to the nearest edge, negative outside.
 struct Reference {
   bool edge_on;
   Real t;
@@ -29,12 +29,12 @@ Reference reference(Vec3d origin, Vec3d direction, const Triangle& triangle) {
   const Real speed = dot(normal, to_real(direction));
   if (speed == 0) return {true, 0, 0};
   const Real t = dot(normal, vertices[0] - to_real(origin)) / speed;
-  const Vec3r place = to_real(origin) + to_real(direction) * t;
+  const Vec3r point = to_real(origin) + to_real(direction) * t;
   Real inset = std::numeric_limits<Real>::infinity();
   for (int i = 0; i < 3; ++i) {
     const Vec3r edge = vertices[(i + 1) % 3] - vertices[i];
     inset =
-        std::min(inset, dot(cross(normal, edge), place - vertices[i]) / (test::length(normal) * test::length(edge)));
+        std::min(inset, dot(cross(normal, edge), point - vertices[i]) / (test::length(normal) * test::length(edge)));
   }
   return {false, t, inset};
 }
@@ -43,8 +43,8 @@ Vec3d point_of(const Triangle& t, double u, double v) {
   return to_double(t.a) + (to_double(t.b) - to_double(t.a)) * u + (to_double(t.c) - to_double(t.a)) * v;
 }
 
-// Edge functions round, so that the depth of a plane that holds the origin exactly may come out as below zero.
-TEST(RayTriangleTest, ARayThatStartsOnAWallHitsItAtZeroWhateverItsDirection) {
+// Edge functions have rounding errors, so the computed depth of a plane that contains the origin may be negative.
+TEST(RayTriangleTest, ARayThatStartsOnAWallHitsItAtZeroInAnyDirection) {
   constexpr uint64_t kSeed = 57;
   Random random(kSeed);
   for (int i = 0; i < 100000; ++i) {
@@ -72,7 +72,7 @@ TEST(RayTriangleTest, ARayThatStartsVisiblyBehindATriangleMissesIt) {
   }
 }
 
-// The promise about misses, for one triangle: hit even when shrunk by e means a hit, no later than e allows.
+// No miss, for one triangle: a triangle that is hit even if shrunk by e is hit, at most e too late.
 TEST(RayTriangleTest, NoMissAndNoLateHitAtAnyAngleAndDistance) {
   constexpr uint64_t kSeed = 51;
   Random random(kSeed);
@@ -123,7 +123,7 @@ TEST(RayTriangleTest, WeightsReproduceThePoint) {
   }
 }
 
-// Signed volumes in whole numbers decide: nothing rounds.
+// Verdict by signed volumes in integer arithmetic, without rounding.
 enum class Exact { kMiss, kHit };
 
 int64_t volume(const int64_t (&p)[3], const int64_t (&q)[3], const int64_t (&d)[3]) {
@@ -138,11 +138,11 @@ Exact exact_verdict(const int64_t (&o)[3], const int64_t (&d)[3], const int64_t 
   const bool all_up = ab >= 0 && bc >= 0 && ca >= 0, all_down = ab <= 0 && bc <= 0 && ca <= 0;
   const int64_t sum = ab + bc + ca;
   if (!(all_up || all_down) || sum == 0) return Exact::kMiss;
-  const int64_t height = volume(p[0], p[1], p[2]);  // of the origin, in the sense of sum
+  const int64_t height = volume(p[0], p[1], p[2]);  // height of the origin over the triangle, times the sign of `sum`
   return (sum > 0 ? height : -height) >= 0 ? Exact::kHit : Exact::kMiss;
 }
 
-TEST(RayTriangleTest, WholeNumberRaysAreJudgedAsInExactArithmetic) {
+TEST(RayTriangleTest, VerdictsOnIntegerRaysAreExact) {
   constexpr uint64_t kSeed = 53;
   Random random(kSeed);
   int hits = 0, grazing = 0;
@@ -176,13 +176,13 @@ TEST(RayTriangleTest, EdgeOnAndZeroAreaTrianglesAreNeverHit) {
   constexpr uint64_t kSeed = 54;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
-    // Vertices on a line, placed so that no rounding betrays it: a, b and 2 b - a on a grid.
+    // Exactly collinear vertices, without rounding: a, b and 2 b - a on a grid.
     const Vec3d a = random.whole_vector(1000), b = random.whole_vector(1000);
     const Triangle needle{to_float(a), to_float(b), to_float(b * 2.0 - a), 0};
     const Vec3d origin = random.vector(3000);
     const Vec3d target = a + (b - a) * random.between(0, 2);
     ASSERT_FALSE(TriangleRay(origin, target - origin).hit(needle).has_value()) << "seed " << kSeed << " case " << i;
-    // A wall in an axis plane seen from within that plane.
+    // A wall perpendicular to an axis and a ray within its plane.
     Vec3d from = random.vector(10), to = random.vector(1) - from;
     Triangle wall{random.float_vector(1), random.float_vector(1), random.float_vector(1), 0};
     const int axis = static_cast<int>(random.below(3));
@@ -194,7 +194,7 @@ TEST(RayTriangleTest, EdgeOnAndZeroAreaTrianglesAreNeverHit) {
   }
 }
 
-TEST(RayTriangleTest, CullModesGoByTheUploadedWinding) {
+TEST(RayTriangleTest, CullModesFollowTheUploadedWinding) {
   const Triangle front{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0};  // counter-clockwise seen from +z
   const Vec3d above = {0.25, 0.25, 2}, below = {0.25, 0.25, -2};
   for (const auto& [origin, direction, is_front] :
@@ -230,7 +230,7 @@ TEST(RayTriangleTest, OriginOnTheTriangleHitsAtZeroAndBehindItMisses) {
   EXPECT_FALSE(TriangleRay({1, 1, 1e-6}, {0, 0, 1}).hit(triangle).has_value());
 }
 
-TEST(RayTriangleTest, VerdictAndPlaceDoNotDependOnTheLengthOfTheDirection) {
+TEST(RayTriangleTest, TheHitDoesNotDependOnTheLengthOfTheDirection) {
   constexpr uint64_t kSeed = 56;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
@@ -249,7 +249,7 @@ TEST(RayTriangleTest, VerdictAndPlaceDoNotDependOnTheLengthOfTheDirection) {
   }
 }
 
-TEST(RayTriangleTest, ToScaledNeverExcludesWhatFromScaledRoundsDown) {
+TEST(RayTriangleTest, ToScaledNeverExcludesAHitThatFromScaledRoundsDown) {
   constexpr uint64_t kSeed = 57;
   Random random(kSeed);
   for (int i = 0; i < 100000; ++i) {
@@ -276,7 +276,7 @@ TEST(RayTriangleTest, ScalingKeepsZeroInfinityAndTheLargestFloat) {
   }
 }
 
-TEST(RayTriangleTest, DistanceLiesWithinTheIntervalOfTheOwnBox) {
+TEST(RayTriangleTest, TheDistanceLiesWithinTheIntervalOfTheBounds) {
   constexpr uint64_t kSeed = 58;
   Random random(kSeed);
   for (int i = 0; i < 100000; ++i) {

@@ -23,7 +23,7 @@ TEST(RotationTest, AgreesWithTheQuaternionProduct) {
   }
 }
 
-TEST(RotationTest, ThereAndBackIsWhereItStarted) {
+TEST(RotationTest, ToLocalInvertsToWorld) {
   constexpr uint64_t kSeed = 92;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
@@ -51,7 +51,7 @@ TEST(RotationTest, QuarterTurnAroundZTakesXToY) {
   EXPECT_LT(distance(rotation_of({0, 0, s, s}).to_world({1, 0, 0}), {0, 1, 0}), 1e-15);
 }
 
-TEST(RotationTest, ComposeTurnsByTheFirstThenTheSecond) {
+TEST(RotationTest, ComposeRotatesByTheFirstThenTheSecond) {
   constexpr uint64_t kSeed = 93;
   Random random(kSeed);
   for (int i = 0; i < 10000; ++i) {
@@ -62,7 +62,7 @@ TEST(RotationTest, ComposeTurnsByTheFirstThenTheSecond) {
   }
 }
 
-TEST(RotationTest, ExtentsReachAsFarAsTheFarthestCorner) {
+TEST(RotationTest, ExtentsEqualTheFarthestCorner) {
   constexpr uint64_t kSeed = 94;
   Random random(kSeed);
   for (int i = 0; i < 10000; ++i) {
@@ -79,7 +79,7 @@ TEST(RotationTest, ExtentsReachAsFarAsTheFarthestCorner) {
   }
 }
 
-TEST(RotationTest, QuaternionsNearlyOfUnitLengthAreNormalised) {
+TEST(RotationTest, NormalizedHasUnitLength) {
   EXPECT_EQ(unit_deviation({0, 0, 0, 1}), 0);
   EXPECT_NEAR(unit_deviation({0, 0, 0, 1.001f}), 1e-3, 1e-7);
   EXPECT_NEAR(unit_deviation({0, 0, 0, 0}), 1, 0);
@@ -87,22 +87,22 @@ TEST(RotationTest, QuaternionsNearlyOfUnitLengthAreNormalised) {
   EXPECT_LT(unit_deviation(q), 1e-7);
 }
 
-TEST(RotationTest, BlendingGoesTheShorterWayAtUnitLength) {
+TEST(RotationTest, BlendedTakesTheShorterArcAtUnitLength) {
   constexpr uint64_t kSeed = 95;
   Random random(kSeed);
   for (int i = 0; i < 1000; ++i) {
     const Quaternion a = random.rotation(), b = random.rotation();
     const double weight = random.unit();
     const Quaternion between = blended(a, b, weight);
-    const Quaternion the_other_way_told = blended(a, {-b.x, -b.y, -b.z, -b.w}, weight);
+    const Quaternion with_opposite_sign = blended(a, {-b.x, -b.y, -b.z, -b.w}, weight);
     ASSERT_LT(unit_deviation(between), 1e-6) << "seed " << kSeed << " case " << i;
-    ASSERT_EQ(between, the_other_way_told) << "seed " << kSeed << " case " << i;
+    ASSERT_EQ(between, with_opposite_sign) << "seed " << kSeed << " case " << i;
   }
   const Quaternion half = blended({0, 0, 0, 1}, {0, 0, 1, 0}, 0.5);
   EXPECT_NEAR(half.z, half.w, 1e-7);
 }
 
-TEST(RotationTest, BlendingEqualsGivesThemBitForBit) {
+TEST(RotationTest, BlendingEqualQuaternionsKeepsTheirBits) {
   const Quaternion q{0.1f, 0.7f, 0.3f, 0.64031242f};
   EXPECT_EQ(blended(q, q, 0.3), q);
   EXPECT_EQ(blended(q, {0, 0, 0, 1}, 0), normalized(q));

@@ -35,7 +35,7 @@ TEST(SegmentTest, DistanceToABoxAgreesWithASearchAlongTheSegment) {
   }
 }
 
-TEST(SegmentTest, WhetherALatticeSegmentMeetsABoxIsExact) {
+TEST(SegmentTest, VerdictsOnLatticeSegmentsAndBoxesAreExact) {
   constexpr uint64_t kSeed = 132;
   Random random(kSeed);
   int touching = 0;
@@ -51,7 +51,7 @@ TEST(SegmentTest, WhetherALatticeSegmentMeetsABoxIsExact) {
   EXPECT_GT(touching, 1000);
 }
 
-TEST(SegmentTest, DistanceToTheSegmentIsExactForThreeFourFive) {
+TEST(SegmentTest, DistanceToTheSegmentIsExactForA345Triangle) {
   EXPECT_EQ(squared_distance_to_segment({3, 4, 7}, {0, 0, 9}), 25);
   EXPECT_EQ(squared_distance_to_segment({0, 3, 13}, {0, 0, 9}), 25);
   EXPECT_EQ(squared_distance_to_segment({3, 0, -13}, {0, 0, 9}), 25);
@@ -59,7 +59,7 @@ TEST(SegmentTest, DistanceToTheSegmentIsExactForThreeFourFive) {
   EXPECT_EQ(squared_distance_to_segment({2, 2, 2}, {7, 7, 7}), 0);
 }
 
-// The nearest place on the segment is k / n of it, which is no binary number: the distance must be exact all the same.
+// The nearest point is at k / n of the segment, which is no binary fraction; the distance must be exact nevertheless.
 TEST(SegmentTest, DistanceOfAnObliqueSegmentToAnEdgeIsExact) {
   for (int n = 3; n <= 49; n += 2) {
     for (int k = 1 - n; k < n; ++k) {

@@ -1,4 +1,4 @@
-// Rays against moving shapes: verdict, distance and normal against a reference that finds the chord by search.
+// Rays and shapes: compares verdict, distance and normal with a reference that finds the chord by search.
 #include <array>
 #include <iomanip>
 #include <sstream>
@@ -22,31 +22,31 @@ using test::Vec3r;
 constexpr std::array<ShapeKind, 3> kSolids = {ShapeKind::kBall, ShapeKind::kBox, ShapeKind::kCapsule};
 constexpr std::array<Inside, 3> kModes = {Inside::kSolid, Inside::kHollow, Inside::kSkip};
 
-// One ray and one shape with all that a verdict is judged by. Distances in the world's unit, not the direction's.
+// Ray, shape and the reference values of their verdict. Distances are in world units, not in units of the direction.
 struct RayCase {
   Shape shape;
   Rayd ray;
   Real tolerance;
   Vec3r offset, unit;
-  Real speed, reach;
-  Real inside_gauge;  // of the origin
+  Real speed, max_distance;
+  Real inside_gauge;  // signed distance of the origin, negative inside
 
   RayCase(const Shape& s, const Rayd& r) : shape(s), ray(r) {
     offset = to_real(r.origin) - to_real(s.position);
     speed = test::length(to_real(r.direction));
     unit = to_real(r.direction) * (1 / speed);
     const Real near = test::length(offset) + test::largest_size(s);
-    reach = 2 * near;
+    max_distance = 2 * near;
     tolerance = 1e-12L * near + 1e-15L * test::length(to_real(s.position));
     inside_gauge = SolidReference(s).gauge(offset);
   }
   std::optional<RealInterval> chord(Real grown) const {
-    return SolidReference(shape).chord(offset, unit, reach, grown);
+    return SolidReference(shape).chord(offset, unit, max_distance, grown);
   }
 };
 
-// The chord of the solid grown by the tolerance must contain the hit, that of the shrunk one must not begin (or, for
-// ways out, end) before it.
+// Expects that the chord of the solid grown by the tolerance contains the hit, and that the chord of the shrunk solid
+// does not begin (for exits: end) before the hit.
 void expect_entry(const RayCase& c, const std::optional<ShapeHit>& hit) {
   const std::optional<RealInterval> outer = c.chord(c.tolerance), inner = c.chord(-c.tolerance);
   if (!outer || outer->far < 0) {
@@ -58,9 +58,9 @@ void expect_entry(const RayCase& c, const std::optional<ShapeHit>& hit) {
   }
   if (!hit) return;
   const Real s = Real{hit->t} * c.speed;
-  const Real slack = 1e-15L * c.reach;
-  EXPECT_GE(s, outer->near - slack);
-  EXPECT_LE(s, (inner ? inner->near : outer->far) + slack);
+  const Real epsilon = 1e-15L * c.max_distance;
+  EXPECT_GE(s, outer->near - epsilon);
+  EXPECT_LE(s, (inner ? inner->near : outer->far) + epsilon);
 }
 
 void expect_exit(const RayCase& c, const std::optional<ShapeHit>& hit) {
@@ -68,23 +68,23 @@ void expect_exit(const RayCase& c, const std::optional<ShapeHit>& hit) {
   const std::optional<RealInterval> outer = c.chord(c.tolerance), inner = c.chord(-c.tolerance);
   ASSERT_TRUE(outer.has_value());
   const Real s = Real{hit->t} * c.speed;
-  const Real slack = 1e-15L * c.reach;
-  EXPECT_LE(s, outer->far + slack);
+  const Real epsilon = 1e-15L * c.max_distance;
+  EXPECT_LE(s, outer->far + epsilon);
   if (inner) {
-    EXPECT_GE(s, inner->far - slack);
+    EXPECT_GE(s, inner->far - epsilon);
   }
 }
 
-// A step along the normal leaves the solid as fast as any step can.
+// Expects that a step along the normal increases the distance from the solid by the length of the step.
 void expect_outward_normal(const RayCase& c, const ShapeHit& hit) {
   EXPECT_NEAR(static_cast<double>(test::length(to_real(hit.normal))), 1.0, 1e-12);
   const SolidReference solid(c.shape);
-  const Vec3r place = c.offset + c.unit * (Real{hit.t} * c.speed);
+  const Vec3r point = c.offset + c.unit * (Real{hit.t} * c.speed);
   const Real thickness = solid.core_radius() > 0 ? solid.core_radius() : Real(test::largest_size(c.shape));
   if (c.shape.kind == ShapeKind::kCapsule && c.shape.radius == 0) return;
   if (thickness < 1e4L * c.tolerance) return;
   const Real step = 0.01L * thickness;
-  const Real gain = solid.gauge(place + to_real(hit.normal) * step) - solid.gauge(place);
+  const Real gain = solid.gauge(point + to_real(hit.normal) * step) - solid.gauge(point);
   EXPECT_NEAR(static_cast<double>(gain / step), 1.0, 1e-6 + static_cast<double>(20 * c.tolerance / step));
 }
 
@@ -100,9 +100,9 @@ void expect_from_inside(const RayCase& c, Inside mode, const std::optional<Shape
   }
 }
 
-std::string described(const Shape& shape, const Rayd& ray, Inside mode, uint64_t seed, int number) {
+std::string described(const Shape& shape, const Rayd& ray, Inside mode, uint64_t seed, int index) {
   std::ostringstream text;
-  text << std::setprecision(17) << "seed " << seed << " case " << number << " kind " << static_cast<int>(shape.kind)
+  text << std::setprecision(17) << "seed " << seed << " case " << index << " kind " << static_cast<int>(shape.kind)
        << " mode " << static_cast<int>(mode) << " radius " << shape.radius;
   const auto add = [&text](const char* name, auto v) {
     text << ' ' << name << " (" << v.x << ' ' << v.y << ' ' << v.z << ')';
@@ -140,8 +140,8 @@ TEST_P(ShapeRayTest, RandomRaysAgreeWithTheReference) {
   EXPECT_GT(inside, 500);
 }
 
-// On the lattice no distance is within 1e-9 of touching unless it touches, so the grown reference is exact.
-TEST_P(ShapeRayTest, LatticeVerdictsAreExactlyRight) {
+// On the lattice a distance within 1e-9 of touching is exactly touching, so the grown reference is exact.
+TEST_P(ShapeRayTest, LatticeVerdictsAreExact) {
   constexpr uint64_t kSeed = 202;
   constexpr Real kGrown = 1e-9L;
   Random random(kSeed + static_cast<uint64_t>(GetParam()));
@@ -168,7 +168,7 @@ TEST_P(ShapeRayTest, LatticeVerdictsAreExactlyRight) {
   EXPECT_GT(touching, 200);
 }
 
-TEST_P(ShapeRayTest, NumbersDoNotDependOnThePowerOfTwoOfTheDirection) {
+TEST_P(ShapeRayTest, ScalingTheDirectionByAPowerOfTwoKeepsTheHit) {
   constexpr uint64_t kSeed = 303;
   Random random(kSeed);
   for (int i = 0; i < 10000; ++i) {
@@ -187,7 +187,7 @@ TEST_P(ShapeRayTest, NumbersDoNotDependOnThePowerOfTwoOfTheDirection) {
   }
 }
 
-TEST_P(ShapeRayTest, DistanceLiesWithinTheIntervalOfTheOwnBounds) {
+TEST_P(ShapeRayTest, TheDistanceLiesWithinTheIntervalOfTheBounds) {
   constexpr uint64_t kSeed = 404;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {

@@ -1,4 +1,4 @@
-// Bounds and overlaps of moving shapes against references by search and by clipping.
+// Bounds and overlaps of shapes, compared with references by search and by clipping.
 #include "core/geometry/shape.h"
 
 #include <array>
@@ -28,12 +28,13 @@ QueryBox query_box(Vec3d center, Vec3d half, const Quaternion& rotation) {
   return {{center, half, rotation_of(rotation)}, rotation};
 }
 
-// Rounding allowance of a verdict about things of `size` at distance `apart`, of which one is at `place`.
-Real allowance(Vec3d place, Vec3r apart, double size) {
-  return 1e-12L * (test::length(apart) + size) + 1e-15L * test::length(to_real(place));
+// Returns the rounding tolerance of a verdict on two solids of `size`, one at `position`, the other at `offset` from
+// it.
+Real allowance(Vec3d position, Vec3r offset, double size) {
+  return 1e-12L * (test::length(offset) + size) + 1e-15L * test::length(to_real(position));
 }
 
-// Whether the solid of `shape` and the box, grown by `grown`, share a point.
+// Returns whether the solid of `shape` and the box, grown by `grown`, share a point.
 bool reference_overlap(const QueryBox& query, const Shape& shape, Real grown) {
   const Vec3r offset = to_real(shape.position) - to_real(query.box.center);
   const test::RealBox box = test::real_box({}, query.rotation, to_real(query.box.half));
@@ -45,9 +46,9 @@ bool reference_overlap(const QueryBox& query, const Shape& shape, Real grown) {
     const Vec3r outside = abs(box.local(offset + half_axis * s)) - box.half;
     return test::length(max(outside, Vec3r{}));
   };
-  const Real least = std::min(distance(test::argmin(distance, -1, 1)), std::min(distance(-1), distance(1)));
+  const Real nearest = std::min(distance(test::argmin(distance, -1, 1)), std::min(distance(-1), distance(1)));
   const SolidReference solid(shape);
-  return least <= solid.core_radius() + grown;
+  return nearest <= solid.core_radius() + grown;
 }
 
 class ShapeOverlapTest : public testing::TestWithParam<ShapeKind> {};
@@ -76,7 +77,7 @@ TEST_P(ShapeOverlapTest, RandomBallsAgreeWithTheReference) {
   EXPECT_GT(found, 2000);
 }
 
-TEST_P(ShapeOverlapTest, LatticeBallsAreJudgedExactly) {
+TEST_P(ShapeOverlapTest, VerdictsOnLatticeBallsAreExact) {
   constexpr uint64_t kSeed = 32;
   constexpr Real kTouching = 1e-9L;
   Random random(kSeed + static_cast<uint64_t>(GetParam()));
@@ -115,7 +116,7 @@ TEST_P(ShapeOverlapTest, RandomBoxesAgreeWithTheReference) {
   EXPECT_GT(found, 500);
 }
 
-TEST_P(ShapeOverlapTest, LatticeBoxesAreJudgedExactly) {
+TEST_P(ShapeOverlapTest, VerdictsOnLatticeBoxesAreExact) {
   constexpr uint64_t kSeed = 34;
   Random random(kSeed + static_cast<uint64_t>(GetParam()));
   int touching = 0;
@@ -129,7 +130,7 @@ TEST_P(ShapeOverlapTest, LatticeBoxesAreJudgedExactly) {
   EXPECT_GT(touching, 100);
 }
 
-// What a structure culls by must never exclude what the predicates accept.
+// Bounds are used for culling and must never exclude a shape that the predicates accept.
 TEST_P(ShapeOverlapTest, BoundsContainTheSolid) {
   constexpr uint64_t kSeed = 35;
   Random random(kSeed);
@@ -150,20 +151,20 @@ TEST_P(ShapeOverlapTest, BoundsContainTheSolid) {
     if (shape.kind == ShapeKind::kCapsule)
       far = to_real(shape.size) * std::copysign(1.0L, dot(local, to_real(shape.size)));
     const Vec3r point = to_real(shape.position) + test::turned(shape.rotation, far) + unit * solid.core_radius();
-    // An unturned box has exact sums but for one rounding.
+    // The sums of an axis-aligned box are exact except for one rounding.
     const Real magnitude = test::length(to_real(shape.position)) + test::largest_size(shape);
-    const Real slack = shape.rotation.is_identity() ? 0x1p-52L * magnitude : 0;
+    const Real epsilon = shape.rotation.is_identity() ? 0x1p-52L * magnitude : 0;
     for (int axis = 0; axis < 3; ++axis) {
-      ASSERT_LE(bounds.min[axis] - slack, point[axis]) << "seed " << kSeed << " case " << i;
-      ASSERT_GE(bounds.max[axis] + slack, point[axis]) << "seed " << kSeed << " case " << i;
+      ASSERT_LE(bounds.min[axis] - epsilon, point[axis]) << "seed " << kSeed << " case " << i;
+      ASSERT_GE(bounds.max[axis] + epsilon, point[axis]) << "seed " << kSeed << " case " << i;
     }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryKind, ShapeOverlapTest, testing::ValuesIn(kKinds));
 
-// Most verdicts on balls are told by the distance alone; these lie where it might tell otherwise than the bounds.
-TEST(ShapeTest, TheShortWayToAVerdictOnBallsAndPointsIsTheLongOne) {
+// The fast path decides most balls by the distance alone; these cases are where distance and bounds could disagree.
+TEST(ShapeTest, TheFastPathOfBallsAndPointsEqualsTheFullTest) {
   Random random(11);
   int met = 0;
   for (int i = 0; i < 200'000; ++i) {
@@ -172,20 +173,20 @@ TEST(ShapeTest, TheShortWayToAVerdictOnBallsAndPointsIsTheLongOne) {
     shape.position = random.vector(random.magnitude(-20, 30));
     shape.radius = static_cast<float>(random.magnitude(-40, 20));
     const double radius = random.magnitude(-40, 20);
-    const double reach = radius + (shape.kind == ShapeKind::kBall ? double{shape.radius} : 0);
+    const double radius_sum = radius + (shape.kind == ShapeKind::kBall ? double{shape.radius} : 0);
     const double near = 1 + random.between(-1, 1) * random.magnitude(-54, -30);
     const Vec3d toward = random.chance(0.5) ? random.unit_vector() : Vec3d{random.chance(0.5) ? 1.0 : -1.0, 0, 0};
-    const Balld ball = {shape.position + toward * (reach * near), radius};
-    const bool long_way =
-        reaches(ball, bounds_of(shape)) && squared_length(ball.center - shape.position) <= reach * reach;
-    ASSERT_EQ(ball_overlaps(ball, shape), long_way) << "case " << i;
-    met += long_way ? 1 : 0;
+    const Balld ball = {shape.position + toward * (radius_sum * near), radius};
+    const bool full_test =
+        reaches(ball, bounds_of(shape)) && squared_length(ball.center - shape.position) <= radius_sum * radius_sum;
+    ASSERT_EQ(ball_overlaps(ball, shape), full_test) << "case " << i;
+    met += full_test ? 1 : 0;
   }
   EXPECT_GT(met, 50'000);
   EXPECT_LT(met, 150'000);
 }
 
-TEST(ShapeTest, ThreeFourFiveTouchesAndTheNextRadiusBelowDoesNot) {
+TEST(ShapeTest, A345TriangleTouchesAndTheNextSmallerRadiusDoesNot) {
   const Shape box{ShapeKind::kBox, {0, 0, 0}, {}, {1, 1, 1}, 0};
   const Vec3d beside_edge = {4, 5, 0};  // the edge x = 1, y = 1 is 3 and 4 away
   EXPECT_TRUE(ball_overlaps({beside_edge, 5}, box));
@@ -195,7 +196,7 @@ TEST(ShapeTest, ThreeFourFiveTouchesAndTheNextRadiusBelowDoesNot) {
   EXPECT_FALSE(box_overlaps({{0, 0, 0}, {1, 0.999999999999, 1}, {}}, ball));
 }
 
-TEST(ShapeTest, TouchingIsExactFarFromTheOriginToo) {
+TEST(ShapeTest, TouchingIsExactFarFromTheOrigin) {
   const Shape box{ShapeKind::kBox, {1e9, -1e9, 5e8}, {}, {1, 1, 1}, 0};
   EXPECT_TRUE(ball_overlaps({{1e9 + 4, -1e9 + 5, 5e8}, 5}, box));
   EXPECT_FALSE(ball_overlaps({{1e9 + 4, -1e9 + 5, 5e8}, 4.9999999}, box));
@@ -203,7 +204,7 @@ TEST(ShapeTest, TouchingIsExactFarFromTheOriginToo) {
   EXPECT_FALSE(box_overlaps({{1e9 + 3, -1e9, 5e8}, {1.9999998, 1, 1}, {}}, box));
 }
 
-TEST(ShapeTest, PointsHaveNoSizeWhateverTheirFieldsSay) {
+TEST(ShapeTest, PointsIgnoreTheirSizeAndRadius) {
   const Shape point{ShapeKind::kPoint, {1, 0, 0}, {}, {9, 9, 9}, 9};
   EXPECT_EQ(bounds_of(point), (Aabbd{{1, 0, 0}, {1, 0, 0}}));
   EXPECT_TRUE(ball_overlaps({{0, 0, 0}, 1}, point));
@@ -212,7 +213,7 @@ TEST(ShapeTest, PointsHaveNoSizeWhateverTheirFieldsSay) {
   EXPECT_FALSE(box_overlaps({{0, 0, 0}, {0.999, 1, 1}, {}}, point));
 }
 
-TEST(ShapeTest, BoundsOfUnturnedBoxesAndPointsAreExact) {
+TEST(ShapeTest, BoundsOfAxisAlignedBoxesAndPointsAreExact) {
   const Shape box{ShapeKind::kBox, {10, 20, 30}, {}, {1, 2, 3}, 0};
   EXPECT_EQ(bounds_of(box), (Aabbd{{9, 18, 27}, {11, 22, 33}}));
 }

@@ -16,7 +16,7 @@ Transform random_transform(Random& random) {
   return make_transform(translation, rotation, static_cast<float>(random.magnitude(-10, 10)));
 }
 
-TEST(TransformTest, PointsComeBackToWhereTheyWere) {
+TEST(TransformTest, PointToMeshInvertsPointToWorld) {
   constexpr uint64_t kSeed = 101;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
@@ -29,8 +29,8 @@ TEST(TransformTest, PointsComeBackToWhereTheyWere) {
   }
 }
 
-TEST(TransformTest, WorldIsTranslationPlusScaleTimesTurned) {
-  const float s = std::sqrt(0.5f);  // a quarter turn around z
+TEST(TransformTest, WorldIsTranslationPlusScaleTimesRotatedMesh) {
+  const float s = std::sqrt(0.5f);  // a rotation of 90 degrees around z
   const Transform transform = make_transform({10, 20, 30}, {0, 0, s, s}, 2);
   EXPECT_LT(max_component(abs(transform.point_to_world({1, 2, 3}) - Vec3d{6, 22, 36})), 1e-14);
   EXPECT_LT(max_component(abs(transform.direction_to_mesh({0, 2, 0}) - Vec3d{1, 0, 0})), 1e-15);
@@ -51,7 +51,7 @@ TEST(TransformTest, DistanceAlongARayIsTheSameInBothAxes) {
   }
 }
 
-TEST(TransformTest, UnturnedUnscaledInstancesAreOnlyMoved) {
+TEST(TransformTest, InstancesWithoutRotationAndScaleAreOnlyTranslated) {
   const Transform transform = make_transform({1, 2, 3}, {}, 1);
   EXPECT_EQ(transform.point_to_mesh({1.5, 2.5, 3.5}), (Vec3d{0.5, 0.5, 0.5}));
   EXPECT_EQ(transform.direction_to_mesh({0.1, 0.2, 0.3}), (Vec3d{0.1, 0.2, 0.3}));

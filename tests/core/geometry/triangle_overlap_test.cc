@@ -14,7 +14,7 @@ using test::reference_distance;
 using test::size_of;
 using test::to_real;
 
-// A polygon clipped in long double, the box grown or shrunk by a margin.
+// Returns the verdict by polygon clipping in long double, with the box grown by `grown`, or shrunk if it is negative.
 bool reference_overlap(const Obbf& box, const Quaternion& rotation, const Triangle& t, Real grown) {
   const test::RealBox real = test::real_box(to_real(box.center), rotation, to_real(box.half));
   return test::clipped_polygon_remains({real.local(to_real(t.a)), real.local(to_real(t.b)), real.local(to_real(t.c))},
@@ -46,12 +46,12 @@ TEST(TriangleOverlapTest, RandomBoxesAgreeWithClipping) {
   EXPECT_GT(found, 5000);
 }
 
-Triangle lattice_triangle(Random& random, int reach) {
-  return {to_float(random.whole_vector(reach)), to_float(random.whole_vector(reach)),
-          to_float(random.whole_vector(reach)), 0};
+Triangle lattice_triangle(Random& random, int extent) {
+  return {to_float(random.whole_vector(extent)), to_float(random.whole_vector(extent)),
+          to_float(random.whole_vector(extent)), 0};
 }
 
-TEST(TriangleOverlapTest, LatticeBoxesAreJudgedExactly) {
+TEST(TriangleOverlapTest, VerdictsOnLatticeBoxesAreExact) {
   constexpr uint64_t kSeed = 43;
   Random random(kSeed);
   int touching = 0;
@@ -65,7 +65,7 @@ TEST(TriangleOverlapTest, LatticeBoxesAreJudgedExactly) {
   EXPECT_GT(touching, 1000);
 }
 
-TEST(TriangleOverlapTest, LatticeBallsAreJudgedExactly) {
+TEST(TriangleOverlapTest, VerdictsOnLatticeBallsAreExact) {
   constexpr uint64_t kSeed = 44;
   Random random(kSeed);
   int touching = 0;
@@ -79,7 +79,7 @@ TEST(TriangleOverlapTest, LatticeBallsAreJudgedExactly) {
   EXPECT_GT(touching, 50);
 }
 
-TEST(TriangleOverlapTest, ThreeFourFiveTouchesEdgeFaceAndVertex) {
+TEST(TriangleOverlapTest, A345TriangleTouchesEdgeFaceAndVertex) {
   const Triangle t{{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, 0};
   EXPECT_TRUE(ball_overlaps({{4, -3, 4}, 5}, t));
   EXPECT_FALSE(ball_overlaps({{4, -3, 4}, std::nextafter(5.0f, 0.0f)}, t));
@@ -89,12 +89,12 @@ TEST(TriangleOverlapTest, ThreeFourFiveTouchesEdgeFaceAndVertex) {
   EXPECT_FALSE(ball_overlaps({{-4, -3, 0}, std::nextafter(5.0f, 0.0f)}, t));
 }
 
-TEST(TriangleOverlapTest, BallInsideAClosedSurfaceThatReachesNothingFindsNothing) {
+TEST(TriangleOverlapTest, ABallThatDoesNotReachATriangleDoesNotOverlapIt) {
   const Triangle floor{{-10, -10, -2}, {10, -10, -2}, {0, 10, -2}, 0};
   EXPECT_FALSE(ball_overlaps({{0, 0, 0}, 1}, floor));
 }
 
-TEST(TriangleOverlapTest, ZeroRadiusAndZeroExtentTouchWhatContainsThem) {
+TEST(TriangleOverlapTest, BallsAndBoxesOfZeroSizeOverlapATriangleThatContainsThem) {
   const Triangle t{{0, 0, 0}, {8, 0, 4}, {0, 8, 4}, 0};
   EXPECT_TRUE(ball_overlaps({{2, 2, 2}, 0}, t));
   EXPECT_FALSE(ball_overlaps({{2, 2, 2.0000002f}, 0}, t));
@@ -114,7 +114,7 @@ TEST(TriangleOverlapTest, TrianglesWithoutAreaCountAsSegmentsAndPoints) {
   EXPECT_TRUE(ball_overlaps({{1, 1, -1}, 2}, point));
 }
 
-// Region tests on dot products lose needles to cancellation; distances to the three edges do not.
+// Region tests by dot products lose needles by cancellation; distances to the three edges do not.
 TEST(TriangleOverlapTest, NeedlesAreNotDropped) {
   const Triangle needle{{1000, 0, 0}, {1100, 0, 0}, {1050, 1e-5f, 0}, 0};
   EXPECT_TRUE(ball_overlaps({{1025, 0, 0.5f}, 0.5f}, needle));

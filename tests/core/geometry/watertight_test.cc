@@ -52,7 +52,7 @@ Sphere subdivided(const Sphere& coarse) {
   return fine;
 }
 
-// A closed float mesh with, for every edge, the triangles around its two ends.
+// Closed float mesh that knows the triangles around each vertex.
 class DentedSphere {
  public:
   DentedSphere(double size, Vec3d offset, uint64_t seed) {
@@ -75,7 +75,7 @@ class DentedSphere {
   const std::vector<Vec3f>& vertices() const { return vertices_; }
   const std::vector<Edge>& edges() const { return edges_; }
 
-  // The triangles around `edge` are tried first; a ray that misses those is given all.
+  // Returns whether the ray hits any triangle; tests those around both ends of `edge` first.
   bool is_hit(const TriangleRay& ray, const Edge& edge) const {
     for (const uint32_t end : {edge.first, edge.second})
       for (const uint32_t number : around_[end])
@@ -92,7 +92,7 @@ class DentedSphere {
   std::vector<Edge> edges_;
 };
 
-// Aims at a place of each edge, middle or random, and at each vertex. Returns the number of rays that leak.
+// Aims rays at the first vertex, the middle and a random point of each edge. Returns the count of rays that leak.
 template <class ToMesh>
 int leaks(const DentedSphere& sphere, const ToMesh& ray_in_mesh, uint64_t seed) {
   test::Random random(seed);
@@ -127,7 +127,7 @@ TEST(WatertightTest, FloatDirectionsFromTheExactCentreDoNotLeak) {
   EXPECT_EQ(leaks(sphere, ray, kSeed), 0);
 }
 
-TEST(WatertightTest, PlacedMeshesFarFromTheOriginDoNotLeak) {
+TEST(WatertightTest, InstancesFarFromTheOriginDoNotLeak) {
   constexpr uint64_t kSeed = 63;
   const DentedSphere sphere(1, {0, 0, 0}, kSeed);
   test::Random placing(kSeed);
@@ -142,8 +142,8 @@ TEST(WatertightTest, PlacedMeshesFarFromTheOriginDoNotLeak) {
   }
 }
 
-// The mesh collapses to the few floats there are at this place; it stays closed and its inside stays inside.
-TEST(WatertightTest, MeshesCrushedByFloatSpacingDoNotLeak) {
+// The vertices collapse to the few floats available at this position; the mesh stays closed.
+TEST(WatertightTest, MeshesDegradedByFloatSpacingDoNotLeak) {
   constexpr uint64_t kSeed = 64;
   const Vec3d center = {1e6, 1e6, -1e6};
   const DentedSphere sphere(1, center, kSeed);

@@ -7,7 +7,7 @@
 namespace locus::test {
 namespace {
 
-TEST(PackedNumbersTest, NumbersComeBackAsTheyWereSet) {
+TEST(PackedNumbersTest, ElementsKeepTheirValues) {
   for (const uint32_t largest : {1u, 255u, 256u, 65'535u, 65'536u, (1u << 24) - 1, 1u << 24, 0xFFFFFFFFu}) {
     PackedNumbers numbers(3, largest);
     numbers.set(2, largest);
@@ -18,14 +18,14 @@ TEST(PackedNumbersTest, NumbersComeBackAsTheyWereSet) {
   }
 }
 
-TEST(PackedNumbersTest, EachTakesTheBytesOfTheLargest) {
+TEST(PackedNumbersTest, EachElementTakesTheBytesOfTheLargest) {
   EXPECT_EQ(PackedNumbers(100, 255).bytes(), 100u);
   EXPECT_EQ(PackedNumbers(100, 256).bytes(), 200u);
   EXPECT_EQ(PackedNumbers(100, 1u << 16).bytes(), 300u);
   EXPECT_EQ(PackedNumbers(100, 1u << 24).bytes(), 400u);
 }
 
-TEST(PackedNumbersTest, ZerosAloneTakeNothing) {
+TEST(PackedNumbersTest, AnArrayOfZerosTakesNoMemory) {
   const PackedNumbers zeros(100, 0);
   EXPECT_EQ(zeros[99], 0u);
   EXPECT_EQ(zeros.bytes(), 0u);

@@ -31,7 +31,7 @@ absl::StatusOr<TriangleMesh> with_coordinate(size_t position, float value) {
   return TriangleMesh::create(vertices, kTwoTriangles, {});
 }
 
-TEST(TriangleMeshTest, NumbersTrianglesByTheirPlaceInTheIndexList) {
+TEST(TriangleMeshTest, TrianglesAreNumberedByTheirPositionInTheIndexList) {
   const auto mesh = TriangleMesh::create(kSquare, kTwoTriangles, {});
   ASSERT_TRUE(mesh.ok());
   EXPECT_EQ(mesh->triangle_count(), 2u);
@@ -50,7 +50,7 @@ TEST(TriangleMeshTest, KeepsTheUploadedColumns) {
   EXPECT_EQ(mesh->parts()[1].first_triangle, 1u);
 }
 
-TEST(TriangleMeshTest, BoundsHoldTrianglesAndNotUnusedVertices) {
+TEST(TriangleMeshTest, BoundsContainTrianglesButNotUnusedVertices) {
   std::vector<float> vertices = kSquare;
   vertices.insert(vertices.end(), {100, -100, 100});
   const auto mesh = TriangleMesh::create(vertices, kTwoTriangles, {});
@@ -73,7 +73,7 @@ TEST(TriangleMeshTest, AnUnusedVertexIsCheckedToo) {
   expect_refused(TriangleMesh::create(vertices, kTwoTriangles, {}), Reason::kNotFinite, "vertices", 4);
 }
 
-TEST(TriangleMeshTest, TheEdgeOfTheWorldIsInsideAndTheNextFloatIsNot) {
+TEST(TriangleMeshTest, TheLargestCoordinateIsAcceptedAndTheNextFloatIsNot) {
   EXPECT_TRUE(with_coordinate(3, 1e9f).ok());
   EXPECT_TRUE(with_coordinate(3, -1e9f).ok());
   expect_refused(with_coordinate(3, std::nextafter(1e9f, kInfinity)), Reason::kOutOfRange, "vertices", 1);
@@ -90,7 +90,7 @@ TEST(TriangleMeshTest, AMeshWithoutTrianglesIsRefused) {
   expect_refused(TriangleMesh::create({}, {0, 1, 2}, {}), Reason::kMalformed, "vertices", {});
 }
 
-TEST(TriangleMeshTest, PartsOfVerticesOrTrianglesAreRefused) {
+TEST(TriangleMeshTest, IncompleteVerticesAndTrianglesAreRefused) {
   expect_refused(TriangleMesh::create({0, 0, 0, 1}, {0, 0, 0}, {}), Reason::kColumnLength, "vertices", {});
   expect_refused(TriangleMesh::create(kSquare, {0, 1, 2, 3}, {}), Reason::kColumnLength, "indices", {});
 }
@@ -103,18 +103,18 @@ TEST(TriangleMeshTest, PartsAscend) {
   expect_refused(TriangleMesh::create(kSquare, kTwoTriangles, {{"a", 0}, {"b", 0}}), Reason::kMalformed, "parts", 1);
 }
 
-TEST(TriangleMeshTest, PartsLieWithinTheMesh) {
+TEST(TriangleMeshTest, PartsBeginWithinTheMesh) {
   expect_refused(TriangleMesh::create(kSquare, kTwoTriangles, {{"a", 0}, {"b", 2}}), Reason::kMalformed, "parts", 1);
 }
 
-TEST(TriangleMeshTest, TooLongANameOfAPartNamesTheLimit) {
+TEST(TriangleMeshTest, TooLongAPartNameIsRefusedWithTheLimit) {
   const std::string name(limits::kMaxLabelLength + 1, 'x');
   const auto mesh = TriangleMesh::create(kSquare, kTwoTriangles, {{"a", 0}, {name, 1}});
   expect_refused(mesh, Reason::kLimit, "parts[1].name", {});
   EXPECT_EQ(refusal_of(mesh.status())->limit, "label_length");
 }
 
-TEST(TriangleMeshTest, TooManyPartsNameTheLimit) {
+TEST(TriangleMeshTest, TooManyPartsAreRefusedWithTheLimit) {
   const std::vector<MeshPart> parts(limits::kMaxMeshParts + 1);
   const auto mesh = TriangleMesh::create(kSquare, kTwoTriangles, parts);
   expect_refused(mesh, Reason::kLimit, "parts", {});
