@@ -47,7 +47,8 @@ template <class Columns, class RegionOf>
 void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {
   if (block_.source == Source::kStatic || !RegionWalk::pays(task_.snapshot().objects.grid())) return;
   const OverlapOptions options = overlap_options(block_, columns.detail);
-  task_.walk_regions(begin, end, [&region_of, options](size_t i) { return region_of(i, options); });
+  // A copy: the walk calls it while later queries run, when the caller's function object is gone.
+  task_.walk_regions(begin, end, [region_of, options](size_t i) { return region_of(i, options); });
 }
 
 template <class Columns>

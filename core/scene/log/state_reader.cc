@@ -7,8 +7,8 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
-#include "core/base/status_macros.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 #include "core/scene/log/state_limits.h"
 
 namespace locus {
