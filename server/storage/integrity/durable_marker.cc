@@ -15,7 +15,6 @@ namespace {
 constexpr absl::string_view kMagic = "locusHW1";
 constexpr size_t kFirstSlotBytes = 4096;
 constexpr size_t kMaxFileBytes = size_t{64} << 20;
-constexpr size_t kFrameBytes = 8 + 4 + 8;  // magic, length, checksum
 
 std::string framed(const std::string& bytes) {
   ByteWriter out;

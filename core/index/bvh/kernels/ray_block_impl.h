@@ -188,7 +188,6 @@ static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, cons
 // Decides one triangle in double. It computes TriangleRay::edge_test() without its scaling by powers of two, which
 // changes no bit within the range of directions and distances accepted by the kernels.
 static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray, PreparedRay prepared) {
-  typedef int64_t Lanes __attribute__((vector_size(32)));
   const uint32_t axis_x = prepared.integer(kAxisX), axis_y = prepared.integer(kAxisY),
                  axis_z = prepared.integer(kAxisZ);
   const double along = ray.direction[axis_z];
@@ -197,9 +196,8 @@ static inline Verdict decide(const TriangleBlock& block, int lane, const KernelR
       (coordinates(block, axis_x, lane) - splat(ray.origin[axis_x])) * splat(along) - z * splat(ray.direction[axis_x]);
   const Doubles y =
       (coordinates(block, axis_y, lane) - splat(ray.origin[axis_y])) * splat(along) - z * splat(ray.direction[axis_y]);
-  const Lanes before = {2, 0, 1, 3}, after = {1, 2, 0, 3};
-  const Doubles weights = __builtin_shuffle(x, before) * __builtin_shuffle(y, after) -
-                          __builtin_shuffle(y, before) * __builtin_shuffle(x, after);
+  const Doubles weights = __builtin_shufflevector(x, x, 2, 0, 1, 3) * __builtin_shufflevector(y, y, 1, 2, 0, 3) -
+                          __builtin_shufflevector(y, y, 2, 0, 1, 3) * __builtin_shufflevector(x, x, 1, 2, 0, 3);
   const double a = weights[0], b = weights[1], c = weights[2];
   const double determinant = a + b + c, size = __builtin_fabs(determinant);
   if (may_be_edge_on(block, prepared, x, y, z, along, size))
