@@ -1,4 +1,5 @@
 """Small trees that break one rule each, and one that keeps them all. None stands for a file taken away."""
+import language_rules
 
 HEADER = """// Three numbers: a position or a direction in world units, for all rooms. Plain data, so threads share it freely.
 #ifndef {guard}
@@ -58,6 +59,7 @@ GOOD_EXAMPLE = {
             '        """Makes it larger."""\n\n    def _grown(self) -> int:\n        return 1\n',
     "tests/client/python/locus/thing_test.py": '"""Tests of things."""\n',
     **{room + "/README.md": README for room in ("proto", "server", "client", "core", "deploy", "tests")},
+    **{path: "content\n" for path in language_rules.PAGES},
     **{path: "content\n" for path in ("README.md", "CMakeLists.txt", "LICENSE", "CMakePresets.json", ".ci/run",
                                       ".clang-format", ".clang-tidy", ".gitignore")},
 }
@@ -138,6 +140,12 @@ BAD_EXAMPLES = {
                          source('const char* path = "/ro' + 'ot/x";\n'), {"tests/run.sh": "/ho" + "me/me/x\n"}],
     "TestsMirrorTheSources": [{"tests/core/geometry/gone_test.cc": "namespace locus {}\n"},
                               {"tests/core/vec3_test.cc": "namespace locus {}\n"}],
+    "CommentsBeginWithAVerbOrANoun": [source("// Of the last batch.\nint refused();"), source("  // Whether it is there.\nbool a;"),
+                                      source("// The same, once more.\nint b;"), source("int c;\n// Where it stands.\nint d;")],
+    "LimitsAreNamedMaxAndMin": [source("constexpr int kMo" + "st = 3;"), source("constexpr int kLe" + "astRows = 3;")],
+    "WordsArePlain": [source("// Wakes who" + "ever waits.\nvoid wake();"), {"core/README.md": "Rules of the ho" + "use.\n"}],
+    "HardRoomsHavePages": [{"core/GLOSSARY.md": None}, {"server/ARCHITECTURE.md": "x\n" * 61}, {"deploy/NOTES.md": "x\n" * 61}],
+    "LinksLeadSomewhere": [{"core/README.md": "See [this](gone.md).\n"}, {"README.md": "[core](core/gone/README.md)\n"}],
     "RoomsUseTheirNamespace": [
         {"server/config/flags.cc": "namespace locus {\n}\n"}, {"core/base/ids.cc": "namespace locus::server {\n}\n"},
         {"core/base/ids.cc": "int global;\n"}, {"client/lib/a.cc": "namespace locus::cli {\n}\n"},

@@ -14,6 +14,7 @@ import sys
 sys.dont_write_bytecode = True
 
 import include_rules
+import language_rules
 import python_rules
 import shape_rules
 import tool_rules
@@ -22,7 +23,7 @@ from examples import (BAD_EXAMPLES, BAD_KERNELS, BAD_SOURCE, BAD_SYMBOLS, GOOD_E
 from source_tree import Tree, read_tree
 
 SKIPPED = 77
-TREE_RULES = {**include_rules.RULES, **shape_rules.RULES, **python_rules.RULES}
+TREE_RULES = {**include_rules.RULES, **shape_rules.RULES, **language_rules.RULES, **python_rules.RULES}
 
 
 def failures_of_the_rule_itself(name, rule):
