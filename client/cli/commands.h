@@ -26,7 +26,6 @@ void add_restore_command(CLI::App& parent, Context& context);
 void add_demo_command(CLI::App& parent, Context& context);
 void add_run_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);
-void add_config_command(CLI::App& parent, Context& context);
 void add_top_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
 void add_health_command(CLI::App& parent, Context& context);

@@ -28,7 +28,6 @@ constexpr char kExamples[] = R"(Examples:
   locus backup arena-backup
   locus -a unix:/run/locus.sock health
   locus top
-  locus config show --origin
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
 LOCUS_SCENE names the scene of commands that are given none.
@@ -139,7 +138,6 @@ void build_cli(CLI::App& app, Context& context) {
   add_demo_command(app, context);
   add_top_command(app, context);
   add_limits_command(app, context);
-  add_config_command(app, context);
   add_health_command(app, context);
   add_version_command(app, context);
   add_completion_command(app, context);

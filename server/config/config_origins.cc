@@ -3,10 +3,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "core/base/check.h"
@@ -51,6 +53,8 @@ Given read_flags(const std::vector<std::string>& arguments, const Environment& e
   build_parser(app, ignored);
   app.set_config();  // do not read the file
   app.add_option("--config", given.file);
+  std::optional<Maintenance> ignored_command;
+  add_maintenance(app, ignored_command);
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   app.parse(std::move(reversed));
   for (const CLI::Option* option : static_cast<const CLI::App&>(app).get_options()) {
@@ -97,12 +101,10 @@ const char* origin_name(Origin origin) {
   return "";
 }
 
-absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::string>& arguments,
-                                                        const Environment& environment) {
-  const Invocation invocation = read_invocation(arguments, environment);
-  if (!invocation.config) return absl::InvalidArgumentError(absl::StripTrailingAsciiWhitespace(invocation.text));
+std::vector<ConfigValue> config_values(const std::vector<std::string>& arguments, const Environment& environment,
+                                       const ServerConfig& config) {
   const Given given = read_flags(arguments, environment);
-  ServerConfig used = *invocation.config;
+  ServerConfig used = config;
   CLI::App app;
   build_parser(app, used);
   std::vector<ConfigValue> values;
@@ -115,6 +117,36 @@ absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::s
     values.push_back(std::move(value));
   }
   return values;
+}
+
+absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::string>& arguments,
+                                                        const Environment& environment) {
+  const Invocation invocation = read_invocation(arguments, environment);
+  if (!invocation.config) return absl::InvalidArgumentError(absl::StripTrailingAsciiWhitespace(invocation.text));
+  return config_values(arguments, environment, *invocation.config);
+}
+
+std::string print_config(const std::vector<ConfigValue>& values, bool json) {
+  if (json) {
+    nlohmann::ordered_json options = nlohmann::ordered_json::array();
+    for (const ConfigValue& value : values)
+      options.push_back({{"option", value.name},
+                         {"value", value.value},
+                         {"origin", origin_name(value.origin)},
+                         {"place", value.place}});
+    return nlohmann::ordered_json{{"options", std::move(options)}}.dump() + "\n";
+  }
+  size_t name_width = 0, value_width = 0;
+  for (const ConfigValue& value : values) {
+    name_width = std::max(name_width, value.name.size());
+    value_width = std::max(value_width, value.value.size());
+  }
+  const int names = static_cast<int>(name_width), in_use = static_cast<int>(value_width);
+  std::string text = absl::StrFormat("%-*s  %-*s  %-11s  %s\n", names, "option", in_use, "value", "origin", "place");
+  for (const ConfigValue& value : values)
+    absl::StrAppendFormat(&text, "%-*s  %-*s  %-11s  %s\n", names, value.name, in_use, value.value,
+                          origin_name(value.origin), value.place.empty() ? "-" : value.place);
+  return text;
 }
 
 }  // namespace locus::server

@@ -27,6 +27,14 @@ struct ConfigValue {
 absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::string>& arguments,
                                                         const Environment& environment);
 
+// Returns the same for options that have been read and checked: `config` is what `arguments` and `environment` result
+// in. A command among the arguments is ignored.
+std::vector<ConfigValue> config_values(const std::vector<std::string>& arguments, const Environment& environment,
+                                       const ServerConfig& config);
+
+// Returns a table with one option a line or, as JSON, one object {"options": [{"option", "value", "origin", "place"}]}.
+std::string print_config(const std::vector<ConfigValue>& values, bool json);
+
 }  // namespace locus::server
 
 #endif  // LOCUS_SERVER_CONFIG_CONFIG_ORIGINS_H_

@@ -13,6 +13,7 @@
 #include "absl/strings/str_replace.h"
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
+#include "server/config/config_origins.h"
 #include "server/config/listen_address.h"
 #include "server/config/machine.h"
 #include "server/config/observability_limits.h"
@@ -38,11 +39,12 @@ Examples:
   locusd --listen 127.0.0.1:0 --port-file p   take a free port and write it to the file p
   locusd --data-dir /var/lib/locus            keep scenes, and every acknowledged update
   locusd check /var/lib/locus                 say whether what is kept there is sound
+  locusd config --config /etc/locus/locusd.conf   print the options in use, and their origin
   locusd --config /etc/locus/locusd.conf --log-format json
 
 Try it: locus health; locus limits; locus scene create demo; locus top
 /metrics, /healthz and /readyz are served on 127.0.0.1:7576. What it would run with
-and why: locus config show --origin
+and why: locusd config
 It ends on SIGTERM or SIGINT once calls in work are done, with exit code 0; a
 second signal ends it at once.)";
 
@@ -234,13 +236,19 @@ Invocation parse_all(const std::vector<std::string>& arguments, const Environmen
   build_parser(app, config);
   add_maintenance(app, invocation.maintenance);
   parse(app, with_environment(arguments, environment));
-  if (invocation.maintenance) {
+  const bool show_config = invocation.maintenance && invocation.maintenance->task == Maintenance::Task::kShowConfig;
+  if (invocation.maintenance && !show_config) {
     std::string& directory = invocation.maintenance->directory;
     if (directory.empty()) directory = config.data_dir;
     return directory.empty() ? mistake("which directory? Name it after the command, or with --data-dir") : invocation;
   }
   if (const absl::Status status = check_config(config); !status.ok()) return mistake(status.message());
   follow_machine(config);
+  if (show_config) {
+    invocation.text = print_config(config_values(arguments, environment, config), invocation.maintenance->json);
+    invocation.maintenance.reset();
+    return invocation;
+  }
   invocation.config = std::move(config);
   return invocation;
 }
@@ -291,6 +299,19 @@ void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen) {
     added.add_option("DIRECTORY", *directory, "The data directory [what --data-dir says]");
     added.callback([&chosen, directory, task = command.task] { chosen = Maintenance{task, *directory}; });
   }
+  CLI::App& config =
+      *app.add_subcommand("config",
+                          "Print every option that locusd would run with here, and where its value comes from:\n"
+                          "flag, environment variable, file and line, or default. Starts nothing.");
+  config.footer(
+      "A flag wins over the environment (LOCUS_...), which wins over the file. Defaults that follow\n"
+      "the machine, threads and memory-limit, are printed with their values here.\n\n"
+      "Examples:\n  locusd config\n  locusd config --config /etc/locus/locusd.conf\n"
+      "  locusd config --json --threads 2");
+  config.fallthrough();
+  const auto json = std::make_shared<bool>(false);
+  config.add_flag("--json", *json, "Print one JSON object instead of a table");
+  config.callback([&chosen, json] { chosen = Maintenance{Maintenance::Task::kShowConfig, "", *json}; });
   app.require_subcommand(0, 1);
 }
 

@@ -106,15 +106,17 @@ using Environment = std::function<std::optional<std::string>(const std::string&)
 // Returns a variable of the process's own environment.
 std::optional<std::string> process_environment(const std::string& name);
 
-// Command `locusd check` or `locusd repair`, for a data directory that no daemon is using.
+// Command that is not to serve: `locusd check` or `locusd repair`, for a data directory that no daemon is using, or
+// `locusd config`.
 struct Maintenance {
-  enum class Task : uint8_t { kCheck, kRepair };
+  enum class Task : uint8_t { kCheck, kRepair, kShowConfig };
   Task task = Task::kCheck;
-  std::string directory;
+  std::string directory;  // of check and repair
+  bool json = false;      // of config
 };
 
 // Parsed command line: run with `config`, do `maintenance`, or, if neither is set, print `text` and end with
-// `exit_code` (0 after --help and --version, 2 after a mistake, which `text` explains).
+// `exit_code` (0 after --help, --version and the command config, 2 after a mistake, which `text` explains).
 struct Invocation {
   std::optional<ServerConfig> config;
   std::optional<Maintenance> maintenance;

@@ -55,7 +55,6 @@ ALLOWED = {
     "client/cli/extras/top": ["client/cli"],
     "client/cli/extras/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
     "client/cli/backup": ["client/cli", "client/lib", "core/base"],
-    "client/cli/config": ["client/cli", "server/config"],
     "client/cli/script": ["client/cli", "client/cli/rows", "core/base"],
     "deploy/manual": ["client/cli", "server/config"],
 }
@@ -76,7 +75,7 @@ THIRD_PARTY = {
     "xxhash.h": ["server/storage"],
     "curl/": ["client/cli/extras/top"],
     "CLI/": ["server/config", "client/cli", "deploy/manual"],
-    "nlohmann/": ["client/cli"],
+    "nlohmann/": ["server/config", "client/cli"],
     "assimp/": ["client/cli/levels/import"],
     "zip.h": ["client/cli/levels/import"],
     "openssl/": ["server/services", "server/security", "client/lib", "client/cli/extras/render"],

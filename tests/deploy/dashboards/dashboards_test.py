@@ -173,7 +173,9 @@ class DashboardsTest(unittest.TestCase):
         self.assertTrue(top["server"]["ready"])
 
     def test_config_shows_where_values_come_from(self):
-        rows = json.loads(self.locus("-o", "json", "config", "show", "--origin", "--", "--max-scenes", "3"))["options"]
+        rows = json.loads(subprocess.run(
+            [os.path.join(BIN, "locusd"), "config", "--json", "--max-scenes", "3"], capture_output=True, text=True,
+            check=True).stdout)["options"]
         by_name = {row["option"]: row for row in rows}
         self.assertEqual(by_name["max-scenes"], {"option": "max-scenes", "value": "3", "origin": "flag",
                                                  "place": "--max-scenes"})

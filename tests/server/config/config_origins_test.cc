@@ -100,5 +100,18 @@ TEST_F(ConfigOriginsTest, OptionsThatTheDaemonRefusesGiveTheSameError) {
   EXPECT_THAT(std::string(origins({"--listen", "0.0.0.0:1"}).status().message()), HasSubstr("two ways out"));
 }
 
+TEST_F(ConfigOriginsTest, TheCommandConfigPrintsOptionsInUseAndStartsNothing) {
+  const auto none = [](const std::string&) { return std::optional<std::string>(); };
+  const Invocation shown = read_invocation({"config", "--max-scenes", "3"}, none);
+  EXPECT_EQ(shown.exit_code, 0);
+  EXPECT_FALSE(shown.config);
+  EXPECT_FALSE(shown.maintenance);
+  EXPECT_THAT(shown.text, testing::ContainsRegex("max-scenes +3 +flag +--max-scenes\n"));
+  EXPECT_THAT(shown.text, testing::ContainsRegex("log-level +info +default +-\n"));
+  const Invocation json = read_invocation({"config", "--json", "--max-scenes", "3"}, none);
+  EXPECT_THAT(json.text, HasSubstr(R"({"option":"max-scenes","value":"3","origin":"flag","place":"--max-scenes"})"));
+  EXPECT_EQ(read_invocation({"config", "--max-scenes", "many"}, none).exit_code, 2);
+}
+
 }  // namespace
 }  // namespace locus::server
