@@ -1,5 +1,5 @@
-// The judge of the ray proof is judged: its tree against the plain list of triangles, and its verdicts on answers that
-// were spoilt on purpose.
+// Tests of the checker of the ray proof: its tree is compared with the plain list of triangles, and it must report
+// answers that were corrupted on purpose.
 #include <gtest/gtest.h>
 
 #include "tests/support/proof/ray_proof.h"
@@ -33,7 +33,7 @@ Nearest by_list(const ReferenceTree& reference, const RealRay& ray) {
   return nearest;
 }
 
-TEST(RayProofJudgeTest, TheReferencesTreeFindsWhatItsListFinds) {
+TEST(RayProofJudgeTest, TheTreeOfTheReferenceFindsWhatItsListFinds) {
   constexpr uint64_t kSeed = 11;
   Random random(kSeed);
   uint64_t hits = 0;
@@ -54,12 +54,12 @@ TEST(RayProofJudgeTest, TheReferencesTreeFindsWhatItsListFinds) {
   EXPECT_GT(hits, scaled_count(100'000) / 3);
 }
 
-class SpoiltAnswersTest : public ::testing::Test {
+class CorruptedAnswersTest : public ::testing::Test {
  protected:
-  SpoiltAnswersTest() : scene_(proof_scenes(12)[6]), random_(12), block_(proof_rays(scene_, 4'000, random_)) {
+  CorruptedAnswersTest() : scene_(proof_scenes(12)[6]), random_(12), block_(proof_rays(scene_, 4'000, random_)) {
     answer_ = run_block(*scene_.snapshot, block_);
   }
-  // Spoils every hit.
+  // Corrupts every hit.
   template <class Spoil>
   RayTally judge_spoilt(Spoil spoil) {
     BlockResult spoilt = answer_;
@@ -75,13 +75,13 @@ class SpoiltAnswersTest : public ::testing::Test {
   BlockResult answer_;
 };
 
-TEST_F(SpoiltAnswersTest, UnspoiltOnesAreClean) {
+TEST_F(CorruptedAnswersTest, UnchangedAnswersHaveNoFaults) {
   const RayTally tally = judge_first_hits(scene_, block_, answer_);
   EXPECT_TRUE(tally.clean()) << absl::StrJoin(tally.faults, "\n");
   EXPECT_GT(tally.hits, tally.rays / 2);
 }
 
-TEST_F(SpoiltAnswersTest, ALostHitIsAMiss) {
+TEST_F(CorruptedAnswersTest, ALostHitIsAMiss) {
   const RayTally tally = judge_spoilt([](BlockResult& result, size_t i) {
     result.t[i] = std::numeric_limits<float>::infinity();
     result.ids[i] = kNoId;
@@ -89,26 +89,26 @@ TEST_F(SpoiltAnswersTest, ALostHitIsAMiss) {
   EXPECT_GT(tally.misses, most());
 }
 
-TEST_F(SpoiltAnswersTest, AHitInFrontOfItsTriangleIsFalseAndOneBehindItAMiss) {
+TEST_F(CorruptedAnswersTest, AHitInFrontOfItsTriangleIsFalseAndAHitBehindItIsAMiss) {
   const auto move = [](float factor) { return [factor](BlockResult& result, size_t i) { result.t[i] *= factor; }; };
-  // Hits at 0 stay where they are.
+  // Hits at 0 stay at 0.
   EXPECT_GT(judge_spoilt(move(0.99f)).false_hits, most() * 8 / 10);
   EXPECT_GT(judge_spoilt(move(1.01f)).misses, most() / 2);
 }
 
-TEST_F(SpoiltAnswersTest, AHitOfAnotherTriangleOrInstanceIsFalse) {
+TEST_F(CorruptedAnswersTest, AHitOfAnotherTriangleOrInstanceIsFalse) {
   EXPECT_GT(judge_spoilt([](BlockResult& result, size_t i) { result.triangles[i] ^= 16; }).false_hits, most());
   EXPECT_GT(judge_spoilt([](BlockResult& result, size_t i) { result.ids[i] = 4 - result.ids[i]; }).false_hits,
             most() / 2);
 }
 
-TEST_F(SpoiltAnswersTest, AHitBeyondTheLimitIsFalse) {
+TEST_F(CorruptedAnswersTest, AHitBeyondTheLimitIsFalse) {
   block_.extras.assign(block_.extras.size(), 0.0f);
   EXPECT_GT(judge_spoilt([](BlockResult&, size_t) {}).false_hits, most() * 8 / 10);
 }
 
-// Half of the triangles taken away by culling that the answer does not know of.
-TEST_F(SpoiltAnswersTest, AHitOfTheCulledSideIsFalse) {
+// The checker culls one side of the triangles, but the answers were computed without culling.
+TEST_F(CorruptedAnswersTest, AHitOfTheCulledSideIsFalse) {
   rays_of(block_).cull = Cull::kNone;
   block_.extras.assign(block_.extras.size(), std::numeric_limits<float>::infinity());
   answer_ = run_block(*scene_.snapshot, block_);
@@ -116,7 +116,7 @@ TEST_F(SpoiltAnswersTest, AHitOfTheCulledSideIsFalse) {
   EXPECT_GT(judge_spoilt([](BlockResult&, size_t) {}).false_hits, most() / 4);
 }
 
-TEST_F(SpoiltAnswersTest, AHitThatIsNotAmongAllIsAMiss) {
+TEST_F(CorruptedAnswersTest, AHitMissingFromAllIsAMiss) {
   rays_of(block_).mode = RayMode::kAll;
   BlockResult all = run_block(*scene_.snapshot, block_);
   EXPECT_TRUE(judge_all_hits(scene_, block_, all).clean());
@@ -136,7 +136,7 @@ TEST_F(SpoiltAnswersTest, AHitThatIsNotAmongAllIsAMiss) {
   EXPECT_GT(tally.misses, spoilt * 8 / 10);
 }
 
-TEST_F(SpoiltAnswersTest, AFartherHitThanTheNearestIsAMiss) {
+TEST_F(CorruptedAnswersTest, AFartherHitThanTheNearestIsAMiss) {
   rays_of(block_).mode = RayMode::kAll;
   const BlockResult all = run_block(*scene_.snapshot, block_);
   uint64_t spoilt = 0;
