@@ -4,8 +4,8 @@
 // ends the batch.
 //
 // Threads: any number of threads may call work() at once; all other members only before the first or after the last
-// call. Memory: rows wait to be written out in order in at most about 2 * kMaxChunks chunks; each holds at most a reply's
-// worth.
+// call. Memory: rows wait to be written out in order in about 2 * kMaxChunks chunks at most; each holds at most a
+// reply's worth.
 //
 // Invariants: chunks_ covers consecutive queries in batch order, from the first query that is not written out to
 // (next_block_, next_query_). Every chunk is unstarted, running or done; active_threads_ is the number of running

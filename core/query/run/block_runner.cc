@@ -15,8 +15,8 @@ constexpr uint64_t kChunkWork = 16'384;
 // Target work of one call of the kernels, which cannot be interrupted.
 constexpr uint64_t kCallWork = 65'536;
 // Limits of the number of rays per call. The maxima bound a call whose rays are unexpectedly expensive: at 4,096
-// triangles per ray, a full call takes 3 ms, or twice that if its rays keep many hits. Twice as many rays per call would
-// not be measurably faster.
+// triangles per ray, a full call takes 3 ms, or twice that if its rays keep many hits. Twice as many per call would not
+// be measurably faster.
 constexpr uint64_t kMinRaysPerCall = 8, kMaxRaysPerCall = 128, kMaxRaysOfManyHits = 64;
 
 }  // namespace
