@@ -30,15 +30,15 @@ class Receiver {
  public:
   explicit Receiver(BackupSink& sink) : sink_(sink) {}
 
-  absl::Status receive(const v1::BackupResponse& piece) {
-    if (piece.has_announced() != first_) return damaged("what comes is not announced in the first piece alone");
-    if (first_) return begin(piece);
-    if (!piece.path().empty()) {
-      RETURN_IF_ERROR(begin_file(piece.path()));
+  absl::Status receive(const v1::BackupResponse& message) {
+    if (message.has_announced() != first_) return damaged("the announcement is not exactly in the first message");
+    if (first_) return begin(message);
+    if (!message.path().empty()) {
+      RETURN_IF_ERROR(begin_file(message.path()));
     }
     if (!in_file_) return damaged("bytes came that belong to no file");
-    RETURN_IF_ERROR(add(piece.data()));
-    return piece.has_end() ? end_file(piece.end()) : absl::OkStatus();
+    RETURN_IF_ERROR(add(message.data()));
+    return message.has_end() ? end_file(message.end()) : absl::OkStatus();
   }
 
   absl::StatusOr<BackupSize> finish() const {
@@ -50,11 +50,11 @@ class Receiver {
   }
 
  private:
-  absl::Status begin(const v1::BackupResponse& piece) {
-    if (!piece.path().empty() || !piece.data().empty() || piece.has_end())
-      return damaged("its first piece is not the announcement alone");
+  absl::Status begin(const v1::BackupResponse& message) {
+    if (!message.path().empty() || !message.data().empty() || message.has_end())
+      return damaged("its first message contains more than the announcement");
     first_ = false;
-    announced_ = {piece.announced().files(), piece.announced().bytes()};
+    announced_ = {message.announced().files(), message.announced().bytes()};
     if (announced_.files > kMaxBackupFiles)
       return damaged(absl::StrCat(announced_.files, " files are announced, at most ", kMaxBackupFiles, " may be"));
     return sink_.begin(announced_);
@@ -105,9 +105,9 @@ absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stu
   context.set_deadline(absl::ToChronoTime(deadline));
   const auto reader = stub.Backup(&context, v1::BackupRequest());
   Receiver receiver(sink);
-  v1::BackupResponse piece;
+  v1::BackupResponse message;
   absl::Status received;
-  while (received.ok() && reader->Read(&piece)) received = receiver.receive(piece);
+  while (received.ok() && reader->Read(&message)) received = receiver.receive(message);
   if (!received.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
   if (!received.ok()) return received;

@@ -28,12 +28,12 @@ class Receiver {
  public:
   Receiver(absl::string_view name, const DownloadProgress& progress) : name_(name), progress_(progress) {}
 
-  absl::Status take(v1::DownloadMeshResponse& piece) {
-    if (piece.has_mesh() != first_) return damaged(name_, "its description is not in the first piece alone");
-    if (first_) begin(piece);
-    if (!append(piece.parts(), mesh_.description.triangles(), &mesh_.parts) ||
-        !append(piece.vertices(), vertex_values_, &mesh_.vertices) ||
-        !append(piece.indices(), index_values_, &mesh_.indices))
+  absl::Status receive(v1::DownloadMeshResponse& message) {
+    if (message.has_mesh() != first_) return damaged(name_, "its description is not exactly in the first message");
+    if (first_) begin(message);
+    if (!append(message.parts(), mesh_.description.triangles(), &mesh_.parts) ||
+        !append(message.vertices(), vertex_values_, &mesh_.vertices) ||
+        !append(message.indices(), index_values_, &mesh_.indices))
       return damaged(name_, "more came than was announced");
     if (progress_) {
       progress_((mesh_.vertices.size() + mesh_.indices.size()) * sizeof(uint32_t),
@@ -60,9 +60,9 @@ class Receiver {
   }
 
  private:
-  void begin(v1::DownloadMeshResponse& piece) {
+  void begin(v1::DownloadMeshResponse& message) {
     first_ = false;
-    mesh_.description = std::move(*piece.mutable_mesh());
+    mesh_.description = std::move(*message.mutable_mesh());
     vertex_values_ = size_t{3} * mesh_.description.vertices();
     index_values_ = size_t{3} * mesh_.description.triangles();
   }
@@ -94,12 +94,12 @@ absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& st
   request.set_mesh(std::string(name));
   const auto reader = stub.DownloadMesh(&context, request);
   Receiver receiver(name, progress);
-  v1::DownloadMeshResponse piece;
-  absl::Status taken;
-  while (taken.ok() && reader->Read(&piece)) taken = receiver.take(piece);
-  if (!taken.ok()) context.TryCancel();
+  v1::DownloadMeshResponse message;
+  absl::Status received;
+  while (received.ok() && reader->Read(&message)) received = receiver.receive(message);
+  if (!received.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  if (!taken.ok()) return taken;
+  if (!received.ok()) return received;
   if (!end.ok()) return end;
   return receiver.finish();
 }

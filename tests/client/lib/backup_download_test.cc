@@ -129,11 +129,11 @@ TEST_F(BackupDownloadTest, AFileEndsOnlyAfterItsHashIsVerified) {
 
 TEST_F(BackupDownloadTest, MessagesOutOfOrderAreDataLoss) {
   pieces()[0].clear_announced();
-  expect_damaged("what comes is not announced in the first piece alone");
+  expect_damaged("the announcement is not exactly in the first message");
   pieces()[1].mutable_announced();
-  expect_damaged("what comes is not announced in the first piece alone");
+  expect_damaged("the announcement is not exactly in the first message");
   pieces()[0].set_path("CURRENT");
-  expect_damaged("its first piece is not the announcement alone");
+  expect_damaged("its first message contains more than the announcement");
   pieces()[1].clear_path();
   expect_damaged("bytes came that belong to no file");
   pieces()[1].clear_end();

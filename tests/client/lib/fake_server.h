@@ -346,7 +346,7 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // Changes the configuration while calls arrive.
+  // Replaces a scene; may be called while calls arrive.
   void replace(const v1::Scene& scene) {
     std::lock_guard lock(mutex_);
     scenes[scene.name()] = scene;

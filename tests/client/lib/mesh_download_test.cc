@@ -81,9 +81,9 @@ TEST_F(MeshDownloadTest, AnUploadedMeshIsDownloadedWithTheSameHash) {
 
 TEST_F(MeshDownloadTest, AMissingOrRepeatedDescriptionIsDataLoss) {
   *pieces()[1].mutable_mesh() = pieces()[0].mesh();
-  expect_damaged("its description is not in the first piece alone");
+  expect_damaged("its description is not exactly in the first message");
   pieces()[0].clear_mesh();
-  expect_damaged("its description is not in the first piece alone");
+  expect_damaged("its description is not exactly in the first message");
   pieces().clear();
   expect_damaged("nothing came");
 }
