@@ -1,7 +1,7 @@
-// Pipelined stream: base of UpdateStream and QueryStream. A bidirectional call whose responses carry the sequence
-// numbers of their requests, with a bounded number of requests in flight. After a broken connection it reconnects and
-// sends the unanswered requests again. A connection without any response for too long counts as broken. Internal to the
-// library.
+// Pipelined stream: base of UpdateStream and QueryStream. Internal to the library. A bidirectional call whose responses
+// carry the sequence numbers of their requests, with a bounded number of requests in flight. After a broken connection
+// it reconnects and sends the unanswered requests again. A connection without any response for too long counts as
+// broken.
 //
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
 // each. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from any
