@@ -43,40 +43,21 @@ struct ColumnArray {
 template <class Get>
 ColumnArray(Column, uint32_t, Get) -> ColumnArray<Get>;
 
-inline constexpr auto kColumnArrays =
-    std::make_tuple(ColumnArray{Column::kT, 1, [](auto& arrays) -> auto& { return arrays.t;
-}  // namespace locus
-}
-, ColumnArray{Column::kId, 1, [](auto& arrays) -> auto& {return arrays.ids;
-}
-}
-, ColumnArray{Column::kTriangle, 1, [](auto& arrays) -> auto& {return arrays.triangles;
-}
-}
-, ColumnArray{Column::kUv, 2, [](auto& arrays) -> auto& {return arrays.uvs;
-}
-}
-, ColumnArray{Column::kNormal, 3, [](auto& arrays) -> auto& {return arrays.normals;
-}
-}
-, ColumnArray{Column::kPoint, 3, [](auto& arrays) -> auto& {return arrays.points;
-}
-}
-, ColumnArray{Column::kGroup, 1, [](auto& arrays) -> auto& {return arrays.groups;
-}
-}
-, ColumnArray{Column::kTag, 1, [](auto& arrays) -> auto& {return arrays.tags;
-}
-}
-, ColumnArray{Column::kLayers, 1, [](auto& arrays) -> auto& {return arrays.layers;
-}
-}
-, ColumnArray{Column::kPose, 3, [](auto& arrays) -> auto& {return arrays.positions;
-}
-}
-, ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& {return arrays.rotations;
-}
-});
+// Rows of the table, one per array. Not formatted: clang-format 14 splits the lambdas and puts comments between them.
+// clang-format off
+inline constexpr auto kColumnArrays = std::make_tuple(
+    ColumnArray{Column::kT, 1, [](auto& arrays) -> auto& { return arrays.t; }},
+    ColumnArray{Column::kId, 1, [](auto& arrays) -> auto& { return arrays.ids; }},
+    ColumnArray{Column::kTriangle, 1, [](auto& arrays) -> auto& { return arrays.triangles; }},
+    ColumnArray{Column::kUv, 2, [](auto& arrays) -> auto& { return arrays.uvs; }},
+    ColumnArray{Column::kNormal, 3, [](auto& arrays) -> auto& { return arrays.normals; }},
+    ColumnArray{Column::kPoint, 3, [](auto& arrays) -> auto& { return arrays.points; }},
+    ColumnArray{Column::kGroup, 1, [](auto& arrays) -> auto& { return arrays.groups; }},
+    ColumnArray{Column::kTag, 1, [](auto& arrays) -> auto& { return arrays.tags; }},
+    ColumnArray{Column::kLayers, 1, [](auto& arrays) -> auto& { return arrays.layers; }},
+    ColumnArray{Column::kPose, 3, [](auto& arrays) -> auto& { return arrays.positions; }},
+    ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& { return arrays.rotations; }});
+// clang-format on
 
 // Column names indexed by the value of Column: the protocol's names without the prefix "COLUMN_".
 inline constexpr std::array<absl::string_view, 11> kColumnNames = {
