@@ -9,7 +9,8 @@
 namespace locus::client {
 namespace {
 
-// Bytes of UTF-8 beyond ASCII are some alphabet's. A checksum file would have to escape the backslash.
+// Returns whether a path may contain the byte. Bytes of UTF-8 sequences are allowed. The backslash is not, since
+// checksum files would have to escape it.
 bool is_printable(char byte) {
   const auto code = static_cast<unsigned char>(byte);
   return code >= 0x20 && code != 0x7F && byte != '\\';

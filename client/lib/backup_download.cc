@@ -25,36 +25,36 @@ bool equal(const Sha256& hash, absl::string_view bytes) {
                     [](uint8_t a, char b) { return a == static_cast<uint8_t>(b); });
 }
 
-// Hands on what comes for as long as it is what was announced.
+// Passes received files on to the sink, and verifies sizes, paths and hashes against the announcement.
 class Receiver {
  public:
   explicit Receiver(BackupSink& sink) : sink_(sink) {}
 
-  absl::Status take(const v1::BackupResponse& piece) {
-    if (piece.has_announced() != first_) return damaged("what comes is not announced in the first piece alone");
-    if (first_) return begin(piece);
-    if (!piece.path().empty()) {
-      RETURN_IF_ERROR(begin_file(piece.path()));
+  absl::Status receive(const v1::BackupResponse& message) {
+    if (message.has_announced() != first_) return damaged("the announcement is not exactly in the first message");
+    if (first_) return begin(message);
+    if (!message.path().empty()) {
+      RETURN_IF_ERROR(begin_file(message.path()));
     }
     if (!in_file_) return damaged("bytes came that belong to no file");
-    RETURN_IF_ERROR(add(piece.data()));
-    return piece.has_end() ? end_file(piece.end()) : absl::OkStatus();
+    RETURN_IF_ERROR(add(message.data()));
+    return message.has_end() ? end_file(message.end()) : absl::OkStatus();
   }
 
   absl::StatusOr<BackupSize> finish() const {
     if (first_) return damaged("nothing came");
     if (in_file_) return damaged_file(file_.path, "has no end");
-    if (came_.files != announced_.files || came_.bytes != announced_.bytes)
+    if (received_.files != announced_.files || received_.bytes != announced_.bytes)
       return damaged("less came than was announced");
-    return came_;
+    return received_;
   }
 
  private:
-  absl::Status begin(const v1::BackupResponse& piece) {
-    if (!piece.path().empty() || !piece.data().empty() || piece.has_end())
-      return damaged("its first piece is not the announcement alone");
+  absl::Status begin(const v1::BackupResponse& message) {
+    if (!message.path().empty() || !message.data().empty() || message.has_end())
+      return damaged("its first message contains more than the announcement");
     first_ = false;
-    announced_ = {piece.announced().files(), piece.announced().bytes()};
+    announced_ = {message.announced().files(), message.announced().bytes()};
     if (announced_.files > kMaxBackupFiles)
       return damaged(absl::StrCat(announced_.files, " files are announced, at most ", kMaxBackupFiles, " may be"));
     return sink_.begin(announced_);
@@ -62,7 +62,7 @@ class Receiver {
 
   absl::Status begin_file(const std::string& path) {
     if (in_file_) return damaged_file(file_.path, "has no end");
-    if (came_.files == announced_.files) return damaged("more came than was announced");
+    if (received_.files == announced_.files) return damaged("more came than was announced");
     if (absl::Status fit = paths_.add(path); !fit.ok()) return damaged_file(path, fit.message());
     in_file_ = true;
     file_ = {.path = path};
@@ -71,8 +71,8 @@ class Receiver {
 
   absl::Status add(const std::string& data) {
     if (data.empty()) return absl::OkStatus();
-    if (data.size() > announced_.bytes - came_.bytes) return damaged("more came than was announced");
-    came_.bytes += data.size();
+    if (data.size() > announced_.bytes - received_.bytes) return damaged("more came than was announced");
+    received_.bytes += data.size();
     file_.bytes += data.size();
     hasher_.add(data);
     return sink_.add(data);
@@ -80,7 +80,7 @@ class Receiver {
 
   absl::Status end_file(const v1::BackupFileEnd& end) {
     in_file_ = false;
-    ++came_.files;
+    ++received_.files;
     file_.sha256 = hasher_.finish();
     if (file_.bytes != end.bytes()) return damaged_file(file_.path, "has another size than the server says");
     if (!equal(file_.sha256, end.sha256())) return damaged_file(file_.path, "has another SHA-256 than the server says");
@@ -91,7 +91,7 @@ class Receiver {
   bool first_ = true;
   bool in_file_ = false;
   BackupSize announced_;
-  BackupSize came_;  // files: those that ended
+  BackupSize received_;  // files: complete ones
   BackupPaths paths_;
   BackupFile file_;
   Sha256Hasher hasher_;
@@ -105,12 +105,12 @@ absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stu
   context.set_deadline(absl::ToChronoTime(deadline));
   const auto reader = stub.Backup(&context, v1::BackupRequest());
   Receiver receiver(sink);
-  v1::BackupResponse piece;
-  absl::Status taken;
-  while (taken.ok() && reader->Read(&piece)) taken = receiver.take(piece);
-  if (!taken.ok()) context.TryCancel();
+  v1::BackupResponse message;
+  absl::Status received;
+  while (received.ok() && reader->Read(&message)) received = receiver.receive(message);
+  if (!received.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  if (!taken.ok()) return taken;
+  if (!received.ok()) return received;
   if (!end.ok()) return end;
   return receiver.finish();
 }

@@ -9,7 +9,7 @@
 
 namespace locus::client {
 
-// See Client::backup. One try.
+// Performs one attempt of Client::backup.
 absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stub, BackupSink& sink,
                                            absl::Time deadline);
 

@@ -1,4 +1,4 @@
-// The metadata every call about a scene carries. Internal to the library.
+// Metadata of every call about a scene. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_CALL_METADATA_H_
 #define LOCUS_CLIENT_LIB_CALL_METADATA_H_
 
@@ -10,8 +10,9 @@ class ClientContext;
 
 namespace locus::client {
 
-// Sets `x-scene`, by which routers go. A name with characters that no scene may have is left out: gRPC aborts on bytes
-// that are illegal in metadata, and the server refuses the name itself with a message that helps.
+// Sets `x-scene`, which routers use to find the server of a scene. Omits names with characters that no scene name may
+// have: gRPC aborts on bytes that are illegal in metadata, and the server refuses the name in the request anyway, with
+// a helpful message.
 void add_scene(grpc::ClientContext& context, absl::string_view scene);
 
 }  // namespace locus::client

@@ -27,7 +27,7 @@ namespace {
 
 enum class Repeat { kNever, kWhenUnavailable };
 
-// A call's frame: when it must be over, whether it may be repeated, which scene it is about.
+// Parameters of a call besides its request: deadline, retries, and the scene that it is about.
 struct CallPlan {
   absl::Duration deadline;
   RetryPolicy retry;
@@ -57,13 +57,13 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
 struct Client::Connection {
   std::string address;
   ClientOptions options;
-  std::shared_ptr<grpc::Channel> channel;  // for single calls
+  std::shared_ptr<grpc::Channel> channel;  // Lane::kLatency, and unary calls
   std::shared_ptr<grpc::Channel> bulk;
   std::unique_ptr<v1::ServerService::StubInterface> servers;
   std::unique_ptr<v1::SceneService::StubInterface> scenes;
   std::unique_ptr<v1::UpdateService::StubInterface> updates;
   std::unique_ptr<v1::QueryService::StubInterface> queries;
-  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // uploads, downloads, dumps
+  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // on `bulk`: uploads, downloads, dumps
 
   const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
   CallPlan once(absl::string_view scene = {}) const { return {options.deadline, options.retry, Repeat::kNever, scene}; }
@@ -185,17 +185,17 @@ absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::C
 }
 
 absl::Status Client::dump(const v1::DumpSceneRequest& request,
-                          const std::function<absl::Status(const v1::DumpSceneResponse&)>& piece) const {
+                          const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const {
   grpc::ClientContext context;
   context.set_deadline(absl::ToChronoTime(absl::Now() + connection_->options.long_deadline));
   add_scene(context, request.scene());
   const auto reader = connection_->transfers->DumpScene(&context, request);
   v1::DumpSceneResponse response;
-  absl::Status taken;
-  while (taken.ok() && reader->Read(&response)) taken = piece(response);
-  if (!taken.ok()) context.TryCancel();
+  absl::Status accepted;
+  while (accepted.ok() && reader->Read(&response)) accepted = on_message(response);
+  if (!accepted.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  return taken.ok() ? end : taken;
+  return accepted.ok() ? end : accepted;
 }
 
 absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateBatch batch) const {

@@ -1,4 +1,4 @@
-// The door of the library: a connection to one locusd, its unary calls, and the streams opened from it. For games,
+// Entry point of the library: a connection to one locusd, its unary calls, and the streams opened from it. For games,
 // simulations and tools; depends on the protocol only.
 //
 //   auto client = locus::client::Client::connect("127.0.0.1:7575");
@@ -9,9 +9,10 @@
 //   auto hits = locus::client::RayHits::of(result->blocks(0));
 //
 // Errors are absl::Status with the server's code and message; error_of() (client/lib/status.h) gives the structured
-// refusal. UNAVAILABLE means that nothing answered or the server drains, DEADLINE_EXCEEDED that the outcome of a change
-// is unknown. Calls that change nothing are repeated on UNAVAILABLE, within their deadline; an update only if it
-// carries `writer` and `batch`; anything else never.
+// refusal. UNAVAILABLE means that no server answered or that the server is draining. After DEADLINE_EXCEEDED the
+// outcome of a change is unknown. Calls that change nothing are retried within their deadline, on UNAVAILABLE, and on
+// RESOURCE_EXHAUSTED with a retry hint. An update is retried only if it carries `writer` and `batch`. No other call is
+// ever retried.
 #ifndef LOCUS_CLIENT_LIB_CLIENT_H_
 #define LOCUS_CLIENT_LIB_CLIENT_H_
 
@@ -39,69 +40,77 @@ namespace locus::client {
 
 inline constexpr char kDefaultAddress[] = "127.0.0.1:7575";
 
-// What grpc.health.v1 says about a server or one of its services.
+// Health of a server or of one of its services, as reported by grpc.health.v1.
 enum class Health { kUnknown = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
-// Called after each message of an upload with the bytes sent so far and the bytes in all.
+// Callback after each message of an upload, with the bytes sent so far and the total bytes.
 using UploadProgress = std::function<void(uint64_t sent, uint64_t total)>;
 
-// Called after each message of a download with the bytes received so far and the bytes in all.
+// Callback after each message of a download, with the bytes received so far and the total bytes.
 using DownloadProgress = std::function<void(uint64_t received, uint64_t total)>;
 
-// Thread promise: every method may be called from any number of threads at once. Streams hold what they need of the
-// connections and may outlive the client. Each client has two connections of its own, so that small calls do not wait
-// behind large messages (Lane); the second is made when it is first needed. Both come back by themselves.
+// Connection to one server. Thread promise: every method may be called from any number of threads at once. Streams
+// share ownership of the connections and may outlive the client. Each client has two connections of its own, so that
+// small calls do not wait behind large messages (see Lane); the second one is opened when it is first needed. Both
+// reconnect automatically.
 class Client {
  public:
-  // `address` is host:port (the port may be left out: 7575) or unix:/path. Blocks until the connection stands;
-  // UNAVAILABLE naming the address where nothing answers, INVALID_ARGUMENT for an empty address.
+  // Connects to `address`: host:port, host alone (port 7575) or unix:/path. Blocks until the connection is established.
+  // Returns UNAVAILABLE naming the address if no server answers, or INVALID_ARGUMENT for an empty address.
   static absl::StatusOr<std::unique_ptr<Client>> connect(absl::string_view address = kDefaultAddress,
                                                          const ClientOptions& options = {});
   ~Client();
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
+  // Returns the address with its port.
   const std::string& address() const;
 
-  // Version, features, limits. Repeated when safe.
+  // Returns version, features and limits. Retried.
   absl::StatusOr<v1::GetServerResponse> get_server() const;
-  // Health of the whole server, or of one service by its full name. Repeated when safe.
+  // Returns the health of the whole server, or of one service given by its full name. Retried.
   absl::StatusOr<Health> health(absl::string_view service = "") const;
-  // Everything on the server's disk as it is at one moment, handed to `sink` in this thread; what came in all. Not
-  // repeated: a second try begins anew, with a new sink. DATA_LOSS if what came is not what the server announced
-  // (files, sizes, hashes), or a path leads out of the backup. UNIMPLEMENTED where the server has no data directory.
+  // Passes a consistent copy of the server's data directory to `sink`, in this thread, and returns its size. Not
+  // retried: a second attempt starts again with a new sink. Returns DATA_LOSS if the received files differ from the
+  // announcement (number, sizes, hashes) or a path leads out of the backup, and UNIMPLEMENTED if the server has no data
+  // directory.
   absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
+  // Create, read, list and delete scenes. get_scene() and list_scenes() are retried, the others are not. list_scenes()
+  // reads all pages and returns the scenes that have all of `labels`.
   absl::StatusOr<v1::Scene> create_scene(const v1::CreateSceneRequest& request) const;
   absl::StatusOr<v1::Scene> get_scene(absl::string_view name) const;
-  // All pages; only scenes with all of `labels`.
   absl::StatusOr<std::vector<v1::Scene>> list_scenes(const std::map<std::string, std::string>& labels = {}) const;
   absl::Status delete_scene(const v1::DeleteSceneRequest& request) const;
 
-  // Sends the mesh in messages of at most 1 MiB, opening with its SHA-256, and stops as soon as the server answers:
-  // bytes it knows are not sent again. Returns when the mesh's tree stands. Not repeated; safe to call again.
-  // INVALID_ARGUMENT before anything is sent if a column does not hold triples or is too long to count.
+  // Uploads a mesh in messages of at most 1 MiB. The first message carries its SHA-256, and the upload stops as soon as
+  // the server answers, so a mesh that the server already has is not sent again. Returns when the server has built the
+  // mesh's tree. Not retried; safe to call again. Returns INVALID_ARGUMENT, before anything is sent, if the length of a
+  // column is not a multiple of three or too large.
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
-  // The mesh as it is stored, held in memory whole: 12 bytes a vertex and a triangle. Repeated when safe. DATA_LOSS if
-  // what came is not what the server announced (counts, hash) or no mesh (an index beyond the vertices, a vertex that
-  // is not finite, parts out of order). Never holds more than was announced.
+  // Downloads a mesh as the server stores it, completely into memory: 12 bytes per vertex and per triangle. Retried.
+  // Returns DATA_LOSS if the received mesh differs from the announcement (counts, hash) or is invalid (an index beyond
+  // the vertices, a vertex that is not finite, parts out of order). Never holds more data than was announced.
   absl::StatusOr<DownloadedMesh> download_mesh(absl::string_view name, const DownloadProgress& progress = {}) const;
-  // All pages.
+  // Returns all meshes, from all pages. Retried.
   absl::StatusOr<std::vector<v1::Mesh>> list_meshes() const;
+  // Deletes a mesh. Not retried.
   absl::Status delete_mesh(absl::string_view name) const;
-  // One atomic change of a scene's instances; returns when it is visible unless `no_wait`.
+  // Applies one atomic change of a scene's instances. Returns when it is visible, or at once with `no_wait`. Not
+  // retried.
   absl::StatusOr<v1::ChangeInstancesResponse> change_instances(const v1::ChangeInstancesRequest& request) const;
-  // Hands over the scene piece by piece, in this thread. Ends early, with its status, when `piece` fails.
+  // Passes the contents of a scene to `on_message`, message by message, in this thread. Ends early if `on_message`
+  // fails, with its status. Not retried.
   absl::Status dump(const v1::DumpSceneRequest& request,
-                    const std::function<absl::Status(const v1::DumpSceneResponse&)>& piece) const;
+                    const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const;
 
-  // One batch. For a steady flow use update_stream().
+  // Applies one batch. Retried only if it carries `writer` and `batch`. For a steady flow use update_stream().
   absl::StatusOr<v1::UpdateAck> apply(absl::string_view scene, v1::UpdateBatch batch) const;
-  // One batch, answered whole at one revision.
+  // Answers one batch at one revision. Retried. For a steady flow use query_stream().
   absl::StatusOr<v1::QueryResult> query(absl::string_view scene, v1::QueryBatch batch) const;
 
-  // Neither connects before the first batch is sent.
+  // Open a stream for one scene. Neither connects before the first batch is sent.
   std::unique_ptr<UpdateStream> update_stream(absl::string_view scene, const UpdateStreamOptions& options = {}) const;
   std::unique_ptr<QueryStream> query_stream(absl::string_view scene, const QueryStreamOptions& options = {}) const;
 

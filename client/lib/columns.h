@@ -1,5 +1,6 @@
-// Columns that are filled row by row. Internal to the builders. The protocol lets a column be absent while every row
-// has the default, so a column starts only when the first row differs, and is then filled up to that row.
+// Functions that fill columns row by row. Internal to the builders. The protocol allows a column to be absent if every
+// row has the default value, so a column stays empty until the first row differs, and is then filled with defaults up
+// to that row.
 #ifndef LOCUS_CLIENT_LIB_COLUMNS_H_
 #define LOCUS_CLIENT_LIB_COLUMNS_H_
 

@@ -1,4 +1,4 @@
-// Opening a gRPC channel so that a wrong address is told at once and in plain words. Internal to the library.
+// Functions that open a gRPC channel and report a wrong address at once, with a clear message. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_CONNECTION_H_
 #define LOCUS_CLIENT_LIB_CONNECTION_H_
 
@@ -16,14 +16,15 @@ class Channel;
 
 namespace locus::client {
 
-// What gRPC is to connect to: `address` with the default port where it names none. INVALID_ARGUMENT if it is empty.
+// Returns the target for gRPC: `address`, with the default port if it has none. INVALID_ARGUMENT if it is empty.
 absl::StatusOr<std::string> target_of(absl::string_view address);
 
-// A channel of its own connection to `target`, shared with no other channel of this process. Does not connect.
+// Returns a channel to `target` whose connection is not shared with any other channel of this process. Does not
+// connect.
 std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options);
 
-// Waits until the channel is connected. UNAVAILABLE naming `target` if it is refused (unless `wait_for_server`) or the
-// time is up.
+// Waits until the channel is connected. Returns UNAVAILABLE naming `target` if the connection is refused (unless
+// `wait_for_server`) or connect_timeout has passed.
 absl::Status await_connection(grpc::Channel& channel, const std::string& target, const ClientOptions& options);
 
 }  // namespace locus::client

@@ -1,4 +1,4 @@
-// How much is gathered into one message, and how long. For callers of QueryBatcher and MoveBatcher. Plain data.
+// Limits of the size of a gathered message and of its delay. For callers of QueryBatcher and MoveBatcher. Plain data.
 #ifndef LOCUS_CLIENT_LIB_GATHER_LIMITS_H_
 #define LOCUS_CLIENT_LIB_GATHER_LIMITS_H_
 
@@ -9,9 +9,9 @@
 namespace locus::client {
 
 struct GatherLimits {
-  // Things in a message, 1 or more. A full one goes at once.
+  // Maximum number of items in a message, at least 1. A full message is sent at once.
   size_t max_items = 1024;
-  // Since the first thing came. 0 = as soon as the message before has gone.
+  // Maximum delay of the first item of a message. 0 = a message is sent as soon as the one before has been sent.
   absl::Duration max_delay = absl::Microseconds(500);
 };
 

@@ -1,9 +1,9 @@
-// Small things from many callers, gathered into one batch until it is full or its first thing has waited long enough.
-// Internal to the library: the machinery under QueryBatcher and MoveBatcher.
+// Gatherer of small items from many callers into one batch, which is sent when it is full or its first item has waited
+// for the maximum delay. Internal to the library: base of QueryBatcher and MoveBatcher.
 //
-// Threads: add() and flush() may be called from any thread; `send` is called by one thread of the gatherer's own, one
-// batch after another, never with a lock held, so that it may block: then a full batch blocks add(). Invariant: at most
-// one batch is gathered and one sent, whatever callers do.
+// Threads: add() and flush() may be called from any thread; the gatherer calls `send` in a thread of its own,
+// one batch after another, without a lock held, so `send` may block; a full batch then blocks add(). Invariant: at any
+// time at most one batch is being gathered and at most one is being sent.
 #ifndef LOCUS_CLIENT_LIB_GATHERER_H_
 #define LOCUS_CLIENT_LIB_GATHERER_H_
 
@@ -30,7 +30,7 @@ class Gatherer {
         send_(std::move(send)),
         thread_([this] { run(); }) {}
 
-  // Sends what is left.
+  // Sends the items that were added and waits until `send` has returned.
   ~Gatherer() {
     {
       std::lock_guard lock(mutex_);
@@ -42,7 +42,7 @@ class Gatherer {
   Gatherer(const Gatherer&) = delete;
   Gatherer& operator=(const Gatherer&) = delete;
 
-  // add_to(batch) puts one thing in, with the lock held. Blocks while the batch is full.
+  // Calls add_to(batch), which adds one item, with the lock held. Blocks while the batch is full.
   template <class AddTo>
   void add(const AddTo& add_to) {
     std::unique_lock lock(mutex_);
@@ -52,13 +52,13 @@ class Gatherer {
     if (items_ == 1 || items_ == max_items_) changed_.notify_all();
   }
 
-  // Blocks until `send` has returned for all that was added before.
+  // Sends at once, and blocks until `send` has returned for all items added before.
   void flush() {
     std::unique_lock lock(mutex_);
-    const uint64_t wanted = sent_ + (sending_ ? 1 : 0) + (items_ > 0 ? 1 : 0);
+    const uint64_t target = sent_ + (sending_ ? 1 : 0) + (items_ > 0 ? 1 : 0);
     due_ = Clock::now();
     changed_.notify_all();
-    changed_.wait(lock, [&] { return sent_ >= wanted; });
+    changed_.wait(lock, [&] { return sent_ >= target; });
   }
 
  private:
@@ -95,10 +95,10 @@ class Gatherer {
   std::mutex mutex_;
   std::condition_variable changed_;
   Batch batch_;
-  size_t items_ = 0;  // in batch_
-  Clock::time_point due_;
+  size_t items_ = 0;       // number of items in batch_
+  Clock::time_point due_;  // when batch_ is sent even if it is not full
   bool sending_ = false;
-  uint64_t sent_ = 0;  // batches that `send` has returned for
+  uint64_t sent_ = 0;  // number of batches for which `send` has returned
   bool ending_ = false;
 
   std::thread thread_;  // last: it uses everything above

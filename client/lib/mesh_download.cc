@@ -16,7 +16,7 @@ absl::Status damaged(absl::string_view name, absl::string_view what) {
   return absl::DataLossError(absl::StrCat("mesh ", name, " came damaged: ", what, "; download it again"));
 }
 
-// Appends a piece's column unless it would hold more than was announced.
+// Appends a column of a message. Returns false, without any change, if the result would be longer than announced.
 template <class T, class Repeated>
 bool append(const Repeated& column, size_t announced, std::vector<T>* to) {
   if (static_cast<size_t>(column.size()) > announced - to->size()) return false;
@@ -28,28 +28,28 @@ class Receiver {
  public:
   Receiver(absl::string_view name, const DownloadProgress& progress) : name_(name), progress_(progress) {}
 
-  absl::Status take(v1::DownloadMeshResponse& piece) {
-    if (piece.has_mesh() != first_) return damaged(name_, "its description is not in the first piece alone");
-    if (first_) begin(piece);
-    if (!append(piece.parts(), mesh_.description.triangles(), &mesh_.parts) ||
-        !append(piece.vertices(), vertex_numbers_, &mesh_.vertices) ||
-        !append(piece.indices(), index_numbers_, &mesh_.indices))
+  absl::Status receive(v1::DownloadMeshResponse& message) {
+    if (message.has_mesh() != first_) return damaged(name_, "its description is not exactly in the first message");
+    if (first_) begin(message);
+    if (!append(message.parts(), mesh_.description.triangles(), &mesh_.parts) ||
+        !append(message.vertices(), vertex_values_, &mesh_.vertices) ||
+        !append(message.indices(), index_values_, &mesh_.indices))
       return damaged(name_, "more came than was announced");
     if (progress_) {
       progress_((mesh_.vertices.size() + mesh_.indices.size()) * sizeof(uint32_t),
-                (vertex_numbers_ + index_numbers_) * sizeof(uint32_t));
+                (vertex_values_ + index_values_) * sizeof(uint32_t));
     }
     return absl::OkStatus();
   }
 
   absl::StatusOr<DownloadedMesh> finish() {
     if (first_) return damaged(name_, "nothing came");
-    if (mesh_.vertices.size() != vertex_numbers_ || mesh_.indices.size() != index_numbers_)
+    if (mesh_.vertices.size() != vertex_values_ || mesh_.indices.size() != index_values_)
       return damaged(name_, "less came than was announced");
-    const size_t vertices = vertex_numbers_ / 3;
+    const size_t vertices = vertex_values_ / 3;
     if (std::any_of(mesh_.indices.begin(), mesh_.indices.end(), [=](uint32_t index) { return index >= vertices; }))
       return damaged(name_, "an index is beyond its vertices");
-    if (!std::all_of(mesh_.vertices.begin(), mesh_.vertices.end(), [](float number) { return std::isfinite(number); }))
+    if (!std::all_of(mesh_.vertices.begin(), mesh_.vertices.end(), [](float value) { return std::isfinite(value); }))
       return damaged(name_, "a vertex is not finite");
     if (!parts_ascend()) return damaged(name_, "its parts do not ascend from triangle 0 within it");
     const Sha256 hash = mesh_sha256(mesh_.vertices, mesh_.indices);
@@ -60,11 +60,11 @@ class Receiver {
   }
 
  private:
-  void begin(v1::DownloadMeshResponse& piece) {
+  void begin(v1::DownloadMeshResponse& message) {
     first_ = false;
-    mesh_.description = std::move(*piece.mutable_mesh());
-    vertex_numbers_ = size_t{3} * mesh_.description.vertices();
-    index_numbers_ = size_t{3} * mesh_.description.triangles();
+    mesh_.description = std::move(*message.mutable_mesh());
+    vertex_values_ = size_t{3} * mesh_.description.vertices();
+    index_values_ = size_t{3} * mesh_.description.triangles();
   }
 
   bool parts_ascend() const {
@@ -79,8 +79,8 @@ class Receiver {
   const absl::string_view name_;
   const DownloadProgress& progress_;
   bool first_ = true;
-  size_t vertex_numbers_ = 0;
-  size_t index_numbers_ = 0;
+  size_t vertex_values_ = 0;
+  size_t index_values_ = 0;
   DownloadedMesh mesh_;
 };
 
@@ -94,12 +94,12 @@ absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& st
   request.set_mesh(std::string(name));
   const auto reader = stub.DownloadMesh(&context, request);
   Receiver receiver(name, progress);
-  v1::DownloadMeshResponse piece;
-  absl::Status taken;
-  while (taken.ok() && reader->Read(&piece)) taken = receiver.take(piece);
-  if (!taken.ok()) context.TryCancel();
+  v1::DownloadMeshResponse message;
+  absl::Status received;
+  while (received.ok() && reader->Read(&message)) received = receiver.receive(message);
+  if (!received.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  if (!taken.ok()) return taken;
+  if (!received.ok()) return received;
   if (!end.ok()) return end;
   return receiver.finish();
 }

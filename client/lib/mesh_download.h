@@ -11,7 +11,7 @@
 
 namespace locus::client {
 
-// See Client::download_mesh. One try.
+// Performs one attempt of Client::download_mesh.
 absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& stub, absl::string_view name,
                                              absl::Time deadline, const DownloadProgress& progress);
 

@@ -12,9 +12,9 @@
 namespace locus::client {
 namespace {
 
-// Numbers a message, of either column: a little under 1 MiB with its frame.
-constexpr size_t kNumbersPerMessage = (1u << 18) - 1024;
-static_assert(kNumbersPerMessage % 3 == 0, "messages end between triples");
+// Number of values of a column per message: a little under 1 MiB including its encoding.
+constexpr size_t kValuesPerMessage = (1u << 18) - 1024;
+static_assert(kValuesPerMessage % 3 == 0, "messages end between triples");
 
 using Writer = grpc::ClientWriterInterface<v1::UploadMeshRequest>;
 
@@ -45,17 +45,17 @@ class Sender {
   Sender(Writer& writer, const MeshColumns& mesh, const UploadProgress& progress)
       : writer_(writer), progress_(progress), total_((mesh.vertices.size() + mesh.indices.size()) * sizeof(uint32_t)) {}
 
-  // False when the server has answered already.
+  // Sends a column in messages. Returns false if the server has already answered.
   template <class T, class Column>
-  bool send(absl::Span<const T> numbers, Column column) {
-    while (!numbers.empty()) {
-      const absl::Span<const T> part = numbers.subspan(0, kNumbersPerMessage);
+  bool send(absl::Span<const T> values, Column column) {
+    while (!values.empty()) {
+      const absl::Span<const T> part = values.subspan(0, kValuesPerMessage);
       v1::UploadMeshRequest request;
       (request.*column)()->Add(part.begin(), part.end());
       if (!writer_.Write(request)) return false;
       sent_ += part.size() * sizeof(T);
       if (progress_) progress_(sent_, total_);
-      numbers.remove_prefix(part.size());
+      values.remove_prefix(part.size());
     }
     return true;
   }
@@ -81,7 +81,7 @@ absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterfa
   const bool all_sent = writer->Write(opening(mesh)) &&
                         sender.send(mesh.vertices, &v1::UploadMeshRequest::mutable_vertices) &&
                         sender.send(mesh.indices, &v1::UploadMeshRequest::mutable_indices);
-  // A write that fails means that the server has answered: Finish says what.
+  // If a write fails, the server has already answered, and Finish() returns its answer.
   if (all_sent) writer->WritesDone();
   const absl::Status status = to_absl_status(writer->Finish());
   if (!status.ok()) return status;

@@ -10,8 +10,8 @@
 
 namespace locus::client {
 
-// See Client::upload_mesh. The first message says what comes and holds no columns, so that a server which knows the
-// bytes can answer before any of them is sent.
+// Performs Client::upload_mesh. The first message holds hash and counts but no columns, so that a server that already
+// has the mesh can answer before any column is sent.
 absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterface& stub, const MeshColumns& mesh,
                                                    absl::Time deadline, const UploadProgress& progress);
 

@@ -22,11 +22,11 @@ class MoveBatcher::Impl {
 
  private:
   void send(UpdateBuilder moves) {
-    const auto told = [this](const absl::StatusOr<v1::UpdateAck>& ack) {
+    const auto notify = [this](const absl::StatusOr<v1::UpdateAck>& ack) {
       if (on_ack_) on_ack_(ack);
     };
-    const absl::Status sent = stream_->send(moves.build(), told);
-    if (!sent.ok()) told(sent);
+    const absl::Status sent = stream_->send(moves.build(), notify);
+    if (!sent.ok()) notify(sent);
   }
 
   const std::unique_ptr<UpdateStream> stream_;

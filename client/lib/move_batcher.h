@@ -1,5 +1,5 @@
-// Single moves from many callers in few messages, each of which becomes one revision. For game code where every thing
-// moves itself; whoever has the positions of a tick at hand builds a batch of them.
+// Batcher of single moves from many callers into few messages, each of which becomes one revision. For game code where
+// every object moves itself; code that has all positions of a tick builds a batch of them with UpdateBuilder instead.
 //
 //   locus::client::MoveBatcher moves(client->update_stream("arena"), {.max_items = 4096});
 //   moves.move(7, {0, 0, 30});
@@ -18,26 +18,26 @@
 
 namespace locus::client {
 
-// Thread promise: every method may be called from any thread. Moves of one caller are applied in their order; of two
-// moves of one object the later stays.
+// Thread promise: every method may be called from any thread. Moves of one caller are applied in order; of two moves of
+// one object the later one wins.
 class MoveBatcher {
  public:
-  // Called for each message with its ack, which lists refused moves (ids that no object has), or with why the stream
-  // ended. On a thread of the library: must not block, nor call the batcher.
+  // Callback for each message, with its ack, which lists refused moves (unknown ids), or with the error that ended the
+  // stream. Runs on a thread of the library: it must not block or call the batcher.
   using AckCallback = std::function<void(const absl::StatusOr<v1::UpdateAck>&)>;
 
   explicit MoveBatcher(std::unique_ptr<UpdateStream> stream, const GatherLimits& limits = {}, AckCallback on_ack = {});
-  // Sends what is left and waits for its acks.
+  // Sends the gathered moves and waits for all acks.
   ~MoveBatcher();
   MoveBatcher(const MoveBatcher&) = delete;
   MoveBatcher& operator=(const MoveBatcher&) = delete;
 
-  // Blocks while `max_items` moves wait for a server that does not keep up. Once the stream has ended moves are
-  // dropped: see flush().
+  // Adds a move. Blocks while `max_items` moves wait because the server does not keep up. After the stream has ended,
+  // moves are dropped: see flush().
   void move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation = std::nullopt);
 
-  // Sends at once what has been gathered, and blocks until all that was moved before is acked. The stream's error if it
-  // has ended instead.
+  // Sends the gathered moves at once, and blocks until all moves added before are acked. Returns the error of the
+  // stream if it has ended.
   absl::Status flush();
 
  private:

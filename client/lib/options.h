@@ -1,4 +1,4 @@
-// What a caller may choose about connections, deadlines and retries. Plain data.
+// Options of connections, deadlines and retries. For callers of Client::connect and the streams. Plain data.
 #ifndef LOCUS_CLIENT_LIB_OPTIONS_H_
 #define LOCUS_CLIENT_LIB_OPTIONS_H_
 
@@ -6,41 +6,42 @@
 
 namespace locus::client {
 
-// How often and how patiently something is tried again. The wait doubles from try to try, varied by a fifth so that
-// many clients of one server do not come back in step; a server's own hint (Error.retry_after_ms) lengthens it.
+// Number of attempts and waits between them. The wait doubles with each attempt and varies randomly by a fifth, so that
+// many clients of one server do not retry in step; a server's hint (Error.retry_after_ms) lengthens it.
 struct RetryPolicy {
-  // Tries in all, the first one included. 1 = never again.
+  // Maximum number of attempts, including the first. 1 = no retries.
   int max_attempts = 5;
-  // The wait before the second try.
+  // Wait before the second attempt.
   absl::Duration first_backoff = absl::Milliseconds(100);
-  // No wait is longer, a hint's excepted.
+  // Maximum wait, unless a hint asks for more.
   absl::Duration max_backoff = absl::Seconds(2);
 };
 
-// Which of a client's two connections carries something. One connection is one socket: what is small waits there behind
-// what is large.
+// One of a client's two connections. A connection is one socket, on which small messages wait behind large ones.
 enum class Lane {
-  kLatency,  // small and soon: single calls, and streams of small batches
-  kBulk,     // much at once: streams by default, uploads, downloads, dumps
+  kLatency,  // small messages with low latency: unary calls, and streams of small batches
+  kBulk,     // large messages: streams by default, uploads, downloads, dumps, backups
 };
 
 struct ClientOptions {
-  // How long connect() may take in all.
+  // Maximum duration of connect().
   absl::Duration connect_timeout = absl::Seconds(10);
-  // False: connect() fails as soon as an attempt is refused, so that a wrong address is told at once. True: it goes on
-  // trying until the timeout; for servers that are just starting.
+  // False: connect() fails as soon as an attempt is refused, so that a wrong address is reported at once. True: it
+  // retries until the timeout, for servers that are just starting.
   bool wait_for_server = false;
-  // How long a call may take, its retries included. Raise it for large query batches on slow machines.
+  // Maximum duration of a call including its retries. Raise it for large query batches on slow machines.
   absl::Duration deadline = absl::Seconds(10);
-  // The same for calls that build or send a lot: mesh uploads, changes of instances, dumps.
+  // Maximum duration of calls that build or transfer much data: mesh uploads and downloads, changes of instances,
+  // dumps.
   absl::Duration long_deadline = absl::Minutes(10);
-  // The same for a backup, which may be as large as a disk.
+  // Maximum duration of a backup, which may be as large as a disk.
   absl::Duration backup_deadline = absl::Hours(24);
   // Largest message sent; the server's default receives 32 MiB.
   int max_send_bytes = 32 << 20;
   // Largest message received; the protocol's max_reply_bytes goes up to 64 MiB.
   int max_receive_bytes = 64 << 20;
-  // For calls that change nothing, and for updates that carry `writer` and `batch`. No other call is ever repeated.
+  // Retries of calls that change nothing, and of updates that carry `writer` and `batch`. No other call is ever
+  // retried.
   RetryPolicy retry;
 };
 

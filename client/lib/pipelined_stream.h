@@ -1,13 +1,14 @@
-// The machinery under UpdateStream and QueryStream: a bidirectional call whose requests are answered under their
-// sequence numbers, with a bounded number under way, that comes back after a broken connection and sends again what was
-// not answered; a connection on which nothing is answered for too long counts as broken. Internal to the library.
+// Pipelined stream: base of UpdateStream and QueryStream. Internal to the library. A bidirectional call whose responses
+// carry the sequence numbers of their requests, with a bounded number of requests in flight. After a broken connection
+// it reconnects and sends the unanswered requests again. A connection without any response for too long counts as
+// broken.
 //
-// Threads: one of its own per stream, the supervisor, which opens call after call and waits for each to be over;
-// messages move on gRPC's callback threads. send(), flush() and close() may be called from any thread. Answers are
-// handed to callbacks one at a time, never with the lock held.
+// Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
+// each. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from any
+// thread. Callbacks run one at a time, without the lock held.
 //
-// Invariants: `items_` holds what was accepted and not answered, in the order of sending; within a call an item is
-// written only after all items before it. After `ended_` is set there are no items, and never will be.
+// Invariants: `items_` holds the requests that were accepted and not answered, in the order of sending; within a call
+// an item is written only after all items before it. After `ended_` is set, `items_` is and stays empty.
 #ifndef LOCUS_CLIENT_LIB_PIPELINED_STREAM_H_
 #define LOCUS_CLIENT_LIB_PIPELINED_STREAM_H_
 
@@ -34,7 +35,7 @@
 
 namespace locus::client {
 
-// True for an end of a stream after which a new one may do better.
+// Returns whether a new call may succeed after a call ended with `end`.
 inline bool worth_reconnecting(const absl::Status& end) {
   if (worth_repeating(end)) return true;
   return (absl::IsCancelled(end) || absl::IsInternal(end)) && !refused_by_server(end);
@@ -47,32 +48,33 @@ class PipelinedStream {
   using Reactor = grpc::ClientBidiReactor<Request, Response>;
 
   struct Item {
-    std::shared_ptr<Request> request;  // shared with a write in progress: replace it to change it
+    std::shared_ptr<Request> request;  // shared with a write in progress: replaced, never modified
     Callback done;
     bool written = false;  // on the current call
   };
   using Items = std::deque<Item>;
 
-  // How one kind of stream differs from another. number() and answered() are called with the stream's lock held.
+  // Differences between the kinds of streams. number() and answered() are called with the stream's lock held.
   class Kind {
    public:
     virtual ~Kind() = default;
     virtual void start_call(grpc::ClientContext* context, Reactor* reactor) = 0;
-    // Gives a new request its sequence and other numbers.
+    // Assigns the sequence number of a new request, and batch numbers if the kind has them.
     virtual void number(Request& request) = 0;
+    // Converts a response into the outcome of its request.
     virtual absl::StatusOr<Result> outcome_of(Response& response) = 0;
-    // Called after the item that stood at `position` was answered and taken out. May renumber those behind it. An error
-    // ends the stream.
+    // Called after the item at `position` was answered and removed. May renumber the items behind it. An error ends the
+    // stream.
     virtual absl::Status answered(const absl::StatusOr<Result>& outcome, Items& items, size_t position) = 0;
   };
 
   struct Options {
     int max_in_flight;
     RetryPolicy reconnect;
-    absl::Duration patience;  // with a server that answers nothing
+    absl::Duration patience;  // maximum time without any response while requests are unanswered
   };
 
-  // `kind` outlives the stream.
+  // Starts the supervisor. `kind` outlives the stream.
   PipelinedStream(Kind& kind, std::string scene, const Options& options)
       : kind_(kind),
         scene_(std::move(scene)),
@@ -98,7 +100,7 @@ class PipelinedStream {
     if (ended_ || closing_) return why_ended();
     shared->set_scene(scene_);
     kind_.number(*shared);
-    if (items_.empty()) last_sign_ = Clock::now();
+    if (items_.empty()) last_response_ = Clock::now();
     items_.push_back({std::move(shared), std::move(done)});
     pump();
     changed_.notify_all();
@@ -107,7 +109,7 @@ class PipelinedStream {
 
   absl::Status flush() {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return items_.empty() && handing_over_ == 0; });
+    changed_.wait(lock, [this] { return items_.empty() && running_callbacks_ == 0; });
     return ended_.value_or(fatal_);
   }
 
@@ -116,8 +118,8 @@ class PipelinedStream {
     closing_ = true;
     pump();
     changed_.notify_all();
-    changed_.wait(lock, [this] { return items_.empty() && handing_over_ == 0; });
-    if (!changed_.wait_for(lock, kFarewell, [this] { return ended_.has_value(); })) {
+    changed_.wait(lock, [this] { return items_.empty() && running_callbacks_ == 0; });
+    if (!changed_.wait_for(lock, kCloseTimeout, [this] { return ended_.has_value(); })) {
       if (attempt_) attempt_->cancel();
       changed_.wait(lock, [this] { return ended_.has_value(); });
     }
@@ -127,13 +129,13 @@ class PipelinedStream {
  private:
   using Clock = std::chrono::steady_clock;
 
-  // How long a server may take to end a stream that was closed.
-  static constexpr std::chrono::seconds kFarewell{5};
-  // Of a clock's wait, which must not overflow.
+  // Maximum time for the server to end a stream that was closed.
+  static constexpr std::chrono::seconds kCloseTimeout{5};
+  // Maximum duration of one wait, so that the time of its end does not overflow.
   static constexpr std::chrono::hours kLongestWait{1};
 
-  // One call. Its hold keeps gRPC from finishing it while other threads may still start writes; the hold ends with the
-  // last read. Members are guarded by the stream's lock, `response_` by the order of reactions.
+  // One call. A hold keeps gRPC from finishing it while other threads may still start writes; the last read removes the
+  // hold. Members are guarded by the stream's lock, except `response_`, which only the sequential read reactions use.
   class Attempt final : public Reactor {
    public:
     Attempt(PipelinedStream& stream, const std::string& scene) : stream_(stream) { add_scene(context_, scene); }
@@ -191,7 +193,7 @@ class PipelinedStream {
     std::optional<absl::Status> end_;
   };
 
-  // The lock is held. Starts the next write, if one may be started.
+  // Starts the next write if no other is in progress. The lock is held.
   void pump() {
     if (!attempt_ || !attempt_->writable()) return;
     const auto next = std::find_if(items_.begin(), items_.end(), [](const Item& item) { return !item.written; });
@@ -203,7 +205,8 @@ class PipelinedStream {
     }
   }
 
-  // Answers that nobody waits for belong to requests that were renumbered since.
+  // Completes the request of a response. Responses without a matching item belong to requests that were renumbered in
+  // the meantime, and are ignored.
   void receive(Response& response) {
     std::unique_lock lock(mutex_);
     const auto item = std::find_if(items_.begin(), items_.end(), [&](const Item& candidate) {
@@ -214,7 +217,7 @@ class PipelinedStream {
     Callback done = std::move(item->done);
     items_.erase(item);
     backoff_.reset();
-    last_sign_ = Clock::now();
+    last_response_ = Clock::now();
     absl::StatusOr<Result> outcome = kind_.outcome_of(response);
     fatal_.Update(kind_.answered(outcome, items_, position));
     if (fatal_.ok()) {
@@ -222,16 +225,16 @@ class PipelinedStream {
     } else {
       attempt_->cancel();
     }
-    hand_over(lock, done, std::move(outcome));
+    complete(lock, done, std::move(outcome));
   }
 
-  void hand_over(std::unique_lock<std::mutex>& lock, Callback& done, absl::StatusOr<Result> outcome) {
-    ++handing_over_;
+  void complete(std::unique_lock<std::mutex>& lock, Callback& done, absl::StatusOr<Result> outcome) {
+    ++running_callbacks_;
     changed_.notify_all();
     lock.unlock();
     done(std::move(outcome));
     lock.lock();
-    --handing_over_;
+    --running_callbacks_;
     changed_.notify_all();
   }
 
@@ -256,7 +259,7 @@ class PipelinedStream {
     for (Item& item : items_) item.written = false;
     attempt_ = std::make_unique<Attempt>(*this, scene_);
     attempt_->start();
-    last_sign_ = Clock::now();
+    last_response_ = Clock::now();
     pump();
     const bool silent = !wait_for_end(lock);
     absl::Status end = *attempt_->end();
@@ -269,11 +272,12 @@ class PipelinedStream {
     return end;
   }
 
-  // False: it was ended here, because the server left everything unanswered for too long.
+  // Waits for the end of the current call. Returns false if it was cancelled here because no response arrived for too
+  // long.
   bool wait_for_end(std::unique_lock<std::mutex>& lock) {
     const auto ended = [this] { return attempt_->end().has_value(); };
     while (!ended()) {
-      const Clock::duration quiet = items_.empty() ? Clock::duration::zero() : Clock::now() - last_sign_;
+      const Clock::duration quiet = items_.empty() ? Clock::duration::zero() : Clock::now() - last_response_;
       if (quiet >= patience_) {
         attempt_->cancel();
         changed_.wait(lock, ended);
@@ -284,7 +288,8 @@ class PipelinedStream {
     return true;
   }
 
-  // Nothing: the stream has ended with `end`. An idle stream may lose its connection as often as it likes.
+  // Returns the wait before the next call, or nothing if the stream ends with `end`. Connections lost while no request
+  // is unanswered do not count as failures.
   std::optional<absl::Duration> wait_before_next(const absl::Status& end) {
     if (broken_off_ || !fatal_.ok() || end.ok() || !worth_reconnecting(end)) return std::nullopt;
     if (items_.empty()) return absl::ZeroDuration();
@@ -294,7 +299,7 @@ class PipelinedStream {
   void finish(std::unique_lock<std::mutex>& lock, const absl::Status& end) {
     ended_ = end;
     Items unanswered = std::exchange(items_, Items());
-    for (Item& item : unanswered) hand_over(lock, item.done, end);
+    for (Item& item : unanswered) complete(lock, item.done, end);
     changed_.notify_all();
   }
 
@@ -312,13 +317,13 @@ class PipelinedStream {
   std::condition_variable changed_;
   Backoff backoff_;
   Items items_;
-  Clock::time_point last_sign_;       // of the server, or since when it is waited for
+  Clock::time_point last_response_;   // last response, or start of the wait for one
   std::unique_ptr<Attempt> attempt_;  // the call in progress
-  int handing_over_ = 0;              // callbacks running
+  int running_callbacks_ = 0;         // number of running callbacks
   bool closing_ = false;
   bool broken_off_ = false;
-  absl::Status fatal_;                 // why the kind ended the stream
-  std::optional<absl::Status> ended_;  // OK = closed in peace
+  absl::Status fatal_;                 // error by which the kind ended the stream
+  std::optional<absl::Status> ended_;  // OK = closed normally
 
   std::thread supervisor_;  // last: it uses everything above
 };

@@ -8,7 +8,7 @@
 namespace locus::client {
 namespace {
 
-// One message: rays in its first block, balls in its second, either of which may be missing.
+// Queries of one message: rays in its first block, balls in its second; a block without queries is omitted.
 struct Gathered {
   std::vector<SingleRay> rays;
   std::vector<SingleBall> balls;
@@ -36,8 +36,8 @@ void fail(const Gathered& gathered, const absl::Status& status) {
   for (const QueryBatcher::IdsCallback& on_ids : gathered.on_ids) on_ids(status);
 }
 
-// A reply that does not answer what was asked counts as one that is no answer at all.
-void hand_out(const Gathered& gathered, const v1::QueryResult& result) {
+// Calls the callbacks with the result. If the result does not match the queries, all callbacks get an error.
+void deliver(const Gathered& gathered, const v1::QueryResult& result) {
   const int rays = gathered.rays.empty() ? 0 : 1, balls = gathered.balls.empty() ? 0 : 1;
   const absl::Status wrong = absl::DataLossError("the server's answer does not fit what was asked");
   if (result.blocks_size() != rays + balls) return fail(gathered, wrong);
@@ -66,7 +66,7 @@ class QueryBatcher::Impl {
   Gatherer<Gathered>& gatherer() { return gatherer_; }
   void flush() {
     gatherer_.flush();
-    stream_->flush().IgnoreError();  // told to each callback
+    stream_->flush().IgnoreError();  // each callback has received it
   }
 
  private:
@@ -75,7 +75,7 @@ class QueryBatcher::Impl {
     const absl::Status sent =
         stream_->send(message_of(*shared, frame_), [shared](absl::StatusOr<v1::QueryResult> result) {
           if (result.ok())
-            hand_out(*shared, *result);
+            deliver(*shared, *result);
           else
             fail(*shared, result.status());
         });

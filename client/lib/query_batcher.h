@@ -1,6 +1,6 @@
-// Single queries from many callers in few messages: each is answered by its own callback, and what callers ask within a
-// moment travels together. For game code that asks here and there; whoever has a thousand queries at hand builds a
-// batch of them.
+// Batcher of single queries from many callers: queries that arrive within a short time are sent in one message, and
+// each is answered by its own callback. For game code with scattered queries; code that has a thousand queries at once
+// builds a batch of them with QueryBuilder instead.
 //
 //   locus::client::QueryBatcher batcher(client->query_stream("arena", {.lane = locus::client::Lane::kLatency}));
 //   batcher.ray({{0, 1, 0}, {0, 0, -1}}, [](auto hit) { if (hit.ok() && hit->id != 0) shoot(hit->id, hit->t); });
@@ -23,12 +23,12 @@ namespace locus::client {
 // Positions are relative to the batcher's frame.
 struct SingleRay {
   Float3 origin;
-  Float3 direction;                                      // t counts in its lengths
+  Float3 direction;                                      // unit of t; any length but zero
   float t_max = std::numeric_limits<float>::infinity();  // included
   Filter filter = {};
 };
 
-// The nearest hit; a miss has t = +infinity, id 0 and kNoTriangle.
+// Nearest hit; a miss has t = +infinity, id 0 and kNoTriangle.
 struct SingleHit {
   float t = std::numeric_limits<float>::infinity();
   uint64_t id = 0;
@@ -47,8 +47,8 @@ struct QueryBatcherOptions {
   Double3 frame = {};
 };
 
-// Thread promise: every method may be called from any thread. Callbacks come one at a time on a thread of the library:
-// they must not block, nor call the batcher.
+// Thread promise: every method may be called from any thread. Callbacks run one at a time on a thread of the library:
+// they must not block or call the batcher.
 class QueryBatcher {
  public:
   using HitCallback = std::function<void(absl::StatusOr<SingleHit>)>;
@@ -56,18 +56,18 @@ class QueryBatcher {
   using IdsCallback = std::function<void(absl::StatusOr<std::vector<uint64_t>>)>;
 
   explicit QueryBatcher(std::unique_ptr<QueryStream> stream, const QueryBatcherOptions& options = {});
-  // Sends what is left and waits until everything is answered.
+  // Sends the gathered queries and waits for all answers.
   ~QueryBatcher();
   QueryBatcher(const QueryBatcher&) = delete;
   QueryBatcher& operator=(const QueryBatcher&) = delete;
 
-  // The callback is called exactly once: with the answer, or with why its message was not answered. A wrong value, one
-  // that is not finite for example, refuses all that travelled with it. Blocks while `max_items` queries wait for a
-  // server that does not keep up.
+  // Add a query. Its callback is called exactly once, with the answer or with the error of its message. An invalid
+  // value, for example one that is not finite, refuses all queries of the same message. Block while `max_items` queries
+  // wait because the server does not keep up.
   void ray(const SingleRay& ray, HitCallback on_hit);
   void ball(const SingleBall& ball, IdsCallback on_ids);
 
-  // Sends at once what has been gathered, and blocks until all that was asked before is answered.
+  // Sends the gathered queries at once, and blocks until all queries added before are answered.
   void flush();
 
  private:

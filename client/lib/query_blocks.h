@@ -1,9 +1,9 @@
-// One block of a query batch, written in columns: rays, balls, boxes, a lookup or what is nearest, with the settings
-// all kinds share. Got from QueryBuilder, and valid until its build(). Nothing is checked here: the server refuses a
-// wrong batch whole, naming block, column and index. Not thread-safe.
+// Builders of one block of a query batch: rays, balls, boxes, nearest or lookup, with the settings that all kinds
+// share. Returned by QueryBuilder, and valid until its build(). Nothing is checked here: the server refuses an invalid
+// batch as a whole, naming block, column and index. Not thread-safe.
 //
-// A per-query column (t_max, greatest distances, masks, ignored groups, rotations) is either filled row by row, or set
-// as a whole: N entries, one for all, or none. Do not mix the two ways in one column of a block.
+// A per-query column (t_max, max_distances, masks, ignored groups, rotations) is either filled row by row, or set as a
+// whole column: N entries, one for all, or none. Do not mix the two ways in one column of a block.
 #ifndef LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 #define LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 
@@ -19,17 +19,17 @@ namespace locus::client {
 
 inline constexpr uint32_t kEveryMask = 0xFFFFFFFFu;
 
-// What one query finds and passes over.
+// Filter of one query by layers and group.
 struct Filter {
   uint32_t mask = kEveryMask;  // found iff (layers & mask) != 0
-  uint64_t ignore_group = 0;   // 0 = nobody
+  uint64_t ignore_group = 0;   // 0 = none
 };
 
 // Settings of every kind of block. Each call returns the block, so that calls chain.
 template <class Derived>
 class BlockBuilder {
  public:
-  // Added to every position of the block; positions in its result are relative to it.
+  // Sets the frame: it is added to every position of the block, and positions in its result are relative to it.
   Derived& frame(const Double3& origin) {
     v1::Vec3d& frame = *block_->mutable_frame();
     frame.set_x(origin.x);
@@ -58,28 +58,29 @@ class BlockBuilder {
     assign(*block_->mutable_ignore_groups(), groups);
     return derived();
   }
-  // For the whole block, at most 64.
+  // Sets the ids that the whole block ignores, at most 64.
   Derived& ignore_ids(absl::Span<const uint64_t> ids) {
     assign(*block_->mutable_ignore_ids(), ids);
     return derived();
   }
-  // Most rows a query; 0 = 1,024.
+  // Sets the maximum number of rows per query; 0 = 1,024.
   Derived& max_results(uint32_t rows) {
     block_->set_max_results(rows);
     return derived();
   }
-  // Only rows with a higher id: goes on after a cut.
+  // Returns only rows with a higher id; continues after a truncated result.
   Derived& after_id(uint64_t id) {
     block_->set_after_id(id);
     return derived();
   }
-  // When each query asks: N ticks or one for all, and N fractions of the way to the next tick, one for all, or none.
+  // Sets the time of each query: N ticks or one for all, and N fractions of the way to the next tick, one for all, or
+  // none.
   Derived& as_of(absl::Span<const uint64_t> ticks, absl::Span<const float> fractions = {}) {
     assign(*block_->mutable_as_of_ticks(), ticks);
     assign(*block_->mutable_as_of_fractions(), fractions);
     return derived();
   }
-  // What to do about times that are not kept; refused by default.
+  // Sets the handling of times outside the history; they are refused by default.
   Derived& outside_history(v1::OutsideHistory outside) {
     block_->set_outside_history(outside);
     return derived();
@@ -106,12 +107,12 @@ class RayBlock : public BlockBuilder<RayBlock> {
   RayBlock& mode(v1::RayMode mode);
   RayBlock& cull(v1::Cull cull);
   RayBlock& inside(v1::Inside inside);
-  // One ray. t counts in the direction's length, which may be any but zero.
+  // Appends one ray. t is a multiple of the direction, which may have any length but zero.
   RayBlock& ray(const Float3& origin, const Float3& direction, float t_max = std::numeric_limits<float>::infinity(),
                 const Filter& filter = {});
   // Appends N rays: 3N floats each.
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
-  // Whole column: N entries or one for all.
+  // Sets the whole column: N entries or one for all.
   RayBlock& t_max(absl::Span<const float> t_max);
 
  private:
@@ -140,34 +141,34 @@ class BoxBlock : public BlockBuilder<BoxBlock> {
                 const Filter& filter = {});
   // Appends N centres and their half extents: 3N floats, or, in the only call for the block, one triple for all.
   BoxBlock& boxes(absl::Span<const float> centers, absl::Span<const float> half_extents);
-  // Whole column: 4N floats or one quaternion for all.
+  // Sets the whole column: 4N floats or one quaternion for all.
   BoxBlock& rotations(absl::Span<const float> rotations);
 
  private:
   v1::Boxes* boxes_;
 };
 
-// What is nearest to points: rows as of rays ALL, t the distance.
+// Nearest objects and instances to points. Rows are like those of rays of mode ALL; t is the distance.
 class NearestBlock : public BlockBuilder<NearestBlock> {
  public:
   explicit NearestBlock(v1::QueryBlock& block) : BlockBuilder(block), nearest_(block.mutable_nearest()) {}
 
-  // How many a point, at most 65,536; 0 = 1.
+  // Sets the number of rows per point, at most 65,536; 0 = 1.
   NearestBlock& k(uint32_t count);
-  // INSTANCES counts an instance once, by its nearest triangle.
+  // Sets the detail: INSTANCES reports an instance once, by its nearest triangle.
   NearestBlock& detail(v1::StaticDetail detail);
   NearestBlock& point(const Float3& point, float max_distance = std::numeric_limits<float>::infinity(),
                       const Filter& filter = {});
   // Appends N points: 3N floats.
   NearestBlock& points(absl::Span<const float> points);
-  // Whole column: N entries or one for all; included.
+  // Sets the whole column: N entries or one for all. The limit itself is included.
   NearestBlock& max_distances(absl::Span<const float> distances);
 
  private:
   v1::Nearest* nearest_;
 };
 
-// Either ids, one row each in their order, or groups, never both in one block.
+// Lookup by ids, one row each in their order, or by groups; never both in one block.
 class LookupBlock : public BlockBuilder<LookupBlock> {
  public:
   explicit LookupBlock(v1::QueryBlock& block) : BlockBuilder(block), lookup_(block.mutable_lookup()) {}

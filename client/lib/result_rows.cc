@@ -34,7 +34,7 @@ absl::Status contradiction(absl::string_view what) {
   return absl::DataLossError(absl::StrCat("the server's answer contradicts itself: ", what));
 }
 
-// Dense answers have no counts: their number of rows is that of any column that is there.
+// Returns the number of rows of a block without counts: the length of any column that is present.
 size_t dense_rows(const std::vector<ColumnLength>& columns) {
   for (const ColumnLength& column : columns) {
     if (column.entries > 0) return static_cast<size_t>(column.entries / column.per_row);

@@ -1,9 +1,8 @@
-// Views over the columns of a query's answer, by query and row. For readers of v1::QueryResult. A view borrows the
-// block it was made from and copies nothing but an index of where each query's rows begin. Immutable, so any number of
-// threads may read one.
+// Views of the columns of a query result, by query and row. For readers of v1::QueryResult. A view borrows its block
+// and copies nothing but the index of each query's first row. Immutable, so any number of threads may read one.
 //
-// of() checks the lengths of the columns once, so that reading cannot run past them whatever a server sent: a block
-// that contradicts itself is DATA_LOSS. Numbers of queries and rows are the caller's promise, as with a vector.
+// of() checks the lengths of the columns once, so that no access runs past their end, whatever the server sent: a block
+// with inconsistent lengths is DATA_LOSS. Indices of queries and rows are not checked, as with a vector.
 #ifndef LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 #define LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 
@@ -26,31 +25,32 @@ struct RowRange {
   size_t size() const { return end - begin; }
 };
 
-// The rows of any block: which belong to which query, and the columns that were asked for.
+// Rows of any block: the range of rows of each query, and the requested columns.
 class ResultRows {
  public:
+  // Returns a view, or DATA_LOSS if the lengths of the columns are inconsistent.
   static absl::StatusOr<ResultRows> of(const v1::BlockResult& block);
 
-  // Queries, and rows of all queries.
+  // Return the number of queries, and the number of rows of all queries.
   size_t queries() const { return begins_.size() - 1; }
   size_t rows() const { return begins_.back(); }
   RowRange rows_of(size_t query) const { return {begins_[query], begins_[query + 1]}; }
-  // Whether the query had more rows than are reported.
+  // Returns whether the query had more rows than are reported.
   bool truncated(size_t query) const;
-  // The time that each query asked about in fact; empty for blocks that ask about now.
+  // Return the effective time of each query; empty for blocks without as_of().
   absl::Span<const uint64_t> resolved_ticks() const { return block_->resolved_ticks(); }
   absl::Span<const float> resolved_fractions() const { return block_->resolved_fractions(); }
-  // Whether the query asked about a time that is not kept.
+  // Returns whether the query asked for a time outside the history and got the nearest kept time.
   bool clamped(size_t query) const;
 
-  // Columns, one entry a row; empty if not asked for.
+  // Return columns with one entry per row; empty if not requested.
   absl::Span<const float> t() const { return block_->t(); }
   absl::Span<const uint64_t> ids() const { return block_->ids(); }
   absl::Span<const uint32_t> triangles() const { return block_->triangles(); }
   absl::Span<const uint64_t> groups() const { return block_->groups(); }
   absl::Span<const uint64_t> tags() const { return block_->tags(); }
   absl::Span<const uint32_t> layers() const { return block_->layers(); }
-  // Columns of two, three or four numbers a row.
+  // Return columns with several values per row: 2 for uvs, 4 for rotations, 3 for the others; empty if not requested.
   absl::Span<const float> uvs() const { return block_->uvs(); }
   absl::Span<const float> normals() const { return block_->normals(); }
   absl::Span<const float> points() const { return block_->points(); }
@@ -61,20 +61,20 @@ class ResultRows {
   ResultRows(const v1::BlockResult& block, std::vector<size_t> begins) : block_(&block), begins_(std::move(begins)) {}
 
   const v1::BlockResult* block_;
-  std::vector<size_t> begins_;  // one more than queries: where each one's rows begin, and the number of rows
+  std::vector<size_t> begins_;  // first row of each query, and behind them the number of rows
 };
 
-// Rays FIRST (one row a ray, a miss has id 0) and ALL (the rows of a ray ascend by t), and what is nearest to points,
-// likewise by distance. Wants T and ID, as by default.
+// Rows of rays of mode FIRST (one row per ray, a miss has id 0) and ALL (rows ascend by t), and of nearest queries
+// (rows ascend by distance). Needs the columns T and ID, which are returned by default.
 class RayHits {
  public:
   static absl::StatusOr<RayHits> of(const v1::BlockResult& block);
 
   const ResultRows& rows() const { return rows_; }
   size_t size() const { return rows_.queries(); }
-  // The ray's nearest hit.
+  // Returns whether the ray has a hit.
   bool hit(size_t ray) const;
-  // +infinity, 0 and kNoTriangle for a miss.
+  // Return the columns of the ray's nearest hit; +infinity, 0 and kNoTriangle for a miss.
   float t(size_t ray) const;
   uint64_t id(size_t ray) const;
   uint32_t triangle(size_t ray) const;
@@ -85,7 +85,7 @@ class RayHits {
   ResultRows rows_;
 };
 
-// Rays ANY: one byte a ray.
+// Result of rays of mode ANY: one byte per ray.
 class AnyHits {
  public:
   static absl::StatusOr<AnyHits> of(const v1::BlockResult& block);
@@ -99,16 +99,17 @@ class AnyHits {
   const v1::BlockResult* block_;
 };
 
-// Balls and boxes: per query a span of ids, and of triangles where they were asked for. Wants ID, as by default.
+// Rows of balls and boxes: for each query a span of ids, and of triangles if requested. Needs the column ID, which is
+// returned by default.
 class Overlaps {
  public:
   static absl::StatusOr<Overlaps> of(const v1::BlockResult& block);
 
   const ResultRows& rows() const { return rows_; }
   size_t size() const { return rows_.queries(); }
-  // Ascending; an instance repeats for each of its triangle rows.
+  // Returns ids in ascending order; the id of an instance repeats for each of its triangles.
   absl::Span<const uint64_t> ids(size_t query) const;
-  // As long as ids(query); empty if not asked for.
+  // Returns triangles, as many as ids(query); empty if not requested.
   absl::Span<const uint32_t> triangles(size_t query) const;
 
  private:

@@ -1,4 +1,4 @@
-// Trying again what may be tried again. Internal to the library: callers choose by RetryPolicy and by what they call.
+// Retries of calls that are safe to repeat. Internal to the library: callers configure them by RetryPolicy.
 #ifndef LOCUS_CLIENT_LIB_RETRY_H_
 #define LOCUS_CLIENT_LIB_RETRY_H_
 
@@ -11,15 +11,15 @@
 
 namespace locus::client {
 
-// The waits of one sequence of tries. Not thread-safe.
+// Waits of one sequence of attempts. Not thread-safe.
 class Backoff {
  public:
   explicit Backoff(const RetryPolicy& policy) : policy_(policy) {}
 
-  // Counts a failure. The wait before the next try, never shorter than the server's hint; nothing when the policy's
-  // tries are used up.
+  // Counts a failure. Returns the wait before the next attempt, at least the server's hint, or nothing if the attempts
+  // of the policy are used up.
   std::optional<absl::Duration> after_failure(const absl::Status& failure);
-  // After a success: the next failure starts from the shortest wait.
+  // Forgets the failures after a success: the next failure gets the first wait again.
   void reset() { failures_ = 0; }
 
  private:
@@ -27,11 +27,13 @@ class Backoff {
   int failures_ = 0;
 };
 
-// UNAVAILABLE always; RESOURCE_EXHAUSTED if the server names a wait. Meant for calls that are safe to repeat.
+// Returns whether a call that is safe to repeat should be repeated: after UNAVAILABLE, and after RESOURCE_EXHAUSTED
+// with a retry hint of the server.
 bool worth_repeating(const absl::Status& failure);
 
-// Calls `attempt` until it succeeds, fails for good, the policy's tries are used up, or the next wait would not end
-// before `deadline`; returns the last outcome. Sleeps in the caller's thread.
+// Calls `attempt` until it succeeds or fails with an error that is not worth repeating, until the attempts of the
+// policy are used up, or until the next wait would reach `deadline`. Returns the last outcome. Sleeps in the caller's
+// thread.
 absl::Status with_retries(const RetryPolicy& policy, absl::Time deadline, const std::function<absl::Status()>& attempt);
 
 }  // namespace locus::client

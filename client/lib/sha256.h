@@ -1,4 +1,4 @@
-// SHA-256 of bytes that come piece by piece: the name of a mesh's bytes, and what proves a backup's files whole.
+// Incremental SHA-256. Identifies the contents of a mesh, and verifies the files of a backup.
 #ifndef LOCUS_CLIENT_LIB_SHA256_H_
 #define LOCUS_CLIENT_LIB_SHA256_H_
 
@@ -13,7 +13,7 @@ namespace locus::client {
 
 using Sha256 = std::array<uint8_t, 32>;
 
-// Not thread-safe. About 1 GB/s where the processor helps.
+// SHA-256 of the bytes added. Not thread-safe. About 1 GB/s on processors with SHA instructions.
 class Sha256Hasher {
  public:
   Sha256Hasher();
@@ -23,7 +23,7 @@ class Sha256Hasher {
 
   void add(const void* data, size_t bytes);
   void add(absl::string_view bytes) { add(bytes.data(), bytes.size()); }
-  // Of all that was added. From here on the hasher is as new.
+  // Returns the hash of all bytes added, and resets the hasher.
   Sha256 finish();
 
  private:

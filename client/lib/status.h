@@ -1,5 +1,5 @@
-// From the wire's errors to absl::Status and back to the server's structured refusal. For callers that want to act on a
-// reason, a field or a limit instead of reading the message. Functions without state.
+// Conversions from gRPC errors to absl::Status, and from there to the server's structured error. For callers that act
+// on a reason, a field or a limit instead of the message. Functions without state; any thread.
 #ifndef LOCUS_CLIENT_LIB_STATUS_H_
 #define LOCUS_CLIENT_LIB_STATUS_H_
 
@@ -15,21 +15,22 @@ class Status;
 
 namespace locus::client {
 
-// What the server said about a refusal. Nothing where the server did not speak: no connection, the deadline, a proxy.
+// Returns the server's structured error, or nothing if the error does not come from the server: no connection, the
+// deadline, a proxy.
 std::optional<v1::Error> error_of(const absl::Status& status);
 
-// The wait the server asked for before the same request is sent again; zero where it did not ask for any.
+// Returns the wait that the server requests before the same request is sent again; zero if it requests none.
 absl::Duration retry_after(const absl::Status& status);
 
-// True where the server refused, so that nothing was changed; false also where the outcome is unknown.
+// Returns whether the server refused the request, so that nothing was changed. False also if the outcome is unknown.
 bool refused_by_server(const absl::Status& status);
 
-// Code and message as they are, with the Error that travels in `grpc-status-details-bin` attached for error_of().
-// Malformed details are left out: the code and the message still hold.
+// Converts a gRPC status: keeps code and message, and attaches the Error from `grpc-status-details-bin` for error_of().
+// Malformed details are dropped; code and message remain valid.
 absl::Status to_absl_status(const grpc::Status& status);
 
-// A refusal that a stream reported under a sequence number. A code that no refusal has (0, or no gRPC code) becomes
-// UNKNOWN, so that a refusal never turns into success.
+// Converts an error that a stream reported under a sequence number. An invalid code (0, or no gRPC code) becomes
+// UNKNOWN, so that an error never turns into success.
 absl::Status to_absl_status(const v1::Error& error);
 
 }  // namespace locus::client

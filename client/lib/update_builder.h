@@ -1,10 +1,10 @@
-// Writes an update batch in columns, row by row or by whole columns. For callers that stream moving objects. Nothing is
-// checked here: the server judges each item and the ack lists what it refused. Not thread-safe. A builder is spent by
-// build().
+// Builder of an update batch, row by row or by whole columns. For callers that stream moving objects. Nothing is
+// checked here: the server checks each item, and the ack lists the refused ones. Not thread-safe. build() resets the
+// builder.
 //
 // Rows of one shape and one kind of position (relative or absolute) share one Insert, in the order added. Moves and
-// relabels keep the order added over all of them, since the later of two moves of one object is the one that stays: a
-// row of another form than the one before (with or without rotation, relative or absolute) opens a new entry.
+// relabels keep the order added over all of them, since the later of two moves of one object wins: a row of another
+// form than the one before (with or without rotation, relative or absolute) opens a new entry.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 #define LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 
@@ -18,8 +18,8 @@
 
 namespace locus::client {
 
-// Columns of N objects, borrowed for the call. `ids` gives N; another column has N entries, one for all or none, and
-// exactly one of the two kinds of positions is given.
+// Columns of N objects, borrowed for the call. `ids` has N entries; another column has N entries, one for all or none,
+// and exactly one of the two position columns is given.
 struct InsertColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions = {};       // 3N, relative to the frame
@@ -37,44 +37,45 @@ struct MoveColumns {
   absl::Span<const float> rotations = {};       // 4N; none = kept
 };
 
-// New labels of one object; what is absent is kept.
+// New labels of one object; absent ones are kept.
 struct Relabeling {
   std::optional<uint32_t> layers = std::nullopt;
   std::optional<uint64_t> group = std::nullopt;
   std::optional<uint64_t> tag = std::nullopt;
 };
 
-// Whether a move is a jump, so that questions about the past do not place the object in between.
+// Kind of a move. After a teleport, queries about the history never place the object between the two positions.
 enum class MoveKind { kContinuous, kTeleport };
 
 class UpdateBuilder {
  public:
-  // Settings of the whole batch. Float positions are relative to the frame.
+  // Sets the frame of the batch. Float positions are relative to it.
   UpdateBuilder& frame(const Double3& origin);
   UpdateBuilder& tick(uint64_t tick);
-  // An insert of a known id replaces the object instead of being refused.
+  // Makes an insert of a known id replace the object instead of being refused.
   UpdateBuilder& upsert();
-  // One bad item refuses the batch.
+  // Makes one refused item refuse the whole batch.
   UpdateBuilder& all_or_nothing();
   // Drops the history and takes the batch's tick even if it is lower than the scene's.
   UpdateBuilder& restart_ticks();
-  // Removes every object first of all.
+  // Removes all objects before the other changes of the batch.
   UpdateBuilder& clear();
 
   UpdateBuilder& remove(uint64_t id);
   UpdateBuilder& remove(absl::Span<const uint64_t> ids);
   UpdateBuilder& remove_group(uint64_t group);
 
-  // One object at a time. Positions are centres.
+  // Insert one object. Positions are centers.
   UpdateBuilder& insert_point(uint64_t id, const Position& position, const Labels& labels = {});
   UpdateBuilder& insert_ball(uint64_t id, const Position& position, float radius, const Labels& labels = {});
   UpdateBuilder& insert_box(uint64_t id, const Position& position, const Float3& half_extents,
                             const Rotation& rotation = {}, const Labels& labels = {});
-  // `half_axis` goes from the centre to one end of the inner segment, in the capsule's own axes.
+  // Inserts one capsule. `half_axis` is the vector from the center to one end of the inner segment, in the capsule's
+  // own axes.
   UpdateBuilder& insert_capsule(uint64_t id, const Position& position, const Float3& half_axis, float radius,
                                 const Rotation& rotation = {}, const Labels& labels = {});
 
-  // Whole columns, copied once each as they are; each call is an Insert of its own.
+  // Insert whole columns, which are copied unchanged; each call makes an Insert of its own.
   UpdateBuilder& insert_points(const InsertColumns& columns);
   UpdateBuilder& insert_balls(const InsertColumns& columns, absl::Span<const float> radii);
   UpdateBuilder& insert_boxes(const InsertColumns& columns, absl::Span<const float> half_extents);
@@ -87,7 +88,7 @@ class UpdateBuilder {
 
   UpdateBuilder& relabel(uint64_t id, const Relabeling& labels);
 
-  // The batch so far; the builder is left empty, with every setting at its default.
+  // Returns the batch, and leaves the builder empty with every setting at its default.
   v1::UpdateBatch build();
 
  private:
@@ -98,7 +99,7 @@ class UpdateBuilder {
 
   v1::UpdateBatch batch_;
   bool move_takes_rows_ = false;  // the last of batch_.moves was added by row, not as whole columns
-  // For each form, relative then absolute: which entry of batch_.inserts its rows go to; -1 = none yet.
+  // Index of the entry of batch_.inserts that collects rows of each form, relative then absolute; -1 = none yet.
   std::array<int, 8> row_inserts_ = {-1, -1, -1, -1, -1, -1, -1, -1};
 };
 

@@ -20,9 +20,10 @@ uint64_t random_writer() {
   return writer;
 }
 
-// A refusal with a reason left the writer's number unused. A gap means that the server does not know the writer as it
-// should, and an error without a reason leaves open whether the number was used: going on could lose a batch silently.
-bool number_is_free(const absl::Status& failure) {
+// Returns whether the batch number of a failed batch can be used again. A refusal with a reason leaves the number
+// unused. A gap means that the server has lost state of the writer, and after an error without a reason it is unknown
+// whether the number was used: continuing could lose a batch silently.
+bool batch_number_is_unused(const absl::Status& failure) {
   const std::optional<v1::Error> error = error_of(failure);
   return error && error->reason() != v1::REASON_UNSPECIFIED && error->reason() != v1::REASON_BATCH_GAP;
 }
@@ -66,7 +67,7 @@ class UpdateStream::Impl final : public Stream::Kind {
       last_ack_ = Revision{outcome->epoch(), outcome->revision()};
       return absl::OkStatus();
     }
-    if (!number_is_free(outcome.status())) return outcome.status();
+    if (!batch_number_is_unused(outcome.status())) return outcome.status();
     next_batch_ -= items.size() - position + 1;
     for (size_t behind = position; behind < items.size(); ++behind) {
       items[behind].request = std::make_shared<v1::StreamUpdatesRequest>(*items[behind].request);

@@ -1,15 +1,15 @@
-// A steady flow of update batches into one scene: pipelined, and applied exactly once each even across broken
-// connections. For game servers that send a batch a tick.
+// Pipelined stream of update batches into one scene; each batch is applied exactly once, even across broken
+// connections. For game servers that send one batch per tick.
 //
-// Each batch carries the stream's random `writer` number and a dense `batch` number. When the connection breaks, every
-// batch without an ack is sent again, in order, on a new one; the server answers what it had applied with
-// `duplicate`. A batch that the server refuses does not use up its number, so the batches behind it are renumbered and
-// sent again by themselves: the caller sees one outcome for each batch, in the order sent.
+// Each batch carries the stream's random `writer` number and a dense `batch` number. After a broken connection, every
+// batch without an ack is sent again, in order, on a new one; the server answers batches that it had already applied
+// with `duplicate`. A batch that the server refuses does not use up its number, so the stream renumbers the batches
+// behind it and sends them again: the caller gets one outcome for each batch, in the order sent.
 //
-// The stream ends for good when the server refuses it (the scene's name, lost rights), when it forgot the writer (its
-// memory was lost: the scene started over), or when reconnecting fails as often as the policy allows without an ack in
-// between. Then every unanswered batch gets that status, and so does every send() from then on. Their outcome is
-// unknown; what was acked before stays applied.
+// The stream ends permanently if the server refuses it (scene name, lost rights), if the server does not know the
+// writer any more (the scene was restarted without its state), or if reconnecting fails as often as the policy allows
+// without an ack in between. Every unanswered batch and every later send() gets that status. The outcome of the
+// unanswered batches is unknown; acked batches stay applied.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 #define LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 
@@ -33,47 +33,48 @@ class ChannelInterface;
 namespace locus::client {
 
 struct UpdateStreamOptions {
-  // Batches under way at once, 1 or more. send() blocks at this number: that is how the server's pace reaches the
-  // caller.
+  // Maximum number of unanswered batches, at least 1. send() blocks at this number, which limits the caller to the pace
+  // of the server.
   int max_in_flight = 8;
-  // 0 draws a random number. Give one, and `next_batch`, only to go on with a writer of an earlier stream.
+  // Writer number; 0 draws a random one. Set it, and `next_batch`, only to continue the writer of an earlier stream.
   uint64_t writer = 0;
   uint64_t next_batch = 1;
-  // For new connections after a break. An ack starts the count anew.
+  // Reconnection after a broken connection. Every ack resets the count of attempts.
   RetryPolicy reconnect = {.max_attempts = 10};
-  // So long may the server ack nothing while batches are under way; then the connection counts as broken.
+  // Maximum time without any ack while batches are unanswered; after that the connection counts as broken.
   absl::Duration patience = absl::Seconds(10);
-  // kLatency where batches are small and acks wanted at once.
+  // kLatency for small batches whose acks are needed quickly.
   Lane lane = Lane::kBulk;
 };
 
 // Thread promise: every method may be called from any thread; batches of several threads are numbered in the order in
-// which their send() gets in. Callbacks come one at a time, in the order of the batches, on a thread of the library:
-// they must not block, nor call send(), flush(), close() or the destructor.
+// which send() accepts them. Callbacks run one at a time, in the order of the batches, on a thread of the library: they
+// must not block, or call send(), flush(), close() or the destructor.
 class UpdateStream {
  public:
   using AckCallback = std::function<void(absl::StatusOr<v1::UpdateAck>)>;
 
-  // Use Client::update_stream.
+  // Called by Client::update_stream, which callers use instead.
   UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const UpdateStreamOptions& options);
-  // Breaks the stream off; unanswered batches get CANCELLED. close() first to end in peace.
+  // Cancels the stream; unanswered batches get CANCELLED. Call close() before to wait for their acks.
   ~UpdateStream();
   UpdateStream(const UpdateStream&) = delete;
   UpdateStream& operator=(const UpdateStream&) = delete;
 
-  // Blocks while `max_in_flight` batches are unanswered. OK means that `on_ack` will be called exactly once; an error
-  // means that the stream has ended and it never will. The batch's own `writer` and `batch` are overwritten.
+  // Sends a batch. Blocks while `max_in_flight` batches are unanswered. Returns OK if `on_ack` will be called exactly
+  // once; returns an error if the stream has ended, and then never calls it. Overwrites `writer` and `batch` of the
+  // batch.
   absl::Status send(v1::UpdateBatch batch, AckCallback on_ack);
-  // The same with a future, which also gets the error of a stream that has ended.
+  // Sends a batch and returns its future, which also receives the error of a stream that has ended.
   std::future<absl::StatusOr<v1::UpdateAck>> send(v1::UpdateBatch batch);
 
-  // Blocks until all that was sent has been answered and its callbacks have returned; the stream's error if it ended
-  // instead.
+  // Blocks until all sent batches are answered and their callbacks have returned. Returns the error of the stream if it
+  // has ended.
   absl::Status flush();
-  // flush(), then ends the stream. Later sends fail.
+  // Flushes and ends the stream. Later sends fail.
   absl::Status close();
 
-  // Where the latest ack put its batch. A query with QueryBuilder::at_least() of it sees every batch acked so far.
+  // Returns the revision of the latest ack. A query with QueryBuilder::at_least() of it sees every batch acked so far.
   std::optional<Revision> last_ack() const;
   uint64_t writer() const;
 

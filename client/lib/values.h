@@ -1,5 +1,5 @@
-// Small plain values that builders take by row: points, rotations, labels, revisions. For callers of the library; no
-// threads, no invariants beyond what a comment says.
+// Small plain values that the builders take by row: points, rotations, labels, revisions. For callers of the library;
+// plain data without invariants, except where a comment names one.
 #ifndef LOCUS_CLIENT_LIB_VALUES_H_
 #define LOCUS_CLIENT_LIB_VALUES_H_
 
@@ -7,40 +7,40 @@
 
 namespace locus::client {
 
-// Relative to a batch's or block's frame.
+// Position relative to the frame of a batch or block.
 struct Float3 {
   float x = 0, y = 0, z = 0;
 };
 
-// Absolute, or a frame itself.
+// Absolute position, or a frame.
 struct Double3 {
   double x = 0, y = 0, z = 0;
 };
 
-// Where an object goes: a Float3 is relative to the batch's frame, a Double3 absolute.
+// Position of an object: a Float3 is relative to the batch's frame, a Double3 absolute.
 struct Position {
   Position(const Float3& relative) : value{relative.x, relative.y, relative.z} {}  // NOLINT: meant to convert
-  Position(const Double3& there) : value(there), absolute(true) {}                 // NOLINT: meant to convert
+  Position(const Double3& world) : value(world), absolute(true) {}                 // NOLINT: meant to convert
 
   Double3 value;  // exact for both
   bool absolute = false;
 };
 
-// A unit quaternion; the server refuses one that is off unit length by more than 1e-3.
+// Unit quaternion; the server refuses one whose length differs from 1 by more than 1e-3.
 struct Rotation {
   float x = 0, y = 0, z = 0, w = 1;
 
   friend constexpr bool operator==(const Rotation&, const Rotation&) = default;
 };
 
-// By what queries choose and report a thing. The defaults are the protocol's.
+// Labels by which queries filter and report an object. The defaults are those of the protocol.
 struct Labels {
   uint32_t layers = 1;  // found iff (layers & mask) != 0; 0 = hidden
   uint64_t group = 0;   // 0 = none
   uint64_t tag = 0;
 };
 
-// A moment of a scene. Revisions count within an epoch; a scene that started over has another epoch.
+// State of a scene. Revisions count within an epoch; a scene that was restarted without its state has another epoch.
 struct Revision {
   uint64_t epoch = 0;
   uint64_t revision = 0;

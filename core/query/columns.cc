@@ -5,12 +5,12 @@
 namespace locus {
 namespace {
 
-// Tags and lengths of every column of a block, and of a reply around its blocks, are shorter than this.
+// Upper bounds of the encoded field tags and lengths: of all columns of one block, and of the reply's own fields.
 constexpr uint64_t kBlockOverhead = 256;
 constexpr uint64_t kReplyOverhead = 256;
 constexpr uint64_t kCountBytes = 4;
 constexpr uint64_t kTruncatedBytes = 4;
-constexpr uint64_t kMomentBytes = 16;  // its tick, its fraction, and whether it was clamped
+constexpr uint64_t kTimeBytes = 16;  // resolved tick, resolved fraction, and an entry of `clamped`
 
 struct ServedColumns {
   ColumnSet operator()(const RayColumns& rays) const {
@@ -79,11 +79,11 @@ uint64_t fixed_reply_bytes(const QueryBatch& batch) {
   uint64_t bytes = kReplyOverhead;
   for (const QueryBlock& block : batch.blocks) {
     const RowLayout layout = row_layout(block);
-    const uint64_t a_query = layout == RowLayout::kDense   ? row_bytes(returned_columns(block))
-                             : layout == RowLayout::kBytes ? 1
-                                                           : kCountBytes;
-    const uint64_t a_moment = block.as_of_ticks.empty() ? 0 : kMomentBytes;
-    bytes += kBlockOverhead + query_count(block) * (a_query + kTruncatedBytes + a_moment);
+    const uint64_t query_bytes = layout == RowLayout::kDense   ? row_bytes(returned_columns(block))
+                                 : layout == RowLayout::kBytes ? 1
+                                                               : kCountBytes;
+    const uint64_t time_bytes = block.as_of_ticks.empty() ? 0 : kTimeBytes;
+    bytes += kBlockOverhead + query_count(block) * (query_bytes + kTruncatedBytes + time_bytes);
   }
   return bytes;
 }

@@ -3,7 +3,7 @@
 //
 // To add a column: give it a number in Column (query_batch.h), an array in ColumnArrays and a row in kColumnNames and
 // kColumnArrays here, fill it in run/rows.cc, and name its field of the protocol in server/convert/result_columns.cc.
-// Whatever allocates, copies or measures columns loops over the table.
+// All code that allocates, copies or measures columns loops over the table.
 #ifndef LOCUS_CORE_QUERY_COLUMNS_H_
 #define LOCUS_CORE_QUERY_COLUMNS_H_
 
@@ -16,8 +16,8 @@
 
 namespace locus {
 
-// The arrays that result columns consist of. Array<T> is a std::vector<T> where rows are collected, and a T* where they
-// are written in place.
+// Arrays of the result columns. Array<T> is a std::vector<T> where rows are collected, and a T* where rows are written
+// directly into the reply.
 template <template <class> class Array>
 struct ColumnArrays {
   Array<float> t{};
@@ -33,7 +33,7 @@ struct ColumnArrays {
   Array<float> rotations{};
 };
 
-// One row of the table: `width` numbers a row belong to `column`, in the array that get() selects.
+// One row of the table: `column` stores `width` values for each result row in the array that get() selects.
 template <class Get>
 struct ColumnArray {
   Column column;
@@ -43,42 +43,23 @@ struct ColumnArray {
 template <class Get>
 ColumnArray(Column, uint32_t, Get) -> ColumnArray<Get>;
 
-inline constexpr auto kColumnArrays =
-    std::make_tuple(ColumnArray{Column::kT, 1, [](auto& arrays) -> auto& { return arrays.t;
-}  // namespace locus
-}
-, ColumnArray{Column::kId, 1, [](auto& arrays) -> auto& {return arrays.ids;
-}
-}
-, ColumnArray{Column::kTriangle, 1, [](auto& arrays) -> auto& {return arrays.triangles;
-}
-}
-, ColumnArray{Column::kUv, 2, [](auto& arrays) -> auto& {return arrays.uvs;
-}
-}
-, ColumnArray{Column::kNormal, 3, [](auto& arrays) -> auto& {return arrays.normals;
-}
-}
-, ColumnArray{Column::kPoint, 3, [](auto& arrays) -> auto& {return arrays.points;
-}
-}
-, ColumnArray{Column::kGroup, 1, [](auto& arrays) -> auto& {return arrays.groups;
-}
-}
-, ColumnArray{Column::kTag, 1, [](auto& arrays) -> auto& {return arrays.tags;
-}
-}
-, ColumnArray{Column::kLayers, 1, [](auto& arrays) -> auto& {return arrays.layers;
-}
-}
-, ColumnArray{Column::kPose, 3, [](auto& arrays) -> auto& {return arrays.positions;
-}
-}
-, ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& {return arrays.rotations;
-}
-});
+// Rows of the table, one per array. Not formatted: clang-format 14 splits the lambdas and puts comments between them.
+// clang-format off
+inline constexpr auto kColumnArrays = std::make_tuple(
+    ColumnArray{Column::kT, 1, [](auto& arrays) -> auto& { return arrays.t; }},
+    ColumnArray{Column::kId, 1, [](auto& arrays) -> auto& { return arrays.ids; }},
+    ColumnArray{Column::kTriangle, 1, [](auto& arrays) -> auto& { return arrays.triangles; }},
+    ColumnArray{Column::kUv, 2, [](auto& arrays) -> auto& { return arrays.uvs; }},
+    ColumnArray{Column::kNormal, 3, [](auto& arrays) -> auto& { return arrays.normals; }},
+    ColumnArray{Column::kPoint, 3, [](auto& arrays) -> auto& { return arrays.points; }},
+    ColumnArray{Column::kGroup, 1, [](auto& arrays) -> auto& { return arrays.groups; }},
+    ColumnArray{Column::kTag, 1, [](auto& arrays) -> auto& { return arrays.tags; }},
+    ColumnArray{Column::kLayers, 1, [](auto& arrays) -> auto& { return arrays.layers; }},
+    ColumnArray{Column::kPose, 3, [](auto& arrays) -> auto& { return arrays.positions; }},
+    ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& { return arrays.rotations; }});
+// clang-format on
 
-// Names by column number, as the protocol spells them without "COLUMN_".
+// Column names indexed by the value of Column: the protocol's names without the prefix "COLUMN_".
 inline constexpr std::array<absl::string_view, 11> kColumnNames = {
     "UNSPECIFIED", "T", "ID", "TRIANGLE", "UV", "NORMAL", "POINT", "GROUP", "TAG", "LAYERS", "POSE"};
 static_assert(kColumnNames.size() == static_cast<size_t>(kLastColumn) + 1);
@@ -89,11 +70,12 @@ constexpr void for_each_column_array(const Visit& visit) {
   std::apply([&visit](const auto&... array) { (visit(array), ...); }, kColumnArrays);
 }
 
-// The first entry of each array of some rows; null where the column is not wanted.
+// Pointer to the first entry of each array of a range of rows; null for columns that are not returned.
 template <class T>
 using Pointer = T*;
 using RowSpans = ColumnArrays<Pointer>;
 
+// Returns the name of a column as in kColumnNames.
 constexpr absl::string_view column_name(Column column) { return kColumnNames[static_cast<size_t>(column)]; }
 
 // Returns the encoded bytes of one row.
@@ -107,28 +89,29 @@ constexpr uint32_t row_bytes(ColumnSet columns) {
 }
 static_assert(
     [] {
-      for (int number = 1; number <= static_cast<int>(kLastColumn); ++number)
-        if (row_bytes({static_cast<Column>(number)}) == 0) return false;
+      for (int value = 1; value <= static_cast<int>(kLastColumn); ++value)
+        if (row_bytes({static_cast<Column>(value)}) == 0) return false;
       return true;
     }(),
     "a column has no array");
 
-// Returns the columns that a block of this kind can return.
+// Returns the columns that a block of this kind may request.
 ColumnSet served_columns(const QueryBlock& block);
-// Returns the columns that the block does return: those it asks for, or its kind's default ones.
+// Returns the columns that the block returns: the requested ones, or the default ones of its kind if it requests none.
 ColumnSet returned_columns(const QueryBlock& block);
 
-// How a block's answer is laid out. Dense: one row a query, a miss included. Bytes: one byte a query, no rows. Counted:
-// any number of rows a query.
+// Layout of a block's result. Dense: one row per query, including misses. Bytes: one byte per query, no rows. Counted:
+// a count per query, and that many rows.
 enum class RowLayout : uint8_t { kDense, kBytes, kCounted };
 RowLayout row_layout(const QueryBlock& block);
 
-// Returns the encoded bytes that a batch's answer takes before its first counted row: dense rows, counts, room for
-// lists of truncated queries and for field headers.
+// Returns an upper bound of the encoded bytes of a reply without its counted rows: dense rows, counts, resolved times,
+// lists of truncated queries and field headers.
 uint64_t fixed_reply_bytes(const QueryBatch& batch);
+// Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if it is 0.
 uint64_t reply_limit(const QueryBatch& batch);
 
-// Returns INVALID_ARGUMENT LIMIT where fixed_reply_bytes() alone is over the batch's limit.
+// Returns INVALID_ARGUMENT with reason LIMIT if fixed_reply_bytes() alone exceeds reply_limit().
 absl::Status check_reply_size(const QueryBatch& batch);
 
 }  // namespace locus

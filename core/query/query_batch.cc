@@ -14,10 +14,10 @@
 namespace locus {
 namespace {
 
-// Checks of one block; every refusal names the block's field.
+// Checks of one block; every error names the field of the block.
 class BlockCheck {
  public:
-  BlockCheck(const QueryBlock& block, size_t number) : block_(block), field_(absl::StrCat("blocks[", number, "]")) {}
+  BlockCheck(const QueryBlock& block, size_t index) : block_(block), field_(absl::StrCat("blocks[", index, "]")) {}
 
   absl::Status run() {
     n_ = query_count(block_);
@@ -61,56 +61,56 @@ class BlockCheck {
 
   absl::Status check_columns_of_kind() const {
     const ColumnSet served = served_columns(block_);
-    for (int number = 1; number <= static_cast<int>(kLastColumn); ++number)
-      if (const auto column = static_cast<Column>(number); block_.columns.has(column) && !served.has(column))
+    for (int value = 1; value <= static_cast<int>(kLastColumn); ++value)
+      if (const auto column = static_cast<Column>(value); block_.columns.has(column) && !served.has(column))
         return refuse_argument(Reason::kMalformed, name("columns"), {},
                                absl::StrCat(column_name(column), " is not a column of this kind of query"));
     return absl::OkStatus();
   }
 
-  absl::Status check_length(size_t numbers, size_t width, ColumnNeed need, absl::string_view field) const {
-    return check_column(numbers, width, n_, need, name(field));
+  absl::Status check_length(size_t values, size_t width, ColumnNeed need, absl::string_view field) const {
+    return check_column(values, width, n_, need, name(field));
   }
 
-  // Whether all points lie within the world: without branches, since nearly always they do.
-  bool all_within_world(absl::Span<const float> numbers) const {
-    bool all = numbers.size() % 3 == 0;
-    for (size_t i = 0; i + 2 < numbers.size(); i += 3)
+  // Returns whether all points lie within the world. Without branches, since valid points are by far the usual case.
+  bool all_within_world(absl::Span<const float> values) const {
+    bool all = values.size() % 3 == 0;
+    for (size_t i = 0; i + 2 < values.size(); i += 3)
       for (int axis = 0; axis < 3; ++axis)
-        all &= std::abs(block_.frame[axis] + double{numbers[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
+        all &= std::abs(block_.frame[axis] + double{values[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
     return all;
   }
 
-  // Points relative to the frame, all within the world.
-  absl::Status check_points(absl::Span<const float> numbers, absl::string_view field) const {
-    if (all_within_world(numbers)) return absl::OkStatus();
-    for (size_t i = 0; i < numbers.size(); ++i) {
-      if (!std::isfinite(numbers[i])) return wrong(Reason::kNotFinite, field, i / 3, "needs finite numbers");
-      const double world = block_.frame[static_cast<int>(i % 3)] + double{numbers[i]};
+  // Checks points relative to the frame: finite, and within the world.
+  absl::Status check_points(absl::Span<const float> values, absl::string_view field) const {
+    if (all_within_world(values)) return absl::OkStatus();
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, i / 3, "needs finite numbers");
+      const double world = block_.frame[static_cast<int>(i % 3)] + double{values[i]};
       if (std::abs(world) > limits::kMaxCoordinate)
         return wrong(Reason::kOutOfRange, field, i / 3, "must lie within +-1e9 in the world");
     }
     return absl::OkStatus();
   }
 
-  // Finite numbers from 0 to the size of the world.
-  absl::Status check_sizes(absl::Span<const float> numbers, size_t width, absl::string_view field) const {
-    for (size_t i = 0; i < numbers.size(); ++i) {
-      if (!std::isfinite(numbers[i])) return wrong(Reason::kNotFinite, field, i / width, "needs finite numbers");
-      if (numbers[i] < 0 || numbers[i] > limits::kMaxCoordinate)
+  // Checks lengths: finite, not negative, and at most the size of the world.
+  absl::Status check_sizes(absl::Span<const float> values, size_t width, absl::string_view field) const {
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, i / width, "needs finite numbers");
+      if (values[i] < 0 || values[i] > limits::kMaxCoordinate)
         return wrong(Reason::kOutOfRange, field, i / width, "must lie within 0 and 1e9");
     }
     return absl::OkStatus();
   }
 
-  // Numbers from 0 to infinity.
-  absl::Status check_reaches(absl::Span<const float> numbers, absl::string_view field) const {
+  // Checks limits of distances: not negative; infinity is allowed.
+  absl::Status check_distance_limits(absl::Span<const float> values, absl::string_view field) const {
     bool all = true;
-    for (const float number : numbers) all &= number >= 0;
+    for (const float value : values) all &= value >= 0;
     if (all) return absl::OkStatus();
-    for (size_t i = 0; i < numbers.size(); ++i) {
-      if (std::isnan(numbers[i])) return wrong(Reason::kNotFinite, field, i, "must be a number");
-      if (numbers[i] < 0) return wrong(Reason::kOutOfRange, field, i, "must not be negative");
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (std::isnan(values[i])) return wrong(Reason::kNotFinite, field, i, "must be a number");
+      if (values[i] < 0) return wrong(Reason::kOutOfRange, field, i, "must not be negative");
     }
     return absl::OkStatus();
   }
@@ -119,20 +119,21 @@ class BlockCheck {
     return refuse_argument(reason, name(field), static_cast<uint32_t>(index), message);
   }
 
-  static bool all_directions_serve(absl::Span<const float> numbers) {
-    constexpr float kLargest = std::numeric_limits<float>::max();
+  // Returns whether all directions are finite and not zero. Without branches, as above.
+  static bool all_directions_valid(absl::Span<const float> values) {
+    constexpr float kMaxFloat = std::numeric_limits<float>::max();
     bool all = true;
-    for (size_t i = 0; i + 2 < numbers.size(); i += 3) {
-      const float x = std::abs(numbers[i]), y = std::abs(numbers[i + 1]), z = std::abs(numbers[i + 2]);
-      all &= (x <= kLargest) & (y <= kLargest) & (z <= kLargest) & ((x > 0) | (y > 0) | (z > 0));
+    for (size_t i = 0; i + 2 < values.size(); i += 3) {
+      const float x = std::abs(values[i]), y = std::abs(values[i + 1]), z = std::abs(values[i + 2]);
+      all &= (x <= kMaxFloat) & (y <= kMaxFloat) & (z <= kMaxFloat) & ((x > 0) | (y > 0) | (z > 0));
     }
     return all;
   }
 
-  absl::Status check_directions(absl::Span<const float> numbers) const {
-    if (all_directions_serve(numbers)) return absl::OkStatus();
-    for (size_t i = 0; i + 2 < numbers.size(); i += 3) {
-      const Vec3f direction{numbers[i], numbers[i + 1], numbers[i + 2]};
+  absl::Status check_directions(absl::Span<const float> values) const {
+    if (all_directions_valid(values)) return absl::OkStatus();
+    for (size_t i = 0; i + 2 < values.size(); i += 3) {
+      const Vec3f direction{values[i], values[i + 1], values[i + 2]};
       if (!is_finite(direction)) return wrong(Reason::kNotFinite, "rays.directions", i / 3, "needs finite numbers");
       if (direction == Vec3f{}) return wrong(Reason::kOutOfRange, "rays.directions", i / 3, "must not be zero");
     }
@@ -144,7 +145,7 @@ class BlockCheck {
     RETURN_IF_ERROR(check_length(rays.directions.size(), 3, ColumnNeed::kEachOrOne, "rays.directions"));
     RETURN_IF_ERROR(check_length(rays.t_max.size(), 1, ColumnNeed::kOptional, "rays.t_max"));
     RETURN_IF_ERROR(check_points(rays.origins, "rays.origins"));
-    RETURN_IF_ERROR(check_reaches(rays.t_max, "rays.t_max"));
+    RETURN_IF_ERROR(check_distance_limits(rays.t_max, "rays.t_max"));
     return check_directions(rays.directions);
   }
 
@@ -164,9 +165,9 @@ class BlockCheck {
     return check_rotations(boxes.rotations);
   }
 
-  absl::Status check_rotations(absl::Span<const float> numbers) const {
-    for (size_t i = 0; i + 3 < numbers.size(); i += 4) {
-      const double deviation = unit_deviation({numbers[i], numbers[i + 1], numbers[i + 2], numbers[i + 3]});
+  absl::Status check_rotations(absl::Span<const float> values) const {
+    for (size_t i = 0; i + 3 < values.size(); i += 4) {
+      const double deviation = unit_deviation({values[i], values[i + 1], values[i + 2], values[i + 3]});
       if (!std::isfinite(deviation)) return wrong(Reason::kNotFinite, "boxes.rotations", i / 4, "needs finite numbers");
       if (deviation > limits::kMaxQuaternionDeviation)
         return wrong(Reason::kOutOfRange, "boxes.rotations", i / 4, "must be a quaternion (x, y, z, w) of unit length");
@@ -180,7 +181,7 @@ class BlockCheck {
     if (nearest.count > limits::kMaxNearest)
       return refuse_limit(name("nearest.k"), "nearest", limits::kMaxNearest, nearest.count);
     RETURN_IF_ERROR(check_points(nearest.points, "nearest.points"));
-    return check_reaches(nearest.max_distances, "nearest.max_distances");
+    return check_distance_limits(nearest.max_distances, "nearest.max_distances");
   }
 
   absl::Status check_kind(const LookupColumns& lookup) const {
@@ -195,7 +196,7 @@ class BlockCheck {
 
   const QueryBlock& block_;
   std::string field_;
-  size_t n_ = 0;
+  size_t n_ = 0;  // number of queries
 };
 
 struct CountQueries {

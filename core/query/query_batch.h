@@ -1,5 +1,9 @@
-// A batch of queries as borrowed columns: a list of blocks, each of one kind. The columns live as long as the call that
-// takes them. A column has N entries, one for all, or none for the default in brackets; N comes from the block's first.
+// Batch of queries as borrowed columns: a list of blocks, each of one kind. For the service, which fills it from a
+// request without copying, and for run/, which answers it. Plain data; any number of threads may read it.
+//
+// The caller keeps the columns alive while the batch is in use. A column has N entries, or one entry for all queries,
+// or none, which selects the default shown in brackets. N is the number of queries of the block: the length of the
+// first column of its kind.
 #ifndef LOCUS_CORE_QUERY_QUERY_BATCH_H_
 #define LOCUS_CORE_QUERY_QUERY_BATCH_H_
 
@@ -21,7 +25,7 @@ enum class OutsideHistory : uint8_t { kReject, kClamp };
 enum class RayMode : uint8_t { kFirst, kAny, kAll };
 enum class StaticDetail : uint8_t { kInstances, kTriangles, kTrianglesSorted };
 
-// Wanted result columns, a set of bits. Numbers equal those of the protocol's Column.
+// Result columns that a block may request. Values equal those of the protocol's Column.
 enum class Column : uint8_t {
   kT = 1,
   kId = 2,
@@ -36,6 +40,7 @@ enum class Column : uint8_t {
 };
 inline constexpr Column kLastColumn = Column::kPose;
 
+// Set of result columns, one bit each.
 class ColumnSet {
  public:
   constexpr ColumnSet() = default;
@@ -75,11 +80,11 @@ struct BoxColumns {
 struct NearestColumns {
   absl::Span<const float> points;         // 3N
   absl::Span<const float> max_distances;  // [+inf], >= 0
-  uint32_t count = 0;                     // rows a query, at most [1]
+  uint32_t count = 0;                     // maximum number of rows per query [1]
   StaticDetail detail = StaticDetail::kInstances;
 };
 
-// Either ids (one row each) or groups (counts and rows).
+// Lookup by ids (one row per id) or by groups (a count per group, and that many rows); exactly one of them is given.
 struct LookupColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const uint64_t> groups;
@@ -89,12 +94,12 @@ struct QueryBlock {
   Vec3d frame;
   Source source = Source::kBoth;
   Precision precision = Precision::kExact;
-  ColumnSet columns;                         // [by the kind]
-  absl::Span<const uint32_t> masks;          // [all]
+  ColumnSet columns;                         // [default columns of the kind]
+  absl::Span<const uint32_t> masks;          // [all layers]
   absl::Span<const uint64_t> ignore_groups;  // [0 = none]
   absl::Span<const uint64_t> ignore_ids;     // for the whole block
   uint32_t max_results = 0;                  // [limits::kDefaultMaxResults]
-  Id after_id = kNoId;                       // overlaps: only ids above it
+  Id after_id = kNoId;                       // overlaps and groups: only ids above it
   absl::Span<const uint64_t> as_of_ticks;    // [now]
   absl::Span<const float> as_of_fractions;   // [0], 0 <= f < 1; only with as_of_ticks
   OutsideHistory outside = OutsideHistory::kReject;
@@ -107,11 +112,11 @@ struct QueryBatch {
   uint32_t max_reply_bytes = 0;  // [limits::kDefaultReplyBytes]
 };
 
-// Number of queries of a block.
+// Returns the number of queries of a block.
 size_t query_count(const QueryBlock& block);
 
-// The whole check of untrusted columns: lengths, limits and every value. INVALID_ARGUMENT (or RESOURCE_EXHAUSTED for a
-// limit) naming the field as blocks[2].rays.directions and the query within it.
+// Checks untrusted columns completely: lengths, limits and every value. Returns INVALID_ARGUMENT (or RESOURCE_EXHAUSTED
+// for a limit) that names the field, such as blocks[2].rays.directions, and the index of the query.
 absl::Status check_batch(const QueryBatch& batch);
 
 }  // namespace locus

@@ -1,5 +1,5 @@
-// No ray leaves a closed mesh: tens of thousands aimed at corners and edges at each run, a million for each scale and
-// distance in the long one.
+// No ray leaves a closed mesh: tens of thousands of rays aimed at corners and edges in each run, and a million for each
+// scale and distance in the long run.
 #include "tests/support/proof/leak_proof.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,8 @@ TEST(LeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(0, scaled_count(8'0
 
 TEST(LongLeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(1, 1'000'000); }
 
-// What the proof stands on: each edge belongs to two triangles and runs both ways, and none comes into the ball.
+// Preconditions of the proof: each edge belongs to two triangles, once in each direction, and no triangle meets the
+// ball from which rays start.
 TEST(LeakProofTest, ItsMeshesAreClosedAroundTheirInside) {
   for (const ClosedMesh& mesh :
        {icosphere(3, 0.1, 0, kSeed), icosphere(3, 0.02, 0x1p-12, kSeed), small_blob(5'000, kSeed)}) {
@@ -58,7 +59,7 @@ TEST(LeakProofTest, ItsMeshesAreClosedAroundTheirInside) {
   }
 }
 
-// With a triangle taken out, rays leave, and the proof says so.
+// Rays leave a mesh without one triangle, and the proof reports them.
 TEST(LeakProofTest, AHoleIsFound) {
   ClosedMesh sphere = icosphere(3, 0.01, 0, kSeed);
   sphere.triangles.resize(sphere.triangles.size() - 5);

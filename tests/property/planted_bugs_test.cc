@@ -1,6 +1,6 @@
-// Proves that the suite catches known bugs: each is planted in turn into a library built for it, and the very
-// comparisons that the random tests expect to find nothing must find something. A new bug needs a name in
-// core/base/planted_bug.h, a place in the code, and a row below.
+// Proves that the suite catches known bugs (mutation testing): each bug is enabled in turn in a library built for that,
+// and the comparisons that find no difference in the random tests must find one. A new bug needs a name in
+// core/base/planted_bug.h, code that checks planted(), and a row below.
 #include <gtest/gtest.h>
 
 #include "core/base/planted_bug.h"
@@ -19,7 +19,7 @@
 namespace locus::test {
 namespace {
 
-// Answers what differs first, empty for nothing.
+// Returns the first difference, or an empty string.
 using Comparison = std::string (*)();
 
 std::string compare_trees_with_list() { return search_all_scenes<Triangle>(200, 200, tree_difference<Triangle>); }
@@ -61,7 +61,7 @@ std::string compare_conservative_answers_with_bounds() { return search_placed_sc
 std::string compare_conservative_overlaps_with_exact() { return search_placed_scenes(touching_scene, superset_fault); }
 
 #ifdef LOCUS_X86_KERNELS
-// One object serves for all instruction sets: they are compiled from one source.
+// One instruction set stands for all of them: they are compiled from one source.
 std::string compare_kernels_with_list() {
   static const std::vector<KernelTrial>* const kTrials = new std::vector<KernelTrial>(all_kernel_trials());
   for (const KernelTrial& trial : *kTrials)

@@ -1,5 +1,5 @@
-// CONSERVATIVE finds all that EXACT finds, no later along a ray and no farther from a point, and of instances nothing
-// but what the bounds of their placed triangles explain, wherever they stand.
+// CONSERVATIVE finds everything that EXACT finds, at the same distance or nearer. For instances, every other row is
+// explained by the bounds of a placed triangle, also far from the world's origin.
 #include <gtest/gtest.h>
 
 #include "tests/support/conservative_answers.h"
@@ -34,7 +34,7 @@ TEST(QueryConservativeTest, FindsAllThatExactFindsInMeshesFarFromTheirOwnOrigin)
   }
 }
 
-TEST(QueryConservativeTest, FindsAllThatExactFindsInThePlaneOfTurnedTriangles) {
+TEST(QueryConservativeTest, FindsAllThatExactFindsInThePlaneOfRotatedTriangles) {
   for (uint64_t seed = 0; seed < scaled_count(1'000); ++seed) {
     Random random(seed);
     expect_superset(turned_floor_scene(random), seed);

@@ -1,5 +1,5 @@
-// The same answer, byte for byte, whatever the order in which things came, the past of the scene, the split into
-// batches and blocks, and the threads.
+// Results are byte-identical for any order of updates, any history of the scene, any split into batches and blocks, and
+// any number of threads.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -18,10 +18,10 @@ BatchResult answer(const SceneSnapshot& snapshot, const std::vector<OwnedBlock>&
   return *std::move(result);
 }
 
-// Runs pieces in scrambled order, shared out over threads.
+// Returns options that run the calls in random order, distributed over threads.
 RunOptions scrambled(size_t threads, uint64_t seed) {
   RunOptions options;
-  options.parallel_for = [threads, seed](size_t count, const std::function<void(size_t)>& piece) {
+  options.parallel_for = [threads, seed](size_t count, const std::function<void(size_t)>& run) {
     Random random(seed);
     std::vector<size_t> order(count);
     std::iota(order.begin(), order.end(), size_t{0});
@@ -29,14 +29,14 @@ RunOptions scrambled(size_t threads, uint64_t seed) {
     std::vector<std::thread> pool;
     for (size_t t = 0; t < threads; ++t)
       pool.emplace_back([&, t] {
-        for (size_t i = t; i < count; i += threads) piece(order[i]);
+        for (size_t i = t; i < count; i += threads) run(order[i]);
       });
     for (std::thread& thread : pool) thread.join();
   };
   return options;
 }
 
-// Blocks long enough for several pieces: every query many times over.
+// Returns the blocks with every query repeated `times` times, so that they are several chunks long.
 std::vector<OwnedBlock> lengthened(const std::vector<OwnedBlock>& blocks, size_t times) {
   std::vector<OwnedBlock> result = blocks;
   for (OwnedBlock& block : result) {
@@ -60,7 +60,7 @@ QueryScene scene_of(uint64_t seed) {
   return query_scene(troublesome_sketch(seed, random), random);
 }
 
-TEST(QueryDeterminismTest, OrderOfArrivalAndPastChangeNoByte) {
+TEST(QueryDeterminismTest, OrderOfUpdatesAndHistoryChangeNoByte) {
   for (uint64_t seed = 0; seed < scaled_count(400); ++seed) {
     const QueryScene scene = scene_of(seed);
     Random random(seed);
@@ -82,7 +82,7 @@ TEST(QueryDeterminismTest, ThreadsChangeNoByte) {
   }
 }
 
-TEST(QueryDeterminismTest, AReplyThatIsFullIsCutAtTheSamePlaceByAllThreads) {
+TEST(QueryDeterminismTest, AFullReplyIsTruncatedAtTheSameRowForAnyNumberOfThreads) {
   for (uint64_t seed = 0; seed < scaled_count(40); ++seed) {
     const QueryScene scene = scene_of(seed);
     const std::vector<OwnedBlock> blocks = lengthened(scene.blocks, 40);
@@ -96,7 +96,7 @@ TEST(QueryDeterminismTest, AReplyThatIsFullIsCutAtTheSamePlaceByAllThreads) {
   }
 }
 
-// What several results of parts of a block come to.
+// Appends the result of a part of a block to the result of the whole block.
 void append(const BlockResult& part, size_t first_query, BlockResult& whole) {
   const auto add = [](const auto& from, auto& to) { to.insert(to.end(), from.begin(), from.end()); };
   for (const uint32_t query : part.truncated) whole.truncated.push_back(query + static_cast<uint32_t>(first_query));
@@ -134,8 +134,8 @@ TEST(QueryDeterminismTest, SplitsIntoBatchesAndBlocksChangeNoByte) {
   }
 }
 
-// A scene moved by whole amounts along with the frame: doubles hold every coordinate exactly there.
-TEST(QueryDeterminismTest, AFrameFarOutGivesTheHitsOfTheSceneAtTheOrigin) {
+// The scene and the frame are moved by whole numbers, so that doubles represent every coordinate exactly.
+TEST(QueryDeterminismTest, ADistantFrameGivesTheHitsOfTheSceneAtTheOrigin) {
   for (uint64_t seed = 0; seed < scaled_count(400); ++seed) {
     Random random(seed);
     QueryScene scene = query_scene(walls_on_a_lattice(random), random);
@@ -161,7 +161,7 @@ TEST(QueryDeterminismTest, AFrameFarOutGivesTheHitsOfTheSceneAtTheOrigin) {
       BatchResult result = answer(*snapshot_of(far.world), far.blocks, {});
       for (size_t b = 0; b < result.blocks.size(); ++b) {
         result.blocks[b].positions = near.blocks[b].positions;
-        // Distances to things are never less than to their bounds, which are as much wider as coordinates are larger.
+        // Distances are never less than those to bounds, which grow with the magnitude of coordinates.
         if (std::holds_alternative<NearestColumns>(far.blocks[b].settings.kind)) result.blocks[b] = near.blocks[b];
       }
       ASSERT_EQ(difference(result, near), "") << "shift " << shift << ", seed " << seed;

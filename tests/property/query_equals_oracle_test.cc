@@ -1,5 +1,5 @@
-// Every column of every answer equals, bit for bit, that of a plain loop over all triangles and objects, and that of
-// the service's own brute force.
+// Every column of every result equals, bit for bit, the column computed by a plain loop over all triangles and objects,
+// and the column of the brute-force mode.
 #include <gtest/gtest.h>
 
 #include "tests/support/placed_scenes.h"
@@ -10,7 +10,7 @@
 namespace locus::test {
 namespace {
 
-// What differs first; empty for nothing.
+// Returns the first difference, or an empty string.
 std::string oracle_difference(const QueryScene& scene, const SceneSnapshot& snapshot) {
   const QueryBatch batch = batch_of(scene.blocks);
   if (const absl::Status status = check_batch(batch); !status.ok()) return status.ToString();

@@ -1,5 +1,5 @@
-// No misses, as the product defines them: where a reference in long double hits a triangle that it still hits when the
-// triangle is shrunk by e = 2^-20 (|origin in mesh axes| + mesh extent), the service reports a hit no later than that
+// No misses, as the product defines them: if a reference in long double hits a triangle that it still hits when the
+// triangle is shrunk by e = 2^-20 (|origin in mesh axes| + mesh extent), the query reports a hit no later than that
 // plus e / |direction|, both in mesh axes.
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ struct RealRay {
   Vec3r origin, direction;
 };
 
-// Where the ray hits the triangle at least `inset` away from its edges.
+// Returns the t at which the ray hits the triangle at least `inset` away from its edges.
 std::optional<Real> inner_hit(const RealRay& ray, const Triangle& triangle, Real inset) {
   const Vec3r corners[] = {to_real(triangle.a), to_real(triangle.b), to_real(triangle.c)};
   const Vec3r normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
@@ -35,18 +35,19 @@ std::optional<Real> inner_hit(const RealRay& ray, const Triangle& triangle, Real
   return t;
 }
 
-struct Judgement {
+struct MissCount {
   uint64_t hits = 0;
   uint64_t misses = 0;
 };
 
-// Judges the rays of `block` one by one; `triangles` are those of the only instance.
-Judgement judge(const SceneSnapshot& snapshot, const OwnedBlock& block, const std::vector<Triangle>& triangles) {
+// Counts hits of the reference and misses of the query for the rays of `block`; `triangles` are those of the only
+// instance.
+MissCount count_misses(const SceneSnapshot& snapshot, const OwnedBlock& block, const std::vector<Triangle>& triangles) {
   const Instance& instance = snapshot.statics->tree().values()[0];
   const Transform& transform = instance.transform;
   const Real extent = magnitude(instance.mesh->bounds());
   const BlockResult result = run_block(snapshot, block);
-  Judgement judgement;
+  MissCount counted;
   for (size_t i = 0; i < result.t.size(); ++i) {
     const auto column = [i](const std::vector<float>& c) { return Vec3d{c[3 * i], c[3 * i + 1], c[3 * i + 2]}; };
     const Vec3r from_translation =
@@ -60,13 +61,13 @@ Judgement judge(const SceneSnapshot& snapshot, const OwnedBlock& block, const st
       if (t && (!nearest || *t < *nearest)) nearest = t;
     }
     if (!nearest) continue;
-    ++judgement.hits;
-    if (!(Real{result.t[i]} <= *nearest + e / length(ray.direction))) ++judgement.misses;
+    ++counted.hits;
+    if (!(Real{result.t[i]} <= *nearest + e / length(ray.direction))) ++counted.misses;
   }
-  return judgement;
+  return counted;
 }
 
-// From around the mesh at, near and past its triangles; a few from far away.
+// Returns rays from around the mesh towards points on, near and beyond its triangles; a few start far away.
 OwnedBlock rays_at(const std::vector<Triangle>& triangles, const Transform& transform, double size, Random& random,
                    uint64_t count) {
   OwnedBlock block = rays_along_x(RayMode::kFirst, {});
@@ -107,7 +108,7 @@ void expect_no_miss(const std::vector<Triangle>& triangles, uint64_t rays, uint6
   Random random(seed);
   const StaticMeshPtr mesh = mesh_of(triangles);
   const double size = magnitude(mesh->bounds());
-  Judgement sum;
+  MissCount sum;
   constexpr uint64_t kTransforms = 10;
   for (uint64_t i = 0; i < kTransforms; ++i) {
     PlacedMesh instance = placed(1, mesh, random.vector(i % 3 == 0 ? 0 : i % 3 == 1 ? 100 : 1e6));
@@ -118,9 +119,9 @@ void expect_no_miss(const std::vector<Triangle>& triangles, uint64_t rays, uint6
     const SnapshotPtr snapshot = snapshot_of(world);
     const Transform& transform = snapshot->statics->find(1)->transform;
     const uint64_t count = rays / kTransforms;
-    const Judgement judgement = judge(*snapshot, rays_at(triangles, transform, size, random, count), triangles);
-    EXPECT_EQ(judgement.misses, 0u) << "seed " << seed << ", transform " << i;
-    sum.hits += judgement.hits;
+    const MissCount counted = count_misses(*snapshot, rays_at(triangles, transform, size, random, count), triangles);
+    EXPECT_EQ(counted.misses, 0u) << "seed " << seed << ", transform " << i;
+    sum.hits += counted.hits;
   }
   EXPECT_GT(sum.hits, rays / 10) << "too few rays hit to prove anything, seed " << seed;
   ::testing::Test::RecordProperty("reference_hits", std::to_string(sum.hits));
@@ -134,19 +135,19 @@ TEST(QueryReferenceTest, NoRayMissesACity) { expect_no_miss(box_city(5, 82), sca
 
 TEST(QueryReferenceTest, NoRayMissesASliver) { expect_no_miss(slivers(83), scaled_count(60'000), 83); }
 
-TEST(QueryReferenceTest, NoRayMissesTrianglesOfScenesKnownForTrouble) {
+TEST(QueryReferenceTest, NoRayMissesTrianglesOfAdversarialScenes) {
   for (uint64_t seed = 0; seed < scaled_count(24); ++seed) {
     Random random(seed);
     std::vector<Triangle> triangles = make_scene<Triangle>(adversarial_scene(seed, random), random).values;
     number_in_order(triangles);
-    Judgement sum;
+    MissCount sum;
     QueryWorld world;
     world.instances = {placed(1, mesh_of(triangles))};
     const SnapshotPtr snapshot = snapshot_of(world);
     const Aabbf bounds = world.instances[0].mesh->bounds();
     const double size = max_component(to_double(bounds.extent()));
     const OwnedBlock block = rays_at(triangles, snapshot->statics->find(1)->transform, size, random, 1'000);
-    EXPECT_EQ(judge(*snapshot, block, triangles).misses, 0u) << "seed " << seed;
+    EXPECT_EQ(count_misses(*snapshot, block, triangles).misses, 0u) << "seed " << seed;
   }
 }
 

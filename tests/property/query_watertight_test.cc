@@ -1,5 +1,5 @@
-// From inside closed meshes every ray hits, through the service's own path: placed, turned, scaled, far out, in two
-// halves, first or any.
+// Every ray from inside a closed mesh hits, through the complete query path: for placed, rotated, scaled and distant
+// instances, for meshes in two halves, and for modes FIRST and ANY.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 namespace locus::test {
 namespace {
 
-// At every vertex, the middle of every edge and a random place of it, from places near the centre.
+// Returns rays from points near the centre to every vertex, and to the middle and a random point of every edge.
 OwnedBlock rays_at_edges(const std::vector<Triangle>& triangles, const Transform& transform, Random& random) {
   OwnedBlock block = rays_along_x(RayMode::kFirst, {});
   block.sizes.clear();
@@ -72,7 +72,7 @@ TEST(QueryWatertightTest, NoRayLeaksFromAPlacedMesh) {
   }
 }
 
-// Every edge between odd and even triangles is one between instances.
+// Odd and even triangles belong to different instances, so edges between them are edges between instances.
 TEST(QueryWatertightTest, NoRayLeaksBetweenInstancesOfEqualTransform) {
   for (uint64_t seed = 0; seed < scaled_count(6); ++seed) {
     const std::vector<Triangle> sphere = bumpy_sphere(16, 0.1, seed);
@@ -94,7 +94,7 @@ TEST(QueryWatertightTest, NoRayLeaksBetweenInstancesOfEqualTransform) {
   }
 }
 
-// Vertices lie far from the mesh's own origin; the translation brings them back.
+// Vertices lie far from the mesh's own origin, and the translation cancels that offset.
 TEST(QueryWatertightTest, NoRayLeaksFromAMeshFarFromItsOwnOrigin) {
   constexpr uint64_t kSeed = 71;
   for (const double offset : {1e3, 1e5}) {

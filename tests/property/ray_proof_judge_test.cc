@@ -1,5 +1,5 @@
-// The judge of the ray proof is judged: its tree against the plain list of triangles, and its verdicts on answers that
-// were spoilt on purpose.
+// Tests of the checker of the ray proof: its tree is compared with the plain list of triangles, and it must report
+// answers that were corrupted on purpose.
 #include <gtest/gtest.h>
 
 #include "tests/support/proof/ray_proof.h"
@@ -27,13 +27,13 @@ Nearest by_tree(const ReferenceTree& reference, const RealRay& ray) {
 
 Nearest by_list(const ReferenceTree& reference, const RealRay& ray) {
   Nearest nearest;
-  for (uint32_t number = 0; number < reference.size(); ++number)
-    if (const std::optional<Meeting> meeting = reference.triangle(number).meet(ray, nearest.t))
-      nearest.offer(number, *meeting);
+  for (uint32_t index = 0; index < reference.size(); ++index)
+    if (const std::optional<Meeting> meeting = reference.triangle(index).meet(ray, nearest.t))
+      nearest.offer(index, *meeting);
   return nearest;
 }
 
-TEST(RayProofJudgeTest, TheReferencesTreeFindsWhatItsListFinds) {
+TEST(RayProofJudgeTest, TheTreeOfTheReferenceFindsWhatItsListFinds) {
   constexpr uint64_t kSeed = 11;
   Random random(kSeed);
   uint64_t hits = 0;
@@ -54,20 +54,21 @@ TEST(RayProofJudgeTest, TheReferencesTreeFindsWhatItsListFinds) {
   EXPECT_GT(hits, scaled_count(100'000) / 3);
 }
 
-class SpoiltAnswersTest : public ::testing::Test {
+class CorruptedAnswersTest : public ::testing::Test {
  protected:
-  SpoiltAnswersTest() : scene_(proof_scenes(12)[6]), random_(12), block_(proof_rays(scene_, 4'000, random_)) {
+  CorruptedAnswersTest() : scene_(proof_scenes(12)[6]), random_(12), block_(proof_rays(scene_, 4'000, random_)) {
     answer_ = run_block(*scene_.snapshot, block_);
   }
-  // Spoils every hit.
-  template <class Spoil>
-  RayTally judge_spoilt(Spoil spoil) {
-    BlockResult spoilt = answer_;
-    for (size_t i = 0; i < spoilt.t.size(); ++i)
-      if (spoilt.ids[i] != kNoId) spoil(spoilt, i);
-    return judge_first_hits(scene_, block_, spoilt);
+  // Corrupts every hit.
+  template <class Corrupt>
+  RayTally check_corrupted(Corrupt corrupt) {
+    BlockResult corrupted = answer_;
+    for (size_t i = 0; i < corrupted.t.size(); ++i)
+      if (corrupted.ids[i] != kNoId) corrupt(corrupted, i);
+    return judge_first_hits(scene_, block_, corrupted);
   }
-  uint64_t most() { return judge_first_hits(scene_, block_, answer_).hits * 9 / 10; }
+  // Returns nine tenths of the number of hits.
+  uint64_t most_hits() { return judge_first_hits(scene_, block_, answer_).hits * 9 / 10; }
 
   ProofScene scene_;
   Random random_;
@@ -75,83 +76,83 @@ class SpoiltAnswersTest : public ::testing::Test {
   BlockResult answer_;
 };
 
-TEST_F(SpoiltAnswersTest, UnspoiltOnesAreClean) {
+TEST_F(CorruptedAnswersTest, UnchangedAnswersHaveNoFaults) {
   const RayTally tally = judge_first_hits(scene_, block_, answer_);
   EXPECT_TRUE(tally.clean()) << absl::StrJoin(tally.faults, "\n");
   EXPECT_GT(tally.hits, tally.rays / 2);
 }
 
-TEST_F(SpoiltAnswersTest, ALostHitIsAMiss) {
-  const RayTally tally = judge_spoilt([](BlockResult& result, size_t i) {
+TEST_F(CorruptedAnswersTest, ALostHitIsAMiss) {
+  const RayTally tally = check_corrupted([](BlockResult& result, size_t i) {
     result.t[i] = std::numeric_limits<float>::infinity();
     result.ids[i] = kNoId;
   });
-  EXPECT_GT(tally.misses, most());
+  EXPECT_GT(tally.misses, most_hits());
 }
 
-TEST_F(SpoiltAnswersTest, AHitInFrontOfItsTriangleIsFalseAndOneBehindItAMiss) {
+TEST_F(CorruptedAnswersTest, AHitInFrontOfItsTriangleIsFalseAndAHitBehindItIsAMiss) {
   const auto move = [](float factor) { return [factor](BlockResult& result, size_t i) { result.t[i] *= factor; }; };
-  // Hits at 0 stay where they are.
-  EXPECT_GT(judge_spoilt(move(0.99f)).false_hits, most() * 8 / 10);
-  EXPECT_GT(judge_spoilt(move(1.01f)).misses, most() / 2);
+  // Hits at 0 stay at 0.
+  EXPECT_GT(check_corrupted(move(0.99f)).false_hits, most_hits() * 8 / 10);
+  EXPECT_GT(check_corrupted(move(1.01f)).misses, most_hits() / 2);
 }
 
-TEST_F(SpoiltAnswersTest, AHitOfAnotherTriangleOrInstanceIsFalse) {
-  EXPECT_GT(judge_spoilt([](BlockResult& result, size_t i) { result.triangles[i] ^= 16; }).false_hits, most());
-  EXPECT_GT(judge_spoilt([](BlockResult& result, size_t i) { result.ids[i] = 4 - result.ids[i]; }).false_hits,
-            most() / 2);
+TEST_F(CorruptedAnswersTest, AHitOfAnotherTriangleOrInstanceIsFalse) {
+  EXPECT_GT(check_corrupted([](BlockResult& result, size_t i) { result.triangles[i] ^= 16; }).false_hits, most_hits());
+  EXPECT_GT(check_corrupted([](BlockResult& result, size_t i) { result.ids[i] = 4 - result.ids[i]; }).false_hits,
+            most_hits() / 2);
 }
 
-TEST_F(SpoiltAnswersTest, AHitBeyondTheLimitIsFalse) {
+TEST_F(CorruptedAnswersTest, AHitBeyondTheLimitIsFalse) {
   block_.extras.assign(block_.extras.size(), 0.0f);
-  EXPECT_GT(judge_spoilt([](BlockResult&, size_t) {}).false_hits, most() * 8 / 10);
+  EXPECT_GT(check_corrupted([](BlockResult&, size_t) {}).false_hits, most_hits() * 8 / 10);
 }
 
-// Half of the triangles taken away by culling that the answer does not know of.
-TEST_F(SpoiltAnswersTest, AHitOfTheCulledSideIsFalse) {
+// The checker culls one side of the triangles, but the answers were computed without culling.
+TEST_F(CorruptedAnswersTest, AHitOfTheCulledSideIsFalse) {
   rays_of(block_).cull = Cull::kNone;
   block_.extras.assign(block_.extras.size(), std::numeric_limits<float>::infinity());
   answer_ = run_block(*scene_.snapshot, block_);
   rays_of(block_).cull = Cull::kFront;
-  EXPECT_GT(judge_spoilt([](BlockResult&, size_t) {}).false_hits, most() / 4);
+  EXPECT_GT(check_corrupted([](BlockResult&, size_t) {}).false_hits, most_hits() / 4);
 }
 
-TEST_F(SpoiltAnswersTest, AHitThatIsNotAmongAllIsAMiss) {
+TEST_F(CorruptedAnswersTest, AHitMissingFromAllIsAMiss) {
   rays_of(block_).mode = RayMode::kAll;
   BlockResult all = run_block(*scene_.snapshot, block_);
   EXPECT_TRUE(judge_all_hits(scene_, block_, all).clean());
   EXPECT_GT(all.t.size(), all.counts.size());
   // The last row of each ray now names the first one's triangle.
-  uint64_t spoilt = 0;
+  uint64_t corrupted = 0;
   for (size_t i = 0, row = 0; i < all.counts.size(); row += all.counts[i++]) {
     if (all.counts[i] < 2) continue;
     const size_t last = row + all.counts[i] - 1;
     all.t[last] = all.t[row];
     all.ids[last] = all.ids[row];
     all.triangles[last] = all.triangles[row];
-    ++spoilt;
+    ++corrupted;
   }
   const RayTally tally = judge_all_hits(scene_, block_, all);
   EXPECT_EQ(tally.false_hits, 0u);
-  EXPECT_GT(tally.misses, spoilt * 8 / 10);
+  EXPECT_GT(tally.misses, corrupted * 8 / 10);
 }
 
-TEST_F(SpoiltAnswersTest, AFartherHitThanTheNearestIsAMiss) {
+TEST_F(CorruptedAnswersTest, AFartherHitThanTheNearestIsAMiss) {
   rays_of(block_).mode = RayMode::kAll;
   const BlockResult all = run_block(*scene_.snapshot, block_);
-  uint64_t spoilt = 0;
+  uint64_t corrupted = 0;
   for (size_t i = 0, row = 0; i < all.counts.size(); row += all.counts[i++]) {
     if (all.counts[i] < 2) continue;
     const size_t last = row + all.counts[i] - 1;
     answer_.t[i] = all.t[last];
     answer_.ids[i] = all.ids[last];
     answer_.triangles[i] = all.triangles[last];
-    spoilt += all.t[last] > all.t[row] * 1.1f;
+    corrupted += all.t[last] > all.t[row] * 1.1f;
   }
   const RayTally tally = judge_first_hits(scene_, block_, answer_);
   EXPECT_EQ(tally.false_hits, 0u);
-  EXPECT_GT(tally.misses, spoilt * 8 / 10);
-  EXPECT_GT(spoilt, tally.rays / 10);
+  EXPECT_GT(tally.misses, corrupted * 8 / 10);
+  EXPECT_GT(corrupted, tally.rays / 10);
 }
 
 }  // namespace

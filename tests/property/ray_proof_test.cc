@@ -1,6 +1,6 @@
-// No ray misses and none hits what is not there: the service's answers against a reference in long double, on a million
-// rays at each run and on a hundred million in the long one, whose number and seed LOCUS_PROOF_RAYS and
-// LOCUS_PROOF_SEED change.
+// No misses and no false hits: query results are compared with a reference in long double, on a million rays in each
+// run and on a hundred million in the long run. LOCUS_PROOF_RAYS and LOCUS_PROOF_SEED change the number and the seed of
+// the long run.
 #include "tests/support/proof/ray_proof.h"
 
 #include <gtest/gtest.h>

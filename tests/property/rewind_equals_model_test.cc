@@ -1,4 +1,4 @@
-// Questions about the past of scenes where anything may happen, and to a model that keeps every tick in full.
+// Queries about the history of scenes with random updates, compared with a model that keeps every tick completely.
 #include <gtest/gtest.h>
 
 #include "tests/support/rewind_lockstep.h"

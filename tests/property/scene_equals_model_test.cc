@@ -1,4 +1,4 @@
-// Thousands of random batches put to scenes and to a model that applies one item after the other to a std::map.
+// Thousands of random batches applied to scenes and to a model that applies one item after another to a std::map.
 #include <gtest/gtest.h>
 
 #include "tests/support/scene_lockstep.h"

@@ -12,8 +12,8 @@ namespace {
 
 bool lower_id(const FoundObject& a, const FoundObject& b) { return a.id < b.id; }
 
-// For few, or for what is almost in order.
-void sort_by_moving(std::vector<FoundObject>& found) {
+// Sorts by insertion: fast for few objects, or almost sorted ones.
+void insertion_sort(std::vector<FoundObject>& found) {
   for (size_t i = 1; i < found.size(); ++i) {
     if (!lower_id(found[i], found[i - 1])) continue;
     const FoundObject moved = found[i];
@@ -24,15 +24,15 @@ void sort_by_moving(std::vector<FoundObject>& found) {
 }
 
 constexpr size_t kFew = 12;
-// Of so many one share of the ids holds a few at most, unless they are uneven.
-constexpr size_t kMaxSpread = 1024;
-constexpr int kShareBits = 8;
-constexpr uint32_t kMaxOfAShare = 16;
+// Maximum number of objects for the bucket sort: if their ids are evenly distributed, each bucket gets a few of them.
+constexpr size_t kMaxBucketed = 1024;
+constexpr int kBucketBits = 8;
+constexpr uint32_t kMaxPerBucket = 16;
 
 }  // namespace
 
-void FoundObjects::restart(size_t most) {
-  most_ = most;
+void FoundObjects::restart(size_t max_count) {
+  max_count_ = max_count;
   truncated_ = false;
   clear_scratch(found_);
 }
@@ -44,39 +44,39 @@ absl::Span<const FoundObject> FoundObjects::finish() {
 }
 
 void FoundObjects::keep_lowest() {
-  if (found_.size() <= most_) return;
+  if (found_.size() <= max_count_) return;
   truncated_ = true;
-  std::nth_element(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(most_), found_.end(), lower_id);
-  found_.resize(most_);
+  std::nth_element(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(max_count_), found_.end(), lower_id);
+  found_.resize(max_count_);
 }
 
-// Comparing ids in no order costs a mispredicted branch every other time: shares of the ids are as good as sorted
-// without.
+// Sorts through buckets where possible: comparing ids in random order mispredicts every other branch, and filling
+// buckets needs no comparison and leaves the objects almost sorted.
 void FoundObjects::sort() {
-  if (found_.size() <= kFew || (found_.size() <= kMaxSpread && spread())) return sort_by_moving(found_);
+  if (found_.size() <= kFew || (found_.size() <= kMaxBucketed && sort_by_bucket())) return insertion_sort(found_);
   std::sort(found_.begin(), found_.end(), lower_id);
 }
 
-bool FoundObjects::spread() {
+bool FoundObjects::sort_by_bucket() {
   Id lowest = std::numeric_limits<Id>::max(), highest = 0;
-  for (const FoundObject& one : found_) {
-    lowest = std::min(lowest, one.id);
-    highest = std::max(highest, one.id);
+  for (const FoundObject& object : found_) {
+    lowest = std::min(lowest, object.id);
+    highest = std::max(highest, object.id);
   }
-  const int shift = std::max(static_cast<int>(std::bit_width(highest - lowest)) - kShareBits, 0);
-  std::array<uint32_t, size_t{1} << kShareBits> shares{};
-  for (const FoundObject& one : found_) ++shares[(one.id - lowest) >> shift];
+  const int shift = std::max(static_cast<int>(std::bit_width(highest - lowest)) - kBucketBits, 0);
+  std::array<uint32_t, size_t{1} << kBucketBits> buckets{};
+  for (const FoundObject& object : found_) ++buckets[(object.id - lowest) >> shift];
   uint32_t before = 0, largest = 0;
-  for (uint32_t& share : shares) {
-    largest = std::max(largest, share);
-    const uint32_t count = share;
-    share = before;
+  for (uint32_t& bucket : buckets) {
+    largest = std::max(largest, bucket);
+    const uint32_t count = bucket;
+    bucket = before;
     before += count;
   }
-  if (largest > kMaxOfAShare) return false;
-  spread_.resize(std::max(spread_.size(), found_.size()));
-  for (const FoundObject& one : found_) spread_[shares[(one.id - lowest) >> shift]++] = one;
-  std::copy_n(spread_.begin(), found_.size(), found_.begin());
+  if (largest > kMaxPerBucket) return false;
+  bucketed_.resize(std::max(bucketed_.size(), found_.size()));
+  for (const FoundObject& object : found_) bucketed_[buckets[(object.id - lowest) >> shift]++] = object;
+  std::copy_n(bucketed_.begin(), found_.size(), found_.begin());
   return true;
 }
 

@@ -1,5 +1,5 @@
-// The objects that one ball or box found: the lowest by id, at most a given number, in order. Kept from query to query,
-// so that their memory is asked for once a piece. One thread.
+// Objects that one ball or box query found: the lowest by id, at most a given number, in order. A QueryTask reuses one
+// for all queries of a chunk, so that its memory is allocated once. Threads: one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 #define LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 
@@ -16,31 +16,33 @@ struct FoundObject {
   GridRef object;
 };
 
-// Memory is bounded by three times the number that is kept at most.
+// Invariant: at most 2 * max_count_ objects are collected between calls. Memory: three times max_count_ at most.
 class FoundObjects {
  public:
-  // Forgets what there is. At most `most` objects are kept from now on.
-  void restart(size_t most);
+  // Clears the collection for the next query, which keeps at most `max_count` objects.
+  void restart(size_t max_count);
 
-  // One whose id was not offered yet.
+  // Adds an object. Precondition: no object with its id was added since restart().
   void offer(const GridRef& object) {
     found_.push_back({object.entry().id, object});
-    if (found_.size() > 2 * most_) keep_lowest();
+    if (found_.size() > 2 * max_count_) keep_lowest();
   }
-  // Ascending by id; good until the next call of anything else here.
+  // Returns the kept objects, ascending by id. Valid until the next call of restart() or offer().
   absl::Span<const FoundObject> finish();
-  // Whether more were offered than are kept.
+  // Returns whether more objects were added than are kept. Valid after finish().
   bool truncated() const { return truncated_; }
 
  private:
+  // Drops all but the max_count_ lowest.
   void keep_lowest();
   void sort();
-  // Puts them in the order of their ids but for neighbours; false where the ids are too uneven for that.
-  bool spread();
+  // Orders the objects by buckets of ids. Returns false, without any change, if the ids are too unevenly distributed.
+  bool sort_by_bucket();
 
-  size_t most_ = 0;
+  size_t max_count_ = 0;
   bool truncated_ = false;
-  std::vector<FoundObject> found_, spread_;
+  std::vector<FoundObject> found_;
+  std::vector<FoundObject> bucketed_;  // scratch of sort_by_bucket()
 };
 
 }  // namespace locus

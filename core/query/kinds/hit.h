@@ -1,5 +1,5 @@
-// What a query found: one object, one instance, or one triangle of an instance. Plain data that borrows from the
-// snapshot.
+// Single result of a query: one object, one instance, or one triangle of an instance. Plain data that borrows from the
+// snapshot, and for objects from a SceneAtTime; any thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_H_
 
@@ -12,25 +12,28 @@
 
 namespace locus {
 
+// One row of a result; a default-constructed hit is a miss.
 struct Hit {
-  float t = std::numeric_limits<float>::infinity();  // in units of the ray's direction
+  float t = std::numeric_limits<float>::infinity();  // multiple of the ray's direction, or distance of a nearest query
   Id id = kNoId;                                     // 0 = a miss
-  uint32_t triangle = kNoTriangle;                   // number in the mesh
-  GridRef object;                                    // one of the two, or neither for a miss
+  uint32_t triangle = kNoTriangle;                   // index in the uploaded index list
+  GridRef object;                                    // object or instance is set; neither for a miss
   const Instance* instance = nullptr;
-  const SceneAtTime* moment = nullptr;  // of the object: when it was found
+  const SceneAtTime* moment = nullptr;  // objects: time at which the object was found; null: as in the snapshot
 
+  // Returns the shape of the object at the time of the hit. Precondition: the hit is on an object.
   Shape object_shape() const { return moment == nullptr ? shape_of(object) : moment->shape(object); }
 };
 
-// As it is in the snapshot; the next, as it was at a moment, which the hit borrows.
+// Returns a hit on an object as it is in the snapshot. The second overload returns a hit on an object as it was at
+// `moment`, which the hit borrows; the third a hit on an instance.
 inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object}; }
 inline Hit hit_on(const GridRef& object, float t, const SceneAtTime& moment) {
   return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};
 }
 inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, GridRef(), &instance}; }
 
-// The order of ray hits: nearer first, then lower id, then lower triangle.
+// Returns whether `a` comes before `b` in the order of hits: nearer first, then lower id, then lower triangle.
 inline bool nearer(const Hit& a, const Hit& b) {
   return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
 }

@@ -1,4 +1,5 @@
-// The best hits of one ray so far, and how near the next one must be. One thread at a time.
+// Best hits of one ray so far, and the largest t that the next hit may have. For ray queries, whose searches shorten
+// the ray by limit(). Threads: a collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 
@@ -15,19 +16,20 @@
 
 namespace locus {
 
-// The best hits so far, and how near the next one must be.
+// Bounded set of the lowest hits in the order of nearer(). Invariants: it holds at most capacity_ hits; once it holds
+// capacity_, the hits are a heap with the highest in front, limit_ is the t of that hit, and limit_ never increases.
 class HitCollector {
  public:
   explicit HitCollector(const RayRequest& request)
       : mode_(request.mode),
-        // One more than wanted tells, whatever the order of visiting, whether there were more.
+        // Keeps one more hit than requested, to detect truncation independently of the order of visiting.
         capacity_(request.mode == RayMode::kAll ? size_t{request.max_results} + 1 : 1),
         limit_(request.t_max) {}
 
-  // Nothing beyond it is wanted; a hit exactly there may be, if its id is lower.
+  // Returns the largest t that may still matter. A hit at exactly this t matters if its id or triangle is lower.
   float limit() const { return limit_; }
 
-  // False when no further hit matters.
+  // Offers a hit. Returns false if no further hit matters.
   bool offer(const Hit& hit) {
     if (!(hit.t <= limit_)) return true;
     if (answer_.hits.size() == capacity_) {
@@ -37,7 +39,7 @@ class HitCollector {
     }
     answer_.hits.push_back(hit);
     if (answer_.hits.size() == capacity_) {
-      // The farthest first: what comes next may push it out.
+      // The highest hit is in front: the next hit may replace it.
       if (is_heap_)
         std::push_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
       else
@@ -48,8 +50,10 @@ class HitCollector {
     return mode_ != RayMode::kAny;
   }
 
+  // Returns whether no further hit matters.
   bool done() const { return mode_ == RayMode::kAny && !answer_.hits.empty(); }
 
+  // Returns the hits in order, at most the requested number. Leaves the collector empty; call it once.
   RayAnswer finish() {
     std::sort(answer_.hits.begin(), answer_.hits.end(), nearer);
     answer_.truncated = mode_ == RayMode::kAll && answer_.hits.size() == capacity_;
@@ -61,24 +65,24 @@ class HitCollector {
   const RayMode mode_;
   const size_t capacity_;
   float limit_;
-  bool is_heap_ = false;  // once there are as many hits as kept at most
+  bool is_heap_ = false;  // answer_.hits has reached capacity_
   RayAnswer answer_;
 };
 
-// As a finite float, rounded once; the sum turns -0 into 0, so that equal answers have equal bytes.
+// Returns `t` rounded once to a finite float. Adding 0 turns -0 into 0, so that equal results have equal bytes.
 inline float rounded_distance(double t) {
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  return static_cast<float>(std::min(t, kLargest)) + 0.0f;
+  constexpr double kMaxFloat = std::numeric_limits<float>::max();
+  return static_cast<float>(std::min(t, kMaxFloat)) + 0.0f;
 }
 
-// Where a ray enters bounds, 0 from inside. Nothing where it passes them.
+// Returns the t at which a ray enters `bounds`, 0 if it starts inside, or nothing if it misses them.
 inline std::optional<float> entry(const SlabRay<double>& slabs, const Aabbd& bounds) {
   const Interval<double> interval = slabs.interval(bounds);
   if (!(interval.near <= interval.far) || interval.far < 0) return std::nullopt;
   return rounded_distance(std::max(interval.near, 0.0));
 }
 
-// Distances of the double slab test that would round down to `limit` as a float are not beyond it.
+// Returns a limit for double distances that excludes none which rounds to at most `limit` as a float.
 inline double raised(float limit) { return double{next_above(limit)}; }
 
 }  // namespace locus

@@ -8,11 +8,11 @@
 namespace locus {
 namespace {
 
-// The exact verdict of one ray on triangles of one instance.
+// Exact test of one ray against triangles of one instance.
 class ExactTest {
  public:
-  // `slabs`: of the same ray in world axes. `nearest`: no hit lies before it, where the ray enters the instance's
-  // bounds.
+  // `slabs` is the slab test of the same ray in world axes. `nearest` is the t at which the ray enters the instance's
+  // bounds; no hit has a lower t.
   ExactTest(const TriangleRay& ray, const SlabRay<double>& slabs, const Instance& instance, float nearest)
       : ray_(ray), slabs_(slabs), placed_(instance), nearest_(nearest) {}
 
@@ -38,7 +38,7 @@ bool offer(const Instance& instance, const Triangle& triangle, float t, HitColle
   return collector.offer(hit);
 }
 
-// Triangles of one instance, exactly.
+// Visitor of the triangles of one instance: EXACT.
 class TriangleVisitor {
  public:
   TriangleVisitor(QueryTask& task, const ExactTest& exact, const Instance& instance, HitCollector& collector)
@@ -58,8 +58,9 @@ class TriangleVisitor {
   HitCollector& collector_;
 };
 
-// Triangles of one instance by their placed bounds, and what the exact test finds though rounding puts it beside or
-// before them: so all exact hits are found, no later.
+// Visitor of the triangles of one instance by their placed bounds: CONSERVATIVE. It also reports hits of the exact test
+// that lie beside or before these bounds because of rounding, so that every exact hit is found at the same t or
+// earlier.
 class PlacedBoundsVisitor {
  public:
   PlacedBoundsVisitor(QueryTask& task, const RayRequest& request, const ExactTest& exact, const Instance& instance,
@@ -101,12 +102,13 @@ class PlacedBoundsVisitor {
 
 }  // namespace
 
-void ask_instance(QueryTask& task, const RayRequest& request, const SlabRay<double>& slabs, const Instance& instance,
-                  float nearest, HitCollector& collector) {
-  const bool by_bounds = request.precision == Precision::kConservative;
-  const TriangleRay ray(instance.transform, request.origin, request.direction, by_bounds ? Cull::kNone : request.cull);
+void trace_instance(QueryTask& task, const RayRequest& request, const SlabRay<double>& slabs, const Instance& instance,
+                    float nearest, HitCollector& collector) {
+  const bool conservative = request.precision == Precision::kConservative;
+  const TriangleRay ray(instance.transform, request.origin, request.direction,
+                        conservative ? Cull::kNone : request.cull);
   const ExactTest exact(ray, slabs, instance, nearest);
-  if (by_bounds) {
+  if (conservative) {
     PlacedBoundsVisitor visitor(task, request, exact, instance, collector);
     task.visit_region(instance.mesh->tree(), visitor);
     return;

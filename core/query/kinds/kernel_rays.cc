@@ -10,33 +10,35 @@
 namespace locus {
 namespace {
 
-// Rows of kAll that a ray gets of one mesh by the kernels; a ray that may have more goes triangle by triangle. Bounds
-// memory.
+// Maximum number of kAll rows per ray and mesh in the output of the kernels, which bounds memory. A ray that may have
+// more is traced triangle by triangle instead.
 constexpr uint32_t kMaxRows = 128;
 
-// An instance that a ray has come to.
+// Ray that waits for the kernels at an instance.
 struct Stop {
-  uint32_t ray;
-  float nearest;  // where the ray enters its bounds
+  uint32_t ray;   // index in the rays
+  float nearest;  // t at which the ray enters the bounds of the instance
   const Instance* instance;
 };
 
-class Round {
+// Traversal of all rays of one call. Invariant: between rounds each ray has at most one stop.
+class Rounds {
   using InstanceWalk = Bvh<Instance>::RayWalk;
 
  public:
-  Round(QueryTask& task, std::vector<AskedRay>& rays) : task_(task), rays_(rays) {
+  Rounds(QueryTask& task, std::vector<PendingRay>& rays) : task_(task), rays_(rays) {
     const Bvh<Instance>& instances = task.snapshot().statics->tree();
     if (instances.size() == 1) only_ = instances.values().data();
     slabs_.reserve(rays.size());
-    for (const AskedRay& ray : rays) slabs_.emplace_back(Rayd{ray.request.origin, ray.request.direction}, kInstancePad);
+    for (const PendingRay& ray : rays)
+      slabs_.emplace_back(Rayd{ray.request.origin, ray.request.direction}, kInstancePad);
     walks_.reserve(only_ == nullptr ? rays.size() : 0);
     if (only_ == nullptr)
       for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
-    most_ = std::min(kMaxRows, rays.front().request.max_results + 1);  // one more tells whether there are more
-    rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * most_);
+    max_rows_ = std::min(kMaxRows, rays.front().request.max_results + 1);  // one more detects truncation
+    rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * max_rows_);
   }
 
   void run() {
@@ -44,115 +46,115 @@ class Round {
       if (only_ == nullptr)
         walk_on(ray);
       else
-        go_to_only(ray);
+        walk_to_only(ray);
     }
     while (!stops_.empty() && !task_.ended()) {
-      now_.swap(stops_);
+      current_.swap(stops_);
       stops_.clear();
       sort_by_tree();
-      for (size_t first = 0; first < now_.size();) first = ask_tree(first);
+      for (size_t first = 0; first < current_.size();) first = trace_tree(first);
       if (only_ != nullptr) return;
-      for (const Stop& stop : now_) walk_on(stop.ray);
+      for (const Stop& stop : current_) walk_on(stop.ray);
     }
   }
 
  private:
   RayMode mode() const { return rays_.front().request.mode; }
 
-  // To the next instance that the ray's filter accepts and its limit reaches, if there is one.
-  void walk_on(uint32_t number) {
-    AskedRay& ray = rays_[number];
-    InstanceWalk& walk = walks_[number];
+  // Advances a ray to the next instance that its filter accepts within its limit, if there is one.
+  void walk_on(uint32_t index) {
+    PendingRay& ray = rays_[index];
+    InstanceWalk& walk = walks_[index];
     while (!task_.ended() && !ray.collector.done()) {
       const Instance* const instance = walk.next(raised(ray.collector.limit()), task_.work());
       if (instance == nullptr) return;
       if (!task_.count_test()) return;
       if (!ray.filter.accepts(*instance)) continue;
-      // Part of the verdict, and hits are no nearer: the tree over instances may cull by it.
-      const std::optional<float> nearest = entry(slabs_[number], instance->bounds);
+      // This test is part of the verdict and bounds t from below, since the tree over instances may cull by it.
+      const std::optional<float> nearest = entry(slabs_[index], instance->bounds);
       if (!nearest || *nearest > ray.collector.limit()) continue;
-      return stops_.push_back({number, *nearest, instance});
+      return stops_.push_back({index, *nearest, instance});
     }
   }
 
-  // The same where there is one instance: its bounds say at once whether the ray comes to it.
-  void go_to_only(uint32_t number) {
-    AskedRay& ray = rays_[number];
+  // Advances a ray to the only instance of the scene if the ray meets its bounds.
+  void walk_to_only(uint32_t index) {
+    PendingRay& ray = rays_[index];
     if (task_.ended()) return;
-    const std::optional<float> nearest = entry(slabs_[number], only_->bounds);
+    const std::optional<float> nearest = entry(slabs_[index], only_->bounds);
     if (!nearest || *nearest > ray.collector.limit()) return;
     ++task_.work().tests;
     if (!task_.count_test() || !ray.filter.accepts(*only_)) return;
-    stops_.push_back({number, *nearest, only_});
+    stops_.push_back({index, *nearest, only_});
   }
 
   void sort_by_tree() {
     const auto tree = [](const Stop& stop) { return &stop.instance->mesh->tree(); };
     const auto other = [&](const Stop& a, const Stop& b) { return tree(a) != tree(b); };
-    if (std::adjacent_find(now_.begin(), now_.end(), other) == now_.end()) return;
-    std::stable_sort(now_.begin(), now_.end(),
+    if (std::adjacent_find(current_.begin(), current_.end(), other) == current_.end()) return;
+    std::stable_sort(current_.begin(), current_.end(),
                      [&](const Stop& a, const Stop& b) { return std::less<const TriangleBvh*>()(tree(a), tree(b)); });
   }
 
-  // Asks all stops at the tree of the first of them, which meshes of equal bytes share. Returns the first stop at
-  // another.
-  size_t ask_tree(size_t first) {
-    const TriangleBvh& tree = now_[first].instance->mesh->tree();
+  // Traces the rays of all stops at the tree of stop `first`, which meshes of equal bytes share. Returns the first stop
+  // at another tree.
+  size_t trace_tree(size_t first) {
+    const TriangleBvh& tree = current_[first].instance->mesh->tree();
     kernel_rays_.clear();
-    asked_.clear();
+    kernel_stops_.clear();
     size_t last = first;
-    for (; last < now_.size() && &now_[last].instance->mesh->tree() == &tree; ++last) {
-      const std::optional<KernelRay> ray = kernel_ray(now_[last]);
+    for (; last < current_.size() && &current_[last].instance->mesh->tree() == &tree; ++last) {
+      const std::optional<KernelRay> ray = kernel_ray(current_[last]);
       if (!ray) {
-        ask_triangles(now_[last]);
+        trace_triangles(current_[last]);
         continue;
       }
       kernel_rays_.push_back(*ray);
-      asked_.push_back(last);
+      kernel_stops_.push_back(last);
     }
-    ask_kernels(tree.tree());
+    run_kernels(tree.tree());
     return last;
   }
 
-  void ask_kernels(const TriangleTree& tree) {
-    if (asked_.empty()) return;
-    hits_.resize(asked_.size());
+  void run_kernels(const TriangleTree& tree) {
+    if (kernel_stops_.empty()) return;
+    hits_.resize(kernel_stops_.size());
     const RayKernels& kernels = *task_.ray_kernels();
     if (mode() == RayMode::kAll)
-      kernels.all(tree, kernel_rays_.data(), hits_.data(), hits_.size(), rows_.get(), most_);
+      kernels.all(tree, kernel_rays_.data(), hits_.data(), hits_.size(), rows_.get(), max_rows_);
     else
       (mode() == RayMode::kAny ? kernels.any : kernels.first)(tree, kernel_rays_.data(), hits_.data(), hits_.size());
     uint64_t tests = 0;
-    for (size_t i = 0; i < asked_.size(); ++i) {
+    for (size_t i = 0; i < kernel_stops_.size(); ++i) {
       task_.work().nodes += hits_[i].nodes;
       tests += hits_[i].tests;
     }
     task_.work().tests += tests;
     task_.count_tests(tests);
-    for (size_t i = 0; i < asked_.size(); ++i) {
+    for (size_t i = 0; i < kernel_stops_.size(); ++i) {
       if (mode() == RayMode::kAll)
-        take_all(now_[asked_[i]], hits_[i], rows_.get() + i * most_);
+        offer_all(current_[kernel_stops_[i]], hits_[i], rows_.get() + i * max_rows_);
       else
-        take(now_[asked_[i]], hits_[i]);
+        offer_hit(current_[kernel_stops_[i]], hits_[i]);
     }
   }
 
-  void take(const Stop& stop, const KernelHit& found) {
+  void offer_hit(const Stop& stop, const KernelHit& found) {
     if (found.verdict == KernelVerdict::kMiss) return;
-    if (found.verdict == KernelVerdict::kUndecided || found.t < stop.nearest) return ask_triangles(stop);
+    if (found.verdict == KernelVerdict::kUndecided || found.t < stop.nearest) return trace_triangles(stop);
     Hit hit = hit_on(*stop.instance, found.t);
     hit.triangle = found.number;
     rays_[stop.ray].collector.offer(hit);
   }
 
-  void take_all(const Stop& stop, const KernelHit& found, const KernelRow* rows) {
+  void offer_all(const Stop& stop, const KernelHit& found, const KernelRow* rows) {
     if (found.verdict == KernelVerdict::kMiss) return;
-    AskedRay& ray = rays_[stop.ray];
-    const bool may_be_more = found.number == most_ && most_ <= ray.request.max_results;
+    PendingRay& ray = rays_[stop.ray];
+    const bool may_be_more = found.number == max_rows_ && max_rows_ <= ray.request.max_results;
     const KernelRow* const end = rows + found.number;
     const auto before = [&](const KernelRow& row) { return row.t < stop.nearest; };
     if (found.verdict == KernelVerdict::kUndecided || may_be_more || std::any_of(rows, end, before))
-      return ask_triangles(stop);
+      return trace_triangles(stop);
     for (; rows != end; ++rows) {
       Hit hit = hit_on(*stop.instance, rows->t);
       hit.triangle = rows->number;
@@ -160,43 +162,44 @@ class Round {
     }
   }
 
-  void ask_triangles(const Stop& stop) {
-    AskedRay& ray = rays_[stop.ray];
-    ask_instance(task_, ray.request, slabs_[stop.ray], *stop.instance, stop.nearest, ray.collector);
+  // Traces one ray triangle by triangle.
+  void trace_triangles(const Stop& stop) {
+    PendingRay& ray = rays_[stop.ray];
+    trace_instance(task_, ray.request, slabs_[stop.ray], *stop.instance, stop.nearest, ray.collector);
   }
 
-  // Nothing where the kernels' bounds do not hold.
+  // Returns the ray in mesh axes, or nothing if its values exceed the range that the kernels support.
   std::optional<KernelRay> kernel_ray(const Stop& stop) const {
-    const AskedRay& ray = rays_[stop.ray];
+    const PendingRay& ray = rays_[stop.ray];
     const Transform& transform = stop.instance->transform;
     const Vec3d origin = transform.point_to_mesh(ray.request.origin);
     const Vec3d direction = transform.direction_to_mesh(ray.request.direction);
-    const double longest = max_component(abs(direction));
-    const double reach = max_component(abs(origin)) + double{stop.instance->mesh->tree().tree().magnitude};
-    if (!(longest >= kMinKernelDirection && longest <= kMaxKernelDirection)) return std::nullopt;
-    if (!(reach >= kMinKernelReach && reach <= kMaxKernelReach)) return std::nullopt;
+    const double max_direction = max_component(abs(direction));
+    const double extent = max_component(abs(origin)) + double{stop.instance->mesh->tree().tree().magnitude};
+    if (!(max_direction >= kMinKernelDirection && max_direction <= kMaxKernelDirection)) return std::nullopt;
+    if (!(extent >= kMinKernelReach && extent <= kMaxKernelReach)) return std::nullopt;
     return KernelRay{{origin.x, origin.y, origin.z},  {direction.x, direction.y, direction.z},
                      ray.collector.limit(),           ray.request.cull != Cull::kFront,
                      ray.request.cull != Cull::kBack, transform.quaternion.is_identity()};
   }
 
   QueryTask& task_;
-  std::vector<AskedRay>& rays_;
-  std::vector<SlabRay<double>> slabs_;  // of each ray
-  const Instance* only_ = nullptr;      // where there is one
-  std::vector<InstanceWalk> walks_;     // of each ray, where there are more
-  std::vector<Stop> stops_, now_;
+  std::vector<PendingRay>& rays_;
+  std::vector<SlabRay<double>> slabs_;  // one per ray
+  const Instance* only_ = nullptr;      // the only instance of the scene, if there is exactly one
+  std::vector<InstanceWalk> walks_;     // one per ray, if there are several instances
+  std::vector<Stop> stops_, current_;   // stops of the next round and of the current one
   std::vector<KernelRay> kernel_rays_;
-  std::vector<size_t> asked_;  // which stop each of kernel_rays_ is
+  std::vector<size_t> kernel_stops_;  // stop of each of kernel_rays_, as an index in current_
   std::vector<KernelHit> hits_;
-  uint32_t most_ = 0;  // kAll: rows of each of kernel_rays_
+  uint32_t max_rows_ = 0;  // kAll: capacity of rows_ for each of kernel_rays_
   std::unique_ptr<KernelRow[]> rows_;
 };
 
 }  // namespace
 
-void ask_meshes(QueryTask& task, std::vector<AskedRay>& rays) {
-  if (!rays.empty() && task.snapshot().statics->size() != 0) Round(task, rays).run();
+void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays) {
+  if (!rays.empty() && task.snapshot().statics->size() != 0) Rounds(task, rays).run();
 }
 
 }  // namespace locus

@@ -1,8 +1,8 @@
-// Rays of one piece of a batch against the scene's meshes, by the vector kernels, which want many rays at once. Every
-// ray walks the tree over instances near to far; in each round the kernels take all rays that have come to an instance,
-// mesh by mesh, and what they find shortens the rays. Rays of any mode, exact.
+// Rays of one chunk of a batch against the scene's meshes, by the vector kernels, which need many rays per call. Each
+// ray walks the tree over instances from near to far. In each round every ray advances to its next instance, the
+// kernels trace the waiting rays mesh by mesh, and their hits shorten the rays. Supports EXACT rays of all modes.
 //
-// Threads: one at a time.
+// Threads: one thread per call.
 #ifndef LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
 #define LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
 
@@ -14,17 +14,18 @@
 
 namespace locus {
 
-// A ray that is being answered.
-struct AskedRay {
-  AskedRay(const RayRequest& asked, const Filter& whom) : request(asked), filter(whom), collector(asked) {}
+// Ray in progress: its request, filter and hits so far.
+struct PendingRay {
+  PendingRay(const RayRequest& ray, const Filter& ray_filter) : request(ray), filter(ray_filter), collector(ray) {}
 
   RayRequest request;
   Filter filter;
   HitCollector collector;
 };
 
-// Offers each ray's collector what it hits of the meshes. Only where the task has kernels.
-void ask_meshes(QueryTask& task, std::vector<AskedRay>& rays);
+// Offers the hits of each ray on the meshes to its collector. All rays have the same mode. Precondition: the task has
+// ray kernels.
+void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays);
 
 }  // namespace locus
 

@@ -18,8 +18,8 @@ absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const 
   const auto offer = [&](const auto& labels, const auto& make_hit) {
     ++task.work().tests;
     if (!task.count_test() || labels.id <= options.after_id) return;
-    const auto wanted = rows.find(labels.group);
-    if (wanted != rows.end()) wanted->second.offer(make_hit());
+    const auto group_rows = rows.find(labels.group);
+    if (group_rows != rows.end()) group_rows->second.offer(make_hit());
   };
   for (const Instance& instance : task.snapshot().statics->tree().values())
     offer(instance, [&] { return hit_on(instance, 0); });

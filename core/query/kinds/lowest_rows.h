@@ -1,5 +1,6 @@
-// The rows of one ball or box, or of one group, in the order of ids (then of triangles), at most a given number. Rows
-// of one instance's triangles differ by a number only, and are kept as such. One thread.
+// Rows of one ball or box, or of one group, ascending by id and then by triangle, at most a given number. The rows of
+// one instance's triangles differ only by the triangle, so they are stored as one run with a list of triangles. One
+// thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_LOWEST_ROWS_H_
 #define LOCUS_CORE_QUERY_KINDS_LOWEST_ROWS_H_
 
@@ -11,43 +12,46 @@
 
 namespace locus {
 
-// One row, or one for each of some triangles of an instance.
+// One row, or one row per triangle of a list for an instance.
 struct RowRun {
-  Hit row;                    // t is 0; without triangle
-  size_t first_triangle = 0;  // in OverlapAnswer::triangles
+  Hit row;                    // t is 0; triangle is not set
+  size_t first_triangle = 0;  // index in OverlapAnswer::triangles
   size_t triangle_count = 0;  // 0: one row without triangle
 
   size_t rows() const { return triangle_count == 0 ? 1 : triangle_count; }
 };
 
+// Result of one overlap query or group.
 struct OverlapAnswer {
   std::vector<RowRun> runs;
   std::vector<uint32_t> triangles;
-  // In place of runs where only objects were found: they, ascending by id, as the task that was asked holds them until
-  // the next query.
+  // Objects ascending by id, in place of runs, if only objects were found. They belong to the QueryTask and are valid
+  // until its next query.
   absl::Span<const FoundObject> objects;
-  bool truncated = false;  // there were more, of higher ids
+  bool truncated = false;  // there were more rows, of higher ids
 
   absl::Span<const uint32_t> triangles_of(const RowRun& run) const {
     return absl::MakeConstSpan(triangles).subspan(run.first_triangle, run.triangle_count);
   }
 };
 
-// Keeps the rows that come first. Memory is bounded by twice that number and what is offered at once.
+// Bounded collection of the lowest rows. Invariants: rows_ is the number of rows of all runs; after keep_lowest() it is
+// at most max_results_ and runs ascend by id. Memory: twice max_results_ rows plus the rows of one offer().
 class LowestRows {
  public:
   explicit LowestRows(uint32_t max_results, bool sorted_triangles)
       : max_results_(max_results), sorted_triangles_(sorted_triangles) {}
 
-  // A row without triangle.
+  // Adds a row without a triangle. Precondition: no other row has its id.
   void offer(const Hit& row);
-  // One row for each of some triangles of an instance; those of one instance in storage order, call by call.
+  // Adds one row per triangle of an instance. Several calls for one instance add its triangles in storage order.
   void offer(const Hit& row, absl::Span<const uint32_t> triangles);
+  // Returns the lowest rows in order. Call it once.
   OverlapAnswer finish();
 
  private:
   bool in_order() const;
-  // Puts runs in order and drops the rows behind the most results.
+  // Sorts the runs, merges those of one instance, and drops rows beyond max_results_.
   void keep_lowest();
 
   const size_t max_results_;

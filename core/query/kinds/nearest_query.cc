@@ -12,10 +12,11 @@
 namespace locus {
 namespace {
 
-// Squared distances beyond this round to more than `farthest`.
+// Returns a limit for squared distances; all beyond it round to more than `farthest` as a float.
 double squared_limit_of(float farthest) { return squared_limit(raised(farthest)); }
 
-// The nearest rows so far, and how near the next one must be.
+// Nearest rows so far, and the largest distance that the next one may have. Invariant: rows_ holds at most count_ rows,
+// sorted if in_order_, otherwise a heap with the last row in front once it is full.
 class NearestRows {
  public:
   explicit NearestRows(const NearestRequest& request)
@@ -26,9 +27,9 @@ class NearestRows {
     rows_.reserve(std::min<size_t>(count_, kMaxInOrder));
   }
 
-  // Nothing beyond it is wanted; a row exactly there may be, if its id is lower.
+  // Returns the largest distance that may still matter. A row at exactly this distance matters if its id is lower.
   float farthest() const { return farthest_; }
-  // The same squared, for boxes in world axes.
+  // Returns the limit of squared distances to boxes in world axes.
   double limit() const { return limit_; }
 
   void offer(const Hit& row) {
@@ -50,7 +51,7 @@ class NearestRows {
   }
 
  private:
-  // Few rows are kept in order, since objects are offered nearly in order; more are a heap with the last on top.
+  // Up to this many rows are kept sorted, since objects are offered nearly in order; more are kept as a heap.
   static constexpr size_t kMaxInOrder = 32;
 
   const Hit& last() const { return in_order_ ? rows_.back() : rows_.front(); }
@@ -69,6 +70,7 @@ class NearestRows {
   std::vector<Hit> rows_;
 };
 
+// Visitor of moving objects.
 class ObjectsNear {
  public:
   ObjectsNear(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request, const Filter& filter,
@@ -80,10 +82,10 @@ class ObjectsNear {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(object.entry())) return true;
     const Shape shape = moment_.shape(object);
-    const double away = request_.precision == Precision::kConservative
-                            ? std::sqrt(squared_distance(request_.point, bounds_of(shape)))
-                            : distance(request_.point, shape);
-    rows_.offer(hit_on(object, rounded_distance(away), moment_));
+    const double distance_to_object = request_.precision == Precision::kConservative
+                                          ? std::sqrt(squared_distance(request_.point, bounds_of(shape)))
+                                          : distance(request_.point, shape);
+    rows_.offer(hit_on(object, rounded_distance(distance_to_object), moment_));
     return true;
   }
 
@@ -95,25 +97,25 @@ class ObjectsNear {
   NearestRows& rows_;
 };
 
-// The rows of one instance: each of its triangles, or the nearest of them.
+// Rows of one instance: one per triangle, or one for the nearest triangle.
 class InstanceRows {
  public:
   InstanceRows(const NearestRequest& request, const Instance& instance, NearestRows& rows)
       : request_(request),
         instance_(instance),
         rows_(rows),
-        away_(squared_distance(request.point, instance.bounds)),
+        squared_bounds_distance_(squared_distance(request.point, instance.bounds)),
         farthest_(rows.farthest()),
         limit_(rows.limit()) {}
 
-  // As NearestRows.
+  // Return the limits as NearestRows does, for this instance.
   float farthest() const { return farthest_; }
   double limit() const { return limit_; }
 
-  // `squared`: the triangle's distance, which counts as no less than that of the instance's bounds: the tree over
-  // instances may cull by them.
+  // Offers a triangle at the squared distance `squared`. The reported distance is never less than that to the
+  // instance's bounds, since the tree over instances may cull by them.
   void offer(const Triangle& triangle, double squared) {
-    Hit row = hit_on(instance_, rounded_distance(std::sqrt(std::max(squared, away_))));
+    Hit row = hit_on(instance_, rounded_distance(std::sqrt(std::max(squared, squared_bounds_distance_))));
     row.triangle = triangle.number;
     if (request_.every_triangle) {
       rows_.offer(row);
@@ -138,12 +140,13 @@ class InstanceRows {
   const NearestRequest& request_;
   const Instance& instance_;
   NearestRows& rows_;
-  const double away_;
+  const double squared_bounds_distance_;
   float farthest_;
   double limit_;
   Hit nearest_;
 };
 
+// Visitor of the triangles of one instance, which measures to their placed corners.
 class TrianglesNear {
  public:
   TrianglesNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
@@ -152,13 +155,13 @@ class TrianglesNear {
         transform_(instance.transform),
         placed_(instance),
         rows_(rows),
-        pad_(pad(request, instance)) {}
+        epsilon_(epsilon(request, instance)) {}
 
-  // In mesh axes.
+  // Returns the limit of squared distances in mesh axes.
   double limit() const {
     if (rows_.farthest() != farthest_) {
       farthest_ = rows_.farthest();
-      limit_ = squared_limit((raised(farthest_) + pad_) / transform_.scale);
+      limit_ = squared_limit((raised(farthest_) + epsilon_) / transform_.scale);
     }
     return limit_;
   }
@@ -172,9 +175,10 @@ class TrianglesNear {
   }
 
  private:
-  // Distances in mesh and world axes differ by the scale and by rounding: that of the ways there and back, in double's
-  // precision of the numbers involved, and that of measuring to a triangle, at worst, for slivers, 2^-30 of its size.
-  static double pad(const NearestRequest& request, const Instance& instance) {
+  // Returns an upper bound of the difference between a distance in world axes and the scaled distance in mesh axes. It
+  // covers the rounding of the transformations, relative to the magnitudes involved, and of the distance to a triangle,
+  // which is 2^-30 of its size in the worst case, a sliver.
+  static double epsilon(const NearestRequest& request, const Instance& instance) {
     const Transform& transform = instance.transform;
     return 0x1p-26 * (max_component(abs(request.point)) + max_component(abs(transform.translation)) +
                       double{transform.scale} * magnitude(instance.mesh->bounds()));
@@ -185,12 +189,12 @@ class TrianglesNear {
   const Transform& transform_;
   const PlacedTriangles placed_;
   InstanceRows& rows_;
-  const double pad_;
-  mutable float farthest_ = -1;  // to which limit_ belongs
+  const double epsilon_;
+  mutable float farthest_ = -1;  // distance from which limit_ was computed
   mutable double limit_ = 0;
 };
 
-// Triangles of one instance by their placed bounds.
+// Visitor of the triangles of one instance, which measures to their placed bounds: CONSERVATIVE.
 class PlacedBoundsNear {
  public:
   PlacedBoundsNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
@@ -214,6 +218,7 @@ class PlacedBoundsNear {
   InstanceRows& rows_;
 };
 
+// Visitor of instances.
 class InstancesNear {
  public:
   InstancesNear(QueryTask& task, const NearestRequest& request, const Filter& filter, NearestRows& rows)
@@ -271,16 +276,16 @@ std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const N
 
 Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
   const Vec3d point = request.point;
-  const bool by_bounds = request.precision == Precision::kConservative;
-  // In axes around the point, where no digits are lost to far places.
+  const bool conservative = request.precision == Precision::kConservative;
+  // Computes relative to the point, which avoids cancellation far from the world's origin.
   if (row.object) {
     Shape shape = row.object_shape();
-    if (by_bounds) return nearest_in(point, bounds_of(shape)) - point;
+    if (conservative) return nearest_in(point, bounds_of(shape)) - point;
     shape.position = shape.position - point;
     return nearest_on_shape({}, shape);
   }
   const Corners corners = corners_of(row.instance->transform, row.instance->mesh->triangle(row.triangle));
-  if (by_bounds) return nearest_in(point, PlacedTriangles(*row.instance).bounds_of_corners(corners)) - point;
+  if (conservative) return nearest_in(point, PlacedTriangles(*row.instance).bounds_of_corners(corners)) - point;
   return nearest_on_triangle({}, corners[0] - point, corners[1] - point, corners[2] - point);
 }
 

@@ -10,29 +10,29 @@
 namespace locus {
 namespace {
 
-// What can be told of an object whose place is known but for some slack: that it overlaps, that it does not, or
-// nothing.
-enum class Verdict { kIn, kOut, kOpen };
+// Verdict on an object from its stored position alone: it overlaps, it does not, or its exact shape has to decide.
+enum class Verdict { kOverlaps, kDisjoint, kUndecided };
 
-// What a verdict goes by. The object reaches no farther than `reach` from its place; it fills a ball of radius `solid`
-// around it; and its place is off by `slack` at most, which covers the rounding of predicates and of what is told here.
-struct LooselyPlaced {
-  Vec3d place;
-  double solid;
-  double reach;
-  double slack;
+// Bounds of an object: it extends at most `extent` from its position and contains the ball of radius `inner_radius`
+// around it. The true position is at most `displacement_bound` away from `position`, which includes an epsilon for the
+// rounding of the exact predicates and of the comparisons with these bounds.
+struct ObjectBounds {
+  Vec3d position;
+  double inner_radius;
+  double extent;
+  double displacement_bound;
 };
 
-// Of an object that is `astray` from where it is filed.
-LooselyPlaced loosely_placed(const GridRef& object, double displacement_bound) {
-  const Vec3d place = object.entry().position;
-  const double reach = object.reach();
-  const double solid = object.entry().kind == ShapeKind::kBall ? reach : 0;
-  return {place, solid, reach,
-          displacement_bound + internal::kBoundsGrowth * (max_component(abs(place)) + reach + displacement_bound)};
+// Returns the bounds of an object that is at most `displacement_bound` away from its stored position.
+ObjectBounds object_bounds(const GridRef& object, double displacement_bound) {
+  const Vec3d position = object.entry().position;
+  const double extent = object.reach();
+  const double inner_radius = object.entry().kind == ShapeKind::kBall ? extent : 0;
+  const double epsilon = internal::kBoundsGrowth * (max_component(abs(position)) + extent + displacement_bound);
+  return {position, inner_radius, extent, displacement_bound + epsilon};
 }
 
-// A ball or box in world axes, and the same in an instance's mesh axes: what the collecting below needs to know of it.
+// Operations on a ball, in world axes and in the mesh axes of an instance, for the templates below.
 struct BallShape {
   using World = Balld;
   using Mesh = Ballf;
@@ -43,19 +43,21 @@ struct BallShape {
     return {to_float(transform.point_to_mesh(ball.center)), static_cast<float>(ball.radius / transform.scale)};
   }
   static double size(const Ballf& ball) { return ball.radius; }
-  static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
+  static double extent(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
   static std::optional<Balld> as_ball(const Balld& ball) { return ball; }
   static bool overlaps_bounds(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
   static bool overlaps_object(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
-  static Verdict verdict(const Balld& ball, const LooselyPlaced& object) {
-    const double away = squared_length(object.place - ball.center);
-    const double far = ball.radius + object.reach + object.slack, near = ball.radius + object.solid - object.slack;
-    if (away > far * far) return Verdict::kOut;
-    return near > 0 && away < near * near ? Verdict::kIn : Verdict::kOpen;
+  static Verdict verdict(const Balld& ball, const ObjectBounds& object) {
+    const double squared = squared_length(object.position - ball.center);
+    const double far = ball.radius + object.extent + object.displacement_bound;
+    const double near = ball.radius + object.inner_radius - object.displacement_bound;
+    if (squared > far * far) return Verdict::kDisjoint;
+    return near > 0 && squared < near * near ? Verdict::kOverlaps : Verdict::kUndecided;
   }
   static bool overlaps_triangle(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
 };
 
+// Operations on a box, likewise.
 struct BoxShape {
   using World = Obbd;
   using Mesh = Obbf;
@@ -67,26 +69,28 @@ struct BoxShape {
             compose(inverse(transform.rotation), box.rotation)};
   }
   static double size(const Obbf& box) { return max_component(box.half); }
-  static double reach(const Obbd& box) { return max_component(abs(box.center)) + max_component(box.half) * 2; }
+  static double extent(const Obbd& box) { return max_component(abs(box.center)) + max_component(box.half) * 2; }
   static std::optional<Balld> as_ball(const Obbd&) { return std::nullopt; }
   static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
-  static Verdict verdict(const Obbd& box, const LooselyPlaced& object) {
-    // How far outside of the box's sides; negative inside.
-    const double outside = max_component(abs(box.rotation.to_local(object.place - box.center)) - box.half);
-    if (outside > object.reach + object.slack) return Verdict::kOut;
-    return outside < -object.slack ? Verdict::kIn : Verdict::kOpen;
+  static Verdict verdict(const Obbd& box, const ObjectBounds& object) {
+    // Largest distance outside one of the box's sides; negative inside.
+    const double outside = max_component(abs(box.rotation.to_local(object.position - box.center)) - box.half);
+    if (outside > object.extent + object.displacement_bound) return Verdict::kDisjoint;
+    return outside < -object.displacement_bound ? Verdict::kOverlaps : Verdict::kUndecided;
   }
   static bool overlaps_triangle(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
 };
 
+// Returns the region of the grid that the search for objects visits.
 template <class Kind>
-GridRegion region_asked(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
+GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
   const typename Kind::WorldRegion region(shape);
-  // Objects themselves, not only their bounds, are to reach into a ball.
+  // An EXACT ball must meet the objects themselves; all other queries meet their bounds.
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 
+// Visitor of moving objects.
 template <class Kind>
 class ObjectRows {
  public:
@@ -97,7 +101,7 @@ class ObjectRows {
   }
 
   Aabbd bounds() const { return typename Kind::WorldRegion(shape_).bounds(); }
-  GridRegion region() const { return region_asked<Kind>(moment_, shape_, options_); }
+  GridRegion region() const { return search_region<Kind>(moment_, shape_, options_); }
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;
@@ -108,9 +112,9 @@ class ObjectRows {
  private:
   bool overlaps(const GridRef& object) const {
     const bool exact = options_.precision == Precision::kExact;
-    if (exact) {  // most objects need neither be looked up in the next tick nor be told by their shape
-      const Verdict verdict = Kind::verdict(shape_, loosely_placed(object, moment_.displacement_bound(object)));
-      if (verdict != Verdict::kOpen) return verdict == Verdict::kIn;
+    if (exact) {  // decides most objects without their shape and without a lookup in the next tick
+      const Verdict verdict = Kind::verdict(shape_, object_bounds(object, moment_.displacement_bound(object)));
+      if (verdict != Verdict::kUndecided) return verdict == Verdict::kOverlaps;
     }
     const Shape shape = moment_.shape(object);
     return exact ? Kind::overlaps_object(shape_, shape) : Kind::overlaps_bounds(shape_, bounds_of(shape));
@@ -124,21 +128,20 @@ class ObjectRows {
   FoundObjects& found_;
 };
 
-// Rows of one instance: itself once, or each of its triangles found, which come in storage order.
+// Rows of one instance: one row, or one row per triangle found. Triangles are offered in storage order.
 class InstanceRows {
  public:
   InstanceRows(const Instance& instance, const OverlapOptions& options, LowestRows& rows)
       : instance_(instance), detail_(options.detail), max_results_(options.max_results), rows_(rows) {}
 
-  // Numbers of triangles, in storage order. False when the instance needs no more: what comes behind the most results
-  // would not be kept.
-  bool offer(absl::Span<const uint32_t> numbers) {
+  // Offers triangles. Returns false if the instance needs no more of them: later ones would not be kept.
+  bool offer(absl::Span<const uint32_t> triangles) {
     if (detail_ == StaticDetail::kInstances) {
-      if (!numbers.empty()) rows_.offer(hit_on(instance_, 0));
-      return numbers.empty();
+      if (!triangles.empty()) rows_.offer(hit_on(instance_, 0));
+      return triangles.empty();
     }
-    rows_.offer(hit_on(instance_, 0), numbers);
-    found_ += numbers.size();
+    rows_.offer(hit_on(instance_, 0), triangles);
+    found_ += triangles.size();
     return detail_ != StaticDetail::kTriangles || found_ <= max_results_;
   }
 
@@ -152,14 +155,14 @@ class InstanceRows {
   size_t found_ = 0;
 };
 
-// The exact verdict of one ball or box on triangles of one instance.
+// Exact test of one ball or box against triangles of one instance.
 template <class Kind>
 class ExactTest {
  public:
   ExactTest(const typename Kind::World& world_shape, const Instance& instance)
       : shape_(Kind::to_mesh(world_shape, instance.transform)),
         world_shape_(world_shape),
-        placed_(instance, Kind::reach(world_shape)) {}
+        placed_(instance, Kind::extent(world_shape)) {}
 
   const typename Kind::Mesh& mesh_shape() const { return shape_; }
   const LoosePlacedTriangles& placed() const { return placed_; }
@@ -174,6 +177,7 @@ class ExactTest {
   const LoosePlacedTriangles placed_;
 };
 
+// Visitor of the triangles of one instance: EXACT, without kernels.
 template <class Kind>
 class ExactTriangles {
  public:
@@ -194,8 +198,8 @@ class ExactTriangles {
   InstanceRows rows_;
 };
 
-// Triangles of one instance by their placed bounds, and what the exact test finds though rounding to the mesh's floats
-// puts it beside them.
+// Visitor of the triangles of one instance by their placed bounds: CONSERVATIVE. It also reports triangles that the
+// exact test finds although their placed bounds miss the shape, because the exact test rounds to the mesh's floats.
 template <class Kind>
 class PlacedBounds {
  public:
@@ -231,6 +235,7 @@ class PlacedBounds {
   InstanceRows rows_;
 };
 
+// Visitor of instances.
 template <class Kind>
 class InstanceSearch {
  public:
@@ -243,7 +248,7 @@ class InstanceSearch {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
-    // Part of the verdict: the tree over instances may cull by it.
+    // This test is part of the verdict, since the tree over instances may cull by it.
     if (!region_.overlaps(instance.bounds)) return true;
     InstanceRows rows(instance, options_, rows_);
     if (options_.precision == Precision::kConservative) {
@@ -260,7 +265,7 @@ class InstanceSearch {
     const TriangleBvh& tree = instance.mesh->tree();
     const ExactTest<Kind> exact(shape_, instance);
     const typename Kind::Mesh& shape = exact.mesh_shape();
-    if (task_.searches_triangles() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
+    if (task_.uses_region_kernels() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
         exact.placed().bounds_follow(to_double(shape.center), Kind::size(shape)))
       return search(tree, shape, rows);
     ExactTriangles<Kind> visitor(task_, exact, rows);
@@ -269,20 +274,20 @@ class InstanceSearch {
 
   void search(const TriangleBvh& tree, const typename Kind::Mesh& shape, InstanceRows& rows) {
     TriangleSearch<typename Kind::Mesh> search(tree, shape);
-    uint32_t numbers[kNumbersAtOnce];
-    const size_t room = options_.detail == StaticDetail::kInstances ? kMinRegionRoom : kNumbersAtOnce;
+    uint32_t triangles[kTrianglesPerStep];
+    const size_t room = options_.detail == StaticDetail::kInstances ? kMinRegionRoom : kTrianglesPerStep;
     bool more = true;
     while (more && !search.over()) {
-      const size_t found = search.next(numbers, room);
+      const size_t found = search.next(triangles, room);
       task_.work().nodes += search.nodes();
       task_.work().tests += search.tests();
-      more = rows.offer({numbers, found});
-      // What is found untested is work too, for whoever waits for an end of it.
+      more = rows.offer({triangles, found});
+      // Counts triangles that were found without a test as well, so that the stop is polled often enough.
       more = task_.count_tests(search.tests() + found) && more;
     }
   }
 
-  static constexpr size_t kNumbersAtOnce = 2048;
+  static constexpr size_t kTrianglesPerStep = 2048;
 
   QueryTask& task_;
   const typename Kind::World& shape_;
@@ -292,7 +297,7 @@ class InstanceSearch {
   LowestRows& rows_;
 };
 
-// The rows of instances, and of objects: of either that come first, and of both.
+// Returns the rows of instances and objects together, in order and at most max_results.
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();
@@ -309,7 +314,7 @@ OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const S
     else
       rows.offer(run.row, instances.triangles_of(run));
   }
-  for (const FoundObject& one : objects) rows.offer(hit_on(one.object, 0, moment));
+  for (const FoundObject& found_object : objects) rows.offer(hit_on(found_object.object, 0, moment));
   OverlapAnswer both = rows.finish();
   both.truncated |= instances.truncated || found.truncated();
   return both;
@@ -351,11 +356,11 @@ OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& bo
 }
 
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options) {
-  return region_asked<BallShape>(moment, ball, options);
+  return search_region<BallShape>(moment, ball, options);
 }
 
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options) {
-  return region_asked<BoxShape>(moment, box, options);
+  return search_region<BoxShape>(moment, box, options);
 }
 
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {

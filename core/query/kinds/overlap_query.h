@@ -1,5 +1,5 @@
-// One ball or box against everything in a snapshot: rows of instances or their triangles and of objects, ascending by
-// id.
+// Overlap of one ball or box with a snapshot: rows of objects, and of instances or their triangles, ascending by id.
+// Free functions; any thread, with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 
@@ -10,6 +10,7 @@
 
 namespace locus {
 
+// Settings of a block that its overlap queries share.
 struct OverlapOptions {
   Source source;
   Precision precision;
@@ -18,19 +19,21 @@ struct OverlapOptions {
   Id after_id;
 };
 
+// Returns the options of a block, with its default of max_results.
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
-// `moment` says when; the answer borrows it.
+// Answer one ball or box in world axes, with objects at `moment`. The answer borrows `moment`, and found objects from
+// `task` until its next query. Cost: the nodes, cells and primitives that meet the region, and the sorting of the rows.
 OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
                        const Filter& filter);
 OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter);
 
-// What such a query asks of the grid of objects.
+// Return the region of the grid of objects that such a query searches.
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options);
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
 
-// The ball or box of query `i` of a block, in world axes.
+// Return the ball or box of query `i` of a block, in world axes.
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i);
 Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i);
 

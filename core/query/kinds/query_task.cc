@@ -2,7 +2,7 @@
 
 namespace locus {
 
-bool BatchControl::go_on(uint64_t work) {
+bool BatchControl::report_work(uint64_t work) {
   done_.fetch_add(work, std::memory_order_relaxed);
   if (stopped() || out_of_work()) return false;
   if (!stop_) return true;
@@ -17,8 +17,8 @@ bool BatchControl::go_on(uint64_t work) {
 
 bool QueryTask::check() {
   const uint64_t done = work_.nodes + work_.cells + work_.tests;
-  ended_ = ended_ || !control_.go_on(done - booked_);
-  booked_ = done;
+  ended_ = ended_ || !control_.report_work(done - reported_work_);
+  reported_work_ = done;
   return !ended_;
 }
 

@@ -1,5 +1,9 @@
-// What every query of a batch needs to know besides its own numbers: where to look, whom to pass over, how much work is
-// left, and when to end. One for each piece of a batch that runs on one thread.
+// Context of the queries of one chunk: the snapshot, the filters of its queries, the work budget of the batch, and its
+// stop. For the query kinds.
+//
+// Threads: a QueryTask belongs to one thread; the tasks of a batch share one BatchControl, which is thread-safe.
+// Invariants: ended() and BatchControl::stopped() never become false again; a task has reported at most the work that
+// it counted.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_TASK_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TASK_H_
 
@@ -19,7 +23,7 @@
 
 namespace locus {
 
-// Whom one query may find.
+// Filter of one query by layers, group and id. Borrows the block's ignored ids.
 class Filter {
  public:
   Filter(const QueryBlock& block, size_t query)
@@ -40,15 +44,15 @@ class Filter {
   absl::Span<const uint64_t> ignored_ids_;
 };
 
-// What the threads of one batch share. Thread-safe.
+// Work budget and stop of one batch, shared by its threads. Thread-safe.
 class BatchControl {
  public:
   BatchControl(uint64_t max_work, std::function<absl::Status()> stop) : max_work_(max_work), stop_(std::move(stop)) {}
 
-  // Books work done; false when the batch is to end: nothing more of it matters, or the budget is used up.
-  bool go_on(uint64_t work);
+  // Adds `work` to the work done and polls the stop. Returns false if the batch ends: stopped, or out of work.
+  bool report_work(uint64_t work);
   bool out_of_work() const { return max_work_ != 0 && done_.load(std::memory_order_relaxed) >= max_work_; }
-  // The status that ended the batch, or OK. Only after all threads have come back.
+  // Returns the status that stopped the batch, or OK. Only after all threads have finished.
   absl::Status status() const { return status_; }
   bool stopped() const { return stopped_.load(std::memory_order_acquire); }
 
@@ -58,42 +62,45 @@ class BatchControl {
   std::atomic<uint64_t> done_ = 0;
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> stopped_ = false;
-  absl::Status status_;  // written once, by whoever turned stopping_ true, before stopped_
+  absl::Status status_;  // written once, by the thread that set stopping_, before it sets stopped_
 };
 
 class QueryTask {
  public:
+  // Borrows `snapshot` and `control`. With `brute_force` every search tests all values instead of using index
+  // structures.
   QueryTask(const SceneSnapshot& snapshot, BatchControl& control, bool brute_force)
       : snapshot_(snapshot), control_(control), brute_force_(brute_force) {}
 
   const SceneSnapshot& snapshot() const { return snapshot_; }
   Work& work() { return work_; }
 
-  // To be called for every primitive test; false when the query is to end, cut short.
+  // Counts one primitive test; called before each. Returns false if the query ends here, truncated.
   bool count_test() {
     if (++tests_ % limits::kTestsBetweenChecks != 0) return !ended_;
     return check();
   }
-  // The same for many tests at once.
+  // Counts many tests at once, like count_test().
   bool count_tests(uint64_t tests) {
     const uint64_t before = tests_ / limits::kTestsBetweenChecks;
     tests_ += tests;
     return tests_ / limits::kTestsBetweenChecks == before ? !ended_ : check();
   }
-  // Looks at the budget and at the end of the batch.
+  // Reports the work since the last call and polls budget and stop. Returns !ended().
   bool check();
   bool ended() const { return ended_; }
 
-  // Kernels for exact hits of rays in meshes; null where there are none, or where all values are to be tested.
+  // Returns the vector kernels for exact hits of rays in meshes; null if the processor has none, or with brute force.
   const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
 
-  // Where a ball or box puts its objects: one query after the other.
+  // Returns the collector of the objects of ball and box queries, reused by one query after another.
   FoundObjects& found_objects() { return found_objects_; }
 
-  // Whether ball and box queries may ask the kernels.
-  bool searches_triangles() const { return !brute_force_; }
+  // Returns whether ball and box queries may use the vector kernels.
+  bool uses_region_kernels() const { return !brute_force_; }
 
-  // Every candidate of an index: by its structure, or, for whoever wants to check that, simply all values.
+  // Call the visitor for every candidate in an index: those that the index structure finds, or all values with brute
+  // force, which serves to verify the structures.
   template <class Index, class Visitor>
   void visit_ray(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs, Visitor& visitor) {
     if (brute_force_)
@@ -116,7 +123,7 @@ class QueryTask {
       index.visit_nearest(point, visitor, work_);
   }
 
-  // The same of the scene's objects at a moment, which visitors take by reference.
+  // Call the visitor for every candidate among the scene's objects at `moment`.
   template <class Visitor>
   void visit_objects_on_ray(const SceneAtTime& moment, const SlabRay<double>& slabs, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
@@ -143,13 +150,14 @@ class QueryTask {
       return;
     }
     const Aabbd bounds = std::as_const(visitor).bounds();
-    const auto ask = [&](const auto& visit_one) {
+    const auto search = [&](const auto& visit_one) {
       if (walk_) return walk_->visit(work_, visit_one);
       std::as_const(visitor).region().visit(work_, visit_one);
     };
-    moment.visit_asked(bounds, work_, ask, visit);
+    moment.visit_asked(bounds, work_, search, visit);
   }
-  // The regions of the visits above are those of the walk from here on, one after the other.
+  // Makes visit_objects_in_region() take its regions from one walk over the regions of queries [begin, end), in order.
+  // The walk prefetches the memory of the next regions while one is visited.
   void walk_regions(size_t begin, size_t end, const std::function<GridRegion(size_t)>& region_of) {
     walk_.emplace(begin, end, region_of);
   }
@@ -170,10 +178,10 @@ class QueryTask {
   BatchControl& control_;
   const bool brute_force_;
   Work work_;
-  std::optional<RegionWalk> walk_;
+  std::optional<RegionWalk> walk_;  // set by walk_regions()
   FoundObjects found_objects_;
-  uint64_t tests_ = 0;
-  uint64_t booked_ = 0;
+  uint64_t tests_ = 0;          // counted by count_test() and count_tests()
+  uint64_t reported_work_ = 0;  // part of work_ that control_ knows
   bool ended_ = false;
 };
 

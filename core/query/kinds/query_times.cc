@@ -7,7 +7,7 @@
 namespace locus {
 namespace {
 
-// Returns why the past begins at its oldest tick, and what to do about it.
+// Returns why the history begins at its oldest tick, and advice for the caller.
 std::string explanation(const SceneSnapshot& snapshot) {
   switch (snapshot.past_limit) {
     case PastLimit::kOff:
@@ -27,6 +27,7 @@ std::string explanation(const SceneSnapshot& snapshot) {
   return "";
 }
 
+// Returns the error for a time outside the history.
 absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std::string& field, size_t entry) {
   Refusal refusal;
   refusal.reason = Reason::kOutOfRange;
@@ -50,7 +51,7 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
   QueryTimes result;
   const size_t n = query_count(block);
   if (block.as_of_ticks.empty() || n == 0) {
-    result.moments_.emplace_back(snapshot.objects);
+    result.scenes_.emplace_back(snapshot.objects);
     return result;
   }
   const ColumnReader<uint64_t> ticks(block.as_of_ticks, 1);
@@ -61,7 +62,7 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
     const AsOf time = nearest_kept(snapshot, asked);
     if (!(time == asked) && block.outside == OutsideHistory::kReject) return not_kept(snapshot, asked, field, i);
     const bool repeated = i > 0 && time == result.times_.back();
-    result.moments_.push_back(repeated ? result.moments_.back() : *find_scene_at(snapshot, time));
+    result.scenes_.push_back(repeated ? result.scenes_.back() : *find_scene_at(snapshot, time));
     result.times_.push_back(time);
     result.clamped_.push_back(time == asked ? 0 : 1);
   }

@@ -1,5 +1,5 @@
-// When each query of a block asks: its as_of columns, found in the past that a snapshot keeps. Borrows from the
-// snapshot and the block; any thread.
+// Effective times of the queries of a block: its as_of columns, resolved in the history that a snapshot keeps.
+// Immutable; borrows from the snapshot; any thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 
@@ -12,25 +12,28 @@
 
 namespace locus {
 
+// Invariant: scenes_ has one entry per query or one for all; times_ and clamped_ have as many, or none if the block has
+// no as_of_ticks.
 class QueryTimes {
  public:
-  // OUT_OF_RANGE naming `field`.as_of_ticks, the entry and what is kept, where that is to be refused. `block` has
-  // passed check_batch().
+  // Resolves the times of `block`, which has passed check_batch(). If the block does not clamp, a time outside the
+  // history is OUT_OF_RANGE with a message that names `field`.as_of_ticks, the entry and the kept ticks.
   static absl::StatusOr<QueryTimes> resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
                                             const std::string& field);
 
-  // Of query `query`.
-  const SceneAtTime& of(size_t query) const { return moments_[number(query)]; }
-  // The time of that moment; says nothing where the block asks about now.
-  const AsOf& time(size_t query) const { return times_[number(query)]; }
+  // Returns the moving objects at the effective time of a query.
+  const SceneAtTime& of(size_t query) const { return scenes_[entry_of(query)]; }
+  // Returns the effective time of a query. Precondition: asks_past().
+  const AsOf& time(size_t query) const { return times_[entry_of(query)]; }
+  // Returns whether the block has as_of_ticks and queries; otherwise all queries see the latest state.
   bool asks_past() const { return !times_.empty(); }
-  // Whether query `query` asked about a time that is not kept.
-  bool clamped(size_t query) const { return clamped_[number(query)] != 0; }
+  // Returns whether a query asked for a time outside the history. Precondition: asks_past().
+  bool clamped(size_t query) const { return clamped_[entry_of(query)] != 0; }
 
  private:
-  size_t number(size_t query) const { return moments_.size() == 1 ? 0 : query; }
+  size_t entry_of(size_t query) const { return scenes_.size() == 1 ? 0 : query; }
 
-  std::vector<SceneAtTime> moments_;  // one a query, or one for all; the next two likewise, or empty for now
+  std::vector<SceneAtTime> scenes_;
   std::vector<AsOf> times_;
   std::vector<uint8_t> clamped_;
 };

@@ -11,6 +11,7 @@
 namespace locus {
 namespace {
 
+// Visitor of moving objects.
 class ObjectVisitor {
  public:
   ObjectVisitor(QueryTask& task, const SceneAtTime& moment, const RayRequest& request, const Filter& filter,
@@ -47,6 +48,7 @@ class ObjectVisitor {
   HitCollector& collector_;
 };
 
+// Visitor of instances, for rays that the kernels do not search.
 class InstanceVisitor {
  public:
   InstanceVisitor(QueryTask& task, const RayRequest& request, const Filter& filter, HitCollector& collector)
@@ -61,10 +63,10 @@ class InstanceVisitor {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(instance)) return true;
-    // Part of the verdict, and hits are no nearer: the tree over instances may cull by it.
+    // This test is part of the verdict and bounds t from below, since the tree over instances may cull by it.
     const std::optional<float> nearest = entry(slabs_, instance.bounds);
     if (!nearest) return true;
-    ask_instance(task_, request_, slabs_, instance, *nearest, collector_);
+    trace_instance(task_, request_, slabs_, instance, *nearest, collector_);
     return !task_.ended() && !collector_.done();
   }
 
@@ -76,12 +78,14 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-bool asks_kernels(const QueryTask& task, const QueryBlock& block) {
+// Returns whether the vector kernels search the instances for the rays of `block`.
+bool uses_kernels(const QueryTask& task, const QueryBlock& block) {
   return block.precision == Precision::kExact && block.source != Source::kDynamic && task.ray_kernels() != nullptr;
 }
 
 Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
 
+// Returns the cull relative to the stored counter-clockwise winding.
 Cull stored_cull(Cull cull, Winding winding) {
   if (winding == Winding::kCounterClockwise || cull == Cull::kNone) return cull;
   return cull == Cull::kBack ? Cull::kFront : Cull::kBack;
@@ -103,24 +107,24 @@ RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding 
   return request;
 }
 
-RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryTimes& moments,
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryTimes& times,
                     Winding winding, size_t begin, size_t end) {
-  std::vector<AskedRay> rays;
+  std::vector<PendingRay> rays;
   rays.reserve(end - begin);
   for (size_t i = begin; i < end; ++i) rays.emplace_back(ray_request(block, columns, winding, i), Filter(block, i));
-  const bool by_kernels = asks_kernels(task, block);
-  if (by_kernels) ask_meshes(task, rays);
+  const bool by_kernels = uses_kernels(task, block);
+  if (by_kernels) trace_meshes(task, rays);
   RayAnswers answers;
   answers.reserve(rays.size());
   for (size_t i = begin; i < end; ++i) {
-    AskedRay& ray = rays[i - begin];
+    PendingRay& ray = rays[i - begin];
     if (!by_kernels && block.source != Source::kDynamic && !task.ended()) {
       InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
       task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
     }
-    const SceneAtTime& moment = moments.of(i);
-    const bool asks_objects = block.source != Source::kStatic && moment.objects().grid().size() != 0;
-    if (asks_objects && !ray.collector.done() && !task.ended()) {
+    const SceneAtTime& moment = times.of(i);
+    const bool has_objects = block.source != Source::kStatic && moment.objects().grid().size() != 0;
+    if (has_objects && !ray.collector.done() && !task.ended()) {
       ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);
       task.visit_objects_on_ray(moment, visitor.slabs(), visitor);
     }

@@ -1,4 +1,5 @@
-// One ray against everything in a snapshot: statics first, whose hit shortens the ray, then moving objects.
+// Rays against a snapshot: static instances first, whose hits shorten the ray, then moving objects. Free functions; any
+// thread, with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 
@@ -16,33 +17,36 @@ struct RayRequest {
   Vec3d direction;
   float t_max;
   RayMode mode;
-  Cull cull;  // by the stored winding
+  Cull cull;  // relative to the stored winding
   Inside inside;
   Source source;
   Precision precision;
-  uint32_t max_results;  // of kAll
+  uint32_t max_results;  // kAll only
 };
 
-// The request of query `i` of a block of rays. `winding` turns the block's cull into the stored winding's.
+// Returns the request of query `i` of a block of rays. Converts the block's cull from the scene's `winding` to the
+// stored counter-clockwise winding.
 RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i);
 
 struct RayAnswer {
   absl::InlinedVector<Hit, 1> hits;  // kFirst and kAny: at most one; kAll: ascending
-  bool truncated = false;            // kAll: there were more; or the batch ended first
+  bool truncated = false;            // kAll: there were more hits; any mode: the batch ended first
 };
 using RayAnswers = std::vector<RayAnswer>;
 
-// The answers to queries `begin` to `end` (exclusive) of a block; they borrow `moments`. Many at once are answered
-// faster than one by one.
-RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryTimes& moments,
+// Answers queries [begin, end) of a block. The answers borrow `times`. One call for many rays is faster than many
+// calls.
+RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryTimes& times,
                     Winding winding, size_t begin, size_t end);
 
-// Weights of the second and third vertex, and the unit normal to the triangle's front or out of the object, at a hit
-// that run_ray() found with kExact. Recomputed from the stored primitive.
+// Surface at a hit: weights of the second and third vertex, and the unit normal of the triangle's front or of the
+// object's outside.
 struct Surface {
   float u = 0, v = 0;
   Vec3d normal;
 };
+// Returns the surface at a hit of an EXACT ray, recomputed from the stored primitive; zeros for misses and
+// CONSERVATIVE.
 Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding);
 
 }  // namespace locus

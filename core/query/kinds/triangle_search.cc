@@ -8,42 +8,43 @@
 namespace locus {
 namespace {
 
-Triangle triangle_at(const TriangleBlock& block, uint32_t place) {
+Triangle triangle_at(const TriangleBlock& block, uint32_t lane) {
   const auto vertex = [&](int row) {
-    return Vec3f{block.vertices[row][place], block.vertices[row + 1][place], block.vertices[row + 2][place]};
+    return Vec3f{block.vertices[row][lane], block.vertices[row + 1][lane], block.vertices[row + 2][lane]};
   };
   return {vertex(0), vertex(3), vertex(6), 0};
 }
 
-bool ball_meets(const void* ball, const TriangleBlock& block, uint32_t place) {
-  return ball_overlaps(*static_cast<const Ballf*>(ball), triangle_at(block, place));
+bool ball_meets(const void* ball, const TriangleBlock& block, uint32_t lane) {
+  return ball_overlaps(*static_cast<const Ballf*>(ball), triangle_at(block, lane));
 }
 
-bool box_meets(const void* box, const TriangleBlock& block, uint32_t place) {
-  return box_overlaps(*static_cast<const Obbf*>(box), triangle_at(block, place));
+bool box_meets(const void* box, const TriangleBlock& block, uint32_t lane) {
+  return box_overlaps(*static_cast<const Obbf*>(box), triangle_at(block, lane));
 }
 
 void copy(Vec3f from, float* to) {
   for (int axis = 0; axis < 3; ++axis) to[axis] = from[axis];
 }
 
-// More than rounding to float can have moved it by.
-float pad(float value) { return std::abs(value) * 0x1p-22f + std::numeric_limits<float>::min(); }
+// Returns an upper bound of the error of rounding `value` to float.
+float epsilon(float value) { return std::abs(value) * 0x1p-22f + std::numeric_limits<float>::min(); }
 
-// Collects numbers until there is no room left.
+// Visitor that collects the indices of overlapping triangles, until the output is full. For processors without kernels.
 template <class Shape>
 class Collector {
  public:
   using Region = std::conditional_t<std::is_same_v<Shape, Ballf>, BallRegion<float>, BoxRegion<float>>;
 
-  Collector(const Shape& shape, absl::Span<uint32_t> numbers) : shape_(shape), region_(shape), numbers_(numbers) {}
+  Collector(const Shape& shape, absl::Span<uint32_t> triangles)
+      : shape_(shape), region_(shape), triangles_(triangles) {}
 
   Aabbf bounds() const { return region_.bounds(); }
   bool overlaps(const Aabbf& box) const { return region_.overlaps(box); }
   bool visit(const Triangle& triangle) {
     if (!meets(triangle)) return true;
-    full_ = count_ == numbers_.size();
-    if (!full_) numbers_[count_++] = triangle.number;
+    full_ = count_ == triangles_.size();
+    if (!full_) triangles_[count_++] = triangle.number;
     return !full_;
   }
   size_t count() const { return count_; }
@@ -59,44 +60,44 @@ class Collector {
 
   const Shape& shape_;
   const Region region_;
-  const absl::Span<uint32_t> numbers_;
+  const absl::Span<uint32_t> triangles_;
   size_t count_ = 0;
   bool full_ = false;
 };
 
-// Answers regions one behind the other, many in one call of the kernels.
+// Run of find_triangles(): answers regions in order, up to kMaxRegions in one call of the kernels.
 template <class Shape>
 class BatchSearch {
  public:
   BatchSearch(const TriangleBvh& tree, absl::Span<const Shape> shapes, absl::Span<uint32_t> counts,
-              absl::Span<uint32_t> numbers)
-      : tree_(tree), shapes_(shapes), counts_(counts), numbers_(numbers) {
+              absl::Span<uint32_t> triangles)
+      : tree_(tree), shapes_(shapes), counts_(counts), triangles_(triangles) {
     LOCUS_CHECK_LE(shapes.size(), counts.size());
   }
 
   size_t run() {
     while (done_ < shapes_.size()) {
-      const size_t together = of_one_kernel();
-      if (!(together == 0 ? find_without_kernels(shapes_[done_]) : find_many(together))) break;
+      const size_t count = next_for_one_kernel();
+      if (!(count == 0 ? find_without_kernels(shapes_[done_]) : find_many(count))) break;
     }
     return done_;
   }
 
  private:
-  // How many of the next are for one kernel.
-  size_t of_one_kernel() const {
+  // Returns how many of the next regions one kernel can answer together; 0 if none supports the next region.
+  size_t next_for_one_kernel() const {
     if (active_region_kernels() == nullptr) return 0;
-    const bool first = turned(shapes_[done_]);
+    const bool first_rotated = rotated(shapes_[done_]);
     size_t count = 0;
     while (count < kMaxRegions && done_ + count < shapes_.size()) {
       const Shape& shape = shapes_[done_ + count];
-      if (!TriangleSearch<Shape>::served(tree_, shape) || turned(shape) != first) break;
+      if (!TriangleSearch<Shape>::served(tree_, shape) || rotated(shape) != first_rotated) break;
       ++count;
     }
     return count;
   }
-  static bool turned(const Ballf& /*ball*/) { return false; }
-  static bool turned(const Obbf& box) { return !(box.rotation == Rotation{}); }
+  static bool rotated(const Ballf& /*ball*/) { return false; }
+  static bool rotated(const Obbf& box) { return !(box.rotation == Rotation{}); }
 
   bool find_many(size_t count) {
     decltype(kernel_region(shapes_[0])) regions[kMaxRegions];
@@ -108,14 +109,14 @@ class BatchSearch {
     uint32_t* const counts = counts_.data() + done_;
     const size_t answered =
         kernel_for(shapes_[done_])
-            .many(tree_.tree(), regions, judges, count, numbers_.data() + used_, numbers_.size() - used_, counts);
+            .many(tree_.tree(), regions, judges, count, triangles_.data() + used_, triangles_.size() - used_, counts);
     for (size_t i = 0; i < answered; ++i) used_ += counts[i];
     done_ += answered;
     return answered == count;
   }
 
   bool find_without_kernels(const Shape& shape) {
-    Collector<Shape> collector(shape, numbers_.subspan(used_));
+    Collector<Shape> collector(shape, triangles_.subspan(used_));
     Work work;
     tree_.visit_region(collector, work);
     if (collector.full()) return false;
@@ -126,8 +127,9 @@ class BatchSearch {
 
   const TriangleBvh& tree_;
   const absl::Span<const Shape> shapes_;
-  const absl::Span<uint32_t> counts_, numbers_;
-  size_t done_ = 0, used_ = 0;
+  const absl::Span<uint32_t> counts_, triangles_;
+  size_t done_ = 0;  // regions answered
+  size_t used_ = 0;  // entries of triangles_ written
 };
 
 }  // namespace
@@ -145,10 +147,10 @@ KernelBox kernel_region(const Obbf& box) {
   const Aabbd bounds = bounds_of(box);
   for (int axis = 0; axis < 3; ++axis) {
     const auto low = static_cast<float>(bounds.min[axis]), high = static_cast<float>(bounds.max[axis]);
-    region.outer_min[axis] = low - pad(low);
-    region.outer_max[axis] = high + pad(high);
-    region.inner_min[axis] = low + pad(low);
-    region.inner_max[axis] = high - pad(high);
+    region.outer_min[axis] = low - epsilon(low);
+    region.outer_max[axis] = high + epsilon(high);
+    region.inner_min[axis] = low + epsilon(low);
+    region.inner_max[axis] = high - epsilon(high);
   }
   return region;
 }
@@ -157,13 +159,13 @@ RegionJudge judge_of(const Ballf& ball) { return {ball_meets, &ball}; }
 RegionJudge judge_of(const Obbf& box) { return {box_meets, &box}; }
 
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Ballf> balls, absl::Span<uint32_t> counts,
-                      absl::Span<uint32_t> numbers) {
-  return BatchSearch<Ballf>(tree, balls, counts, numbers).run();
+                      absl::Span<uint32_t> triangles) {
+  return BatchSearch<Ballf>(tree, balls, counts, triangles).run();
 }
 
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Obbf> boxes, absl::Span<uint32_t> counts,
-                      absl::Span<uint32_t> numbers) {
-  return BatchSearch<Obbf>(tree, boxes, counts, numbers).run();
+                      absl::Span<uint32_t> triangles) {
+  return BatchSearch<Obbf>(tree, boxes, counts, triangles).run();
 }
 
 }  // namespace locus

@@ -1,15 +1,15 @@
-// All triangles of a mesh that a ball or a box in mesh axes meets, by the vector kernels: their numbers, in storage
-// order, decided as ball_overlaps() and box_overlaps() decide. For whoever wants numbers and no visitor;
-// find_triangles() for whole batches, TriangleSearch for whoever wants to look up between runs of them:
+// Triangles of a mesh that a ball or a box in mesh axes overlaps, found by the vector kernels: their indices in the
+// uploaded index list, in storage order, with the verdicts of ball_overlaps() and box_overlaps(). find_triangles()
+// answers many regions in one call. TriangleSearch answers one region in steps, so that the caller can stop in between:
 //
 //   if (TriangleSearch<Ballf>::served(tree, ball)) {
 //     TriangleSearch<Ballf> search(tree, ball);
-//     while (!search.over()) use(numbers, search.next(numbers, room));
+//     while (!search.over()) use(triangles, search.next(triangles, room));
 //   } else {
 //     tree.visit_region(...);
 //   }
 //
-// Threads: a search belongs to one thread; the tree may serve many.
+// Threads: a search belongs to one thread; any number of searches may share a tree.
 #ifndef LOCUS_CORE_QUERY_KINDS_TRIANGLE_SEARCH_H_
 #define LOCUS_CORE_QUERY_KINDS_TRIANGLE_SEARCH_H_
 
@@ -20,49 +20,55 @@
 
 namespace locus {
 
-// The regions as kernels want them.
+// Return a region in the representation of the kernels.
 KernelBall kernel_region(const Ballf& ball);
 KernelBox kernel_region(const Obbf& box);
 
-// The predicates, for what float leaves open.
+// Return the double predicate of a region, for triangles that the kernels cannot decide in float.
 RegionJudge judge_of(const Ballf& ball);
 RegionJudge judge_of(const Obbf& box);
 
-// The kernel for a region; not without kernels.
+// Return the kernel for a region. Precondition: active_region_kernels() is not null.
 inline auto kernel_for(const Ballf& /*ball*/) { return active_region_kernels()->ball; }
 inline auto kernel_for(const Obbf& box) {
   return box.rotation == Rotation{} ? active_region_kernels()->box : active_region_kernels()->turned_box;
 }
 
-// How far a region reaches from the origin of mesh axes; kernels serve up to kMaxRegionReach, the tree's included.
-inline float reach_of(const Ballf& ball) { return max_component(abs(ball.center)) + ball.radius; }
-inline float reach_of(const Obbf& box) { return max_component(abs(box.center)) + box.half.x + box.half.y + box.half.z; }
+// Return the largest distance of a region from the origin of mesh axes. The kernels support up to kMaxRegionReach for
+// the sum of this and the tree's magnitude.
+inline float extent_of(const Ballf& ball) { return max_component(abs(ball.center)) + ball.radius; }
+inline float extent_of(const Obbf& box) {
+  return max_component(abs(box.center)) + box.half.x + box.half.y + box.half.z;
+}
 
-// Shape is Ballf or Obbf.
+// Search for the triangles of one region, in steps. Shape is Ballf or Obbf. Borrows the tree and the shape.
 template <class Shape>
 class TriangleSearch {
  public:
-  // Whether there are kernels, and this is for them; not for an empty tree.
+  // Returns whether kernels exist and support this region and tree; an empty tree is not supported.
   static bool served(const TriangleBvh& tree, const Shape& shape) {
     return active_region_kernels() != nullptr && tree.size() != 0 &&
-           reach_of(shape) + tree.tree().magnitude <= kMaxRegionReach;
+           extent_of(shape) + tree.tree().magnitude <= kMaxRegionReach;
   }
 
+  // Precondition: served(tree, shape).
   TriangleSearch(const TriangleBvh& tree, const Shape& shape)
       : run_(kernel_for(shape).one), tree_(tree.tree()), region_(kernel_region(shape)) {
     visit_.start(judge_of(shape));
   }
 
+  // Returns whether all triangles have been returned.
   bool over() const { return visit_.over(); }
-  // Writes the next numbers and returns how many: at most `room`, fewer while the search is not over. `room` is at
-  // least kMinRegionRoom; all of it may be written to. Ends after kMaxRegionTests tests or so.
-  size_t next(uint32_t* numbers, size_t room) {
-    visit_.numbers = numbers;
+  // Writes the next triangle indices and returns their count, which may be less than `room`, even 0, before the search
+  // is over. `room` is at least kMinRegionRoom; any of it may be overwritten. Returns after about kMaxRegionTests
+  // tests.
+  size_t next(uint32_t* triangles, size_t room) {
+    visit_.numbers = triangles;
     visit_.room = room;
     run_(tree_, region_, visit_);
     return visit_.found;
   }
-  // Of the last next(): nodes opened and triangles tested, and of these how many by the predicates.
+  // Return the cost of the last next(): nodes opened, triangles tested, and how many of these needed the predicates.
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }
   uint32_t judged() const { return visit_.judged; }
@@ -74,13 +80,14 @@ class TriangleSearch {
   RegionVisit visit_;
 };
 
-// Answers regions in order: the count of each, and its numbers behind those of the one before. Returns how many regions
-// are answered: all, unless `numbers` is too short; it has room for all of them if it has tree.size() + kMinRegionRoom
-// for each. Kernels or not.
+// Answers regions in order, with or without kernels: writes the count of each region to `counts` and its triangle
+// indices to `triangles`, one region behind another. Returns the number of regions answered: all of them unless
+// `triangles` is too short. A length of tree.size() + kMinRegionRoom per region is always sufficient. `counts` has one
+// entry per region.
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Ballf> balls, absl::Span<uint32_t> counts,
-                      absl::Span<uint32_t> numbers);
+                      absl::Span<uint32_t> triangles);
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Obbf> boxes, absl::Span<uint32_t> counts,
-                      absl::Span<uint32_t> numbers);
+                      absl::Span<uint32_t> triangles);
 
 }  // namespace locus
 

@@ -1,8 +1,8 @@
-// Where a batch's answer goes: columns that whoever asks owns, such as those of a reply, so that each number is written
-// once, in its place. Columns nobody asked for are never touched.
+// Destination of a batch's result columns. The caller of a batch implements it, for example over the fields of a reply,
+// so that each value is written once, at its final position. Columns that the batch did not request are never touched.
 //
-// Threads: a sink is asked by one thread at a time, which need not be the same each time. What it hands out may be
-// written by several at once, each its own rows.
+// Threads: one thread at a time calls a sink, but not always the same one. Several threads may write at once to the
+// memory that a sink returned, each to its own rows.
 #ifndef LOCUS_CORE_QUERY_RUN_ANSWER_SINK_H_
 #define LOCUS_CORE_QUERY_RUN_ANSWER_SINK_H_
 
@@ -13,7 +13,7 @@
 
 namespace locus {
 
-// When queries asked in fact, one entry a query.
+// Effective time of each query.
 struct TimeSpans {
   uint64_t* ticks;
   float* fractions;
@@ -23,17 +23,18 @@ class AnswerSink {
  public:
   virtual ~AnswerSink() = default;
 
-  // Room for more rows at the end of the columns of a block. Where it is stays good until more rows of the block are
-  // asked for. The rows hold anything until they are written, and all of them are, unless the batch ends with an error.
+  // Appends `rows` rows to each column of a block in `columns`. The pointers stay valid until more rows of the same
+  // block are added. Rows are uninitialized; the caller writes all of them unless the batch ends with an error.
   virtual RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) = 0;
-  // The same for one byte a query, 0 or 1.
+  // Appends one byte per query: 0 or 1.
   virtual char* add_hits(size_t block, size_t queries) = 0;
-  // Rows of each query.
+  // Appends the number of rows of each query.
   virtual uint32_t* add_counts(size_t block, size_t queries) = 0;
-  // Numbers of queries that were cut, ascending.
+  // Appends indices of truncated queries, ascending.
   virtual uint32_t* add_truncated(size_t block, size_t queries) = 0;
+  // Appends the effective time of each query.
   virtual TimeSpans add_times(size_t block, size_t queries) = 0;
-  // Numbers of queries whose moment was not kept, so that the nearest was taken, ascending.
+  // Appends indices of queries that asked for a time outside the history and got the nearest kept time, ascending.
   virtual uint32_t* add_clamped(size_t block, size_t queries) = 0;
 };
 

@@ -1,4 +1,5 @@
-// A batch's answer in columns of its own, for whoever has no others to put it in. Plain data.
+// Result of a batch in vectors that it owns, for callers without columns of their own: run_batch() and tests. Plain
+// data; BatchResultSink fills it, and its thread promise is that of AnswerSink.
 #ifndef LOCUS_CORE_QUERY_RUN_BATCH_RESULT_H_
 #define LOCUS_CORE_QUERY_RUN_BATCH_RESULT_H_
 
@@ -13,18 +14,19 @@ namespace locus {
 template <class T>
 using ColumnVector = std::vector<T>;
 
-// Rows of one block, concatenated in query order; columns nobody asked for stay empty.
+// Rows of one block, concatenated in query order; columns that were not requested stay empty.
 struct BlockResult : ColumnArrays<ColumnVector> {
-  std::vector<uint32_t> counts;     // rows a query; empty = one row each
-  std::vector<uint32_t> truncated;  // queries that were cut, ascending
-  std::string hits;                 // ANY: one byte a query, 0 or 1
-  // Blocks that ask about the past: the moments that were asked in fact, one a query, and the queries, ascending, whose
-  // moment was not kept, so that the nearest was taken.
+  std::vector<uint32_t> counts;     // rows per query; empty for dense results, which have one row each
+  std::vector<uint32_t> truncated;  // indices of truncated queries, ascending
+  std::string hits;                 // ANY: one byte per query, 0 or 1
+  // Blocks with as_of_ticks: the effective time of each query, and the indices, ascending, of queries that asked for a
+  // time outside the history and got the nearest kept time.
   std::vector<uint64_t> resolved_ticks;
   std::vector<float> resolved_fractions;
   std::vector<uint32_t> clamped;
-  Work work;                 // not part of the answer: depends on the structure
-  uint64_t nanoseconds = 0;  // nor is this: by RunOptions::clock, all threads together
+  // Cost, which may differ between equal results: work depends on the index structures.
+  Work work;
+  uint64_t nanoseconds = 0;  // by RunOptions::work_clock, all threads together
 };
 
 struct BatchResult {
@@ -33,12 +35,13 @@ struct BatchResult {
   uint64_t nanoseconds = 0;
 };
 
-// More rows at the end of each column of `columns`.
+// Appends `rows` uninitialized rows to each column of `columns`; the pointers stay valid until the next call.
 RowSpans add_rows(BlockResult& result, ColumnSet columns, size_t rows);
 
+// Sink that appends to a BatchResult.
 class BatchResultSink final : public AnswerSink {
  public:
-  // `result` is borrowed and has its blocks.
+  // `result` is borrowed; its `blocks` already have the number of blocks of the batch.
   explicit BatchResultSink(BatchResult& result) : result_(result) {}
 
   RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) override;

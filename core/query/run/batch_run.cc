@@ -11,10 +11,10 @@
 namespace locus {
 namespace {
 
-// Queries of a piece. Those that turn out to be much work are parted further.
+// Maximum number of queries of a chunk. Chunks that turn out to be expensive are split further.
 constexpr size_t kChunkQueries = 256;
 
-size_t most_queries(const QueryBlock& block) {
+size_t max_chunk_queries(const QueryBlock& block) {
   const auto* const lookup = std::get_if<LookupColumns>(&block.kind);
   // Groups are looked up in one pass over all objects.
   return lookup != nullptr && !lookup->groups.empty() ? limits::kMaxQueries : kChunkQueries;
@@ -27,13 +27,13 @@ void copy_rows(const BlockResult& from, size_t first, size_t rows, const RowSpan
   });
 }
 
-void write_times(const QueryTimes& moments, size_t block, size_t queries, AnswerSink& answer) {
-  if (!moments.asks_past() || queries == 0) return;
+void write_times(const QueryTimes& times, size_t block, size_t queries, AnswerSink& answer) {
+  if (!times.asks_past() || queries == 0) return;
   const TimeSpans to = answer.add_times(block, queries);
   for (size_t i = 0; i < queries; ++i) {
-    to.ticks[i] = moments.time(i).tick;
-    to.fractions[i] = moments.time(i).fraction;
-    if (moments.clamped(i)) *answer.add_clamped(block, 1) = static_cast<uint32_t>(i);
+    to.ticks[i] = times.time(i).tick;
+    to.fractions[i] = times.time(i).fraction;
+    if (times.clamped(i)) *answer.add_clamped(block, 1) = static_cast<uint32_t>(i);
   }
 }
 
@@ -41,17 +41,17 @@ void write_times(const QueryTimes& moments, size_t block, size_t queries, Answer
 
 absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                                             RunOptions options, AnswerSink& answer) {
-  std::vector<QueryTimes> moments;
-  moments.reserve(batch.blocks.size());
+  std::vector<QueryTimes> times;
+  times.reserve(batch.blocks.size());
   for (size_t b = 0; b < batch.blocks.size(); ++b) {
     ASSIGN_OR_RETURN(QueryTimes resolved,
                      QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]")));
-    moments.push_back(std::move(resolved));
+    times.push_back(std::move(resolved));
   }
   std::unique_ptr<BatchRun> run(new BatchRun(snapshot, batch, std::move(options), answer));
-  for (QueryTimes& of_block : moments) run->add_block(std::move(of_block));
+  for (QueryTimes& block_times : times) run->add_block(std::move(block_times));
   const MutexLock lock(run->mutex_);
-  run->pass_empty_blocks();
+  run->skip_empty_blocks();
   return run;
 }
 
@@ -61,17 +61,17 @@ BatchRun::BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOp
       options_(std::move(options)),
       answer_(answer),
       control_(batch.max_work, options_.stop),
-      room_(reply_limit(batch) - fixed_reply_bytes(batch)) {}
+      free_bytes_(reply_limit(batch) - fixed_reply_bytes(batch)) {}
 
-void BatchRun::add_block(QueryTimes moments) {
-  const size_t number = blocks_.size();
-  const QueryBlock& block = batch_.blocks[number];
+void BatchRun::add_block(QueryTimes times) {
+  const size_t index = blocks_.size();
+  const QueryBlock& block = batch_.blocks[index];
   const size_t queries = query_count(block);
-  Block& to = blocks_.emplace_back(std::move(moments), queries, most_queries(block));
+  Block& to = blocks_.emplace_back(std::move(times), queries, max_chunk_queries(block));
   if (row_layout(block) == RowLayout::kDense)
-    to.place.rows = answer_.add_rows(number, returned_columns(block), queries);
-  if (row_layout(block) == RowLayout::kBytes) to.place.hits = answer_.add_hits(number, queries);
-  write_times(to.moments, number, queries, answer_);
+    to.output.rows = answer_.add_rows(index, returned_columns(block), queries);
+  if (row_layout(block) == RowLayout::kBytes) to.output.hits = answer_.add_hits(index, queries);
+  write_times(to.times, index, queries, answer_);
 }
 
 QueryCost BatchRun::cost() const {
@@ -92,59 +92,61 @@ Progress BatchRun::work(uint64_t nanoseconds) {
     chunk = begin_chunk();
   }
   TimingSpan timing = begin_timing(chunk->block);
-  const uint64_t worked_before = timing.start;
+  const uint64_t work_time_before = timing.start;
   while (true) {
     end_chunk(chunk, run(*chunk));
-    // Who lost the core meanwhile has not worked yet.
-    const bool enough = !options_.clock || (now() - start >= nanoseconds && worked() - worked_before >= nanoseconds);
+    // Requires CPU time as well as wall time: a thread that lost its core in between has not worked yet.
+    const bool time_is_up =
+        !options_.clock || (now() - start >= nanoseconds && work_time() - work_time_before >= nanoseconds);
     const MutexLock lock(mutex_);
-    --at_work_;
+    --active_threads_;
     const Progress reached = progress();
-    const bool over = reached != Progress::kMore || enough;
-    if (!over) chunk = begin_chunk();
-    if (over || chunk->block != timing.block) end_timing(timing);
-    if (over) return reached;
+    const bool leave = reached != Progress::kMore || time_is_up;
+    if (!leave) chunk = begin_chunk();
+    if (leave || chunk->block != timing.block) end_timing(timing);
+    if (leave) return reached;
     if (chunk->block != timing.block) timing = begin_timing(chunk->block);
   }
 }
 
-// What is in no piece yet may wait for those before it; the first of all pieces may not.
+// Queries that are in no chunk yet wait while many chunks exist. The first chunk never waits, since all others are
+// written out after it.
 bool BatchRun::can_begin() const {
   if (control_.stopped()) return false;
-  if (!left_.empty()) return chunks_.size() < 2 * kMaxChunks || left_.front() == chunks_.begin();
+  if (!unstarted_.empty()) return chunks_.size() < 2 * kMaxChunks || unstarted_.front() == chunks_.begin();
   return next_block_ < blocks_.size() && chunks_.size() < kMaxChunks;
 }
 
 BatchRun::Chunks::iterator BatchRun::begin_chunk() {
-  ++at_work_;
-  if (!left_.empty()) return pop_left();
+  ++active_threads_;
+  if (!unstarted_.empty()) return pop_unstarted();
   const Block& block = blocks_[next_block_];
-  const size_t end = std::min(block.queries, next_query_ + block.step);
+  const size_t end = std::min(block.queries, next_query_ + block.max_chunk_queries);
   chunks_.push_back({next_block_, next_query_, end});
   next_query_ = end;
   if (end == block.queries) {
     ++next_block_;
     next_query_ = 0;
-    pass_empty_blocks();
+    skip_empty_blocks();
   }
   return std::prev(chunks_.end());
 }
 
-BatchRun::Chunks::iterator BatchRun::pop_left() {
-  const Chunks::iterator chunk = left_.front();
-  left_.erase(left_.begin());
+BatchRun::Chunks::iterator BatchRun::pop_unstarted() {
+  const Chunks::iterator chunk = unstarted_.front();
+  unstarted_.erase(unstarted_.begin());
   return chunk;
 }
 
-void BatchRun::pass_empty_blocks() {
+void BatchRun::skip_empty_blocks() {
   while (next_block_ < blocks_.size() && blocks_[next_block_].queries == 0) ++next_block_;
 }
 
 size_t BatchRun::run(Chunk& chunk) {
   Block& block = blocks_[chunk.block];
   QueryTask task(snapshot_, control_, options_.brute_force);
-  BlockRunner runner(task, batch_.blocks[chunk.block], block.moments, block.place,
-                     room_.load(std::memory_order_relaxed));
+  BlockRunner runner(task, batch_.blocks[chunk.block], block.times, block.output,
+                     free_bytes_.load(std::memory_order_relaxed));
   const size_t reached = runner.run(chunk.begin, chunk.end);
   chunk.rows = runner.take_rows();
   chunk.work = task.work();
@@ -154,7 +156,7 @@ size_t BatchRun::run(Chunk& chunk) {
 void BatchRun::end_chunk(Chunks::iterator chunk, size_t reached) {
   {
     const MutexLock lock(mutex_);
-    if (reached < chunk->end) leave(chunk, reached);
+    if (reached < chunk->end) split(chunk, reached);
     chunk->done = true;
     if (writing_ || !chunks_.front().done) return;
     writing_ = true;
@@ -162,14 +164,13 @@ void BatchRun::end_chunk(Chunks::iterator chunk, size_t reached) {
   write_out();
 }
 
-// What is left of a piece is one of its own, right behind it.
-void BatchRun::leave(Chunks::iterator chunk, size_t reached) {
-  const Chunks::iterator left = chunks_.insert(std::next(chunk), {chunk->block, reached, chunk->end});
+void BatchRun::split(Chunks::iterator chunk, size_t reached) {
+  const Chunks::iterator rest = chunks_.insert(std::next(chunk), {chunk->block, reached, chunk->end});
   chunk->end = reached;
   const auto before = [](Chunks::iterator a, Chunks::iterator b) {
     return std::tie(a->block, a->begin) < std::tie(b->block, b->begin);
   };
-  left_.insert(std::upper_bound(left_.begin(), left_.end(), left, before), left);
+  unstarted_.insert(std::upper_bound(unstarted_.begin(), unstarted_.end(), rest, before), rest);
 }
 
 void BatchRun::write_out() {
@@ -177,8 +178,9 @@ void BatchRun::write_out() {
     Chunks ready;
     {
       const MutexLock lock(mutex_);
-      const auto open = std::find_if(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return !chunk.done; });
-      ready.splice(ready.end(), chunks_, chunks_.begin(), open);
+      const auto first_open =
+          std::find_if(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return !chunk.done; });
+      ready.splice(ready.end(), chunks_, chunks_.begin(), first_open);
       if (ready.empty()) {
         writing_ = false;
         return;
@@ -197,13 +199,13 @@ void BatchRun::write(const Chunk& chunk) {
   if (!cut.empty()) std::copy(cut.begin(), cut.end(), answer_.add_truncated(chunk.block, cut.size()));
 }
 
-// Cuts rows where the reply is full.
+// Writes the counts and rows of a chunk. Drops rows that do not fit the reply and lists their queries as truncated.
 void BatchRun::write_counted(const Chunk& chunk) {
   const ColumnSet columns = returned_columns(batch_.blocks[chunk.block]);
   const uint32_t bytes = row_bytes(columns);
-  uint64_t room = room_.load(std::memory_order_relaxed);
+  uint64_t free_bytes = free_bytes_.load(std::memory_order_relaxed);
   uint32_t* const counts = answer_.add_counts(chunk.block, chunk.rows.counts.size());
-  size_t first = 0, row = 0;  // rows from first to row are to be copied
+  size_t first = 0, row = 0;  // rows [first, row) of the chunk are kept but not copied yet
   const auto copy = [&] {
     if (row != first) copy_rows(chunk.rows, first, row - first, answer_.add_rows(chunk.block, columns, row - first));
   };
@@ -211,9 +213,9 @@ void BatchRun::write_counted(const Chunk& chunk) {
   for (size_t i = 0; i < chunk.rows.counts.size(); ++i) {
     const auto query = static_cast<uint32_t>(chunk.begin + i);
     const uint32_t rows = chunk.rows.counts[i];
-    const auto kept = static_cast<uint32_t>(std::min<uint64_t>(rows, room / bytes));
+    const auto kept = static_cast<uint32_t>(std::min<uint64_t>(rows, free_bytes / bytes));
     counts[i] = kept;
-    room -= uint64_t{kept} * bytes;
+    free_bytes -= uint64_t{kept} * bytes;
     row += kept;
     const bool was_cut = cut != chunk.rows.truncated.end() && *cut == query;
     if (was_cut) ++cut;
@@ -224,12 +226,12 @@ void BatchRun::write_counted(const Chunk& chunk) {
     first = row;
   }
   copy();
-  room_.store(room, std::memory_order_relaxed);
+  free_bytes_.store(free_bytes, std::memory_order_relaxed);
 }
 
 Progress BatchRun::progress() {
   if (can_begin()) return Progress::kMore;
-  if (at_work_ > 0 || done_) return Progress::kBegun;
+  if (active_threads_ > 0 || done_) return Progress::kBegun;
   done_ = true;
   return Progress::kDone;
 }

@@ -1,9 +1,15 @@
-// A checked batch being answered against one snapshot, in pieces that any threads take. The answer is a function of
-// snapshot and batch alone: who takes which piece, how large it is and in what order they end changes no byte of it (a
-// batch cut by max_work apart).
+// Execution of a checked batch against one snapshot, in chunks that any threads may take. For the scheduler, which
+// decides how long each thread works on which batch. The result is a function of snapshot and batch alone: the
+// assignment of chunks to threads, their sizes and the order in which they finish change no byte of it, unless max_work
+// ends the batch.
 //
-// Threads: work() may be called by any number of threads at once; everything else before the first or after the last
-// call. Memory: rows wait for their turn in at most kMaxChunks pieces, each of at most a reply.
+// Threads: any number of threads may call work() at once; all other members only before the first or after the last
+// call. Memory: rows wait to be written out in order in about 2 * kMaxChunks chunks at most; each holds at most a
+// reply's worth.
+//
+// Invariants: chunks_ covers consecutive queries in batch order, from the first query that is not written out to
+// (next_block_, next_query_). Every chunk is unstarted, running or done; active_threads_ is the number of running
+// chunks plus the number of threads about to leave work(). One thread at a time writes out. kDone is returned once.
 #ifndef LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 #define LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 
@@ -28,22 +34,23 @@
 namespace locus {
 
 struct RunOptions {
-  // Of run_batch() alone: calls its second argument for each number below the first, on any threads, and returns when
-  // all calls have. [in order, on this thread]
+  // Calls its second argument for each index below the first, on any threads, and returns when all calls have returned.
+  // Used by run_batch() only. [one call on this thread]
   std::function<void(size_t, const std::function<void(size_t)>&)> parallel_for;
-  // Asked every limits::kTestsBetweenChecks primitive tests, from any thread: a status that is not OK ends the batch
-  // with it. [never ends]
+  // Polled every limits::kTestsBetweenChecks primitive tests, from any thread; a status that is not OK ends the batch
+  // with that status. [never ends]
   std::function<absl::Status()> stop;
-  // Nanoseconds since some moment, asked before and after each piece of work, from any thread. [work() takes one piece]
+  // Wall clock in nanoseconds with any origin, read before and after each chunk, from any thread. [without it work()
+  // runs one chunk per call]
   std::function<uint64_t()> clock;
-  // What the calling thread has worked in its life; may be dear, as it is asked about twice a call of work() and a
-  // block. [clock; without that, times are 0]
+  // CPU time of the calling thread in nanoseconds. May be expensive: it is read about twice for each call of work() and
+  // for each block that the call works on. [clock; without both, times are 0]
   std::function<uint64_t()> work_clock;
-  // Test every value instead of asking the structures: for checking them. Same answers, different work.
+  // Tests every value instead of searching the index structures, in order to verify them. Same results, different cost.
   bool brute_force = false;
 };
 
-// What queries took, by all threads together. No part of the answer.
+// Cost of queries, summed over all threads. Not part of the result.
 struct QueryCost {
   Work work;
   uint64_t nanoseconds = 0;  // by RunOptions::work_clock
@@ -51,69 +58,81 @@ struct QueryCost {
 
 class BatchRun {
  public:
-  // Pieces that wait for those before them, or are in work.
+  // Maximum number of chunks that are running, or done and waiting for an earlier chunk. Remainders of chunks that were
+  // split count as well and may double it.
   static constexpr size_t kMaxChunks = 16;
 
-  // `snapshot`, `batch` and `answer` are borrowed; `batch` has passed check_batch(). OUT_OF_RANGE for a time that is
-  // not kept, unless its block clamps.
+  // Prepares the execution of `batch`, which has passed check_batch(): resolves its times and allocates dense rows in
+  // `answer`. All of `snapshot`, `batch` and `answer` are borrowed. Returns OUT_OF_RANGE for a time outside the history
+  // unless its block clamps.
   static absl::StatusOr<std::unique_ptr<BatchRun>> prepare(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                                            RunOptions options, AnswerSink& answer);
 
-  // Takes pieces until about so much time has passed or none can be begun.
+  // Runs chunks until about `nanoseconds` have passed or no chunk may be started. Writes out finished chunks as far as
+  // they are in order.
   Progress work(uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
-  // Once work() has returned kDone: OK, or what RunOptions::stop said, and then `answer` is void.
+  // Returns OK, or the status of RunOptions::stop, in which case `answer` must be discarded. Valid once work() has
+  // returned kDone.
   absl::Status status() const { return control_.stopped() ? control_.status() : absl::OkStatus(); }
+  // Returns the cost of one block, or of the batch. Valid once work() has returned kDone.
   const QueryCost& cost(size_t block) const { return blocks_[block].cost; }
   QueryCost cost() const;
 
  private:
   struct Block {
-    Block(QueryTimes&& when, size_t count, size_t most) : moments(std::move(when)), queries(count), step(most) {}
+    Block(QueryTimes&& resolved, size_t count, size_t max_chunk)
+        : times(std::move(resolved)), queries(count), max_chunk_queries(max_chunk) {}
 
-    const QueryTimes moments;
+    const QueryTimes times;
     const size_t queries;
-    const size_t step;  // queries of a piece, at most
-    BlockPlace place;
-    QueryCost cost;  // its work as far as it is written out
+    const size_t max_chunk_queries;
+    BlockOutput output;
+    QueryCost cost;  // work of the chunks that are written out; nanoseconds of all chunks
   };
-  // Some queries of a block, in a row.
+  // Consecutive queries of one block: [begin, end).
   struct Chunk {
     size_t block;
     size_t begin, end;
     bool done = false;
-    BlockResult rows = {};  // of blocks that count them
+    BlockResult rows = {};  // rows of counted blocks, and truncated queries of any block
     Work work = {};
   };
   using Chunks = std::list<Chunk>;
-  // What one thread does for one block without a break.
+  // Interval in which one thread works on one block without interruption; `start` is in nanoseconds of work_time().
   struct TimingSpan {
     size_t block;
     uint64_t start;
   };
 
   BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOptions options, AnswerSink& answer);
-  void add_block(QueryTimes moments);
+  void add_block(QueryTimes times);
 
+  // Returns whether a chunk may be started now.
   bool can_begin() const LOCUS_REQUIRES(mutex_);
+  // Takes the first unstarted chunk, or cuts a new one. Precondition: can_begin().
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
-  Chunks::iterator pop_left() LOCUS_REQUIRES(mutex_);
-  void leave(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
-  void pass_empty_blocks() LOCUS_REQUIRES(mutex_);
-  // Answers the piece, or as much of it as makes a piece; returns the first query that is left.
+  Chunks::iterator pop_unstarted() LOCUS_REQUIRES(mutex_);
+  // Cuts the queries from `reached` on off `chunk`, into an unstarted chunk right behind it.
+  void split(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
+  void skip_empty_blocks() LOCUS_REQUIRES(mutex_);
+  // Answers the queries of `chunk`, or the first of them if they turn out to be expensive. Returns the first query that
+  // is not answered.
   size_t run(Chunk& chunk);
+  // Marks a chunk as done, and writes out unless another thread is writing.
   void end_chunk(Chunks::iterator chunk, size_t reached) LOCUS_EXCLUDES(mutex_);
-  // Hands on what is done up to the first piece that is not.
+  // Writes out chunks in order, up to the first one that is not done.
   void write_out() LOCUS_EXCLUDES(mutex_);
   void write(const Chunk& chunk);
   void write_counted(const Chunk& chunk);
+  // Returns the progress for a thread that leaves work(); kDone once.
   Progress progress() LOCUS_REQUIRES(mutex_);
   uint64_t now() const { return options_.clock ? options_.clock() : 0; }
-  TimingSpan begin_timing(size_t block) const { return {block, worked()}; }
+  TimingSpan begin_timing(size_t block) const { return {block, work_time()}; }
   void end_timing(const TimingSpan& timing) LOCUS_REQUIRES(mutex_) {
-    blocks_[timing.block].cost.nanoseconds += worked() - timing.start;
+    blocks_[timing.block].cost.nanoseconds += work_time() - timing.start;
   }
-  uint64_t worked() const { return options_.work_clock ? options_.work_clock() : now(); }
+  uint64_t work_time() const { return options_.work_clock ? options_.work_clock() : now(); }
 
   const SceneSnapshot& snapshot_;
   const QueryBatch& batch_;
@@ -121,16 +140,17 @@ class BatchRun {
   AnswerSink& answer_;
   BatchControl control_;
   std::deque<Block> blocks_;
-  std::atomic<uint64_t> room_;  // bytes of counted rows that still fit; written by whoever writes out
+  std::atomic<uint64_t>
+      free_bytes_;  // bytes of counted rows that still fit the reply; set by the thread that writes out
 
   Mutex mutex_;
-  Chunks chunks_ LOCUS_GUARDED_BY(mutex_);                       // in order, from the first that is not handed on
-  std::vector<Chunks::iterator> left_ LOCUS_GUARDED_BY(mutex_);  // of them, in order, those that nobody has begun
-  size_t next_block_ LOCUS_GUARDED_BY(mutex_) = 0;               // the first query that is in no piece
-  size_t next_query_ LOCUS_GUARDED_BY(mutex_) = 0;
-  uint32_t at_work_ LOCUS_GUARDED_BY(mutex_) = 0;  // threads
-  bool writing_ LOCUS_GUARDED_BY(mutex_) = false;
-  bool done_ LOCUS_GUARDED_BY(mutex_) = false;  // and somebody was told
+  Chunks chunks_ LOCUS_GUARDED_BY(mutex_);                            // in batch order, from the first not written out
+  std::vector<Chunks::iterator> unstarted_ LOCUS_GUARDED_BY(mutex_);  // unstarted elements of chunks_, in batch order
+  size_t next_block_ LOCUS_GUARDED_BY(mutex_) = 0;                    // block of the first query that is in no chunk
+  size_t next_query_ LOCUS_GUARDED_BY(mutex_) = 0;                    // index of that query in its block
+  uint32_t active_threads_ LOCUS_GUARDED_BY(mutex_) = 0;              // threads that run a chunk or write out
+  bool writing_ LOCUS_GUARDED_BY(mutex_) = false;                     // a thread is in write_out()
+  bool done_ LOCUS_GUARDED_BY(mutex_) = false;                        // kDone was returned
 };
 
 }  // namespace locus

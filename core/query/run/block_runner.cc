@@ -10,29 +10,30 @@
 namespace locus {
 namespace {
 
-// Work of a piece: about a tenth of a millisecond.
+// Work after which a chunk is split: about a tenth of a millisecond.
 constexpr uint64_t kChunkWork = 16'384;
-// Work of a call of the kernels, which nothing can stop.
+// Target work of one call of the kernels, which cannot be interrupted.
 constexpr uint64_t kCallWork = 65'536;
-// Rays of a call. The most are for rays that turn out dear behind cheap ones: at 4,096 triangles each they take 3 ms,
-// and those that keep many hits twice that. Twice as many would not be answered measurably faster.
-constexpr uint64_t kMinRaysAtOnce = 8, kMaxRaysAtOnce = 128, kMaxRaysOfManyHits = 64;
+// Limits of the number of rays per call. The maxima bound a call whose rays are unexpectedly expensive: at 4,096
+// triangles per ray, a full call takes 3 ms, or twice that if its rays keep many hits. Twice as many per call would not
+// be measurably faster.
+constexpr uint64_t kMinRaysPerCall = 8, kMaxRaysPerCall = 128, kMaxRaysOfManyHits = 64;
 
 }  // namespace
 
-BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& moments, BlockPlace& place,
+BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, BlockOutput& output,
                          uint64_t max_bytes)
     : task_(task),
       block_(block),
-      moments_(moments),
-      place_(place),
+      times_(times),
+      output_(output),
       columns_(returned_columns(block)),
       max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {}
 
 size_t BlockRunner::run(size_t begin, size_t end) {
   task_.check();
   const size_t reached = std::visit([&](const auto& kind) { return run_queries(kind, begin, end); }, block_.kind);
-  task_.check();  // books what is not booked yet: many small pieces use up a budget like a large one
+  task_.check();  // reports the rest of the work, so that many small chunks use up a budget like a large one
   return reached;
 }
 
@@ -41,7 +42,7 @@ uint64_t BlockRunner::work_done() const {
   return work.nodes + work.cells + work.tests + rows_;
 }
 
-bool BlockRunner::enough() const { return work_done() >= kChunkWork && groups_.empty(); }
+bool BlockRunner::should_split() const { return work_done() >= kChunkWork && groups_.empty(); }
 
 template <class Columns, class RegionOf>
 void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {
@@ -55,14 +56,14 @@ template <class Columns>
 size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end) {
   if constexpr (std::is_same_v<Columns, BallColumns>)
     walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
-      return ball_region(moments_.of(i), ball_of(block_, columns, i), options);
+      return ball_region(times_.of(i), ball_of(block_, columns, i), options);
     });
   if constexpr (std::is_same_v<Columns, BoxColumns>)
     walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
-      return box_region(moments_.of(i), box_of(block_, columns, i), options);
+      return box_region(times_.of(i), box_of(block_, columns, i), options);
     });
   for (size_t i = begin; i < end; ++i) {
-    if (i != begin && enough()) return i;
+    if (i != begin && should_split()) return i;
     run_query(columns, i);
     if (!task_.ended()) continue;
     const auto query = static_cast<uint32_t>(i);
@@ -71,17 +72,16 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
   return end;
 }
 
-// Rows of query `i`, from row `row` on. Few ask for more than where and what is hit.
+// Writes the rows of query `i` from row `row` on. Computes surfaces only if their columns are returned, which is rare.
 void BlockRunner::write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
                              size_t row) {
-  for (size_t number = 0; number < hits.size(); ++number) write_row(hits[number], to, row + number);
+  for (size_t k = 0; k < hits.size(); ++k) write_row(hits[k], to, row + k);
   if (to.uvs == nullptr && to.normals == nullptr && to.points == nullptr) return;
   const Winding winding = task_.snapshot().winding;
-  // The surface of a miss is nothing, whatever the ray.
+  // A miss has zero surface columns, so its request is not needed.
   const bool is_miss = hits.empty() || hits.front().id == kNoId;
   const RayRequest request = is_miss ? RayRequest() : ray_request(block_, rays, winding, i);
-  for (size_t number = 0; number < hits.size(); ++number)
-    write_surface(request, block_.frame, hits[number], winding, to, row + number);
+  for (size_t k = 0; k < hits.size(); ++k) write_surface(request, block_.frame, hits[k], winding, to, row + k);
 }
 
 void BlockRunner::append_counted(const RayColumns& rays, const RayAnswer& answer, size_t i) {
@@ -94,7 +94,7 @@ void BlockRunner::append_counted(const RayColumns& rays, const RayAnswer& answer
 void BlockRunner::append_rows(const OverlapAnswer& answer, size_t i) {
   if (answer.objects.empty()) return append_runs(answer, i);
   const size_t kept = std::min<uint64_t>(answer.objects.size(), max_rows_ - rows_);
-  write_object_rows(answer.objects.subspan(0, kept), moments_.of(i), add_rows(result_, columns_, kept));
+  write_object_rows(answer.objects.subspan(0, kept), times_.of(i), add_rows(result_, columns_, kept));
   count_rows(kept, answer.truncated || kept < answer.objects.size(), i);
 }
 
@@ -123,41 +123,42 @@ void BlockRunner::count_rows(size_t rows, bool cut, size_t i) {
 
 size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) {
   for (size_t first = begin; first < end;) {
-    if (first != begin && enough()) return first;
-    const size_t last = std::min<size_t>(end, first + place_.rays_at_once.load(std::memory_order_relaxed));
+    if (first != begin && should_split()) return first;
+    const size_t last = std::min<size_t>(end, first + output_.rays_per_call.load(std::memory_order_relaxed));
     const uint64_t before = work_done();
-    const RayAnswers answers = run_rays(task_, block_, rays, moments_, task_.snapshot().winding, first, last);
-    for (size_t i = first; i < last; ++i) take_ray(rays, answers[i - first], i);
-    pace_rays(last - first, work_done() - before);
+    const RayAnswers answers = run_rays(task_, block_, rays, times_, task_.snapshot().winding, first, last);
+    for (size_t i = first; i < last; ++i) write_ray(rays, answers[i - first], i);
+    adapt_rays_per_call(last - first, work_done() - before);
     first = last;
   }
   return end;
 }
 
-// As many rays in the next call as should be little work, if they are like these.
-void BlockRunner::pace_rays(size_t rays, uint64_t work) {
+// Sets the number of rays so that the next call takes about kCallWork if its rays cost as much as the last ones. Grows
+// at most fourfold.
+void BlockRunner::adapt_rays_per_call(size_t rays, uint64_t work) {
   const bool many_hits = std::get<RayColumns>(block_.kind).mode == RayMode::kAll;
-  const uint64_t most = many_hits ? kMaxRaysOfManyHits : kMaxRaysAtOnce;
+  const uint64_t max_rays = many_hits ? kMaxRaysOfManyHits : kMaxRaysPerCall;
   const uint64_t fit = kCallWork * rays / std::max<uint64_t>(work, 1);
-  const uint64_t next = std::clamp<uint64_t>(std::min<uint64_t>(fit, 4 * rays), kMinRaysAtOnce, most);
-  place_.rays_at_once.store(static_cast<uint32_t>(next), std::memory_order_relaxed);
+  const uint64_t next = std::clamp<uint64_t>(std::min<uint64_t>(fit, 4 * rays), kMinRaysPerCall, max_rays);
+  output_.rays_per_call.store(static_cast<uint32_t>(next), std::memory_order_relaxed);
 }
 
-void BlockRunner::take_ray(const RayColumns& rays, const RayAnswer& answer, size_t i) {
+void BlockRunner::write_ray(const RayColumns& rays, const RayAnswer& answer, size_t i) {
   if (rays.mode == RayMode::kAll) return append_counted(rays, answer, i);
   if (answer.truncated) result_.truncated.push_back(static_cast<uint32_t>(i));
   if (rays.mode == RayMode::kAny) {
-    place_.hits[i] = answer.hits.empty() ? '\0' : '\1';
+    output_.hits[i] = answer.hits.empty() ? '\0' : '\1';
     return;
   }
   const Hit miss;
-  write_hits(rays, {answer.hits.empty() ? &miss : answer.hits.data(), 1}, i, place_.rows, i);
+  write_hits(rays, {answer.hits.empty() ? &miss : answer.hits.data(), 1}, i, output_.rows, i);
 }
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
-    answer = run_ball(task_, moments_.of(i), ball_of(block_, balls, i), overlap_options(block_, balls.detail),
+    answer = run_ball(task_, times_.of(i), ball_of(block_, balls, i), overlap_options(block_, balls.detail),
                       Filter(block_, i));
   append_rows(answer, i);
 }
@@ -165,7 +166,7 @@ void BlockRunner::run_query(const BallColumns& balls, size_t i) {
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
-    answer = run_box(task_, moments_.of(i), box_of(block_, boxes, i), overlap_options(block_, boxes.detail),
+    answer = run_box(task_, times_.of(i), box_of(block_, boxes, i), overlap_options(block_, boxes.detail),
                      Filter(block_, i));
   append_rows(answer, i);
 }
@@ -173,7 +174,7 @@ void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
 void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   const NearestRequest request = nearest_request(block_, nearest, i);
   std::vector<Hit> rows;
-  if (!task_.ended()) rows = run_nearest(task_, moments_.of(i), request, Filter(block_, i));
+  if (!task_.ended()) rows = run_nearest(task_, times_.of(i), request, Filter(block_, i));
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
   const RowSpans to = add_rows(result_, columns_, kept);
   for (size_t row = 0; row < kept; ++row) {
@@ -183,16 +184,16 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   count_rows(kept, kept < rows.size(), i);
 }
 
-// One pass over the objects answers all queries in a row that ask about the same moment.
+// Looks up all groups of the block in one pass over the objects, which serves all consecutive queries at the same time.
 void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
-  const bool same = groups_query_ && (!moments_.asks_past() || moments_.time(*groups_query_) == moments_.time(i));
+  const bool same = groups_query_ && (!times_.asks_past() || times_.time(*groups_query_) == times_.time(i));
   if (same || task_.ended()) return;
   groups_query_ = i;
-  groups_ = look_up_groups(task_, moments_.of(i), lookup.groups, overlap_options(block_, StaticDetail::kInstances));
+  groups_ = look_up_groups(task_, times_.of(i), lookup.groups, overlap_options(block_, StaticDetail::kInstances));
 }
 
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
-  if (lookup.groups.empty()) return write_row(look_up(task_.snapshot(), moments_.of(i), lookup.ids[i]), place_.rows, i);
+  if (lookup.groups.empty()) return write_row(look_up(task_.snapshot(), times_.of(i), lookup.ids[i]), output_.rows, i);
   look_up_groups_at(lookup, i);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];
   append_runs(answer, i);

@@ -1,5 +1,8 @@
-// Runs a run of queries of one block on one thread: into the answer's columns where each query has one row, into
-// columns of its own where rows are counted.
+// Runs consecutive queries of one block on one thread. Dense rows and bytes go directly into the reply's columns;
+// counted rows are collected in columns of the runner, since their positions depend on the chunks before.
+//
+// Threads: a runner belongs to one thread. Invariant: the runner keeps at most max_rows_ rows, and one count per query
+// that was run if the block is counted.
 #ifndef LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 #define LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 
@@ -13,26 +16,26 @@
 
 namespace locus {
 
-// Where the rows of a block go, and what its pieces tell each other.
-struct BlockPlace {
-  RowSpans rows;         // of all queries, where each has one
-  char* hits = nullptr;  // the same of bytes
-  // Rays that the kernels get at once. Many are answered faster than few, but a call cannot be stopped.
-  std::atomic<uint32_t> rays_at_once{64};
+// Output columns of a block, and the state that its chunks share.
+struct BlockOutput {
+  RowSpans rows;         // dense blocks: rows of all queries
+  char* hits = nullptr;  // byte blocks: bytes of all queries
+  // Number of rays for the next call of the kernels. Throughput grows with it, but a call cannot be interrupted.
+  std::atomic<uint32_t> rays_per_call{64};
 };
 
 class BlockRunner {
  public:
-  // Rows beyond `max_bytes` of columns are dropped and their queries listed as truncated: nothing behind them would fit
-  // the reply either.
-  BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& moments, BlockPlace& place,
+  // Borrows all arguments. Rows beyond `max_bytes` of columns are dropped and their queries listed as truncated: later
+  // rows would not fit the reply either.
+  BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, BlockOutput& output,
               uint64_t max_bytes);
 
-  // Queries begin to end (exclusive), in order, or fewer where they turn out to be much work, but one at least. Returns
-  // the first that is left.
+  // Answers queries [begin, end) in order, or fewer if they turn out to be expensive, but at least one. Returns the
+  // first query that is not answered. Precondition: begin < end. Called once.
   size_t run(size_t begin, size_t end);
 
-  // Counts and rows of blocks that have them, and the queries that were cut, counted from 0 at the block's first.
+  // Returns the collected counts and rows (counted blocks) and the truncated queries as indices into the block.
   BlockResult take_rows() { return std::move(result_); }
 
  private:
@@ -45,27 +48,28 @@ class BlockRunner {
   void run_query(const BoxColumns& boxes, size_t i);
   void run_query(const LookupColumns& lookup, size_t i);
   void run_query(const NearestColumns& nearest, size_t i);
-  void take_ray(const RayColumns& rays, const RayAnswer& answer, size_t i);
+  void write_ray(const RayColumns& rays, const RayAnswer& answer, size_t i);
   void write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
   void append_counted(const RayColumns& rays, const RayAnswer& answer, size_t i);
   void append_rows(const OverlapAnswer& answer, size_t i);
   void append_runs(const OverlapAnswer& answer, size_t i);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);
   void count_rows(size_t rows, bool cut, size_t i);
-  // In units that do not depend on the machine.
+  // Returns the work so far, in units that do not depend on the machine.
   uint64_t work_done() const;
-  // Whether what is left should be a piece of its own.
-  bool enough() const;
-  void pace_rays(size_t rays, uint64_t work);
+  // Returns whether the remaining queries should become a chunk of their own.
+  bool should_split() const;
+  // Adapts rays_per_call to the work that the last call took.
+  void adapt_rays_per_call(size_t rays, uint64_t work);
 
   QueryTask& task_;
   const QueryBlock& block_;
-  const QueryTimes& moments_;
-  BlockPlace& place_;
+  const QueryTimes& times_;
+  BlockOutput& output_;
   const ColumnSet columns_;
   const uint64_t max_rows_;
   uint64_t rows_ = 0;
-  // Answers of a lookup of groups, at the moment of the query of that number.
+  // Result of a lookup of all groups, at the time of query groups_query_.
   absl::flat_hash_map<Group, OverlapAnswer> groups_;
   std::optional<size_t> groups_query_;
   BlockResult result_;

@@ -1,4 +1,4 @@
-// How far a batch is that several threads work on in pieces. For whoever hands out its work.
+// Progress of a batch that several threads work on in chunks. For the scheduler that assigns threads to batches.
 #ifndef LOCUS_CORE_QUERY_RUN_PROGRESS_H_
 #define LOCUS_CORE_QUERY_RUN_PROGRESS_H_
 
@@ -7,9 +7,9 @@
 namespace locus {
 
 enum class Progress : uint8_t {
-  kMore,   // there is work left to begin
-  kBegun,  // nothing to begin just now: other threads are at it, after which there may be more
-  kDone,   // the answer is complete; told to one caller only, the last
+  kMore,   // at least one chunk may be started
+  kBegun,  // no chunk may be started now: other threads are working, and may make more available when they finish
+  kDone,   // the result is complete; returned to exactly one caller, the last one that worked
 };
 
 }  // namespace locus

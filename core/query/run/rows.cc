@@ -7,7 +7,7 @@
 namespace locus {
 namespace {
 
-// What objects and instances have in common in a row.
+// Columns of a row that objects and instances have in common.
 struct Labels {
   Group group = 0;
   Tag tag = 0;
@@ -43,8 +43,8 @@ void write_labels(const Hit& hit, const RowSpans& to, size_t row) {
   if (to.layers != nullptr) to.layers[row] = labels.layers;
   if (to.positions == nullptr) return;
   write_point(to.positions, row, labels.position.x, labels.position.y, labels.position.z);
-  const Quaternion& turned = labels.rotation;
-  std::copy_n(std::array{turned.x, turned.y, turned.z, turned.w}.begin(), 4, to.rotations + 4 * row);
+  const Quaternion& rotation = labels.rotation;
+  std::copy_n(std::array{rotation.x, rotation.y, rotation.z, rotation.w}.begin(), 4, to.rotations + 4 * row);
 }
 
 bool has_labels(const RowSpans& to) {

@@ -1,4 +1,5 @@
-// Writes hits into the columns of an answer: one row a hit, and a row of a miss where rows are dense.
+// Writes hits into result columns: one row per hit, and one row per miss in dense results. Free functions; several
+// threads may write different rows at once.
 #ifndef LOCUS_CORE_QUERY_RUN_ROWS_H_
 #define LOCUS_CORE_QUERY_RUN_ROWS_H_
 
@@ -11,17 +12,17 @@
 
 namespace locus {
 
-// Writes the columns of row `row` that every kind has; a miss where `hit` names nothing.
+// Writes the columns of row `row` that are common to all kinds of queries. A default-constructed hit is a miss.
 void write_row(const Hit& hit, const RowSpans& to, size_t row);
-// Writes a row like `hit` for each of some triangles, from row `row` on.
+// Writes one row per triangle, otherwise equal to the row of `hit`, starting at row `row`.
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);
-// Writes a row for each of some objects, as they were at `moment`, from the first row on.
+// Writes one row per object, with its pose at `moment`, starting at row 0.
 void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime& moment, const RowSpans& to);
-// Writes what only hits of rays have: uv, normal and point, the latter relative to the frame.
+// Writes the columns that only ray hits have: uv, normal, and the point relative to the frame.
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row);
 
-// Writes the point of a row of what is nearest, relative to the frame, where it is wanted.
+// Writes the nearest point of a row of a nearest query, relative to the frame, if that column is returned.
 void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
 
 }  // namespace locus

@@ -19,7 +19,7 @@ absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const Query
     while ((*run)->work(std::numeric_limits<uint64_t>::max()) == Progress::kMore) {
     }
   };
-  // One who finds nothing to begin may go: those at work go on until all is done.
+  // A thread that finds no chunk to start may leave: the threads still working continue until the batch is done.
   if (options.parallel_for)
     options.parallel_for(BatchRun::kMaxChunks, work);
   else

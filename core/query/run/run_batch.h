@@ -1,4 +1,5 @@
-// A batch answered here and now, into columns of its own.
+// Answers a batch synchronously, into columns that the result owns. For tests, tools and verification; the server uses
+// BatchRun directly. Threads: any number of calls may run at once on one snapshot.
 #ifndef LOCUS_CORE_QUERY_RUN_RUN_BATCH_H_
 #define LOCUS_CORE_QUERY_RUN_RUN_BATCH_H_
 
@@ -10,7 +11,8 @@
 
 namespace locus {
 
-// `batch` has passed check_batch(). OUT_OF_RANGE for a time that is not kept, unless its block clamps.
+// Answers `batch`, which has passed check_batch(), at `snapshot`. Returns OUT_OF_RANGE for a time outside the history
+// unless its block clamps, or the status of RunOptions::stop.
 absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                       const RunOptions& options);
 

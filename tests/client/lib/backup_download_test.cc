@@ -14,7 +14,7 @@ using testing::FakeServer;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Keeps files whose bytes were proven, and fails where told.
+// Sink that keeps verified files in memory, and fails at a configured call.
 class KeptFiles final : public BackupSink {
  public:
   absl::Status begin(const BackupSize& announced) override {
@@ -43,7 +43,7 @@ class KeptFiles final : public BackupSink {
   std::string refused;
 };
 
-// A server that plans to send three files in an announcement and three pieces.
+// Fake server that sends three files as an announcement and three messages.
 class BackupDownloadTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -68,7 +68,7 @@ class BackupDownloadTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(BackupDownloadTest, FilesArriveWholeAndAreCounted) {
+TEST_F(BackupDownloadTest, FilesArriveCompleteAndAreCounted) {
   KeptFiles kept;
   const absl::StatusOr<BackupSize> size = client_->backup(kept);
   ASSERT_TRUE(size.ok()) << size.status();
@@ -79,7 +79,7 @@ TEST_F(BackupDownloadTest, FilesArriveWholeAndAreCounted) {
   EXPECT_EQ(size->bytes, 8u);
 }
 
-TEST_F(BackupDownloadTest, AFileMayComeInManyPieces) {
+TEST_F(BackupDownloadTest, AFileMayArriveInManyMessages) {
   const v1::BackupResponse whole = pieces()[3];
   pieces()[3].clear_end();
   pieces()[3].set_data("th");
@@ -103,14 +103,14 @@ TEST_F(BackupDownloadTest, AStreamThatEndsEarlyWithoutAnErrorIsDataLoss) {
   expect_damaged("less came than was announced");
 }
 
-TEST_F(BackupDownloadTest, MoreThanWasAnnouncedIsDataLoss) {
+TEST_F(BackupDownloadTest, MoreDataThanAnnouncedIsDataLoss) {
   pieces()[0].mutable_announced()->set_files(2);
   expect_damaged("more came than was announced");
   pieces()[0].mutable_announced()->set_bytes(7);
   expect_damaged("more came than was announced");
 }
 
-TEST_F(BackupDownloadTest, BytesThatAreNotThoseTheServerHashedAreDataLoss) {
+TEST_F(BackupDownloadTest, BytesWithAnotherHashAreDataLoss) {
   pieces()[1].set_data("onE");
   expect_damaged("its file \"CURRENT\" has another SHA-256 than the server says");
   pieces()[1].mutable_end()->set_bytes(4);
@@ -119,7 +119,7 @@ TEST_F(BackupDownloadTest, BytesThatAreNotThoseTheServerHashedAreDataLoss) {
   expect_damaged("its file \"empty\" has another SHA-256 than the server says");
 }
 
-TEST_F(BackupDownloadTest, AFileIsKnownAsProvenOnlyAfterItsHash) {
+TEST_F(BackupDownloadTest, AFileEndsOnlyAfterItsHashIsVerified) {
   pieces()[1].set_data("onE");
   KeptFiles kept;
   EXPECT_FALSE(client_->backup(kept).ok());
@@ -127,13 +127,13 @@ TEST_F(BackupDownloadTest, AFileIsKnownAsProvenOnlyAfterItsHash) {
   EXPECT_THAT(kept.files, IsEmpty());
 }
 
-TEST_F(BackupDownloadTest, PiecesOutOfOrderAreDataLoss) {
+TEST_F(BackupDownloadTest, MessagesOutOfOrderAreDataLoss) {
   pieces()[0].clear_announced();
-  expect_damaged("what comes is not announced in the first piece alone");
+  expect_damaged("the announcement is not exactly in the first message");
   pieces()[1].mutable_announced();
-  expect_damaged("what comes is not announced in the first piece alone");
+  expect_damaged("the announcement is not exactly in the first message");
   pieces()[0].set_path("CURRENT");
-  expect_damaged("its first piece is not the announcement alone");
+  expect_damaged("its first message contains more than the announcement");
   pieces()[1].clear_path();
   expect_damaged("bytes came that belong to no file");
   pieces()[1].clear_end();
@@ -142,7 +142,7 @@ TEST_F(BackupDownloadTest, PiecesOutOfOrderAreDataLoss) {
   expect_damaged("1048577 files are announced");
 }
 
-TEST_F(BackupDownloadTest, PathsThatLeadElsewhereAreRefusedBeforeTheSinkSeesThem) {
+TEST_F(BackupDownloadTest, InvalidPathsAreRefusedBeforeTheSinkReceivesThem) {
   for (const std::string path : {"../x", "/etc/x", "a/../../x", "a\nb"}) {
     pieces()[1].set_path(path);
     KeptFiles kept;
@@ -154,7 +154,7 @@ TEST_F(BackupDownloadTest, PathsThatLeadElsewhereAreRefusedBeforeTheSinkSeesThem
   expect_damaged("its file \"CURRENT\" comes twice");
 }
 
-TEST_F(BackupDownloadTest, WhatTheSinkRefusesEndsTheBackup) {
+TEST_F(BackupDownloadTest, AnErrorOfTheSinkEndsTheBackup) {
   KeptFiles kept;
   kept.refused = "empty";
   const absl::Status status = client_->backup(kept).status();
@@ -162,10 +162,10 @@ TEST_F(BackupDownloadTest, WhatTheSinkRefusesEndsTheBackup) {
   EXPECT_THAT(kept.begun, ElementsAre("CURRENT", "empty"));
 }
 
-TEST_F(BackupDownloadTest, WhatTheServerRefusesIsItsToSay) {
+TEST_F(BackupDownloadTest, AnErrorOfTheServerIsReturned) {
   server_.servers.backup_end = {grpc::StatusCode::UNAVAILABLE, "planned"};
   KeptFiles kept;
-  EXPECT_TRUE(absl::IsUnavailable(client_->backup(kept).status())) << "also after the last file came";
+  EXPECT_TRUE(absl::IsUnavailable(client_->backup(kept).status())) << "also after the last file was received";
 }
 
 }  // namespace

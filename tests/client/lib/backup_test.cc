@@ -13,7 +13,7 @@ std::string refusal_of(const std::string& path) {
   return std::string(paths.add(path).message());
 }
 
-TEST(BackupPathsTest, OrdinaryPathsAreFit) {
+TEST(BackupPathsTest, OrdinaryPathsAreAccepted) {
   BackupPaths paths;
   for (const char* path :
        {"CURRENT", "000007.sst", "tables/1", "tables/deep/1", "...", ".hidden", "a b", "grün/ü", "a..b", "tables 2/1"})
@@ -21,13 +21,13 @@ TEST(BackupPathsTest, OrdinaryPathsAreFit) {
   EXPECT_TRUE(paths.add(std::string(kMaxBackupPathLength, 'a')).ok());
 }
 
-TEST(BackupPathsTest, NoPathLeadsOutOfItsDirectory) {
+TEST(BackupPathsTest, PathsThatLeadOutOfTheDirectoryAreRefused) {
   for (const char* path : {"/etc/passwd", "..", "../x", "a/../b", "a/..", ".", "./a", "a/.", "a//b", "a/", "/"})
     EXPECT_THAT(refusal_of(path), HasSubstr("leads out of its directory")) << path;
   EXPECT_EQ(refusal_of(""), "is empty");
 }
 
-TEST(BackupPathsTest, NoPathBreaksALineOrNeedsToBeEscaped) {
+TEST(BackupPathsTest, PathsWithControlCharactersOrBackslashesAreRefused) {
   for (const std::string& path :
        {std::string("a\nb"), std::string("a\0b", 3), std::string("a\\b"), std::string("a\x7F"), std::string("\x1B[2J")})
     EXPECT_THAT(refusal_of(path), HasSubstr("has a character that a path may not have")) << path;
@@ -37,7 +37,7 @@ TEST(BackupPathsTest, ALongPathIsRefused) {
   EXPECT_EQ(refusal_of(std::string(kMaxBackupPathLength + 1, 'a')), "is too long");
 }
 
-TEST(BackupPathsTest, NoFileComesTwiceNorStandsInTheWayOfAnother) {
+TEST(BackupPathsTest, DuplicatePathsAndFilesUsedAsFoldersAreRefused) {
   BackupPaths paths;
   ASSERT_TRUE(paths.add("tables/deep/1").ok());
   EXPECT_EQ(paths.add("tables/deep/1").message(), "comes twice");
@@ -46,7 +46,7 @@ TEST(BackupPathsTest, NoFileComesTwiceNorStandsInTheWayOfAnother) {
   EXPECT_EQ(paths.add("tables/deep/1/2").message(), "has another file for a folder");
 }
 
-TEST(BackupPathsTest, ThereIsAMostOfFiles) {
+TEST(BackupPathsTest, TheNumberOfFilesIsLimited) {
   BackupPaths paths;
   for (size_t i = 0; i < kMaxBackupFiles; ++i) ASSERT_TRUE(paths.add(std::to_string(i)).ok());
   EXPECT_EQ(paths.add("one more").message(), "is one more than a backup may have");

@@ -38,7 +38,7 @@ v1::QueryBatch one_ray() {
   return builder.build();
 }
 
-TEST(ConnectTest, WhereNothingListensTheErrorSaysWhereAndWhatToDo) {
+TEST(ConnectTest, WithoutAServerTheErrorNamesTheAddressAndARemedy) {
   std::string address;
   {
     const FakeServer gone;
@@ -61,7 +61,7 @@ TEST(ConnectTest, WaitingForAServerEndsWithTheTimeout) {
 
 TEST(ConnectTest, AnEmptyAddressIsRefusedAtOnce) { EXPECT_TRUE(absl::IsInvalidArgument(Client::connect("").status())); }
 
-TEST_F(ClientTest, QueriesAreRepeatedWhileTheServerIsUnavailable) {
+TEST_F(ClientTest, QueriesAreRetriedWhileTheServerIsUnavailable) {
   server_.queries.failing_calls = 3;
   const absl::StatusOr<v1::QueryResult> result = client_->query("arena", one_ray());
   ASSERT_TRUE(result.ok()) << result.status();
@@ -70,13 +70,13 @@ TEST_F(ClientTest, QueriesAreRepeatedWhileTheServerIsUnavailable) {
   EXPECT_EQ(server_.queries.scene, "arena") << "x-scene";
 }
 
-TEST_F(ClientTest, QueriesGiveUpWhenThePolicyEnds) {
+TEST_F(ClientTest, QueriesFailWhenTheAttemptsAreUsedUp) {
   server_.queries.failing_calls = 100;
   EXPECT_TRUE(absl::IsUnavailable(client_->query("arena", one_ray()).status()));
   EXPECT_EQ(server_.queries.calls, 4);
 }
 
-TEST_F(ClientTest, RefusalsAreNotRepeatedAndKeepTheirFields) {
+TEST_F(ClientTest, RefusalsAreNotRetriedAndKeepTheirFields) {
   server_.queries.failing_calls = 1;
   v1::Error error;
   error.set_reason(v1::REASON_NOT_FINITE);
@@ -89,7 +89,7 @@ TEST_F(ClientTest, RefusalsAreNotRepeatedAndKeepTheirFields) {
   EXPECT_EQ(server_.queries.calls, 1);
 }
 
-TEST_F(ClientTest, ExhaustedWithAHintIsRepeated) {
+TEST_F(ClientTest, ResourceExhaustedWithAHintIsRetried) {
   server_.queries.failing_calls = 1;
   v1::Error error;
   error.set_reason(v1::REASON_LIMIT);
@@ -105,7 +105,7 @@ TEST_F(ClientTest, AnUpdateWithoutWriterIsSentOnce) {
   EXPECT_EQ(server_.updates.calls, 1);
 }
 
-TEST_F(ClientTest, AnUpdateWithWriterAndBatchIsRepeated) {
+TEST_F(ClientTest, AnUpdateWithWriterAndBatchIsRetried) {
   server_.updates.failing_calls = 2;
   v1::UpdateBatch batch;
   batch.set_writer(77);
@@ -117,7 +117,7 @@ TEST_F(ClientTest, AnUpdateWithWriterAndBatchIsRepeated) {
   EXPECT_THAT(server_.updates.applied(), ElementsAre(5));
 }
 
-TEST_F(ClientTest, OtherChangesAreNeverRepeated) {
+TEST_F(ClientTest, OtherChangesAreNeverRetried) {
   server_.scenes.failing_creates = 1;
   v1::CreateSceneRequest request;
   request.set_name("arena");
@@ -153,12 +153,12 @@ TEST_F(ClientTest, HealthIsServingAndAnUnknownServiceIsNotFound) {
   EXPECT_TRUE(absl::IsNotFound(client_->health("no.such.Service").status()));
 }
 
-TEST_F(ClientTest, AServerThatIsGoneIsUnavailable) {
+TEST_F(ClientTest, AStoppedServerIsUnavailable) {
   server_.stop();
   EXPECT_TRUE(absl::IsUnavailable(client_->get_server().status()));
 }
 
-TEST_F(ClientTest, ADumpEndsEarlyWithTheReadersError) {
+TEST_F(ClientTest, ADumpEndsEarlyWithTheErrorOfItsCallback) {
   int pieces = 0;
   v1::DumpSceneRequest request;
   request.set_scene("arena");
@@ -174,7 +174,7 @@ TEST_F(ClientTest, ADumpEndsEarlyWithTheReadersError) {
             absl::AbortedError("enough"));
 }
 
-TEST_F(ClientTest, AMeshArrivesWholeInMessagesOfAtMostOneMebibyte) {
+TEST_F(ClientTest, AMeshArrivesCompleteInMessagesOfAtMostOneMebibyte) {
   std::vector<float> vertices(900'000);
   for (size_t i = 0; i < vertices.size(); ++i) vertices[i] = static_cast<float>(i);
   std::vector<uint32_t> indices(600'000);
@@ -200,10 +200,10 @@ TEST_F(ClientTest, AKnownMeshIsNotSentAgain) {
       {.name = "level", .vertices = vertices, .indices = indices}, [&](uint64_t bytes, uint64_t) { sent = bytes; });
   ASSERT_TRUE(uploaded.ok()) << uploaded.status();
   EXPECT_TRUE(uploaded->already_known());
-  EXPECT_LT(sent, vertices.size() * 4) << "the upload goes on although the server has answered";
+  EXPECT_LT(sent, vertices.size() * 4) << "the upload continues although the server has answered";
 }
 
-TEST_F(ClientTest, AMeshOfBrokenTriplesIsNotSent) {
+TEST_F(ClientTest, AMeshWithIncompleteTriplesIsNotSent) {
   const std::vector<float> vertices(10);
   EXPECT_TRUE(absl::IsInvalidArgument(client_->upload_mesh({.name = "level", .vertices = vertices}).status()));
 }

@@ -1,6 +1,6 @@
-// A small server of the real protocol inside the test's process, with planned misbehaviour: for tests of the client
-// library and the command line. Handlers run on gRPC's threads; the plan is set before the first call, or through
-// the locked setters.
+// Fake server of the real protocol inside the test's process, with configurable failures: for tests of the client
+// library and the command line. Handlers run on gRPC's threads; failures are configured before the first call, or
+// through the locked setters.
 #ifndef LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
 #define LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
 
@@ -23,7 +23,7 @@
 
 namespace locus::client::testing {
 
-// A refusal as the server sends it, details and all.
+// Returns a refusal as the server sends it, including its details.
 inline grpc::Status refusal(grpc::StatusCode code, const std::string& message, const v1::Error& fields) {
   v1::Error error = fields;
   error.set_code(code);
@@ -40,13 +40,13 @@ inline std::string metadata_of(const grpc::ServerContext& context, const std::st
   return found == context.client_metadata().end() ? "" : std::string(found->second.data(), found->second.size());
 }
 
-// Applies batches by the protocol's rule of writers, and breaks streams where told.
+// Fake UpdateService: applies batches by the protocol's rules for writers, and breaks streams as configured.
 class FakeUpdates final : public v1::UpdateService::Service {
  public:
-  // Every how many messages of a stream it breaks, and whether the message before the break is applied without ack.
+  // Breaks of streams: after how many messages, and whether the message before the break is applied without an ack.
   struct Breaks {
     int after_messages = 0;  // 0 = never
-    int times = 0;           // how many streams break in all
+    int times = 0;           // total number of streams that break
     bool apply_last = false;
     grpc::Status status{grpc::StatusCode::UNAVAILABLE, "planned"};
   };
@@ -93,13 +93,13 @@ class FakeUpdates final : public v1::UpdateService::Service {
     return grpc::Status::OK;
   }
 
-  // Ticks of the batches that were applied, in order: tests give each batch its own.
+  // Returns the ticks of the applied batches, in order; tests give each batch its own tick.
   std::vector<uint64_t> applied() const {
     std::lock_guard lock(mutex_);
     return applied_;
   }
 
-  // Forgets every writer, as a server does that lost its memory.
+  // Forgets every writer, like a server that lost its state.
   void forget_writers() {
     std::lock_guard lock(mutex_);
     next_.clear();
@@ -113,7 +113,7 @@ class FakeUpdates final : public v1::UpdateService::Service {
   int duplicates = 0;
   int gaps = 0;
   std::vector<std::string> scenes;  // x-scene of each call
-  // What an ack lists as refused items.
+  // Refused items that every ack lists.
   std::vector<v1::ItemError> item_errors;
   v1::UpdateBatch last_batch;
 
@@ -159,7 +159,7 @@ class FakeUpdates final : public v1::UpdateService::Service {
   std::vector<uint64_t> applied_;
 };
 
-// Answers every query by `answer`.
+// Fake QueryService: answers every query by `answer`.
 class FakeQueries final : public v1::QueryService::Service {
  public:
   grpc::Status Query(grpc::ServerContext* context, const v1::QueryRequest* request,
@@ -175,8 +175,8 @@ class FakeQueries final : public v1::QueryService::Service {
     return answer(*request, *response->mutable_result());
   }
 
-  // Holds back the answers of each pair of messages until both are there, then sends them in the wrong order. With a
-  // `stream_answer` each message is answered by it at once.
+  // Delays the answers of each pair of messages until both have arrived, then sends them in reverse order. If
+  // `stream_answer` is set, it answers each message at once.
   grpc::Status StreamQueries(
       grpc::ServerContext*,
       grpc::ServerReaderWriter<v1::StreamQueriesResponse, v1::StreamQueriesRequest>* stream) override {
@@ -226,7 +226,7 @@ class FakeQueries final : public v1::QueryService::Service {
     return grpc::Status::OK;
   };
   std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
-  int silent_messages = 0;  // of streams, that are never answered
+  int silent_messages = 0;  // number of stream messages that are never answered
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;
@@ -237,7 +237,7 @@ class FakeQueries final : public v1::QueryService::Service {
   std::mutex mutex_;
 };
 
-// Keeps scenes by name and meshes by hash.
+// Fake SceneService: keeps scenes by name and meshes by hash.
 class FakeScenes final : public v1::SceneService::Service {
  public:
   grpc::Status CreateScene(grpc::ServerContext*, const v1::CreateSceneRequest* request,
@@ -269,7 +269,7 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // Pages of two.
+  // Returns pages of two scenes.
   grpc::Status ListScenes(grpc::ServerContext*, const v1::ListScenesRequest* request,
                           v1::ListScenesResponse* response) override {
     std::lock_guard lock(mutex_);
@@ -312,7 +312,7 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // The planned pieces, whatever was uploaded.
+  // Sends the configured messages, independent of earlier uploads.
   grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
     std::lock_guard lock(mutex_);
@@ -346,7 +346,7 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // While calls come in.
+  // Replaces a scene; may be called while calls arrive.
   void replace(const v1::Scene& scene) {
     std::lock_guard lock(mutex_);
     scenes[scene.name()] = scene;
@@ -365,7 +365,7 @@ class FakeScenes final : public v1::SceneService::Service {
   std::vector<uint32_t> indices;
   size_t largest_message = 0;
   std::vector<v1::DownloadMeshResponse> mesh_pieces;
-  int failing_downloads = 0;  // how many end after their first piece
+  int failing_downloads = 0;  // number of downloads that end after their first message
   bool no_mesh = false;
   v1::ChangeInstancesRequest last_change;
   int creates = 0;
@@ -389,10 +389,11 @@ class FakeServerService final : public v1::ServerService::Service {
     return grpc::Status::OK;
   }
 
-  // The planned pieces, then the planned end.
+  // Sends the configured messages and the configured status.
   grpc::Status Backup(grpc::ServerContext*, const v1::BackupRequest*,
                       grpc::ServerWriter<v1::BackupResponse>* writer) override {
-    // A copy: a client that has broken off is told so before the last piece, and the test plans the next.
+    // Copies the messages: after a client has cancelled, the test configures the next backup while this call still
+    // runs.
     const std::vector<v1::BackupResponse> pieces = backup_pieces;
     for (const v1::BackupResponse& piece : pieces) {
       if (!writer->Write(piece)) break;
@@ -400,7 +401,7 @@ class FakeServerService final : public v1::ServerService::Service {
     return backup_end;
   }
 
-  // A backup of these files by path, in pieces as the server makes them of files below 1 MiB.
+  // Configures a backup of files by path, one message per file, as the server sends files below 1 MiB.
   void plan_backup(const std::map<std::string, std::string>& files) {
     backup_pieces.assign(1, {});
     v1::BackupSize& announced = *backup_pieces[0].mutable_announced();
@@ -423,7 +424,7 @@ class FakeServerService final : public v1::ServerService::Service {
   grpc::Status backup_end;
 };
 
-// All of them on a loopback port of the kernel's choice.
+// Fake server with all services on a free loopback port.
 class FakeServer {
  public:
   FakeServer() {
@@ -438,7 +439,7 @@ class FakeServer {
     if (server_) server_->Shutdown(std::chrono::system_clock::now());
     server_.reset();
   }
-  // On the same port, with the same state.
+  // Restarts on the same port, with the same state.
   void restart() { start(address()); }
 
   FakeUpdates updates;

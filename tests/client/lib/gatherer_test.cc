@@ -14,7 +14,7 @@ using Numbers = std::vector<int>;
 
 constexpr absl::Duration kLong = absl::Hours(1);
 
-// What was sent, message by message.
+// Items that were sent, one list per message.
 class Sent {
  public:
   auto taker() {
@@ -37,7 +37,7 @@ void add(Gatherer<Numbers>& gatherer, int number) {
   gatherer.add([&](Numbers& numbers) { numbers.push_back(number); });
 }
 
-TEST(GathererTest, AFullBatchGoesAtOnce) {
+TEST(GathererTest, AFullBatchIsSentAtOnce) {
   std::promise<Numbers> first;
   Gatherer<Numbers> gatherer({.max_items = 3, .max_delay = kLong},
                              [&](Numbers numbers) { first.set_value(std::move(numbers)); });
@@ -45,7 +45,7 @@ TEST(GathererTest, AFullBatchGoesAtOnce) {
   EXPECT_THAT(first.get_future().get(), ElementsAre(1, 2, 3));
 }
 
-TEST(GathererTest, WhatIsNotFullGoesAfterItsDelay) {
+TEST(GathererTest, APartialBatchIsSentAfterTheDelay) {
   std::promise<Numbers> first;
   Gatherer<Numbers> gatherer({.max_items = 1000, .max_delay = absl::Milliseconds(1)},
                              [&](Numbers numbers) { first.set_value(std::move(numbers)); });
@@ -53,7 +53,7 @@ TEST(GathererTest, WhatIsNotFullGoesAfterItsDelay) {
   EXPECT_THAT(first.get_future().get(), ElementsAre(7));
 }
 
-TEST(GathererTest, FlushingSendsWhatIsThereWithoutWaiting) {
+TEST(GathererTest, FlushSendsAPartialBatchAtOnce) {
   Sent sent;
   Gatherer<Numbers> gatherer({.max_items = 1000, .max_delay = kLong}, sent.taker());
   gatherer.flush();
@@ -64,7 +64,7 @@ TEST(GathererTest, FlushingSendsWhatIsThereWithoutWaiting) {
   EXPECT_THAT(sent.messages(), ElementsAre(ElementsAre(1, 2)));
 }
 
-TEST(GathererTest, TheEndSendsWhatIsLeft) {
+TEST(GathererTest, TheDestructorSendsAPartialBatch) {
   Sent sent;
   {
     Gatherer<Numbers> gatherer({.max_items = 1000, .max_delay = kLong}, sent.taker());
@@ -73,7 +73,7 @@ TEST(GathererTest, TheEndSendsWhatIsLeft) {
   EXPECT_THAT(sent.messages(), ElementsAre(ElementsAre(9)));
 }
 
-TEST(GathererTest, WhileSendingBlocksOneBatchIsGatheredAndNoMore) {
+TEST(GathererTest, WhileSendBlocksAtMostOneBatchIsGathered) {
   std::promise<void> may_go;
   std::shared_future<void> gate = may_go.get_future().share();
   Sent sent;
@@ -96,7 +96,7 @@ TEST(GathererTest, WhileSendingBlocksOneBatchIsGatheredAndNoMore) {
   EXPECT_THAT(sent.messages(), ElementsAre(ElementsAre(1, 2), ElementsAre(3, 4), ElementsAre(5)));
 }
 
-TEST(GathererTest, ThingsOfManyThreadsAllArriveThoseOfOneInOrder) {
+TEST(GathererTest, ItemsOfManyThreadsAllArriveAndItemsOfOneThreadInOrder) {
   Sent sent;
   {
     Gatherer<Numbers> gatherer({.max_items = 64, .max_delay = absl::Microseconds(100)}, sent.taker());

@@ -18,7 +18,7 @@ std::string hash_of(const std::vector<float>& vertices, const std::vector<uint32
   return std::string(hash.begin(), hash.end());
 }
 
-// A server that holds one mesh: two triangles over four vertices, in three pieces.
+// Fake server with one mesh: two triangles over four vertices, in three messages.
 class MeshDownloadTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -54,7 +54,7 @@ class MeshDownloadTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(MeshDownloadTest, PiecesBecomeOneMeshAndProgressIsTold) {
+TEST_F(MeshDownloadTest, MessagesBecomeOneMeshAndProgressIsReported) {
   std::vector<uint64_t> received;
   const absl::StatusOr<DownloadedMesh> mesh = client_->download_mesh("level", [&](uint64_t bytes, uint64_t total) {
     received.push_back(bytes);
@@ -69,7 +69,7 @@ TEST_F(MeshDownloadTest, PiecesBecomeOneMeshAndProgressIsTold) {
   EXPECT_EQ(received, (std::vector<uint64_t>{24, 60, 72}));
 }
 
-TEST_F(MeshDownloadTest, WhatWasUploadedComesBackWithTheSameHash) {
+TEST_F(MeshDownloadTest, AnUploadedMeshIsDownloadedWithTheSameHash) {
   ASSERT_TRUE(client_->upload_mesh({.name = "level", .vertices = vertices_, .indices = indices_}).ok());
   const absl::StatusOr<DownloadedMesh> mesh = client_->download_mesh("level");
   ASSERT_TRUE(mesh.ok()) << mesh.status();
@@ -79,11 +79,11 @@ TEST_F(MeshDownloadTest, WhatWasUploadedComesBackWithTheSameHash) {
   EXPECT_EQ(again.parts.size(), 1u);
 }
 
-TEST_F(MeshDownloadTest, ADescriptionMissingOrGivenTwiceIsDataLoss) {
+TEST_F(MeshDownloadTest, AMissingOrRepeatedDescriptionIsDataLoss) {
   *pieces()[1].mutable_mesh() = pieces()[0].mesh();
-  expect_damaged("its description is not in the first piece alone");
+  expect_damaged("its description is not exactly in the first message");
   pieces()[0].clear_mesh();
-  expect_damaged("its description is not in the first piece alone");
+  expect_damaged("its description is not exactly in the first message");
   pieces().clear();
   expect_damaged("nothing came");
 }
@@ -132,14 +132,14 @@ TEST_F(MeshDownloadTest, BytesOfAnotherHashAreDataLoss) {
   expect_damaged("its bytes have another SHA-256 than was announced");
 }
 
-TEST_F(MeshDownloadTest, ADownloadIsRepeatedWhereTheServerWasAway) {
+TEST_F(MeshDownloadTest, ADownloadIsRetriedWhenTheServerWasUnavailable) {
   server_.scenes.failing_downloads = 1;
   EXPECT_TRUE(client_->download_mesh("level").ok());
   server_.scenes.failing_downloads = 2;
   EXPECT_TRUE(absl::IsUnavailable(client_->download_mesh("level").status()));
 }
 
-TEST_F(MeshDownloadTest, AMeshThatIsNotThereIsTheServersToName) {
+TEST_F(MeshDownloadTest, TheServersErrorForAnUnknownMeshIsReturned) {
   server_.scenes.mesh_pieces.clear();
   server_.scenes.no_mesh = true;
   const absl::Status status = client_->download_mesh("level").status();

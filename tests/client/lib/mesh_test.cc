@@ -24,7 +24,7 @@ TEST(MeshSha256Test, AnEmptyMeshIsTheHashOfTwoZeroCounts) {
   EXPECT_EQ(hex(mesh_sha256({}, {})), "af5570f5a1810b7af78caf4bc70a660f0df51e42baf91d4de5b2328de0e83dfc");
 }
 
-TEST(MeshSha256Test, TheBorderBetweenTheColumnsMatters) {
+TEST(MeshSha256Test, TheBoundaryBetweenTheColumnsMatters) {
   const std::vector<float> six = {0, 0, 0, 0, 0, 0};
   const std::vector<float> three = {0, 0, 0};
   const std::vector<uint32_t> none = {};

@@ -28,7 +28,7 @@ class MoveBatcherTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(MoveBatcherTest, MovesOfOneMomentAreOneMessageInTheirOrder) {
+TEST_F(MoveBatcherTest, MovesAddedTogetherAreOneMessageInOrder) {
   MoveBatcher moves(client_->update_stream("arena"), {.max_items = 100, .max_delay = kLong});
   for (const uint64_t id : {7u, 8u, 7u}) moves.move(id, Float3{static_cast<float>(id), 0, 0});
   ASSERT_TRUE(moves.flush().ok());
@@ -38,7 +38,7 @@ TEST_F(MoveBatcherTest, MovesOfOneMomentAreOneMessageInTheirOrder) {
   EXPECT_THAT(server_.updates.last_batch.moves(0).positions(), ElementsAre(7, 0, 0, 8, 0, 0, 7, 0, 0));
 }
 
-TEST_F(MoveBatcherTest, AFullMessageIsSentAndTheNextBegins) {
+TEST_F(MoveBatcherTest, AFullMessageIsSentAndTheNextOneStarted) {
   {
     MoveBatcher moves(client_->update_stream("arena"), {.max_items = 10, .max_delay = kLong});
     for (uint64_t id = 1; id <= 25; ++id) moves.move(id, Float3{0, 0, 0});
@@ -56,7 +56,7 @@ TEST_F(MoveBatcherTest, EachMessageIsAcked) {
   EXPECT_THAT(revisions, ElementsAre(1, 2, 3));
 }
 
-TEST_F(MoveBatcherTest, ABreakAppliesEachMessageOnceAllTheSame) {
+TEST_F(MoveBatcherTest, EachMessageIsAppliedOnceDespiteABrokenConnection) {
   server_.updates.breaks = {.after_messages = 2, .times = 4, .apply_last = true};
   const RetryPolicy quick = {.max_attempts = 20, .first_backoff = absl::Milliseconds(1)};
   MoveBatcher moves(client_->update_stream("arena", {.reconnect = quick}), {.max_items = 1});
@@ -65,7 +65,7 @@ TEST_F(MoveBatcherTest, ABreakAppliesEachMessageOnceAllTheSame) {
   EXPECT_EQ(server_.updates.applied().size(), 12u);
 }
 
-TEST_F(MoveBatcherTest, TheEndOfTheStreamIsToldByFlushAndByEachAck) {
+TEST_F(MoveBatcherTest, FlushAndEachAckReportTheEndOfTheStream) {
   std::vector<absl::StatusCode> codes;
   MoveBatcher moves(client_->update_stream("arena", {.reconnect = {.max_attempts = 1}}), {},
                     [&](const absl::StatusOr<v1::UpdateAck>& ack) { codes.push_back(ack.status().code()); });

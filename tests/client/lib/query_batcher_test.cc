@@ -17,7 +17,7 @@ using testing::FakeServer;
 
 constexpr absl::Duration kLong = absl::Hours(1);
 
-// A ray meets what lies at its origin's x; a ball of radius r finds the ids 1 ... r.
+// Fake server: a ray hits the id equal to its origin's x, and a ball of radius r finds the ids 1 to r.
 v1::QueryResult answer_by_values(const v1::QueryBatch& batch) {
   v1::QueryResult result;
   for (const v1::QueryBlock& block : batch.blocks()) {
@@ -52,7 +52,7 @@ class QueryBatcherTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(QueryBatcherTest, QueriesOfOneMomentTravelInOneMessageAndGetTheirOwnAnswers) {
+TEST_F(QueryBatcherTest, QueriesAddedTogetherAreSentInOneMessageAndGetTheirOwnAnswers) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   std::vector<uint64_t> ids;
   QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 100, .max_delay = kLong}});
@@ -70,7 +70,7 @@ TEST_F(QueryBatcherTest, QueriesOfOneMomentTravelInOneMessageAndGetTheirOwnAnswe
   EXPECT_THAT(ids, ElementsAre(1, 2, 3, 4));
 }
 
-TEST_F(QueryBatcherTest, AFullMessageIsSentWithoutAWait) {
+TEST_F(QueryBatcherTest, AFullMessageIsSentAtOnce) {
   std::promise<uint64_t> last;
   QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 2, .max_delay = kLong}});
   batcher.ray({.origin = {1, 0, 0}, .direction = {0, 0, 1}}, [](absl::StatusOr<SingleHit>) {});
@@ -79,7 +79,7 @@ TEST_F(QueryBatcherTest, AFullMessageIsSentWithoutAWait) {
   EXPECT_EQ(last.get_future().get(), 2u);
 }
 
-TEST_F(QueryBatcherTest, FilterFrameAndReachTravelToo) {
+TEST_F(QueryBatcherTest, FilterFrameAndTMaxAreSentToo) {
   v1::QueryBatch seen;
   server_.queries.stream_answer = [&](const v1::QueryBatch& batch) {
     seen = batch;
@@ -97,7 +97,7 @@ TEST_F(QueryBatcherTest, FilterFrameAndReachTravelToo) {
   EXPECT_THAT(seen.blocks(0).ignore_groups(), ElementsAre(8));
 }
 
-TEST_F(QueryBatcherTest, WhenTheStreamEndsEveryCallbackIsTold) {
+TEST_F(QueryBatcherTest, WhenTheStreamEndsEveryCallbackGetsItsError) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   QueryBatcher batcher(client_->query_stream("arena", {.reconnect = {.max_attempts = 1}}));
   server_.stop();
@@ -110,7 +110,7 @@ TEST_F(QueryBatcherTest, WhenTheStreamEndsEveryCallbackIsTold) {
   EXPECT_TRUE(absl::IsUnavailable(hits[1].status())) << hits[1].status();
 }
 
-TEST_F(QueryBatcherTest, AnAnswerThatDoesNotFitIsDataLoss) {
+TEST_F(QueryBatcherTest, AnAnswerThatDoesNotMatchTheQueriesIsDataLoss) {
   server_.queries.stream_answer = [](const v1::QueryBatch&) { return answer_by_values({}); };
   std::vector<absl::StatusOr<SingleHit>> hits;
   QueryBatcher batcher(client_->query_stream("arena"));
@@ -120,7 +120,7 @@ TEST_F(QueryBatcherTest, AnAnswerThatDoesNotFitIsDataLoss) {
   EXPECT_EQ(hits[0].status().code(), absl::StatusCode::kDataLoss);
 }
 
-TEST_F(QueryBatcherTest, TheEndWaitsForEveryAnswer) {
+TEST_F(QueryBatcherTest, TheDestructorWaitsForAllAnswers) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   {
     QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 8, .max_delay = kLong}});

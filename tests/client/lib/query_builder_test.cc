@@ -13,7 +13,7 @@ using ::testing::IsEmpty;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-TEST(QueryBuilderTest, RaysByRowFillColumnsOnlyWhereRowsDiffer) {
+TEST(QueryBuilderTest, RaysAddedByRowFillOnlyColumnsWhoseRowsDiffer) {
   QueryBuilder builder;
   builder.rays()
       .mode(v1::RAY_MODE_ALL)
@@ -33,7 +33,7 @@ TEST(QueryBuilderTest, RaysByRowFillColumnsOnlyWhereRowsDiffer) {
   EXPECT_EQ(block.rays().inside(), v1::INSIDE_SKIP);
 }
 
-TEST(QueryBuilderTest, DefaultsLeaveNoColumn) {
+TEST(QueryBuilderTest, DefaultValuesLeaveColumnsEmpty) {
   QueryBuilder builder;
   builder.rays().ray({0, 1, 0}, {0, 0, -1});
   const v1::QueryBlock block = builder.build().blocks(0);
@@ -42,7 +42,7 @@ TEST(QueryBuilderTest, DefaultsLeaveNoColumn) {
   EXPECT_THAT(block.ignore_groups(), IsEmpty());
 }
 
-TEST(QueryBuilderTest, TimesOfThePastAreColumns) {
+TEST(QueryBuilderTest, AsOfTimesAreColumns) {
   QueryBuilder builder;
   builder.lookup().id(7).as_of({{12}}, {{0.5f}}).outside_history(v1::OUTSIDE_HISTORY_CLAMP);
   const v1::QueryBlock block = builder.build().blocks(0);
@@ -68,7 +68,7 @@ TEST(QueryBuilderTest, WholeSpansAppend) {
   EXPECT_THAT(block.ignore_groups(), ElementsAre(7));
 }
 
-TEST(QueryBuilderTest, BlocksComeInTheOrderOpenedWithTheirOwnSettings) {
+TEST(QueryBuilderTest, BlocksKeepTheirOrderAndTheirOwnSettings) {
   QueryBuilder builder;
   BallBlock balls = builder.balls();
   BoxBlock boxes = builder.boxes();
@@ -95,7 +95,7 @@ TEST(QueryBuilderTest, BlocksComeInTheOrderOpenedWithTheirOwnSettings) {
   EXPECT_THAT(batch.blocks(3).lookup().groups(), ElementsAre(3));
 }
 
-TEST(QueryBuilderTest, PointsComeRowByRowOrAsAColumn) {
+TEST(QueryBuilderTest, PointsAreAddedByRowOrAsAColumn) {
   QueryBuilder builder;
   builder.nearest().k(4).detail(v1::STATIC_DETAIL_TRIANGLES).point({1, 2, 3}).point({4, 5, 6}, 7, {.ignore_group = 9});
   builder.nearest().points({1, 2, 3, 4, 5, 6}).max_distances({8});

@@ -21,13 +21,13 @@ class QueryStreamTest : public ::testing::Test {
     open({.reconnect = kPatient});
   }
 
-  // For as long as a test's server may be away.
+  // Retries that last longer than a test's server is down.
   static constexpr RetryPolicy kPatient = {
       .max_attempts = 1000, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(20)};
 
   void open(const QueryStreamOptions& options) { stream_ = client_->query_stream("arena", options); }
 
-  // The fake answers with the work budget as the revision, so an answer shows whose it is.
+  // The fake server answers with max_work as the revision, which identifies the batch of an answer.
   std::future<absl::StatusOr<v1::QueryResult>> ask(uint64_t number) {
     v1::QueryBatch batch;
     batch.set_max_work(number);
@@ -39,7 +39,7 @@ class QueryStreamTest : public ::testing::Test {
   std::unique_ptr<QueryStream> stream_;
 };
 
-TEST_F(QueryStreamTest, AnswersOutOfOrderReachTheirOwnQuestions) {
+TEST_F(QueryStreamTest, AnswersOutOfOrderReachTheirOwnBatches) {
   std::vector<std::future<absl::StatusOr<v1::QueryResult>>> answers;
   for (uint64_t number = 1; number <= 20; ++number) answers.push_back(ask(number));
   for (uint64_t number = 1; number <= 20; ++number) {
@@ -59,7 +59,7 @@ TEST_F(QueryStreamTest, ARefusedBatchDoesNotEndTheStream) {
   EXPECT_EQ(answered.get()->revision(), 7u);
 }
 
-TEST_F(QueryStreamTest, AfterABreakUnansweredQuestionsAreAskedAgain) {
+TEST_F(QueryStreamTest, AfterABreakUnansweredBatchesAreSentAgain) {
   server_.queries.failing_calls = 2;
   auto first = ask(1);
   auto second = ask(2);
@@ -67,7 +67,7 @@ TEST_F(QueryStreamTest, AfterABreakUnansweredQuestionsAreAskedAgain) {
   EXPECT_EQ(second.get()->revision(), 2u);
 }
 
-TEST_F(QueryStreamTest, AnEndThatARetryCannotMendReachesEveryQuestion) {
+TEST_F(QueryStreamTest, APermanentErrorReachesEveryUnansweredBatch) {
   server_.queries.failure = grpc::Status(grpc::StatusCode::PERMISSION_DENIED, "planned");
   server_.queries.failing_calls = 1;
   auto first = ask(1);
@@ -76,7 +76,7 @@ TEST_F(QueryStreamTest, AnEndThatARetryCannotMendReachesEveryQuestion) {
   EXPECT_TRUE(absl::IsPermissionDenied(second.get().status()));
 }
 
-TEST_F(QueryStreamTest, AServerThatRestartsOnItsPortIsAskedTheRest) {
+TEST_F(QueryStreamTest, ARestartedServerGetsTheRemainingBatches) {
   server_.queries.stream_answer = [](const v1::QueryBatch& batch) {
     v1::QueryResult result;
     result.set_revision(batch.max_work());
@@ -94,7 +94,7 @@ TEST_F(QueryStreamTest, AServerThatRestartsOnItsPortIsAskedTheRest) {
   }
 }
 
-TEST_F(QueryStreamTest, AServerThatAnswersNothingIsAskedAgainOnANewConnection) {
+TEST_F(QueryStreamTest, BatchesWithoutAnAnswerAreSentAgainOnANewConnection) {
   server_.queries.stream_answer = [](const v1::QueryBatch&) {
     v1::QueryResult result;
     result.set_revision(5);
@@ -105,7 +105,7 @@ TEST_F(QueryStreamTest, AServerThatAnswersNothingIsAskedAgainOnANewConnection) {
   EXPECT_EQ(ask(1).get()->revision(), 5u);
 }
 
-TEST_F(QueryStreamTest, AServerThatNeverAnswersIsUnavailableInTheEnd) {
+TEST_F(QueryStreamTest, AServerThatNeverAnswersBecomesUnavailable) {
   server_.queries.silent_messages = 1000;
   open({.reconnect = {.max_attempts = 3, .first_backoff = absl::Milliseconds(1)}, .patience = absl::Milliseconds(20)});
   auto answer = ask(1);

@@ -28,7 +28,7 @@ v1::BlockResult overlaps_of_three() {
   return block;
 }
 
-TEST(ResultRowsTest, TimesThatWereAskedAndClampedAreShownByQuery) {
+TEST(ResultRowsTest, EffectiveTimesAndClampedQueriesAreReportedByQuery) {
   v1::BlockResult block = first_hits();
   for (const uint64_t tick : {5, 9}) block.add_resolved_ticks(tick);
   for (const float fraction : {0.5f, 0.0f}) block.add_resolved_fractions(fraction);
@@ -41,7 +41,7 @@ TEST(ResultRowsTest, TimesThatWereAskedAndClampedAreShownByQuery) {
   EXPECT_TRUE(rows->clamped(1));
 }
 
-TEST(RayHitsTest, FirstHasOneRowARayAndMissesAreMisses) {
+TEST(RayHitsTest, FirstHasOneRowPerRayAndReportsMisses) {
   const v1::BlockResult block = first_hits();
   const absl::StatusOr<RayHits> hits = RayHits::of(block);
   ASSERT_TRUE(hits.ok()) << hits.status();
@@ -55,7 +55,7 @@ TEST(RayHitsTest, FirstHasOneRowARayAndMissesAreMisses) {
   EXPECT_EQ(hits->triangle(1), kNoTriangle);
 }
 
-TEST(RayHitsTest, AllGivesTheNearestOfEachRayAndNothingForRaysWithoutRows) {
+TEST(RayHitsTest, AllGivesTheNearestHitOfEachRayAndAMissForRaysWithoutRows) {
   v1::BlockResult block;
   for (const uint32_t count : {0, 2}) block.add_counts(count);
   for (const float t : {1.0f, 2.0f}) block.add_t(t);
@@ -66,16 +66,16 @@ TEST(RayHitsTest, AllGivesTheNearestOfEachRayAndNothingForRaysWithoutRows) {
   EXPECT_TRUE(std::isinf(hits->t(0)));
   EXPECT_EQ(hits->id(1), 5u);
   EXPECT_EQ(hits->rows().rows_of(1).size(), 2u);
-  EXPECT_EQ(hits->triangle(1), kNoTriangle) << "the column was not asked for";
+  EXPECT_EQ(hits->triangle(1), kNoTriangle) << "the column was not requested";
 }
 
-TEST(RayHitsTest, WithoutTheNeededColumnsTheCallerIsTold) {
+TEST(RayHitsTest, MissingColumnsAreAnError) {
   v1::BlockResult block = first_hits();
   block.clear_t();
   EXPECT_EQ(RayHits::of(block).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
-TEST(AnyHitsTest, OneByteARay) {
+TEST(AnyHitsTest, AnyHasOneBytePerRay) {
   v1::BlockResult block;
   block.set_hits(std::string("\1\0\1", 3));
   const absl::StatusOr<AnyHits> hits = AnyHits::of(block);
@@ -109,7 +109,7 @@ TEST(OverlapsTest, TriangleRowsAreAsLongAsIds) {
   EXPECT_THAT(overlaps->triangles(2), ElementsAre(kNoTriangle));
 }
 
-TEST(ResultRowsTest, AColumnThatContradictsTheCountsIsDataLoss) {
+TEST(ResultRowsTest, AColumnWhoseLengthContradictsTheCountsIsDataLoss) {
   v1::BlockResult block = overlaps_of_three();
   block.add_counts(5);
   EXPECT_EQ(ResultRows::of(block).status().code(), absl::StatusCode::kDataLoss);

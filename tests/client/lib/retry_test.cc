@@ -19,7 +19,7 @@ absl::Status exhausted(uint32_t retry_after_ms) {
   return to_absl_status(error);
 }
 
-TEST(BackoffTest, DoublesUpToTheLongestWaitThenGivesUp) {
+TEST(BackoffTest, WaitsDoubleUpToTheMaximumUntilTheAttemptsAreUsedUp) {
   Backoff backoff(
       {.max_attempts = 4, .first_backoff = absl::Milliseconds(100), .max_backoff = absl::Milliseconds(150)});
   const absl::Status failure = absl::UnavailableError("");
@@ -34,12 +34,12 @@ TEST(BackoffTest, DoublesUpToTheLongestWaitThenGivesUp) {
   EXPECT_TRUE(backoff.after_failure(failure).has_value());
 }
 
-TEST(BackoffTest, TheServersHintIsAFloor) {
+TEST(BackoffTest, TheServersHintIsAMinimum) {
   Backoff backoff(kQuick);
   EXPECT_EQ(backoff.after_failure(exhausted(700)), absl::Milliseconds(700));
 }
 
-TEST(RetriesTest, UnavailableIsTriedUntilThePolicyEnds) {
+TEST(RetriesTest, UnavailableIsRetriedUntilTheAttemptsAreUsedUp) {
   int calls = 0;
   const absl::Status status = with_retries(kQuick, absl::Now() + absl::Minutes(1), [&] {
     ++calls;
@@ -49,7 +49,7 @@ TEST(RetriesTest, UnavailableIsTriedUntilThePolicyEnds) {
   EXPECT_EQ(calls, 3);
 }
 
-TEST(RetriesTest, SuccessEndsTheTries) {
+TEST(RetriesTest, SuccessEndsTheRetries) {
   int calls = 0;
   const absl::Status status = with_retries(kQuick, absl::Now() + absl::Minutes(1), [&] {
     return ++calls < 2 ? absl::UnavailableError("down") : absl::OkStatus();
@@ -58,14 +58,14 @@ TEST(RetriesTest, SuccessEndsTheTries) {
   EXPECT_EQ(calls, 2);
 }
 
-TEST(RetriesTest, ExhaustedIsRepeatedOnlyWithAHint) {
+TEST(RetriesTest, ResourceExhaustedIsRetriedOnlyWithAHint) {
   EXPECT_TRUE(worth_repeating(exhausted(5)));
   EXPECT_FALSE(worth_repeating(exhausted(0)));
   EXPECT_FALSE(worth_repeating(absl::InternalError("")));
   EXPECT_FALSE(worth_repeating(absl::DeadlineExceededError("")));
 }
 
-TEST(RetriesTest, AWaitBeyondTheDeadlineIsNotBegun) {
+TEST(RetriesTest, AWaitBeyondTheDeadlineIsNotStarted) {
   int calls = 0;
   const absl::Status status = with_retries(kQuick, absl::Now() + absl::Seconds(5), [&] {
     ++calls;

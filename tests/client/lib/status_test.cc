@@ -7,7 +7,7 @@
 namespace locus::client {
 namespace {
 
-TEST(StatusTest, DetailsOfARefusalComeBackAsTheErrorTheServerSent) {
+TEST(StatusTest, DetailsOfAStatusAreReturnedAsTheErrorThatTheServerSent) {
   v1::Error sent;
   sent.set_reason(v1::REASON_LIMIT);
   sent.set_field("blocks[2].rays.directions");
@@ -38,13 +38,13 @@ TEST(StatusTest, WithoutDetailsThereIsNoError) {
   EXPECT_EQ(retry_after(status), absl::ZeroDuration());
 }
 
-TEST(StatusTest, DetailsThatAreNoMessageAreLeftOut) {
+TEST(StatusTest, MalformedDetailsAreDropped) {
   const absl::Status status = to_absl_status(grpc::Status(grpc::StatusCode::INTERNAL, "broken", "\xff\xff\xff"));
   EXPECT_TRUE(absl::IsInternal(status));
   EXPECT_FALSE(error_of(status).has_value());
 }
 
-TEST(StatusTest, ARefusalOnAStreamNeverBecomesSuccess) {
+TEST(StatusTest, AnErrorOnAStreamNeverBecomesSuccess) {
   v1::Error error;
   error.set_code(0);
   error.set_reason(v1::REASON_LIMIT);

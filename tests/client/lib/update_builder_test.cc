@@ -22,7 +22,7 @@ TEST(UpdateBuilderTest, RowsOfOneShapeShareOneInsertInTheOrderAdded) {
   EXPECT_THAT(batch.inserts(1).box().half_extents(), ElementsAre(1, 2, 3));
 }
 
-TEST(UpdateBuilderTest, ColumnsOfDefaultsStayEmpty) {
+TEST(UpdateBuilderTest, ColumnsOfDefaultValuesStayEmpty) {
   const v1::UpdateBatch batch = UpdateBuilder().insert_box(9, Float3{0, 0, 0}, {1, 1, 1}).build();
   const v1::Insert& insert = batch.inserts(0);
   EXPECT_THAT(insert.rotations(), IsEmpty());
@@ -60,7 +60,7 @@ TEST(UpdateBuilderTest, CapsulesHaveAxisAndRadius) {
   EXPECT_THAT(batch.inserts(0).capsule().radii(), ElementsAre(0.25f));
 }
 
-TEST(UpdateBuilderTest, WholeColumnsAreCopiedAsTheyAre) {
+TEST(UpdateBuilderTest, WholeColumnsAreCopiedUnchanged) {
   const std::vector<uint64_t> ids = {1, 2};
   const std::vector<float> positions = {1, 2, 3, 4, 5, 6};
   const std::vector<uint32_t> one_for_all = {4};
@@ -70,7 +70,7 @@ TEST(UpdateBuilderTest, WholeColumnsAreCopiedAsTheyAre) {
                                     .insert_balls({.ids = ids, .positions = positions, .layers = one_for_all}, radii)
                                     .insert_ball(10, Float3{}, 1)
                                     .build();
-  ASSERT_EQ(batch.inserts_size(), 2) << "rows do not mix with columns that may stand for all";
+  ASSERT_EQ(batch.inserts_size(), 2) << "rows are not added to columns that may have one entry for all";
   EXPECT_THAT(batch.inserts(0).ids(), ElementsAre(9, 10));
   EXPECT_THAT(batch.inserts(1).ids(), ElementsAre(1, 2));
   EXPECT_THAT(batch.inserts(1).positions(), ElementsAre(1, 2, 3, 4, 5, 6));
@@ -116,7 +116,7 @@ TEST(UpdateBuilderTest, RelabelsLeaveAbsentColumnsEmpty) {
   EXPECT_THAT(batch.relabels(1).tags(), ElementsAre(5));
 }
 
-TEST(UpdateBuilderTest, SettingsAndRemovesLandInTheBatchAndBuildLeavesNothingBehind) {
+TEST(UpdateBuilderTest, SettingsAndRemovesAreInTheBatchAndBuildResetsTheBuilder) {
   UpdateBuilder builder;
   const std::vector<uint64_t> more = {2, 3};
   const v1::UpdateBatch batch = builder.frame({1, 2, 3})

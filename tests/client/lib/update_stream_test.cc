@@ -32,7 +32,7 @@ std::vector<uint64_t> one_to(uint64_t last) {
   return ticks;
 }
 
-// Outcomes in the order in which they were handed over.
+// Outcomes of batches in the order of their callbacks.
 struct Outcomes {
   std::mutex mutex;
   std::vector<uint64_t> ticks;
@@ -82,7 +82,7 @@ TEST_F(UpdateStreamTest, BatchesAreAppliedAndAckedInOrder) {
   EXPECT_THAT(server_.updates.scenes, ElementsAre("arena")) << "x-scene";
 }
 
-TEST_F(UpdateStreamTest, AfterABreakWhatWasAppliedWithoutAckIsNotAppliedAgain) {
+TEST_F(UpdateStreamTest, AfterABreakBatchesAppliedWithoutAckAreNotAppliedAgain) {
   server_.updates.breaks = {.after_messages = 3, .times = 5, .apply_last = true};
   const auto stream = open();
   Outcomes outcomes;
@@ -95,7 +95,7 @@ TEST_F(UpdateStreamTest, AfterABreakWhatWasAppliedWithoutAckIsNotAppliedAgain) {
   EXPECT_GE(server_.updates.duplicates, 1);
 }
 
-TEST_F(UpdateStreamTest, AfterABreakWhatWasLostIsSentAgain) {
+TEST_F(UpdateStreamTest, AfterABreakLostBatchesAreSentAgain) {
   server_.updates.breaks = {.after_messages = 2, .times = 7, .apply_last = false};
   const auto stream = open();
   Outcomes outcomes;
@@ -105,7 +105,7 @@ TEST_F(UpdateStreamTest, AfterABreakWhatWasLostIsSentAgain) {
   EXPECT_EQ(outcomes.ticks, one_to(50));
 }
 
-TEST_F(UpdateStreamTest, AServerThatRestartsWithItsStateGetsTheRest) {
+TEST_F(UpdateStreamTest, ARestartedServerWithItsStateGetsTheRemainingBatches) {
   const auto stream = open();
   Outcomes outcomes;
   send_ticks(*stream, 10, outcomes);
@@ -122,7 +122,7 @@ TEST_F(UpdateStreamTest, AServerThatRestartsWithItsStateGetsTheRest) {
   EXPECT_EQ(outcomes.ticks, one_to(40));
 }
 
-TEST_F(UpdateStreamTest, ARefusedBatchCostsOnlyItselfAndTheRestIsRenumbered) {
+TEST_F(UpdateStreamTest, ARefusedBatchDoesNotAffectOthersAndTheRestIsRenumbered) {
   server_.updates.refused_ticks = {1, 5, 6, 20};
   const auto stream = open();
   Outcomes outcomes;
@@ -139,7 +139,7 @@ TEST_F(UpdateStreamTest, ARefusedBatchCostsOnlyItselfAndTheRestIsRenumbered) {
   EXPECT_EQ(server_.updates.streams, 1) << "a refusal does not end the stream";
 }
 
-TEST_F(UpdateStreamTest, RefusalsAndBreaksTogetherStillApplyEachBatchOnce) {
+TEST_F(UpdateStreamTest, EachBatchIsAppliedOnceDespiteRefusalsAndBreaks) {
   server_.updates.refused_ticks = {3, 17, 18, 33};
   server_.updates.breaks = {.after_messages = 5, .times = 12, .apply_last = true};
   const auto stream = open();
@@ -165,7 +165,7 @@ TEST_F(UpdateStreamTest, AServerThatForgotTheWriterEndsTheStreamInsteadOfLosingB
   EXPECT_THAT(server_.updates.applied(), ElementsAre(1));
 }
 
-TEST_F(UpdateStreamTest, WhenReconnectingFailsForGoodEveryUnansweredBatchIsTold) {
+TEST_F(UpdateStreamTest, WhenReconnectingFailsEveryUnansweredBatchGetsTheError) {
   const auto stream =
       client_->update_stream("arena", {.reconnect = {.max_attempts = 2, .first_backoff = absl::Milliseconds(1)}});
   server_.stop();
@@ -175,7 +175,7 @@ TEST_F(UpdateStreamTest, WhenReconnectingFailsForGoodEveryUnansweredBatchIsTold)
   EXPECT_TRUE(absl::IsUnavailable(stream->send(batch_of_tick(2)).get().status()));
 }
 
-TEST_F(UpdateStreamTest, ARefusedStreamIsNotTriedAgain) {
+TEST_F(UpdateStreamTest, ARefusedStreamIsNotRetried) {
   server_.updates.breaks = {
       .after_messages = 1, .times = 1, .status = {grpc::StatusCode::PERMISSION_DENIED, "planned"}};
   const auto stream = open();
@@ -184,7 +184,7 @@ TEST_F(UpdateStreamTest, ARefusedStreamIsNotTriedAgain) {
   EXPECT_EQ(server_.updates.streams, 1);
 }
 
-TEST_F(UpdateStreamTest, AtMostTheWindowIsUnderWay) {
+TEST_F(UpdateStreamTest, AtMostMaxInFlightBatchesAreUnanswered) {
   const auto stream = open(/*max_in_flight=*/1);
   Outcomes outcomes;
   send_ticks(*stream, 30, outcomes);
@@ -200,7 +200,7 @@ TEST_F(UpdateStreamTest, ClosingAnUnusedStreamOpensNoCall) {
   EXPECT_FALSE(stream->last_ack().has_value());
 }
 
-TEST_F(UpdateStreamTest, BreakingOffTellsEveryUnansweredBatch) {
+TEST_F(UpdateStreamTest, CancellingTheStreamFailsEveryUnansweredBatch) {
   server_.updates.breaks = {.after_messages = 1, .times = 1'000'000};
   Outcomes outcomes;
   {

@@ -15,7 +15,7 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-// Three blocks that are right; the last, of 20 queries, is what tests spoil.
+// Three valid blocks; tests make the last one, of 20 queries, invalid.
 std::vector<OwnedBlock> three_blocks(OwnedBlock last) {
   return {rays_along_x(RayMode::kFirst), one_ball({0, 0, 0}, 1), std::move(last)};
 }
@@ -60,7 +60,7 @@ Refusal refusal_for(const std::vector<OwnedBlock>& blocks) {
   return refusal_of(status).value_or(Refusal{});
 }
 
-// `field` is relative to block 2; an index of -1 is none.
+// Expects the error to name `field` of block 2 and `index`; -1 means no index.
 void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
   const Refusal refusal = refusal_for(three_blocks(block));
   EXPECT_EQ(reason_name(refusal.reason), reason_name(reason));
@@ -68,7 +68,7 @@ void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& f
   EXPECT_EQ(refusal.index ? static_cast<int>(*refusal.index) : -1, index);
 }
 
-TEST(CheckBatchTest, BlocksThatAreRightPass) {
+TEST(CheckBatchTest, ValidBlocksPass) {
   for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), twenty_points(), lookup_of_ids({1}),
                                   lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
     EXPECT_TRUE(status_with(block).ok());
@@ -81,7 +81,7 @@ TEST(CheckBatchTest, TheMessageNamesFieldAndIndex) {
   EXPECT_NE(status.message().find("blocks[2].rays.directions[17]"), absl::string_view::npos) << status;
 }
 
-TEST(CheckBatchTest, NumbersOfRaysThatAreNotFiniteAreRefused) {
+TEST(CheckBatchTest, RayValuesThatAreNotFiniteAreRefused) {
   for (const float wrong : {kNan, kInf, -kInf}) {
     OwnedBlock block = twenty_rays();
     block.points[19 * 3 + 2] = wrong;
@@ -104,7 +104,7 @@ TEST(CheckBatchTest, DenormalDirectionsPass) {
   EXPECT_TRUE(status_with(block).ok());
 }
 
-TEST(CheckBatchTest, RayEndsMayBeInfiniteButNotNegativeNorNan) {
+TEST(CheckBatchTest, TMaxMayBeInfiniteButNotNegativeOrNan) {
   OwnedBlock block = twenty_rays();
   block.extras[3] = kInf;
   block.extras[4] = 0;
@@ -139,7 +139,7 @@ TEST(CheckBatchTest, HalfExtentsMustBeFiniteAndNotNegative) {
   expect_refusal(block, Reason::kOutOfRange, "boxes.half_extents", 8);
 }
 
-TEST(CheckBatchTest, CentresMustBeFinite) {
+TEST(CheckBatchTest, CentersMustBeFinite) {
   OwnedBlock balls = twenty_balls();
   balls.points[4] = kNan;
   expect_refusal(balls, Reason::kNotFinite, "balls.centers", 1);
@@ -148,7 +148,7 @@ TEST(CheckBatchTest, CentresMustBeFinite) {
   expect_refusal(boxes, Reason::kNotFinite, "boxes.centers", 19);
 }
 
-TEST(CheckBatchTest, GreatestDistancesMayBeInfiniteButNotNegativeNorNan) {
+TEST(CheckBatchTest, MaxDistancesMayBeInfiniteButNotNegativeOrNan) {
   OwnedBlock block = twenty_points();
   block.extras[11] = kInf;
   EXPECT_TRUE(status_with(block).ok());
@@ -160,7 +160,7 @@ TEST(CheckBatchTest, GreatestDistancesMayBeInfiniteButNotNegativeNorNan) {
   }
 }
 
-TEST(CheckBatchTest, HowManyAreNearestHasALimit) {
+TEST(CheckBatchTest, TheCountOfNearestHasALimit) {
   OwnedBlock block = twenty_points();
   std::get<NearestColumns>(block.settings.kind).count = limits::kMaxNearest;
   EXPECT_TRUE(status_with(block).ok());
@@ -217,7 +217,7 @@ struct Column20 {
   bool one_for_all, none;
 };
 
-TEST(CheckBatchTest, ColumnsHaveNEntriesOneOrWhereAllowedNone) {
+TEST(CheckBatchTest, ColumnsHaveNEntriesOrOneOrIfOptionalNone) {
   const auto sizes = [](OwnedBlock& b) -> std::vector<float>& { return b.sizes; };
   const auto extras = [](OwnedBlock& b) -> std::vector<float>& { return b.extras; };
   const Column20 columns[] = {{"rays.directions", twenty_rays, sizes, 3, true, false},
@@ -248,7 +248,7 @@ TEST(CheckBatchTest, ColumnsHaveNEntriesOneOrWhereAllowedNone) {
   expect_refusal(balls, Reason::kColumnLength, "balls.centers", -1);
 }
 
-TEST(CheckBatchTest, MasksAndIgnoredGroupsHaveNEntriesOneOrNone) {
+TEST(CheckBatchTest, MasksAndIgnoredGroupsHaveNEntriesOrOneOrNone) {
   OwnedBlock block = twenty_rays();
   for (const size_t entries : {0u, 1u, 20u}) {
     block.masks.assign(entries, 1);
@@ -299,7 +299,7 @@ TEST(CheckBatchTest, ABatchHasAtMost65536QueriesOverAllBlocks) {
   EXPECT_EQ(refusal.asked, 65537);
 }
 
-TEST(CheckBatchTest, AReplyHasALargestSize) {
+TEST(CheckBatchTest, MaxReplyBytesHasALimit) {
   const std::vector<OwnedBlock> blocks = {rays_along_x(RayMode::kFirst)};
   QueryBatch batch = batch_of(blocks);
   batch.max_reply_bytes = limits::kMaxReplyBytes;
@@ -308,7 +308,7 @@ TEST(CheckBatchTest, AReplyHasALargestSize) {
   EXPECT_EQ(refusal_of(check_batch(batch)).value_or(Refusal{}).field, "max_reply_bytes");
 }
 
-TEST(CheckBatchTest, RowsThatCannotBeCutMustFitTheReply) {
+TEST(CheckBatchTest, DenseRowsMustFitTheReply) {
   std::vector<OwnedBlock> blocks = {rays_along_x(RayMode::kFirst, std::vector<float>(3 * 65536, 0))};
   EXPECT_TRUE(check_batch(batch_of(blocks)).ok());  // T, ID and TRIANGLE: 16 bytes a ray
   blocks[0].settings.columns = {Column::kT, Column::kId, Column::kNormal, Column::kPoint, Column::kPose};
@@ -353,13 +353,13 @@ TEST(CheckBatchTest, CountsCannotBeCutEither) {
   EXPECT_EQ(refusal.asked, 8512);
 }
 
-TEST(CheckBatchTest, RaysOfAnyHaveNoColumns) {
+TEST(CheckBatchTest, RaysOfModeAnyHaveNoColumns) {
   OwnedBlock block = rays_along_x(RayMode::kAny);
   block.settings.columns = {Column::kT};
   expect_refusal(block, Reason::kMalformed, "columns", -1);
 }
 
-TEST(CheckBatchTest, ColumnsThatAKindCannotGiveAreRefused) {
+TEST(CheckBatchTest, ColumnsThatAKindDoesNotServeAreRefused) {
   for (const Column column : {Column::kT, Column::kUv, Column::kNormal, Column::kPoint}) {
     for (OwnedBlock block : {twenty_balls(), twenty_boxes(), lookup_of_ids({1})}) {
       block.settings.columns = {Column::kId, column};
@@ -376,14 +376,14 @@ TEST(CheckBatchTest, ColumnsThatAKindCannotGiveAreRefused) {
   expect_refusal(lookup, Reason::kMalformed, "columns", -1);
 }
 
-TEST(CheckBatchTest, LookupsHaveIdsOrGroups) {
+TEST(CheckBatchTest, LookupsHaveEitherIdsOrGroups) {
   OwnedBlock both = lookup_of_ids({1});
   both.groups = {1};
   expect_refusal(both, Reason::kMalformed, "lookup", -1);
   expect_refusal(lookup_of_ids({}), Reason::kMalformed, "lookup", -1);
 }
 
-TEST(CheckBatchTest, ZeroIsNoIdAndNoGroup) {
+TEST(CheckBatchTest, ZeroIsRefusedAsIdAndAsGroup) {
   expect_refusal(lookup_of_ids({3, 4, 0}), Reason::kOutOfRange, "lookup.ids", 2);
   expect_refusal(lookup_of_groups({3, 0}), Reason::kOutOfRange, "lookup.groups", 1);
 }

@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// Objects of those ids, as a grid holds them.
+// Grid of objects with the given ids.
 class Block {
  public:
   explicit Block(const std::vector<Id>& ids) : block_(static_cast<uint32_t>(ids.size()), false) {
@@ -53,14 +53,14 @@ void expect_in_order(std::vector<Id> ids) {
   EXPECT_FALSE(found.truncated());
 }
 
-TEST(FoundObjectsTest, NothingFoundIsNothing) {
+TEST(FoundObjectsTest, WithoutOffersTheResultIsEmpty) {
   FoundObjects found;
   found.restart(10);
   EXPECT_THAT(found.finish(), IsEmpty());
   EXPECT_FALSE(found.truncated());
 }
 
-TEST(FoundObjectsTest, IdsAscendHoweverManyThereAre) {
+TEST(FoundObjectsTest, IdsAscendForAnyNumberOfObjects) {
   Random random(1);
   for (const uint64_t count : {1, 2, 12, 13, 79, 256, 1024, 1025, 3000}) {
     std::vector<Id> ids;
@@ -70,13 +70,13 @@ TEST(FoundObjectsTest, IdsAscendHoweverManyThereAre) {
   }
 }
 
-TEST(FoundObjectsTest, IdsAscendHoweverUnevenTheyAre) {
+TEST(FoundObjectsTest, IdsAscendForAnyDistributionOfIds) {
   std::vector<Id> ids = {~Id{0}, 1, Id{1} << 63};
   for (Id id = 100; id > 2; --id) ids.push_back(id);
   expect_in_order(ids);
 }
 
-TEST(FoundObjectsTest, OnlyTheLowestAreKept) {
+TEST(FoundObjectsTest, OnlyTheLowestIdsAreKept) {
   const Block block({9, 2, 7, 1, 8, 3, 6, 4, 5, 10});
   FoundObjects found;
   found.restart(3);
@@ -85,7 +85,7 @@ TEST(FoundObjectsTest, OnlyTheLowestAreKept) {
   EXPECT_TRUE(found.truncated());
 }
 
-TEST(FoundObjectsTest, AFreshStartForgetsWhatWas) {
+TEST(FoundObjectsTest, RestartForgetsEarlierObjects) {
   const Block first({4, 3, 2, 1}), second({5});
   FoundObjects found;
   found.restart(2);

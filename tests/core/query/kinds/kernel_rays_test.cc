@@ -1,4 +1,4 @@
-// Rays that go to the kernels piece by piece, against every triangle of every instance.
+// Rays that the kernels trace chunk by chunk, compared with tests of every triangle of every instance.
 #include "core/query/kinds/kernel_rays.h"
 
 #include <gmock/gmock.h>
@@ -14,9 +14,9 @@
 namespace locus::test {
 namespace {
 
-constexpr size_t kRays = 700;  // several pieces, the last of them not full
+constexpr size_t kRays = 700;  // several chunks, the last of them not full
 
-// Three meshes in forty places, turned, scaled and across one another.
+// Forty instances of three meshes, rotated, scaled and overlapping each other.
 QueryWorld crowd() {
   Random random(1);
   const StaticMeshPtr meshes[] = {mesh_of(bumpy_sphere(8, 0.1, 1)), mesh_of(bumpy_sphere(5, 0.2, 2)),
@@ -55,7 +55,7 @@ class KernelRaysTest : public ::testing::TestWithParam<std::string> {
   void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
 };
 
-TEST_P(KernelRaysTest, FindTheFirstHitsOfAllInstancesAsEveryTriangleDoes) {
+TEST_P(KernelRaysTest, FirstHitsEqualThoseOfBruteForce) {
   const SnapshotPtr snapshot = snapshot_of(crowd());
   const OwnedBlock rays = rays_through(RayMode::kFirst);
   RunOptions every_triangle;
@@ -63,7 +63,7 @@ TEST_P(KernelRaysTest, FindTheFirstHitsOfAllInstancesAsEveryTriangleDoes) {
   EXPECT_EQ(difference(run_block(*snapshot, rays), run_block(*snapshot, rays, every_triangle)), "");
 }
 
-TEST_P(KernelRaysTest, FindWhetherThereIsAHitAsEveryTriangleDoes) {
+TEST_P(KernelRaysTest, AnyHitsEqualThoseOfBruteForce) {
   const SnapshotPtr snapshot = snapshot_of(crowd());
   const OwnedBlock rays = rays_through(RayMode::kAny);
   RunOptions every_triangle;
@@ -71,7 +71,7 @@ TEST_P(KernelRaysTest, FindWhetherThereIsAHitAsEveryTriangleDoes) {
   EXPECT_EQ(run_block(*snapshot, rays).hits, run_block(*snapshot, rays, every_triangle).hits);
 }
 
-TEST_P(KernelRaysTest, FindAllHitsOrTheLowestOfThemAsEveryTriangleDoes) {
+TEST_P(KernelRaysTest, AllHitsAndTruncatedHitsEqualThoseOfBruteForce) {
   const SnapshotPtr snapshot = snapshot_of(crowd());
   RunOptions every_triangle;
   every_triangle.brute_force = true;
@@ -82,8 +82,8 @@ TEST_P(KernelRaysTest, FindAllHitsOrTheLowestOfThemAsEveryTriangleDoes) {
   }
 }
 
-// More of one mesh than the kernels keep.
-TEST_P(KernelRaysTest, FindAllHitsOfARayThroughManyTrianglesOfOneMesh) {
+// The ray has more hits in one mesh than the kernels keep.
+TEST_P(KernelRaysTest, AllHitsOfARayThroughManyTrianglesOfOneMeshAreFound) {
   constexpr uint32_t kWalls = 500;
   std::vector<Triangle> walls;
   for (uint32_t i = 0; i < kWalls; ++i) walls.push_back(wall_triangle(static_cast<float>(i)));
@@ -96,7 +96,7 @@ TEST_P(KernelRaysTest, FindAllHitsOfARayThroughManyTrianglesOfOneMesh) {
   for (uint32_t i = 0; i < kWalls; ++i) EXPECT_EQ(result.triangles[i], i);
 }
 
-TEST_P(KernelRaysTest, ABudgetThatEndsListsTheRaysThatWereLeft) {
+TEST_P(KernelRaysTest, AnExhaustedBudgetListsTheUnansweredRays) {
   const SnapshotPtr snapshot = snapshot_of(crowd());
   const std::vector<OwnedBlock> blocks = {rays_through(RayMode::kFirst)};
   QueryBatch batch = batch_of(blocks);

@@ -22,7 +22,7 @@ QueryWorld small_world() {
   return world;
 }
 
-TEST(LookupQueryTest, IdsGiveOneRowEachInTheOrderAsked) {
+TEST(LookupQueryTest, EachIdGivesOneRowInRequestOrder) {
   OwnedBlock block = lookup_of_ids({3, 99, 5, 3});
   block.settings.columns = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers};
   const BlockResult result = run_block(*snapshot_of(small_world()), block);
@@ -41,13 +41,13 @@ TEST(LookupQueryTest, DefaultColumnsAreIdAndPose) {
   EXPECT_THAT(result.groups, IsEmpty());
 }
 
-TEST(LookupQueryTest, PosesAreAbsoluteDoublesWhateverTheFrame) {
+TEST(LookupQueryTest, PosesAreAbsoluteDoublesForAnyFrame) {
   OwnedBlock block = lookup_of_ids({5, 3});
   block.settings.frame = {1e8, 0, 0};
   EXPECT_THAT(run_block(*snapshot_of(small_world()), block).positions, ElementsAre(1e8 + 0.1, 2, 3, 7, 8, 1e-9));
 }
 
-TEST(LookupQueryTest, HiddenObjectsAreFoundAndFiltersAreNotLookedAt) {
+TEST(LookupQueryTest, HiddenObjectsAreFoundAndFiltersAreIgnored) {
   OwnedBlock block = lookup_of_ids({2});
   block.masks = {1};
   block.ignore_ids = {2};
@@ -57,7 +57,7 @@ TEST(LookupQueryTest, HiddenObjectsAreFoundAndFiltersAreNotLookedAt) {
   EXPECT_THAT(result.rotations, ElementsAre(0, 0, 1, 0));
 }
 
-TEST(LookupQueryTest, GroupsGiveAllTheirMembersAscending) {
+TEST(LookupQueryTest, GroupsGiveAllTheirMembersAscendingById) {
   const BlockResult result = run_block(*snapshot_of(small_world()), lookup_of_groups({41, 40}));
   EXPECT_THAT(result.counts, ElementsAre(0, 2));
   EXPECT_THAT(result.ids, ElementsAre(3, 5));
@@ -70,14 +70,14 @@ TEST(LookupQueryTest, HiddenMembersOfAGroupAreFound) {
   EXPECT_THAT(run_block(*snapshot_of(world), lookup_of_groups({40})).ids, ElementsAre(2, 3, 5));
 }
 
-TEST(LookupQueryTest, AGroupAskedTwiceIsAnsweredTwice) {
+TEST(LookupQueryTest, AGroupRequestedTwiceIsAnsweredTwice) {
   const BlockResult result = run_block(*snapshot_of(small_world()), lookup_of_groups({40, 40}));
   EXPECT_THAT(result.counts, ElementsAre(2, 2));
   EXPECT_THAT(result.ids, ElementsAre(3, 5, 3, 5));
 }
 
-// Each answer kept for itself would take 65,536 times 2,000 rows.
-TEST(LookupQueryTest, ALargeGroupAskedManyTimesIsKeptOnceAndCutToTheReply) {
+// Keeping each answer separately would take 65,536 times 2,000 rows.
+TEST(LookupQueryTest, ALargeGroupRequestedManyTimesIsKeptOnceAndTruncatedToTheReply) {
   QueryWorld world;
   for (Id id = 1; id <= 2000; ++id) world.objects.push_back(ball_object(id, {}));
   for (Object& object : world.objects) object.group = 40;
@@ -91,7 +91,7 @@ TEST(LookupQueryTest, ALargeGroupAskedManyTimesIsKeptOnceAndCutToTheReply) {
   EXPECT_EQ(result.truncated.back(), 65535u);
 }
 
-TEST(LookupQueryTest, GroupsArePagedByIdAndCutByMaxResults) {
+TEST(LookupQueryTest, GroupsArePagedByAfterIdAndTruncatedByMaxResults) {
   QueryWorld world;
   for (Id id = 1; id <= 10; ++id) world.objects.push_back(ball_object(id, {}));
   for (Object& object : world.objects) object.group = 40;

@@ -51,7 +51,7 @@ TEST(LowestRowsTest, TrianglesOfAnInstanceKeepTheirOrderUnlessSorted) {
   }
 }
 
-TEST(LowestRowsTest, OnlyTheLowestAreKeptHoweverTheyCome) {
+TEST(LowestRowsTest, OnlyTheLowestAreKeptForAnyOrderOfOffers) {
   LowestRows rows(3, true);
   for (uint32_t triangle = 20; triangle > 0; --triangle) rows.offer(row(7), std::vector<uint32_t>{triangle});
   rows.offer(row(9), std::vector<uint32_t>{1, 2});
@@ -61,13 +61,13 @@ TEST(LowestRowsTest, OnlyTheLowestAreKeptHoweverTheyCome) {
   EXPECT_TRUE(answer.truncated);
 }
 
-TEST(LowestRowsTest, AsManyAsAreWantedIsNotTruncated) {
+TEST(LowestRowsTest, ExactlyMaxResultsRowsAreNotTruncated) {
   LowestRows rows(3, false);
   rows.offer(row(1), std::vector<uint32_t>{5, 6, 7});
   EXPECT_FALSE(rows.finish().truncated);
 }
 
-TEST(LowestRowsTest, NothingOfferedIsNoRow) {
+TEST(LowestRowsTest, WithoutOffersThereAreNoRows) {
   LowestRows rows(3, false);
   rows.offer(row(1), std::vector<uint32_t>());
   EXPECT_THAT(rows.finish().runs, IsEmpty());

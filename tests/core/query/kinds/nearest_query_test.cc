@@ -22,7 +22,7 @@ Object point_object(Id id, Vec3d position) {
   return object;
 }
 
-// Walls at x = 0, 10 and 20 of instances 4 and 5, which stands 3 behind; objects between them.
+// Instances 4 and 5 with walls at x = 0, 10 and 20, instance 5 displaced by 3; objects between them.
 QueryWorld mixed_world() {
   QueryWorld world;
   const StaticMeshPtr walls = mesh_of({wall_triangle(0), wall_triangle(10), wall_triangle(20)});
@@ -31,7 +31,7 @@ QueryWorld mixed_world() {
   return world;
 }
 
-TEST(NearestQueryTest, OneIsTheDefault) {
+TEST(NearestQueryTest, CountIsOneByDefault) {
   const BlockResult result = run_block(*snapshot_of(mixed_world()), one_point({-1.75, 0, 0}));
   EXPECT_THAT(result.counts, ElementsAre(1));
   EXPECT_THAT(result.ids, ElementsAre(7));
@@ -48,7 +48,7 @@ TEST(NearestQueryTest, RowsAscendByDistanceOverInstancesAndObjects) {
   EXPECT_THAT(result.truncated, IsEmpty());
 }
 
-TEST(NearestQueryTest, AnInstanceIsOneRowOfItsNearestTriangle) {
+TEST(NearestQueryTest, AnInstanceIsOneRowWithItsNearestTriangle) {
   OwnedBlock block = one_point({18, 0, 0}, 100);
   block.settings.source = Source::kStatic;
   const BlockResult result = run_block(*snapshot_of(mixed_world()), block);
@@ -57,7 +57,7 @@ TEST(NearestQueryTest, AnInstanceIsOneRowOfItsNearestTriangle) {
   EXPECT_THAT(result.triangles, ElementsAre(2, 1));
 }
 
-TEST(NearestQueryTest, TrianglesAreARowEachByDistanceSortedOrNot) {
+TEST(NearestQueryTest, EachTriangleIsARowByDistanceSortedOrNot) {
   for (const StaticDetail detail : {StaticDetail::kTriangles, StaticDetail::kTrianglesSorted}) {
     OwnedBlock block = one_point({11, 0, 0}, 100, detail);
     block.settings.source = Source::kStatic;
@@ -68,7 +68,7 @@ TEST(NearestQueryTest, TrianglesAreARowEachByDistanceSortedOrNot) {
   }
 }
 
-TEST(NearestQueryTest, OfEqualDistanceTheLowerIdAndThenTheLowerTriangleComesFirst) {
+TEST(NearestQueryTest, AtEqualDistanceTheLowerIdAndThenTheLowerTriangleComesFirst) {
   QueryWorld world;
   world.instances = {placed(5, mesh_of({wall_triangle(1), wall_triangle(-1), wall_triangle(1)}))};
   world.objects = {point_object(9, {0, 1, 0}), point_object(3, {0, 0, -1})};
@@ -82,7 +82,7 @@ TEST(NearestQueryTest, OfEqualDistanceTheLowerIdAndThenTheLowerTriangleComesFirs
   EXPECT_THAT(run_block(*snapshot, one_point({}, 9)).triangles, ElementsAre(kNoTriangle, 0, kNoTriangle));
 }
 
-TEST(NearestQueryTest, TheGreatestDistanceIsIncluded) {
+TEST(NearestQueryTest, MaxDistanceIsIncluded) {
   const SnapshotPtr snapshot = snapshot_of(mixed_world());
   OwnedBlock block = one_point({-1, 0, 0}, 100);
   block.extras = {4};
@@ -95,7 +95,7 @@ TEST(NearestQueryTest, TheGreatestDistanceIsIncluded) {
   EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(4, 7, 9, 5, 2));
 }
 
-TEST(NearestQueryTest, EachQueryHasItsOwnGreatestDistance) {
+TEST(NearestQueryTest, EachQueryHasItsOwnMaxDistance) {
   OwnedBlock block = one_point({-1, 0, 0}, 100);
   block.points.insert(block.points.end(), {-1, 0, 0});
   block.extras = {1, 2};
@@ -103,7 +103,7 @@ TEST(NearestQueryTest, EachQueryHasItsOwnGreatestDistance) {
   EXPECT_THAT(result.counts, ElementsAre(2, 3));
 }
 
-TEST(NearestQueryTest, APointInASolidOrOnASurfaceIsAtZeroAndItsOwnNearestPoint) {
+TEST(NearestQueryTest, APointInASolidOrOnASurfaceHasDistanceZeroAndIsItsOwnNearestPoint) {
   QueryWorld world;
   world.objects = {ball_object(1, {1, 2, 3}), box_object(2, {2, 2, 3})};
   world.instances = {placed(4, wall_mesh(), {1.5, 2, 3})};
@@ -131,7 +131,7 @@ TEST(NearestQueryTest, PointsAreOnTheSurfaceRelativeToTheFrame) {
   EXPECT_THAT(std::vector<float>(result.points.begin() + 2, result.points.end()), ElementsAre(0, -4, 0, 0, 8, 0, 0));
 }
 
-TEST(NearestQueryTest, DistancesToScaledInstancesAreInTheWorld) {
+TEST(NearestQueryTest, DistancesToScaledInstancesAreInWorldUnits) {
   QueryWorld world;
   PlacedMesh wall = placed(4, wall_mesh(), {10, 0, 0});
   wall.scale = 8;
@@ -142,7 +142,7 @@ TEST(NearestQueryTest, DistancesToScaledInstancesAreInTheWorld) {
   EXPECT_NEAR(result.t[0], 24, 1e-5);
 }
 
-TEST(NearestQueryTest, WithoutTheExactShapeBoundsDecide) {
+TEST(NearestQueryTest, ConservativeDistancesAreToBounds) {
   QueryWorld world;
   world.objects = {ball_object(1, {5, 5, 0}, 4)};
   world.instances = {placed(4, mesh_of({{{8, 0, 0}, {0, 8, 0}, {8, 8, 0}}}))};
@@ -158,7 +158,7 @@ TEST(NearestQueryTest, WithoutTheExactShapeBoundsDecide) {
   EXPECT_EQ(result.points[5], 0);
 }
 
-TEST(NearestQueryTest, FiltersPassOverWhatIsNearer) {
+TEST(NearestQueryTest, FiltersSkipNearerRows) {
   QueryWorld world;
   for (Id id = 1; id <= 4; ++id) world.objects.push_back(point_object(id, {static_cast<double>(id), 0, 0}));
   world.objects[0].layers = 2;
@@ -170,7 +170,7 @@ TEST(NearestQueryTest, FiltersPassOverWhatIsNearer) {
   EXPECT_THAT(run_block(*snapshot_of(world), block).ids, ElementsAre(4));
 }
 
-TEST(NearestQueryTest, SourceAndLabelsAreAsForOtherKinds) {
+TEST(NearestQueryTest, SourceAndLabelColumnsWorkAsForOtherKinds) {
   QueryWorld world = mixed_world();
   world.objects[2].tag = 99;
   OwnedBlock block = one_point({-1, 0, 0}, 9);
@@ -183,7 +183,7 @@ TEST(NearestQueryTest, SourceAndLabelsAreAsForOtherKinds) {
   EXPECT_THAT(result.t, IsEmpty());
 }
 
-TEST(NearestQueryTest, MaxResultsAndAfterIdAreNotLookedAt) {
+TEST(NearestQueryTest, MaxResultsAndAfterIdAreIgnored) {
   OwnedBlock block = one_point({-1, 0, 0}, 3);
   block.settings.max_results = 1;
   block.settings.after_id = 1000;
@@ -192,7 +192,7 @@ TEST(NearestQueryTest, MaxResultsAndAfterIdAreNotLookedAt) {
   EXPECT_THAT(result.truncated, IsEmpty());
 }
 
-TEST(NearestQueryTest, AnEmptySceneHasNothingNear) {
+TEST(NearestQueryTest, AnEmptySceneGivesNoRows) {
   const BlockResult result = run_block(*snapshot_of({}), one_point({1, 2, 3}, 5));
   EXPECT_THAT(result.counts, ElementsAre(0));
   EXPECT_THAT(result.ids, IsEmpty());
@@ -206,7 +206,7 @@ TEST(NearestQueryTest, TrianglesWithoutAreaAreFound) {
   EXPECT_THAT(result.triangles, ElementsAre(0, 1));
 }
 
-TEST(NearestQueryTest, FewTrianglesOfALargeMeshAreMeasured) {
+TEST(NearestQueryTest, FewTrianglesOfALargeMeshAreTested) {
   Random random(71);
   std::vector<Triangle> triangles;
   for (int i = 0; i < 20'000; ++i) {
@@ -220,7 +220,7 @@ TEST(NearestQueryTest, FewTrianglesOfALargeMeshAreMeasured) {
   EXPECT_LE(result.work.tests, 200u);
 }
 
-TEST(NearestQueryTest, WithoutTheExactShapeDistanceAndPointAreOfOneBoxFarFromTheOrigin) {
+TEST(NearestQueryTest, ConservativeDistanceAndPointBelongToTheSameBoundsFarFromTheOrigin) {
   for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
     QueryWorld world;
     PlacedMesh cube = placed(4, cube_mesh(), {away, away, -away});

@@ -21,7 +21,7 @@ Object point_object(Id id, Vec3d position) {
   return object;
 }
 
-// A row of walls at x = 0 to 9, triangle n at x = (7 n) mod 10.
+// Mesh of walls at x = 0 to 9: triangle n is at x = (7 n) mod 10.
 StaticMeshPtr ten_walls() {
   std::vector<Triangle> walls;
   for (int i = 0; i < 10; ++i) walls.push_back(wall_triangle(static_cast<float>(7 * i % 10)));
@@ -45,7 +45,7 @@ TEST(OverlapQueryTest, RowsAscendByIdOverInstancesAndObjects) {
   }
 }
 
-TEST(OverlapQueryTest, InstancesAreOneRowHoweverManyTrianglesTouch) {
+TEST(OverlapQueryTest, AnInstanceIsOneRowForAnyNumberOfTrianglesFound) {
   OwnedBlock block = one_ball({0, 0, 0}, 100);
   block.settings.columns = {Column::kId, Column::kTriangle};
   block.settings.source = Source::kStatic;
@@ -54,7 +54,7 @@ TEST(OverlapQueryTest, InstancesAreOneRowHoweverManyTrianglesTouch) {
   EXPECT_THAT(result.triangles, ElementsAre(kNoTriangle, kNoTriangle));
 }
 
-TEST(OverlapQueryTest, TrianglesComeInStorageOrder) {
+TEST(OverlapQueryTest, TrianglesAreInStorageOrder) {
   const SnapshotPtr snapshot = snapshot_of(mixed_world());
   OwnedBlock block = one_ball({0, 0, 0}, 100, StaticDetail::kTriangles);
   block.settings.source = Source::kStatic;
@@ -95,7 +95,7 @@ TEST(OverlapQueryTest, TouchingCounts) {
   EXPECT_THAT(run_block(*snapshot, one_box({0, 0, 0}, {less, less, less})).ids, IsEmpty());
 }
 
-TEST(OverlapQueryTest, ZeroRadiusAndZeroExtentAskWhatContainsThePoint) {
+TEST(OverlapQueryTest, ZeroRadiusAndZeroExtentFindWhatContainsThePoint) {
   QueryWorld world;
   world.objects = {ball_object(1, {5, 0, 0}), point_object(2, {4, 0, 0}), box_object(3, {9, 0, 0})};
   world.instances = {placed(4, wall_mesh(), {4, 0, 0})};
@@ -110,7 +110,7 @@ TEST(OverlapQueryTest, StaticTrianglesAreSurfaces) {
   EXPECT_THAT(run_block(*snapshot_of(world), one_ball({0, 0, 0}, 1)).ids, IsEmpty());
 }
 
-TEST(OverlapQueryTest, TurnedBoxesReachWithTheirCornersOnly) {
+TEST(OverlapQueryTest, RotatedBoxesReachFarthestAtTheirCorners) {
   QueryWorld world;
   world.objects = {point_object(1, {1.4, 0, 0}), point_object(2, {0.99, 0.99, 0})};
   OwnedBlock block = one_box({0, 0, 0}, {1, 1, 1});
@@ -139,7 +139,7 @@ TEST(OverlapQueryTest, MaxResultsKeepsTheLowestIds) {
   EXPECT_THAT(run_block(*snapshot_of(world), block).truncated, IsEmpty());
 }
 
-TEST(OverlapQueryTest, MaxResultsAreThoseOfTheDefaultWithoutIt) {
+TEST(OverlapQueryTest, MaxResultsHasADefault) {
   QueryWorld world;
   for (Id id = 1; id <= 1025; ++id) world.objects.push_back(ball_object(id, {0, 0, 0}));
   const BlockResult result = run_block(*snapshot_of(world), one_ball({0, 0, 0}, 1));
@@ -147,7 +147,7 @@ TEST(OverlapQueryTest, MaxResultsAreThoseOfTheDefaultWithoutIt) {
   EXPECT_THAT(result.truncated, ElementsAre(0));
 }
 
-TEST(OverlapQueryTest, GoingOnAfterTheLastIdGivesTheSameAsOneLargeQuery) {
+TEST(OverlapQueryTest, PagingByAfterIdGivesTheRowsOfOneLargeQuery) {
   QueryWorld world;
   for (Id id = 1; id <= 100; ++id) {
     if (id % 3 == 0) world.instances.push_back(placed(id * 7, wall_mesh()));
@@ -169,7 +169,7 @@ TEST(OverlapQueryTest, GoingOnAfterTheLastIdGivesTheSameAsOneLargeQuery) {
   }
 }
 
-TEST(OverlapQueryTest, SourcesLookAtOneSideOnly) {
+TEST(OverlapQueryTest, SourceRestrictsTheSearchToStaticOrDynamic) {
   const SnapshotPtr snapshot = snapshot_of(mixed_world());
   OwnedBlock block = one_ball({0, 0, 0}, 4);
   block.settings.source = Source::kStatic;
@@ -178,7 +178,7 @@ TEST(OverlapQueryTest, SourcesLookAtOneSideOnly) {
   EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(2, 6, 9));
 }
 
-TEST(OverlapQueryTest, MasksFindWhatSharesALayer) {
+TEST(OverlapQueryTest, MasksFindObjectsThatShareALayer) {
   QueryWorld world;
   world.objects = {ball_object(1, {}), ball_object(2, {}), ball_object(3, {})};
   world.instances = {placed(4, wall_mesh()), placed(5, wall_mesh())};
@@ -197,7 +197,7 @@ TEST(OverlapQueryTest, MasksFindWhatSharesALayer) {
   EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(2, 2, 2));
 }
 
-TEST(OverlapQueryTest, OneGroupAQueryAndUpTo64IdsABlockArePassedOver) {
+TEST(OverlapQueryTest, OneGroupPerQueryAndUpTo64IdsPerBlockAreIgnored) {
   QueryWorld world;
   world.objects = {ball_object(1, {}), ball_object(2, {}), ball_object(3, {})};
   world.instances = {placed(4, wall_mesh())};
@@ -208,14 +208,14 @@ TEST(OverlapQueryTest, OneGroupAQueryAndUpTo64IdsABlockArePassedOver) {
   block.points.assign(9, 0);
   block.ignore_groups = {8, 9, 0};
   const BlockResult result = run_block(*snapshot, block);
-  EXPECT_THAT(result.counts, ElementsAre(2, 3, 4)) << "group 0 is nobody's";
+  EXPECT_THAT(result.counts, ElementsAre(2, 3, 4)) << "group 0 means no group";
   EXPECT_THAT(result.ids, ElementsAre(2, 3, 1, 3, 4, 1, 2, 3, 4));
   block.ignore_groups = {8};
   block.ignore_ids = {77, 3};
   EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(2, 2, 2));
 }
 
-TEST(OverlapQueryTest, InstancesAreFoundAtTheirScaleAndPlace) {
+TEST(OverlapQueryTest, InstancesAreFoundAtTheirScaleAndPosition) {
   QueryWorld world;
   PlacedMesh instance = placed(1, wall_mesh(), {1e6, -1e6, 5});
   for (const float scale : {1e-3f, 1.0f, 1e3f}) {
@@ -229,7 +229,7 @@ TEST(OverlapQueryTest, InstancesAreFoundAtTheirScaleAndPlace) {
   }
 }
 
-TEST(OverlapQueryTest, ConservativeTurnedQueryBoxesCountAsTheirAxisAlignedBounds) {
+TEST(OverlapQueryTest, ConservativeRotatedQueryBoxesCountAsTheirAxisAlignedBounds) {
   QueryWorld world;
   world.objects = {point_object(1, {1.41, 1.41, 0.9}), point_object(2, {1.42, 0, 0})};
   world.instances = {placed(3, mesh_of({{{1.4f, 1.4f, 0}, {2, 1.4f, 0}, {1.4f, 2, 0}}})),
@@ -241,7 +241,7 @@ TEST(OverlapQueryTest, ConservativeTurnedQueryBoxesCountAsTheirAxisAlignedBounds
   EXPECT_THAT(run_block(*snapshot_of(world), block).ids, ElementsAre(1, 3));
 }
 
-TEST(OverlapQueryTest, ConservativeBallsReachBoundsAsBalls) {
+TEST(OverlapQueryTest, ConservativeBallsAreTestedAsBallsAgainstBounds) {
   QueryWorld world;
   world.objects = {ball_object(1, {1.6, 1.6, 0}, 1), ball_object(2, {1.75, 1.75, 0}, 1)};
   world.instances = {placed(3, mesh_of({{{0.6f, 0.9f, 0}, {0.9f, 0.6f, 0}, {0.9f, 0.9f, 0}}})),
@@ -252,7 +252,7 @@ TEST(OverlapQueryTest, ConservativeBallsReachBoundsAsBalls) {
   EXPECT_THAT(run_block(*snapshot_of(world), block).ids, ElementsAre(1, 3));
 }
 
-TEST(OverlapQueryTest, ConservativeRegionsFarFromTheOriginReachWhatTheyReachNearIt) {
+TEST(OverlapQueryTest, ConservativeRegionsFindTheSameFarFromTheOriginAsNearIt) {
   for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
     QueryWorld world;
     world.instances = {placed(4, mesh_of({wall_triangle(1), wall_triangle(8)}), {away, 0, -away})};

@@ -52,7 +52,7 @@ Aabb<Real> bounds_in_long_double(const Instance& instance, const Triangle& trian
   return bounds;
 }
 
-TEST(PlacedTriangleTest, BoundsContainTheTriangleAndNoMoreThanRoundingAsks) {
+TEST(PlacedTriangleTest, BoundsContainTheTriangleAndAreGrownByRoundingOnly) {
   for_each_triangle([](const Instance& instance, const PlacedTriangles& placed, const Triangle& triangle) {
     const Aabb<Real> inner = bounds_in_long_double(instance, triangle);
     const Aabbd bounds = placed.bounds_of_triangle(triangle);
@@ -62,14 +62,14 @@ TEST(PlacedTriangleTest, BoundsContainTheTriangleAndNoMoreThanRoundingAsks) {
   });
 }
 
-// What culls by the instance's bounds, or measures to them, changes nothing of what the triangle's decide.
-TEST(PlacedTriangleTest, BoundsLieWithinThoseOfTheInstance) {
+// Culling by the instance's bounds, or measuring to them, therefore never changes a verdict of the triangle's bounds.
+TEST(PlacedTriangleTest, BoundsLieWithinTheInstanceBounds) {
   for_each_triangle([](const Instance& instance, const PlacedTriangles& placed, const Triangle& triangle) {
     EXPECT_TRUE(contains(instance.bounds, placed.bounds_of_triangle(triangle)));
   });
 }
 
-TEST(PlacedTriangleTest, BoundsLieWithinThoseOfEveryBoxAroundTheTriangle) {
+TEST(PlacedTriangleTest, BoundsLieWithinTheBoundsOfEveryBoxAroundTheTriangle) {
   for_each_triangle([](const Instance& /*instance*/, const PlacedTriangles& placed, const Triangle& triangle) {
     EXPECT_TRUE(contains(placed.bounds_of_box(bounds_of(triangle)), placed.bounds_of_triangle(triangle)));
   });

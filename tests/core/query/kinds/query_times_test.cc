@@ -1,4 +1,4 @@
-// Times of queries: which are kept, what is said of those that are not, and what a batch answers.
+// Times of queries: resolving them, the errors for times outside the history, and the results of a batch.
 #include "core/query/kinds/query_times.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ SceneSpec ten_ticks() {
   return spec;
 }
 
-// Point 1 is at (t, 0, 0) at tick t, up to 30; it is in group 4.
+// Scene whose point 1 is at (t, 0, 0) at tick t, up to 30; it is in group 4.
 class QueryTimesTest : public SceneFixture {
  protected:
   QueryTimesTest() : SceneFixture(ten_ticks()) {}
@@ -60,7 +60,7 @@ TEST_F(QueryTimesTest, EachQueryHasItsOwnTime) {
   EXPECT_TRUE(result.clamped.empty());
 }
 
-TEST_F(QueryTimesTest, OneTimeServesAllQueriesAndIsReportedForEach) {
+TEST_F(QueryTimesTest, OneTimeForAllQueriesIsReportedForEach) {
   OwnedBlock block = where({22});
   block.ids = {1, 1, 1};
   const BlockResult result = run_block(*scene_.latest(), block);
@@ -68,14 +68,14 @@ TEST_F(QueryTimesTest, OneTimeServesAllQueriesAndIsReportedForEach) {
   EXPECT_EQ(result.resolved_ticks, (std::vector<uint64_t>{22, 22, 22}));
 }
 
-TEST_F(QueryTimesTest, OneTickWithManyFractionsAreManyTimes) {
+TEST_F(QueryTimesTest, OneTickWithManyFractionsGivesOneTimePerQuery) {
   OwnedBlock block = where({22});
   block.ids = {1, 1};
   block.as_of_fractions = {0, 0.5f};
   EXPECT_EQ(xs(run_block(*scene_.latest(), block)), (std::vector<double>{22, 22.5}));
 }
 
-TEST_F(QueryTimesTest, WithoutTimesNoneAreReported) {
+TEST_F(QueryTimesTest, WithoutAsOfTicksNoTimesAreReported) {
   OwnedBlock block = where({22});
   block.as_of_ticks.clear();
   const BlockResult result = run_block(*scene_.latest(), block);
@@ -84,7 +84,7 @@ TEST_F(QueryTimesTest, WithoutTimesNoneAreReported) {
   EXPECT_TRUE(result.resolved_fractions.empty());
 }
 
-TEST_F(QueryTimesTest, ATimeThatIsNotKeptRefusesTheBatchAndNamesTheRange) {
+TEST_F(QueryTimesTest, ATimeOutsideTheHistoryRefusesTheBatchAndNamesTheRange) {
   const absl::Status status = refusal(where({25, 19}, {0, 0.75f}));
   expect_refusal(status, absl::StatusCode::kOutOfRange, Reason::kOutOfRange, "blocks[0].as_of_ticks", 1);
   EXPECT_NE(status.message().find("ticks 20 to 30"), absl::string_view::npos) << status;
@@ -93,7 +93,7 @@ TEST_F(QueryTimesTest, ATimeThatIsNotKeptRefusesTheBatchAndNamesTheRange) {
                  "blocks[0].as_of_ticks", 0);
 }
 
-TEST_F(QueryTimesTest, ATimeThatHasNotComeIsRefusedWithoutAdviceAboutHistory) {
+TEST_F(QueryTimesTest, AFutureTimeIsRefusedWithoutAdviceAboutHistory) {
   for (const OwnedBlock& block : {where({31}), where({30}, {0.5f})}) {
     const std::string message(refusal(block).message());
     EXPECT_NE(message.find("has not come yet; ticks 20 to 30 are kept"), std::string::npos) << message;
@@ -101,7 +101,7 @@ TEST_F(QueryTimesTest, ATimeThatHasNotComeIsRefusedWithoutAdviceAboutHistory) {
   }
 }
 
-TEST_F(QueryTimesTest, ClampingTakesTheNearestAndListsTheQuery) {
+TEST_F(QueryTimesTest, ClampingUsesTheNearestKeptTimeAndListsTheQuery) {
   OwnedBlock block = where({2, 25, 31}, {0.5f, 0.5f, 0.5f});
   block.settings.outside = OutsideHistory::kClamp;
   const BlockResult result = run_block(*scene_.latest(), block);
@@ -110,7 +110,7 @@ TEST_F(QueryTimesTest, ClampingTakesTheNearestAndListsTheQuery) {
   EXPECT_EQ(result.resolved_fractions, (std::vector<float>{0, 0.5f, 0}));
 }
 
-TEST_F(QueryTimesTest, GroupsAreLookedUpAtEachTime) {
+TEST_F(QueryTimesTest, GroupsAreLookedUpAtTheTimeOfEachQuery) {
   OwnedBlock block = where({20, 20, 28, 20});
   block.ids.clear();
   block.groups = {4, 4, 4, 5};
@@ -119,7 +119,7 @@ TEST_F(QueryTimesTest, GroupsAreLookedUpAtEachTime) {
   EXPECT_EQ(xs(result), (std::vector<double>{20, 20, 28}));
 }
 
-TEST_F(QueryTimesTest, TheRoomForTimesIsPartOfTheReply) {
+TEST_F(QueryTimesTest, TimesCountTowardsTheReplySize) {
   OwnedBlock block = where({20});
   QueryBatch batch;
   batch.blocks = {block.view()};
@@ -130,7 +130,7 @@ TEST_F(QueryTimesTest, TheRoomForTimesIsPartOfTheReply) {
   EXPECT_LT(fixed_reply_bytes(batch), with_times);
 }
 
-// What the refusal of a time says about why it is not kept.
+// Tests of the reason that the error for a time outside the history gives.
 class NotKeptTest : public SceneFixture {
  protected:
   // Objects 1 to 100 all move at each tick up to 30.
@@ -170,7 +170,7 @@ TEST_F(NotKeptTest, ASceneWithoutHistoryAdvisesHistoryTicks) {
             "scene with history_ticks");
 }
 
-TEST_F(NotKeptTest, ATickBeyondHistoryTicksAdvisesMoreOfThem) {
+TEST_F(NotKeptTest, ATickBeyondHistoryTicksAdvisesMoreHistoryTicks) {
   Scene scene("scene", ten_ticks(), kEpoch, StaticSet::empty());
   live(scene);
   EXPECT_EQ(refusal(*scene.latest(), 19),
@@ -178,7 +178,7 @@ TEST_F(NotKeptTest, ATickBeyondHistoryTicksAdvisesMoreOfThem) {
             "clamp, or create the scene with a larger history_ticks");
 }
 
-TEST_F(NotKeptTest, ATickThatDidNotFitAdvisesMoreBytes) {
+TEST_F(NotKeptTest, ATickThatDidNotFitAdvisesMoreHistoryBytes) {
   SceneSpec spec;
   spec.history = {1000, 100'000};
   Scene scene("scene", spec, kEpoch, StaticSet::empty());
@@ -189,7 +189,7 @@ TEST_F(NotKeptTest, ATickThatDidNotFitAdvisesMoreBytes) {
                                    "create the scene with a larger history_bytes"));
 }
 
-TEST_F(NotKeptTest, ATickBeforeTicksRestartedNeverComesBack) {
+TEST_F(NotKeptTest, ATickBeforeRestartTicksStaysOutsideTheHistory) {
   Scene scene("scene", ten_ticks(), kEpoch, StaticSet::empty());
   live(scene);
   UpdateBatch restart;
@@ -200,7 +200,8 @@ TEST_F(NotKeptTest, ATickBeforeTicksRestartedNeverComesBack) {
             "tick 24 is not kept; ticks 25 to 25 are: the scene's ticks began there. Ask about one of those, or clamp");
 }
 
-// Ball 7 is at the origin at tick 1 and at (0, 5, 0) at tick 3; in the tick between it first went far.
+// Scene whose ball 7 is at the origin at tick 1 and at (0, 5, 0) at tick 3; within the tick between it first moves far
+// away.
 class FastMoverQueryTest : public SceneFixture {
  protected:
   FastMoverQueryTest() : SceneFixture(ten_ticks()) {}
@@ -225,7 +226,7 @@ class FastMoverQueryTest : public SceneFixture {
     batch(3, {});
   }
 
-  // Half way between ticks 1 and 2, where the ball is at (0, 2.5, 0).
+  // Time half way between ticks 1 and 2, at which the ball is at (0, 2.5, 0).
   static OwnedBlock half_way(decltype(QueryBlock::kind) kind, std::vector<float> points,
                              std::vector<float> sizes = {}) {
     OwnedBlock block;
@@ -270,7 +271,7 @@ TEST_F(FastMoverQueryTest, ABallThatCameBackIsFoundOnItsWayBeforeTheTickEnds) {
   expect_found();
 }
 
-TEST_F(FastMoverQueryTest, ANewLifeUnderItsIdIsNotOnItsWay) {
+TEST_F(FastMoverQueryTest, AnObjectReplacedUnderItsIdIsNotFoundOnItsWay) {
   batch(2, removing({7}));
   end_by_upsert();
   EXPECT_TRUE(found(half_way(BallColumns{}, {0, 2.5f, 0}, {0.1f})).empty());

@@ -16,7 +16,7 @@ using ::testing::IsEmpty;
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-TEST(RayQueryTest, AMissIsARowOfInfinityAndZeros) {
+TEST(RayQueryTest, AMissIsARowWithInfiniteTAndZeros) {
   OwnedBlock block = rays_along_x(RayMode::kFirst);
   for (int number = 1; number <= 10; ++number) block.settings.columns.add(static_cast<Column>(number));
   const BlockResult result = run_block(*snapshot_of({}), block);
@@ -43,7 +43,7 @@ TEST(RayQueryTest, FirstIsDenseWithMissesBetweenHits) {
   EXPECT_THAT(result.triangles, ElementsAre(kNoTriangle, kNoTriangle, kNoTriangle));
 }
 
-TEST(RayQueryTest, AnyIsOneByteARay) {
+TEST(RayQueryTest, AnyIsOneBytePerRay) {
   QueryWorld world;
   world.objects = {ball_object(7, {5, 0, 0})};
   const BlockResult result = run_block(*snapshot_of(world), rays_along_x(RayMode::kAny, {0, 0, 0, 0, 9, 0, 2, 0, 0}));
@@ -65,7 +65,7 @@ TEST(RayQueryTest, AllIsSortedOverObjectsAndInstances) {
   EXPECT_THAT(result.truncated, IsEmpty());
 }
 
-TEST(RayQueryTest, AllKeepsTheNearestAndListsWhatWasCut) {
+TEST(RayQueryTest, AllKeepsTheNearestHitsAndListsTruncatedRays) {
   QueryWorld world;
   for (Id id = 1; id <= 6; ++id) world.objects.push_back(ball_object(id, {3.0 * double(id), 0, 0}));
   OwnedBlock block = rays_along_x(RayMode::kAll, {0, 0, 0, 14, 0, 0, 0, 50, 0});
@@ -76,7 +76,7 @@ TEST(RayQueryTest, AllKeepsTheNearestAndListsWhatWasCut) {
   EXPECT_THAT(result.truncated, ElementsAre(0));
 }
 
-TEST(RayQueryTest, AllWithExactlyAsManyHitsAsWantedIsNotCut) {
+TEST(RayQueryTest, AllWithExactlyMaxResultsHitsIsNotTruncated) {
   QueryWorld world;
   world.objects = {ball_object(1, {3, 0, 0}), ball_object(2, {6, 0, 0})};
   OwnedBlock block = rays_along_x(RayMode::kAll);
@@ -84,7 +84,7 @@ TEST(RayQueryTest, AllWithExactlyAsManyHitsAsWantedIsNotCut) {
   EXPECT_THAT(run_block(*snapshot_of(world), block).truncated, IsEmpty());
 }
 
-TEST(RayQueryTest, AllGivesAnObjectOnce) {
+TEST(RayQueryTest, AllReportsAnObjectOnce) {
   QueryWorld world;
   world.objects = {ball_object(1, {5, 0, 0})};
   for (const Inside inside : {Inside::kSolid, Inside::kHollow, Inside::kSkip}) {
@@ -94,8 +94,8 @@ TEST(RayQueryTest, AllGivesAnObjectOnce) {
   }
 }
 
-// The static hit must not end the search, nor the object's hide it.
-TEST(RayQueryTest, TheNearerOfAnInstanceAndAnObjectWinsEitherWay) {
+// A static hit must not end the search for objects, and an object's hit must not hide a nearer static one.
+TEST(RayQueryTest, TheNearerOfAnInstanceAndAnObjectWins) {
   for (const double wall : {3.0, 7.0}) {
     QueryWorld world;
     world.objects = {ball_object(1, {6, 0, 0})};
@@ -106,7 +106,7 @@ TEST(RayQueryTest, TheNearerOfAnInstanceAndAnObjectWinsEitherWay) {
   }
 }
 
-TEST(RayQueryTest, OfEqualDistanceTheLowerIdWinsAcrossInstancesAndObjects) {
+TEST(RayQueryTest, AtEqualDistanceTheLowerIdWinsAcrossInstancesAndObjects) {
   for (const Id instance : {Id{1}, Id{9}, kChosenIdBit | 1}) {
     QueryWorld world;
     world.objects = {box_object(5, {5, 0, 0})};
@@ -119,7 +119,7 @@ TEST(RayQueryTest, OfEqualDistanceTheLowerIdWinsAcrossInstancesAndObjects) {
   }
 }
 
-TEST(RayQueryTest, OfEqualDistanceTheLowerIdWinsAmongInstancesAndAmongObjects) {
+TEST(RayQueryTest, AtEqualDistanceTheLowerIdWinsAmongInstancesAndAmongObjects) {
   QueryWorld world;
   for (const Id id : {Id{8}, Id{3}, Id{6}}) world.instances.push_back(placed(id, wall_mesh(), {4, 0, 0}));
   EXPECT_THAT(run_block(*snapshot_of(world), rays_along_x(RayMode::kFirst)).ids, ElementsAre(3));
@@ -129,15 +129,15 @@ TEST(RayQueryTest, OfEqualDistanceTheLowerIdWinsAmongInstancesAndAmongObjects) {
   EXPECT_THAT(run_block(*snapshot_of(objects), rays_along_x(RayMode::kFirst)).ids, ElementsAre(3));
 }
 
-TEST(RayQueryTest, OfEqualDistanceAndIdTheLowerTriangleWins) {
+TEST(RayQueryTest, AtEqualDistanceAndIdTheLowerTriangleWins) {
   QueryWorld world;
   world.instances = {placed(1, mesh_of({wall_triangle(9), wall_triangle(4), wall_triangle(4), wall_triangle(4)}))};
   EXPECT_THAT(run_block(*snapshot_of(world), rays_along_x(RayMode::kFirst)).triangles, ElementsAre(1));
   EXPECT_THAT(run_block(*snapshot_of(world), rays_along_x(RayMode::kAll)).triangles, ElementsAre(1, 2, 3, 0));
 }
 
-// Which of the equally far are kept must not depend on the order of visiting.
-TEST(RayQueryTest, ACutAmongEqualDistancesKeepsTheLowestIds) {
+// The hits kept among equally distant ones must not depend on the order of visiting.
+TEST(RayQueryTest, TruncationAmongEqualDistancesKeepsTheLowestIds) {
   QueryWorld world;
   for (Id id = 40; id > 0; --id) {
     if (id % 2 == 0) world.objects.push_back(box_object(id, {5, 0, 0}));
@@ -150,7 +150,7 @@ TEST(RayQueryTest, ACutAmongEqualDistancesKeepsTheLowestIds) {
   EXPECT_THAT(result.truncated, ElementsAre(0));
 }
 
-TEST(RayQueryTest, AHitExactlyAtTheRaysEndCounts) {
+TEST(RayQueryTest, AHitExactlyAtTMaxCounts) {
   QueryWorld world;
   world.objects = {box_object(1, {5, 0, 0})};
   world.instances = {placed(2, wall_mesh(), {4, 0, 0})};
@@ -172,7 +172,7 @@ TEST(RayQueryTest, AHitExactlyAtTheRaysEndCounts) {
   }
 }
 
-TEST(RayQueryTest, ARayThatEndsWhereItStartsHitsTheSurfaceItStartsOn) {
+TEST(RayQueryTest, ARayOfLengthZeroHitsTheSurfaceAtItsOrigin) {
   QueryWorld world;
   world.objects = {box_object(1, {5, 0, 0})};
   world.instances = {placed(2, wall_mesh(), {4, 0, 0})};
@@ -184,7 +184,7 @@ TEST(RayQueryTest, ARayThatEndsWhereItStartsHitsTheSurfaceItStartsOn) {
   EXPECT_FALSE(std::signbit(result.t[0]) || std::signbit(result.t[1]));
 }
 
-TEST(RayQueryTest, DistancesCountInTheDirectionAsGiven) {
+TEST(RayQueryTest, DistancesAreMultiplesOfTheGivenDirection) {
   QueryWorld world;
   world.objects = {box_object(1, {5, 0, 0})};
   world.instances = {placed(2, wall_mesh(), {-8, 0, 0})};
@@ -197,7 +197,7 @@ TEST(RayQueryTest, DistancesCountInTheDirectionAsGiven) {
   }
 }
 
-TEST(RayQueryTest, TrianglesHaveTwoSidesUnlessOneIsCulled) {
+TEST(RayQueryTest, TrianglesAreTwoSidedUnlessOneSideIsCulled) {
   const Triangle to_ray = turned_over(wall_triangle(3)), from_ray = wall_triangle(5);
   for (const Winding winding : {Winding::kCounterClockwise, Winding::kClockwise}) {
     QueryWorld world;
@@ -218,7 +218,7 @@ TEST(RayQueryTest, TrianglesHaveTwoSidesUnlessOneIsCulled) {
   }
 }
 
-TEST(RayQueryTest, ObjectsHaveNoSidesToCull) {
+TEST(RayQueryTest, CullDoesNotApplyToObjects) {
   QueryWorld world;
   world.objects = {ball_object(1, {5, 0, 0})};
   for (const Cull cull : {Cull::kNone, Cull::kBack, Cull::kFront}) {
@@ -228,7 +228,7 @@ TEST(RayQueryTest, ObjectsHaveNoSidesToCull) {
   }
 }
 
-TEST(RayQueryTest, NormalsAreOfTheUploadedWindingWhicheverSideIsHit) {
+TEST(RayQueryTest, NormalsFollowTheUploadedWindingForBothSides) {
   QueryWorld world;
   world.instances = {placed(1, wall_mesh(), {4, 0, 0})};
   for (const float from : {0.0f, 8.0f}) {
@@ -241,7 +241,7 @@ TEST(RayQueryTest, NormalsAreOfTheUploadedWindingWhicheverSideIsHit) {
   }
 }
 
-TEST(RayQueryTest, NormalsTurnWithTheInstance) {
+TEST(RayQueryTest, NormalsRotateWithTheInstance) {
   QueryWorld world;
   world.instances = {placed(1, wall_mesh(), {0, 5, 0})};
   world.instances[0].rotation = {0, 0, std::sqrt(0.5f), std::sqrt(0.5f)};  // x to y
@@ -254,7 +254,7 @@ TEST(RayQueryTest, NormalsTurnWithTheInstance) {
   EXPECT_NEAR(result.normals[1], 1, 1e-6);
 }
 
-TEST(RayQueryTest, AnOriginInsideASolidHitsAtZeroAgainstTheRay) {
+TEST(RayQueryTest, AnOriginInsideASolidHitsAtZeroWithANormalAgainstTheRay) {
   QueryWorld world;
   world.objects = {ball_object(1, {0, 0, 0}, 2)};
   OwnedBlock block = one_ray(RayMode::kFirst, {0.5f, 0, 0}, {4, 0, 3});
@@ -284,7 +284,7 @@ TEST(RayQueryTest, ASkippedSolidIsPassedByRaysFromInsideOnly) {
   EXPECT_THAT(run_block(*snapshot_of(world), block).ids, ElementsAre(2, 1));
 }
 
-TEST(RayQueryTest, InsideDoesNotConcernTriangles) {
+TEST(RayQueryTest, InsideDoesNotApplyToTriangles) {
   QueryWorld world;
   world.instances = {placed(1, wall_mesh())};
   for (const Inside inside : {Inside::kSolid, Inside::kHollow, Inside::kSkip}) {
@@ -312,7 +312,7 @@ TEST(RayQueryTest, EdgeOnTrianglesAndTrianglesWithoutAreaAreNeverHit) {
   EXPECT_THAT(result.triangles, ElementsAre(2)) << "numbering is kept";
 }
 
-TEST(RayQueryTest, UvAndPointDescribeTheSamePlace) {
+TEST(RayQueryTest, UvAndPointDescribeTheSamePosition) {
   Random random(31);
   QueryWorld world;
   const Triangle triangle = {{1, 2, 3}, {-2, 5, 1}, {0, -3, -4}};
@@ -355,7 +355,7 @@ TEST(RayQueryTest, ConservativeRaysEnterBoundsAndHaveNoSurface) {
   EXPECT_THAT(result.uvs, ElementsAre(0, 0));
 }
 
-// Bounds are grown by 2^-41 of the magnitudes, and the slab test by 2^-40 of those of origin and box.
+// Bounds are grown by 2^-41 of the magnitudes, and the slab test by 2^-40 of the magnitudes of origin and box.
 TEST(RayQueryTest, ConservativeRaysEnterBoundsOfPlacedTrianglesWhereTheyAreFarFromTheOrigin) {
   for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
     QueryWorld world;
@@ -371,7 +371,7 @@ TEST(RayQueryTest, ConservativeRaysEnterBoundsOfPlacedTrianglesWhereTheyAreFarFr
   }
 }
 
-TEST(RayQueryTest, ConservativeRaysPassPlacedTrianglesThatTheyPassFarFromTheOrigin) {
+TEST(RayQueryTest, ConservativeRaysMissPlacedTrianglesThatTheyMissFarFromTheOrigin) {
   QueryWorld world;
   world.instances = {placed(4, cube_mesh(), {1e6, 0, 0})};
   OwnedBlock block = one_ray(RayMode::kAny, {-11, 1.0001f, 0}, {1, 0, 0});
@@ -399,7 +399,7 @@ class FarHitTest : public ::testing::TestWithParam<Precision> {
 
 constexpr float kLargest = std::numeric_limits<float>::max();
 
-TEST_P(FarHitTest, BeyondTheLargestFloatIsAtTheLargestFloat) {
+TEST_P(FarHitTest, AHitBeyondTheLargestFloatIsReportedAtTheLargestFloat) {
   const BlockResult first = answer(RayMode::kFirst, kInf);
   EXPECT_THAT(first.t, ElementsAre(kLargest));
   EXPECT_THAT(first.ids, ElementsAre(2));
@@ -408,14 +408,14 @@ TEST_P(FarHitTest, BeyondTheLargestFloatIsAtTheLargestFloat) {
   EXPECT_THAT(all.ids, ElementsAre(2, 3, 9));
 }
 
-TEST_P(FarHitTest, BeyondTheLargestFloatIsWithinALimitOfThatAndBeyondAnyOther) {
+TEST_P(FarHitTest, AHitBeyondTheLargestFloatIsWithinATMaxOfThatValueAndBeyondAnySmallerOne) {
   EXPECT_EQ(answer(RayMode::kAny, kLargest).hits, "\1");
   EXPECT_THAT(answer(RayMode::kFirst, kLargest).ids, ElementsAre(2));
   EXPECT_EQ(answer(RayMode::kAny, std::nextafter(kLargest, 0.0f)).hits, std::string("\0", 1));
   EXPECT_THAT(answer(RayMode::kFirst, std::nextafter(kLargest, 0.0f)).t, ElementsAre(kInf));
 }
 
-TEST_P(FarHitTest, BeyondTheLargestFloatHasThePointAtTheLargestFloat) {
+TEST_P(FarHitTest, AHitBeyondTheLargestFloatHasItsPointAtTheLargestFloat) {
   OwnedBlock block = one_ray(RayMode::kFirst, {1, 0, 0}, {1e-44f, 0, 0});
   block.settings.columns = {Column::kPoint};
   block.settings.precision = GetParam();

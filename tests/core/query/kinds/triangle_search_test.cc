@@ -56,7 +56,7 @@ class TriangleSearchTest : public ::testing::Test {
   TriangleBvh tree_;
 };
 
-TEST_F(TriangleSearchTest, BatchesFindWhatThePredicatesFindInOrderWithAndWithoutKernels) {
+TEST_F(TriangleSearchTest, BatchesFindWhatThePredicatesFindInStorageOrderWithAndWithoutKernels) {
   ASSERT_GT(tree_.bytes(), size_t{2} << 20);  // large enough for searches to take turns
   for (const std::string& name : instruction_sets()) {
     SCOPED_TRACE(name);
@@ -77,7 +77,7 @@ TEST_F(TriangleSearchTest, ABatchEndsBeforeTheRegionThatDoesNotFit) {
   }
 }
 
-TEST_F(TriangleSearchTest, KernelsAreNotForRegionsBeyondTheirReach) {
+TEST_F(TriangleSearchTest, KernelsAreNotUsedForRegionsBeyondTheirMaximumExtent) {
   EXPECT_FALSE(TriangleSearch<Ballf>::served(tree_, Ballf{{1e9f, 0, 0}, 1}));
   EXPECT_FALSE(TriangleSearch<Obbf>::served(tree_, Obbf{{0, 0, 0}, {1e9f, 0, 0}, {}}));
   EXPECT_FALSE(TriangleSearch<Ballf>::served(TriangleBvh(), Ballf{{0, 0, 0}, 1}));

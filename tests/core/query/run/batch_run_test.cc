@@ -16,16 +16,17 @@ namespace {
 
 using ::testing::IsEmpty;
 
-// A batch and its answer, which a run borrows.
-struct Asked {
-  Asked(const SceneSnapshot& snapshot, std::vector<OwnedBlock> asked, RunOptions options = {}, uint32_t reply_bytes = 0)
-      : blocks(std::move(asked)), batch(batch_of(blocks)) {
+// Batch, result and run over them.
+struct Prepared {
+  Prepared(const SceneSnapshot& snapshot, std::vector<OwnedBlock> requested, RunOptions options = {},
+           uint32_t reply_bytes = 0)
+      : blocks(std::move(requested)), batch(batch_of(blocks)) {
     batch.max_reply_bytes = reply_bytes;
     LOCUS_CHECK_EQ(check_batch(batch).ToString(), "OK");
     result.blocks.resize(blocks.size());
-    auto prepared = BatchRun::prepare(snapshot, batch, std::move(options), sink);
-    LOCUS_CHECK(prepared.ok());
-    run = *std::move(prepared);
+    auto created = BatchRun::prepare(snapshot, batch, std::move(options), sink);
+    LOCUS_CHECK(created.ok());
+    run = *std::move(created);
   }
 
   const std::vector<OwnedBlock> blocks;
@@ -35,7 +36,7 @@ struct Asked {
   std::unique_ptr<BatchRun> run;
 };
 
-// Balls around the origin, and a bumpy mesh.
+// Returns a world of balls along the x axis and a bumpy mesh.
 QueryWorld world_of(Id balls) {
   QueryWorld world;
   for (Id id = 1; id <= balls; ++id) world.objects.push_back(ball_object(id, {static_cast<double>(id % 40), 0, 0}));
@@ -59,7 +60,7 @@ OwnedBlock many_balls(size_t count, StaticDetail detail) {
   return block;
 }
 
-// Blocks of every layout, several pieces each.
+// Returns blocks of every layout, most of them several chunks long.
 std::vector<OwnedBlock> mixed_blocks() {
   std::vector<OwnedBlock> blocks = {many_rays(RayMode::kFirst, 700), many_balls(900, StaticDetail::kInstances),
                                     many_rays(RayMode::kAny, 600),   many_rays(RayMode::kFirst, 0),
@@ -71,53 +72,53 @@ std::vector<OwnedBlock> mixed_blocks() {
   return blocks;
 }
 
-// Works on `run` with so many threads; the number of calls that were told it is done.
+// Works on `run` with `threads` threads. Returns the number of calls of work() that returned kDone.
 int work_on(BatchRun& run, size_t threads) {
-  std::atomic<int> told{0};
+  std::atomic<int> done_calls{0};
   std::vector<std::thread> pool;
   for (size_t i = 0; i < threads; ++i)
     pool.emplace_back([&] {
       Progress progress = Progress::kMore;
       while (progress == Progress::kMore) progress = run.work(0);
-      if (progress == Progress::kDone) ++told;
+      if (progress == Progress::kDone) ++done_calls;
     });
   for (std::thread& thread : pool) thread.join();
-  return told;
+  return done_calls;
 }
 
-TEST(BatchRunTest, TheAnswerIsTheSameByteForByteHoweverManyThreadsWork) {
+TEST(BatchRunTest, TheResultIsByteIdenticalForAnyNumberOfThreads) {
   const SnapshotPtr snapshot = snapshot_of(world_of(200));
   const std::vector<OwnedBlock> blocks = mixed_blocks();
-  Asked alone(*snapshot, blocks);
+  Prepared alone(*snapshot, blocks);
   ASSERT_EQ(work_on(*alone.run, 1), 1);
   const auto bytes = static_cast<uint32_t>(fixed_reply_bytes(alone.batch));
   for (const uint32_t reply_bytes : {0u, bytes + 5'000, bytes + 40'000}) {
-    Asked expected(*snapshot, blocks, {}, reply_bytes);
+    Prepared expected(*snapshot, blocks, {}, reply_bytes);
     work_on(*expected.run, 1);
     for (const size_t threads : {2, 3, 8}) {
-      Asked asked(*snapshot, blocks, {}, reply_bytes);
-      EXPECT_EQ(work_on(*asked.run, threads), 1) << "exactly one is told";
-      EXPECT_TRUE(asked.run->status().ok());
-      EXPECT_EQ(difference(asked.result, expected.result), "") << threads << " threads, " << reply_bytes;
+      Prepared prepared(*snapshot, blocks, {}, reply_bytes);
+      EXPECT_EQ(work_on(*prepared.run, threads), 1) << "kDone is returned to exactly one thread";
+      EXPECT_TRUE(prepared.run->status().ok());
+      EXPECT_EQ(difference(prepared.result, expected.result), "") << threads << " threads, " << reply_bytes;
     }
   }
 }
 
 TEST(BatchRunTest, ABatchWithoutQueriesIsDoneAtTheFirstCall) {
   const SnapshotPtr snapshot = snapshot_of(world_of(1));
-  Asked asked(*snapshot, {many_rays(RayMode::kFirst, 0)});
-  EXPECT_EQ(asked.run->work(0), Progress::kDone);
-  EXPECT_EQ(asked.run->work(0), Progress::kBegun) << "told once";
+  Prepared prepared(*snapshot, {many_rays(RayMode::kFirst, 0)});
+  EXPECT_EQ(prepared.run->work(0), Progress::kDone);
+  EXPECT_EQ(prepared.run->work(0), Progress::kBegun) << "kDone is returned once";
 }
 
-TEST(BatchRunTest, CheapQueriesGoManyAtOnce) {
+TEST(BatchRunTest, CheapQueriesRunInLargeChunks) {
   const SnapshotPtr snapshot = snapshot_of(world_of(1));
   const std::vector<OwnedBlock> blocks = {many_balls(256, StaticDetail::kInstances)};
-  Asked asked(*snapshot, blocks);
-  EXPECT_EQ(asked.run->work(0), Progress::kDone);
+  Prepared prepared(*snapshot, blocks);
+  EXPECT_EQ(prepared.run->work(0), Progress::kDone);
 }
 
-TEST(BatchRunTest, ExpensiveQueriesGoFewAtOnce) {
+TEST(BatchRunTest, ExpensiveQueriesRunInSmallChunks) {
   QueryWorld world;
   for (Id id = 1; id <= 5'000; ++id) world.objects.push_back(ball_object(id, {0, 0, 0}));
   const SnapshotPtr snapshot = snapshot_of(world);
@@ -125,96 +126,96 @@ TEST(BatchRunTest, ExpensiveQueriesGoFewAtOnce) {
   block.points.assign(3 * 256, 0);
   block.settings.max_results = 1;
   const std::vector<OwnedBlock> blocks = {block};
-  Asked asked(*snapshot, blocks);
+  Prepared prepared(*snapshot, blocks);
   int turns = 1;
-  while (asked.run->work(0) == Progress::kMore) ++turns;
-  EXPECT_GE(turns, 256 * 5'000 / 32'768) << "so many tests in one turn at most";
+  while (prepared.run->work(0) == Progress::kMore) ++turns;
+  EXPECT_GE(turns, 256 * 5'000 / 32'768) << "a turn is split after a bounded number of tests";
 }
 
-TEST(BatchRunTest, WithAClockATurnTakesPiecesUntilTheTimeIsUp) {
+TEST(BatchRunTest, WithAClockATurnTakesChunksUntilTheTimeIsUp) {
   const SnapshotPtr snapshot = snapshot_of(world_of(1));
   const std::vector<OwnedBlock> blocks = {many_balls(2'560, StaticDetail::kInstances)};
   uint64_t now = 0;
   RunOptions options;
   options.clock = [&now] { return now += 10; };
-  Asked asked(*snapshot, blocks, options);
+  Prepared prepared(*snapshot, blocks, options);
   int turns = 1;
-  while (asked.run->work(50) == Progress::kMore) ++turns;
-  EXPECT_EQ(turns, 3) << "ten pieces that look at the clock once, and twice more a turn at both of its ends";
-  EXPECT_EQ(asked.run->cost(0).nanoseconds, 60u + 60 + 30) << "from the second look of a turn to its last";
+  while (prepared.run->work(50) == Progress::kMore) ++turns;
+  EXPECT_EQ(turns, 3) << "ten chunks read the clock once each, and every turn twice more at both ends";
+  EXPECT_EQ(prepared.run->cost(0).nanoseconds, 60u + 60 + 30) << "from the second reading of a turn to its last";
 }
 
-TEST(BatchRunTest, WhoLostItsCoreWorksOnUntilItHasWorkedSoLong) {
+TEST(BatchRunTest, AThreadThatLostItsCoreContinuesUntilItsCpuTimeIsUp) {
   const SnapshotPtr snapshot = snapshot_of(world_of(1));
   const std::vector<OwnedBlock> blocks = {many_balls(2'560, StaticDetail::kInstances)};
   uint64_t now = 0, worked = 0;
   RunOptions options;
   options.clock = [&now] { return now += 1'000; };
   options.work_clock = [&worked] { return worked += 10; };
-  Asked asked(*snapshot, blocks, options);
-  EXPECT_EQ(asked.run->work(90), Progress::kMore);
-  EXPECT_EQ(worked, 110u) << "the beginning, nine pieces, the end";
-  EXPECT_EQ(asked.run->cost(0).nanoseconds, 100u);
+  Prepared prepared(*snapshot, blocks, options);
+  EXPECT_EQ(prepared.run->work(90), Progress::kMore);
+  EXPECT_EQ(worked, 110u) << "readings: the beginning, nine chunks, the end";
+  EXPECT_EQ(prepared.run->cost(0).nanoseconds, 100u);
 }
 
-TEST(BatchRunTest, EachBlockIsToldWhatItTook) {
+TEST(BatchRunTest, EachBlockReportsItsCost) {
   const SnapshotPtr snapshot = snapshot_of(world_of(1));
   const std::vector<OwnedBlock> blocks = {many_balls(256, StaticDetail::kInstances),
                                           many_balls(512, StaticDetail::kInstances)};
   uint64_t now = 0;
   RunOptions options;
   options.clock = [&now] { return now += 10; };
-  Asked asked(*snapshot, blocks, options);
-  EXPECT_EQ(asked.run->work(1'000), Progress::kDone);
-  EXPECT_EQ(asked.run->cost(0).nanoseconds, 20u) << "a piece, and a look at its end";
-  EXPECT_EQ(asked.run->cost(1).nanoseconds, 30u);
-  EXPECT_EQ(asked.run->cost().nanoseconds, 50u);
+  Prepared prepared(*snapshot, blocks, options);
+  EXPECT_EQ(prepared.run->work(1'000), Progress::kDone);
+  EXPECT_EQ(prepared.run->cost(0).nanoseconds, 20u) << "one chunk, and one reading at its end";
+  EXPECT_EQ(prepared.run->cost(1).nanoseconds, 30u);
+  EXPECT_EQ(prepared.run->cost().nanoseconds, 50u);
 }
 
-TEST(BatchRunTest, RowsThatWaitForAnEarlierPieceAreOfAtMostSixteenPieces) {
+TEST(BatchRunTest, AtMostSixteenChunksWaitForAnEarlierOne) {
   const SnapshotPtr snapshot = snapshot_of(world_of(10));
   const std::vector<OwnedBlock> blocks = {many_balls(256 * 40, StaticDetail::kInstances)};
   std::atomic<std::thread::id> slow;
-  std::atomic<bool> slow_waits{false}, let_go{false};
+  std::atomic<bool> slow_waits{false}, released{false};
   RunOptions options;
   options.stop = [&] {
     if (std::this_thread::get_id() == slow.load()) {
       slow_waits = true;
-      while (!let_go) std::this_thread::yield();
+      while (!released) std::this_thread::yield();
     }
     return absl::OkStatus();
   };
-  Asked asked(*snapshot, blocks, options);
+  Prepared prepared(*snapshot, blocks, options);
   Progress last = Progress::kMore;
   std::thread first([&] {
     slow = std::this_thread::get_id();
-    while (last == Progress::kMore) last = asked.run->work(0);
+    while (last == Progress::kMore) last = prepared.run->work(0);
   });
   while (!slow_waits) std::this_thread::yield();
   size_t turns = 1;
-  while (asked.run->work(0) == Progress::kMore) ++turns;
+  while (prepared.run->work(0) == Progress::kMore) ++turns;
   EXPECT_EQ(turns, BatchRun::kMaxChunks - 1);
-  let_go = true;
+  released = true;
   first.join();
-  EXPECT_EQ(last, Progress::kDone) << "who held the others up goes on alone";
-  EXPECT_EQ(asked.result.blocks[0].counts.size(), 256u * 40);
+  EXPECT_EQ(last, Progress::kDone) << "the slow thread finishes the batch alone";
+  EXPECT_EQ(prepared.result.blocks[0].counts.size(), 256u * 40);
 }
 
-TEST(BatchRunTest, AStoppedBatchIsDoneWithItsStatusAsSoonAsThoseAtWorkComeBack) {
+TEST(BatchRunTest, AStoppedBatchIsDoneWithItsStatusWhenTheActiveThreadsReturn) {
   const SnapshotPtr snapshot = snapshot_of(world_of(100));
   for (const size_t threads : {1, 4}) {
-    std::atomic<int> asked_to_stop{0};
+    std::atomic<int> stop_polls{0};
     RunOptions options;
-    options.stop = [&] { return ++asked_to_stop < 5 ? absl::OkStatus() : absl::CancelledError("gone"); };
-    Asked asked(*snapshot, mixed_blocks(), options);
-    EXPECT_EQ(work_on(*asked.run, threads), 1);
-    EXPECT_EQ(asked.run->status().code(), absl::StatusCode::kCancelled);
-    EXPECT_LE(asked_to_stop, 5 + static_cast<int>(threads)) << "nobody begins anything new";
+    options.stop = [&] { return ++stop_polls < 5 ? absl::OkStatus() : absl::CancelledError("gone"); };
+    Prepared prepared(*snapshot, mixed_blocks(), options);
+    EXPECT_EQ(work_on(*prepared.run, threads), 1);
+    EXPECT_EQ(prepared.run->status().code(), absl::StatusCode::kCancelled);
+    EXPECT_LE(stop_polls, 5 + static_cast<int>(threads)) << "no thread starts another chunk";
   }
 }
 
 // A ray that meets thousands of triangles takes tens of microseconds, and the kernels take many rays at once.
-TEST(BatchRunTest, RaysThroughThousandsOfTrianglesAskForTheStopInBoundedWork) {
+TEST(BatchRunTest, RaysThroughThousandsOfTrianglesPollTheStopInBoundedWork) {
   constexpr size_t kWalls = 4'000, kRays = 500;
   std::vector<Triangle> walls;
   for (size_t i = 0; i < kWalls; ++i) walls.push_back(wall_triangle(static_cast<float>(i)));
@@ -225,25 +226,25 @@ TEST(BatchRunTest, RaysThroughThousandsOfTrianglesAskForTheStopInBoundedWork) {
   block.settings.max_results = 100;
   block.masks = {1};
   const std::vector<OwnedBlock> blocks = {block};
-  uint64_t asked_to_stop = 0;
+  uint64_t stop_polls = 0;
   RunOptions options;
   options.stop = [&] {
-    ++asked_to_stop;
+    ++stop_polls;
     return absl::OkStatus();
   };
-  Asked asked(*snapshot, blocks, options);
-  work_on(*asked.run, 1);
-  EXPECT_GE(asked.run->cost().work.tests, kRays * 100);
-  EXPECT_GE(asked_to_stop, asked.run->cost().work.tests / 100'000);
+  Prepared prepared(*snapshot, blocks, options);
+  work_on(*prepared.run, 1);
+  EXPECT_GE(prepared.run->cost().work.tests, kRays * 100);
+  EXPECT_GE(stop_polls, prepared.run->cost().work.tests / 100'000);
 }
 
-TEST(BatchRunTest, ColumnsNobodyAskedForAreNeverTouched) {
+TEST(BatchRunTest, ColumnsThatWereNotRequestedAreNeverTouched) {
   const SnapshotPtr snapshot = snapshot_of(world_of(10));
   std::vector<OwnedBlock> blocks = {many_rays(RayMode::kFirst, 40), many_rays(RayMode::kAll, 40)};
   for (OwnedBlock& block : blocks) block.settings.columns = {Column::kId};
-  Asked asked(*snapshot, blocks);
-  work_on(*asked.run, 1);
-  for (const BlockResult& block : asked.result.blocks) {
+  Prepared prepared(*snapshot, blocks);
+  work_on(*prepared.run, 1);
+  for (const BlockResult& block : prepared.result.blocks) {
     EXPECT_FALSE(block.ids.empty());
     EXPECT_THAT(block.t, IsEmpty());
     EXPECT_THAT(block.triangles, IsEmpty());

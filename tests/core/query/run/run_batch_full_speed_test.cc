@@ -1,5 +1,6 @@
 // One writer at full speed, readers that check a model at the revision they happen to see and at random ticks of its
-// past. Ten minutes of the same: tests/property/scene_proof_test.cc.
+// past. tests/property/scene_proof_test.cc
+// runs the same for ten minutes.
 #include <gtest/gtest.h>
 
 #include "tests/support/full_speed.h"

@@ -1,5 +1,5 @@
-// Readers that take their time beside a writer at full speed: what they hold is bounded, they are ended, and nobody
-// else notices.
+// Slow readers beside a writer at full speed: the memory they pin is bounded, they are revoked, and other readers are
+// not affected.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ namespace {
 constexpr uint64_t kObjects = 1'000;
 constexpr Scene::Deadline kNow = Scene::Deadline::min();
 
-// All objects move with every revision, to x = its number.
+// Scene whose objects all move with every revision, to x = revision.
 class RunBatchPinsTest : public ::testing::Test {
  protected:
   RunBatchPinsTest() : ids_(kObjects), positions_(3 * kObjects), scene_(empty(0)) {
@@ -28,14 +28,14 @@ class RunBatchPinsTest : public ::testing::Test {
     insert.ids = ids_;
     insert.positions = positions_at(1);
     batch.inserts.push_back(insert);
-    // What all objects take says what readers may hold.
+    // Measures the size of a revision, from which the limit of pinned bytes is derived.
     EXPECT_TRUE(scene_->apply(batch).ok());
     scene_bytes_ = scene_->status().memory_bytes;
     scene_ = empty(kRevisions * scene_bytes_);
     EXPECT_TRUE(scene_->apply(batch).ok());
   }
 
-  // Revisions that readers may hold.
+  // Number of revisions that readers may pin.
   static constexpr uint64_t kRevisions = 8;
 
   static std::unique_ptr<Scene> empty(uint64_t pinned_bytes) {
@@ -52,7 +52,7 @@ class RunBatchPinsTest : public ::testing::Test {
     return positions_;
   }
 
-  // One thread's.
+  // Publishes the next revision. Called by one thread.
   void advance() {
     UpdateBatch batch;
     MoveColumns move;
@@ -62,15 +62,14 @@ class RunBatchPinsTest : public ::testing::Test {
     ASSERT_TRUE(scene_->apply(batch).ok());
   }
 
-  // Told to end as long before the latest revision as readers may hold at most; what one more revision and the next
-  // count add comes on top.
+  // Expects pinned bytes within the limit, plus the growth by one more revision and by the time until the next check.
   void expect_bounded() const {
     const SceneStatus status = scene_->status();
     EXPECT_LE(status.pinned_bytes, status.max_pinned_bytes + status.max_pinned_bytes / 16 + 2 * scene_bytes_);
   }
 
-  // `pins` are oldest first, as they are told to end.
-  static uint64_t drop_told(std::deque<SnapshotPin>& pins) {
+  // Drops the revoked pins from the front of `pins`, which are ordered from oldest to newest, as they are revoked.
+  static uint64_t drop_revoked(std::deque<SnapshotPin>& pins) {
     uint64_t dropped = 0;
     for (; !pins.empty() && !pins.front().status().ok(); ++dropped) pins.pop_front();
     return dropped;
@@ -91,38 +90,38 @@ class RunBatchPinsTest : public ::testing::Test {
   std::unique_ptr<Scene> scene_;
 };
 
-TEST_F(RunBatchPinsTest, ABatchThatHoldsTooMuchEndsAtItsNextCheckAndTheWriterGoesOn) {
-  std::atomic<bool> begun{false}, told{false};
+TEST_F(RunBatchPinsTest, ABatchThatPinsTooMuchEndsAtItsNextCheckAndTheWriterContinues) {
+  std::atomic<bool> begun{false}, revoked{false};
   std::thread reader([&] {
     const SnapshotPin pin = *scene_->pin({}, kNow);
     const absl::StatusOr<BatchResult> answer = ask(pin, [&] {
       begun = true;
       while (pin.status().ok()) std::this_thread::yield();
-      told = true;
+      revoked = true;
       return pin.status();
     });
     EXPECT_EQ(answer.status().code(), absl::StatusCode::kResourceExhausted);
   });
   while (!begun) std::this_thread::yield();
-  // Younger than the batch's, until together they hold too much.
+  // Pins newer revisions until the pins together exceed the limit.
   std::deque<SnapshotPin> others;
-  while (!told) {
+  while (!revoked) {
     others.push_back(*scene_->pin({}, kNow));
     advance();
     expect_bounded();
-    drop_told(others);
+    drop_revoked(others);
   }
   reader.join();
-  EXPECT_GE(others.size(), kRevisions / 2) << "no more are told to end than it takes";
+  EXPECT_GE(others.size(), kRevisions / 2) << "no more pins are revoked than necessary";
   const uint64_t before = scene_->latest()->revision;
   for (int i = 0; i < 10; ++i) {
     advance();
-    drop_told(others);
+    drop_revoked(others);
   }
   EXPECT_EQ(scene_->latest()->revision, before + 10);
 }
 
-TEST_F(RunBatchPinsTest, ABatchThatHoldsItsRevisionForLongIsAnswered) {
+TEST_F(RunBatchPinsTest, ABatchThatPinsOneRevisionForLongIsAnswered) {
   const uint64_t turns = scaled_count(500);
   std::atomic<bool> done{false};
   std::atomic<bool> begun{false};
@@ -142,21 +141,21 @@ TEST_F(RunBatchPinsTest, ABatchThatHoldsItsRevisionForLongIsAnswered) {
   reader.join();
 }
 
-// One reader keeps every revision it sees until it is told to end, oldest first; beside it others are quick.
-TEST_F(RunBatchPinsTest, QuickReadersAreNeverToldToEndBesideOneThatKeepsAll) {
+// One reader keeps every revision until it is revoked, oldest first; another one reads quickly.
+TEST_F(RunBatchPinsTest, QuickReadersAreNeverRevokedBesideOneThatKeepsAllRevisions) {
   const uint64_t turns = scaled_count(2'000);
   std::atomic<bool> done{false};
-  std::atomic<uint64_t> quick{0}, told{0};
+  std::atomic<uint64_t> quick{0}, revoked{0};
   std::thread hoarder([&] {
     std::deque<SnapshotPin> kept;
     uint64_t seen = 0;
     while (!done) {
-      // No more than one for each answer to the others, so that theirs are never the oldest of too many.
+      // Pins at most one revision per answer to the quick reader, so that its pin is never the oldest of too many.
       if (quick > seen) {
         seen = quick;
         kept.push_back(*scene_->pin({}, kNow));
       }
-      told += drop_told(kept);
+      revoked += drop_revoked(kept);
       std::this_thread::yield();
     }
   });
@@ -170,8 +169,8 @@ TEST_F(RunBatchPinsTest, QuickReadersAreNeverToldToEndBesideOneThatKeepsAll) {
       ++quick;
     }
   });
-  // A reader that failed asks no more, and without it nothing is told to end.
-  for (uint64_t i = 0; (i < turns || told == 0) && !HasFailure(); ++i) {
+  // Stops on failure: a failed reader makes no more progress, and without it no pin is revoked.
+  for (uint64_t i = 0; (i < turns || revoked == 0) && !HasFailure(); ++i) {
     advance();
     expect_bounded();
   }

@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// `count` balls around the origin, ids from 1.
+// Returns a world of `count` balls around the origin, with ids from 1.
 QueryWorld crowd(Id count) {
   QueryWorld world;
   for (Id id = 1; id <= count; ++id) world.objects.push_back(ball_object(id, {0, 0, 0}));
@@ -28,11 +28,11 @@ BatchResult run(const SceneSnapshot& snapshot, const QueryBatch& batch, const Ru
   return *std::move(result);
 }
 
-TEST(RunBatchTest, ABatchWithoutBlocksIsAnsweredByNone) {
+TEST(RunBatchTest, ABatchWithoutBlocksHasNoResultBlocks) {
   EXPECT_THAT(run(*snapshot_of(crowd(1)), {}).blocks, IsEmpty());
 }
 
-TEST(RunBatchTest, ABlockWithoutQueriesIsAnsweredByAnEmptyBlock) {
+TEST(RunBatchTest, ABlockWithoutQueriesHasAnEmptyResultBlock) {
   const std::vector<OwnedBlock> blocks = {rays_along_x(RayMode::kFirst, {}), rays_along_x(RayMode::kAny),
                                           rays_along_x(RayMode::kAll, {})};
   const BatchResult result = run(*snapshot_of(crowd(1)), batch_of(blocks));
@@ -53,7 +53,7 @@ TEST(RunBatchTest, EachBlockHasItsOwnFrame) {
   EXPECT_THAT(result.blocks[1].ids, ElementsAre(2));
 }
 
-TEST(RunBatchTest, DefaultColumnsAreThoseOfTheKind) {
+TEST(RunBatchTest, DefaultColumnsDependOnTheKind) {
   QueryWorld world = crowd(1);
   world.instances = {placed(2, wall_mesh())};
   const SnapshotPtr snapshot = snapshot_of(world);
@@ -75,7 +75,7 @@ TEST(RunBatchTest, DefaultColumnsAreThoseOfTheKind) {
   EXPECT_THAT(nearest.points, IsEmpty());
 }
 
-TEST(RunBatchTest, OnlyColumnsAskedForAreFilled) {
+TEST(RunBatchTest, OnlyRequestedColumnsAreFilled) {
   OwnedBlock block = rays_along_x(RayMode::kAll, {-5, 0, 0});
   block.settings.columns = {Column::kTag};
   QueryWorld world = crowd(1);
@@ -87,7 +87,7 @@ TEST(RunBatchTest, OnlyColumnsAskedForAreFilled) {
   EXPECT_EQ(difference(result, expected), "");
 }
 
-TEST(RunBatchTest, RowsThatDoNotFitTheReplyAreCutFromTheEndAndListed) {
+TEST(RunBatchTest, RowsThatDoNotFitTheReplyAreDroppedFromTheEndAndListed) {
   OwnedBlock block = one_ball({}, 1);
   block.points.assign(9, 0);
   const std::vector<OwnedBlock> blocks = {block, block};
@@ -101,7 +101,7 @@ TEST(RunBatchTest, RowsThatDoNotFitTheReplyAreCutFromTheEndAndListed) {
   EXPECT_THAT(result.blocks[1].truncated, ElementsAre(0, 1, 2));
 }
 
-TEST(RunBatchTest, QueriesWithoutRowsAreNotCutByAFullReply) {
+TEST(RunBatchTest, QueriesWithoutRowsAreNotTruncatedByAFullReply) {
   OwnedBlock block = one_ball({}, 1);
   block.points = {0, 0, 0, 50, 0, 0, 0, 0, 0};
   QueryBatch batch;
@@ -112,7 +112,7 @@ TEST(RunBatchTest, QueriesWithoutRowsAreNotCutByAFullReply) {
   EXPECT_THAT(result.blocks[0].truncated, ElementsAre(2));
 }
 
-TEST(RunBatchTest, AReplyThatIsJustLargeEnoughIsWhole) {
+TEST(RunBatchTest, AReplyThatIsJustLargeEnoughIsComplete) {
   OwnedBlock block = one_ball({}, 1);
   QueryBatch batch;
   batch.blocks = {block.view()};
@@ -122,7 +122,7 @@ TEST(RunBatchTest, AReplyThatIsJustLargeEnoughIsWhole) {
   EXPECT_THAT(run(*snapshot_of(crowd(10)), batch).blocks[0].truncated, ElementsAre(0));
 }
 
-TEST(RunBatchTest, GoingOnAfterAFullReplyGivesTheRest) {
+TEST(RunBatchTest, PagingAfterAFullReplyGivesTheRest) {
   OwnedBlock block = one_ball({}, 1);
   std::vector<uint64_t> pages;
   const SnapshotPtr snapshot = snapshot_of(crowd(100));
@@ -149,9 +149,9 @@ TEST(RunBatchTest, AStopEndsTheBatchWithItsStatus) {
   EXPECT_EQ(result.status().message(), "too late");
 }
 
-TEST(RunBatchTest, AStopIsAskedForAtLeastEvery4096Tests) {
+TEST(RunBatchTest, TheStopIsPolledAtLeastEvery4096Tests) {
   const SnapshotPtr snapshot = snapshot_of(crowd(5'000));
-  for (const uint32_t mask : {1u, 0u}) {  // passing things over is work as well
+  for (const uint32_t mask : {1u, 0u}) {  // skipped objects count as work as well
     int asked = 0;
     RunOptions options;
     options.stop = [&] {
@@ -177,10 +177,10 @@ TEST(RunBatchTest, AStopInTheMiddleEndsTheBatch) {
   QueryBatch batch;
   batch.blocks = {block.view(), lookup.view()};
   EXPECT_EQ(run_batch(*snapshot, batch, options).status().code(), absl::StatusCode::kCancelled);
-  EXPECT_EQ(asked, 5) << "nobody asks again once it is over";
+  EXPECT_EQ(asked, 5) << "the stop is not polled again after the batch has ended";
 }
 
-TEST(RunBatchTest, QueriesNotDoneWithinMaxWorkAreListed) {
+TEST(RunBatchTest, QueriesNotAnsweredWithinMaxWorkAreListed) {
   const SnapshotPtr snapshot = snapshot_of(crowd(5'000));
   OwnedBlock block = one_ball({}, 1);
   block.points.assign(3 * 20, 0);
@@ -207,12 +207,12 @@ TEST(RunBatchTest, MaxWorkEndsBatchesOfManySmallQueriesToo) {
   EXPECT_LT(result.work.tests, 30'000u);
   ASSERT_FALSE(result.blocks[0].truncated.empty());
   const uint32_t first = result.blocks[0].truncated.front();
-  EXPECT_EQ(result.blocks[0].t[first - 1], 0) << "what was done is reported";
-  EXPECT_EQ(result.blocks[0].t.back(), std::numeric_limits<float>::infinity()) << "none found";
-  EXPECT_EQ(result.blocks[0].truncated.size(), 60'000u - first) << "each once";
+  EXPECT_EQ(result.blocks[0].t[first - 1], 0) << "completed queries are reported";
+  EXPECT_EQ(result.blocks[0].t.back(), std::numeric_limits<float>::infinity()) << "an unanswered query reports a miss";
+  EXPECT_EQ(result.blocks[0].truncated.size(), 60'000u - first) << "each unanswered query is listed once";
 }
 
-TEST(RunBatchTest, EnoughMaxWorkCutsNothing) {
+TEST(RunBatchTest, EnoughMaxWorkTruncatesNothing) {
   const SnapshotPtr snapshot = snapshot_of(crowd(4));
   const OwnedBlock block = rays_along_x(RayMode::kFirst, std::vector<float>(3 * 1'000, 0));
   QueryBatch batch;
