@@ -14,7 +14,7 @@ Aabbd bounds_of_all(const SceneSnapshot& snapshot) {
   return bounds;
 }
 
-v1::SceneSpec to_proto(const SceneSpec& spec) {
+v1::SceneSpec spec_to_proto(const SceneSpec& spec) {
   v1::SceneSpec out;
   for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
   out.set_history_ticks(spec.history.ticks);
@@ -52,7 +52,7 @@ absl::StatusOr<HistoryOptions> to_history(const v1::SceneSpec& spec) {
 
 Vec3d to_vec(const v1::Vec3d& vec) { return {vec.x(), vec.y(), vec.z()}; }
 
-v1::Vec3d to_proto(const Vec3d& vec) {
+v1::Vec3d vec_to_proto(const Vec3d& vec) {
   v1::Vec3d out;
   out.set_x(vec.x);
   out.set_y(vec.y);
@@ -102,7 +102,7 @@ v1::Scene to_proto(const Scene& scene) {
   const SceneStatus status = scene.status();
   v1::Scene out;
   out.set_name(scene.name());
-  *out.mutable_spec() = to_proto(scene.spec());
+  *out.mutable_spec() = spec_to_proto(scene.spec());
   const bool local = scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
   out.mutable_spec()->set_durability(local ? v1::DURABILITY_LOCAL : v1::DURABILITY_MEMORY);
   out.set_state(status.pending_changes > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
@@ -123,8 +123,8 @@ v1::Scene to_proto(const Scene& scene) {
   out.set_last_build_error(status.last_build_error);
   const Aabbd bounds = bounds_of_all(*snapshot);
   if (!bounds.empty()) {
-    *out.mutable_min() = to_proto(bounds.min);
-    *out.mutable_max() = to_proto(bounds.max);
+    *out.mutable_min() = vec_to_proto(bounds.min);
+    *out.mutable_max() = vec_to_proto(bounds.max);
   }
   return out;
 }

@@ -6,7 +6,7 @@
 namespace locus::server {
 namespace {
 
-absl::Status malformed(absl::string_view field, absl::string_view message) {
+absl::Status malformed_update(absl::string_view field, absl::string_view message) {
   return refuse_argument(Reason::kMalformed, field, {}, message);
 }
 
@@ -15,9 +15,10 @@ template <class Message>
 absl::Status check_positions(const Message& message, const std::string& field) {
   const bool relative = !message.positions().empty();
   const bool absolute = !message.positions_f64().empty();
-  if (relative && absolute) return malformed(field + ".positions_f64", "give positions or positions_f64, not both");
+  if (relative && absolute)
+    return malformed_update(field + ".positions_f64", "give positions or positions_f64, not both");
   if (!relative && !absolute && !message.ids().empty())
-    return malformed(field + ".positions", "give positions, relative to the frame, or positions_f64, absolute");
+    return malformed_update(field + ".positions", "give positions, relative to the frame, or positions_f64, absolute");
   return absl::OkStatus();
 }
 
@@ -42,7 +43,7 @@ absl::Status read_shape(const v1::Insert& insert, const std::string& field, Inse
     case v1::Insert::SHAPE_NOT_SET:
       break;
   }
-  return malformed(field + ".shape", "say what the objects are: point, ball, box or capsule");
+  return malformed_update(field + ".shape", "say what the objects are: point, ball, box or capsule");
 }
 
 absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::string& field) {
@@ -84,9 +85,9 @@ absl::Status check_batch_form(const v1::UpdateBatch& batch) {
   if (lists > limits::kMaxUpdateLists)
     return refuse_limit("", "update_lists", limits::kMaxUpdateLists, static_cast<double>(lists));
   if (batch.writer() == 0 && batch.batch() != 0)
-    return malformed("writer", "goes with batch: a random number that is not 0");
+    return malformed_update("writer", "goes with batch: a random number that is not 0");
   if (batch.writer() != 0 && batch.batch() == 0)
-    return malformed("batch", "goes with writer: 1 for its first batch, then 2, 3 and so on");
+    return malformed_update("batch", "goes with writer: 1 for its first batch, then 2, 3 and so on");
   return absl::OkStatus();
 }
 

@@ -1,12 +1,12 @@
 #include "server/host/memory_use.h"
 
 #include <malloc.h>
-#include <unistd.h>
 
-#include <fstream>
 #include <limits>
 #include <string>
 #include <vector>
+
+#include "server/observability/process_figures.h"
 
 namespace locus::server {
 namespace {
@@ -19,15 +19,6 @@ constexpr uint64_t kUploadTimesColumns = 3;
 // Bytes a triangle for the build: the copy ordered by triangle, temporary memory, the tree and its additional data.
 constexpr uint64_t kBytesATriangle = 180;
 constexpr uint64_t kBytesAnInstance = 1024;
-
-uint64_t resident_bytes() {
-  // Both in pages: the whole address space, and the part of it that is in memory.
-  uint64_t mapped = 0;
-  uint64_t resident = 0;
-  std::ifstream("/proc/self/statm") >> mapped >> resident;
-  const auto page = static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
-  return resident * page;
-}
 
 }  // namespace
 

@@ -72,13 +72,6 @@ double seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) * 1e-6;
 }
 
-uint64_t resident_bytes() {
-  uint64_t mapped = 0;
-  uint64_t resident = 0;
-  std::ifstream("/proc/self/statm") >> mapped >> resident;
-  return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
-}
-
 // Returns the fields of /proc/self/stat after the process's name. The name may contain spaces and brackets, but no
 // bracket follows it.
 std::vector<std::string> fields_after_name() {
@@ -105,6 +98,14 @@ double number_at(const std::vector<std::string>& fields, size_t at) {
 }
 
 }  // namespace
+
+uint64_t resident_bytes() {
+  // Both in pages: the whole address space, and the part of it that is in memory.
+  uint64_t mapped = 0;
+  uint64_t resident = 0;
+  std::ifstream("/proc/self/statm") >> mapped >> resident;
+  return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+}
 
 ProcessFigures read_process(const std::vector<std::string>& addresses) {
   // Indices counted from the field after the name, which is field 3 in proc(5).

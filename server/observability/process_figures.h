@@ -21,6 +21,9 @@ struct ProcessFigures {
   double start_seconds = 0;  // since 1970
 };
 
+// Returns the bytes of the process that are in memory now. One read of /proc.
+uint64_t resident_bytes();
+
 // Reads all figures. `addresses` are texts for parse_listen_address(); invalid ones are ignored. A figure that cannot
 // be read is 0. O(open files), two system calls each.
 ProcessFigures read_process(const std::vector<std::string>& addresses);

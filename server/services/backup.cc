@@ -29,13 +29,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint32_t kBusyRetryMs = 5000;
+constexpr uint32_t kBackupRetryMs = 5000;
 constexpr size_t kSha256Bytes = 32;
 // Directory inside kBackupDirectory, so that files that the log leaves beside its copy are removed with it.
 constexpr const char* kCopy = "copy";
 
 // Writes a piece to the caller; returns false to end the backup.
-using TakePiece = std::function<bool(const v1::BackupResponse&)>;
+using TakeBackupPiece = std::function<bool(const v1::BackupResponse&)>;
 
 struct File {
   std::string path;  // relative to the copy
@@ -135,7 +135,7 @@ class OpenFile {
 };
 
 // Sends exactly the number of bytes that the file was listed with. Returns false if `take` ended the backup.
-absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const TakePiece& take) {
+absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const TakeBackupPiece& take) {
   const OpenFile from(copy / file.path);
   if (!from.is_open()) return unreadable(file.path, std::strerror(errno));
   const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> hash(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
@@ -162,7 +162,7 @@ absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const Tak
   return take(piece);
 }
 
-absl::StatusOr<bool> send_copy(const fs::path& copy, const TakePiece& take) {
+absl::StatusOr<bool> send_copy(const fs::path& copy, const TakeBackupPiece& take) {
   ASSIGN_OR_RETURN(const std::vector<File> files, list_files(copy));
   v1::BackupResponse first;
   first.mutable_announced()->set_files(static_cast<uint32_t>(files.size()));
@@ -195,12 +195,14 @@ void remove_leftover_backup(const Host& host) { remove_tree(directory_of(host));
 absl::Status back_up(Host& host, const Caller& caller, grpc::ServerWriter<v1::BackupResponse>& writer) {
   if (!can_back_up(host)) return no_data_directory();
   const AdmissionLimiter::Permit permit = host.backups.enter();
-  if (!permit) return refuse_full("", "backups", host.backups.max(), host.backups.max() + 1.0, kBusyRetryMs);
+  if (!permit) return refuse_full("", "backups", host.backups.max(), host.backups.max() + 1.0, kBackupRetryMs);
   const fs::path path = directory_of(host);
   const Directory directory(path);
   RETURN_IF_ERROR(directory.make());
   RETURN_IF_ERROR(host.log->back_up((path / kCopy).string()));
-  const TakePiece take = [&](const v1::BackupResponse& piece) { return caller.stop().ok() && writer.Write(piece); };
+  const TakeBackupPiece take = [&](const v1::BackupResponse& piece) {
+    return caller.stop().ok() && writer.Write(piece);
+  };
   absl::StatusOr<bool> sent = false;
   std::thread([&] {
     take_batch_priority(host.config.batch_priority);

@@ -14,7 +14,7 @@ namespace locus::server {
 namespace {
 
 // A waiting call checks this often whether its caller has gone.
-constexpr std::chrono::milliseconds kWaitSlice{50};
+constexpr std::chrono::milliseconds kCancellationCheck{50};
 
 // Result of a background change, handed to the call that waits for it. The call may have ended before.
 class Outcome {
@@ -30,7 +30,7 @@ class Outcome {
     MutexLock lock(mutex_);
     while (!change_) {
       RETURN_IF_ERROR(caller.stop());
-      known_.wait_until(mutex_, std::min(caller.deadline(), std::chrono::steady_clock::now() + kWaitSlice));
+      known_.wait_until(mutex_, std::min(caller.deadline(), std::chrono::steady_clock::now() + kCancellationCheck));
     }
     return *change_;
   }

@@ -18,12 +18,12 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "columns are hashed as they lie in memory");
 
-absl::Status malformed(absl::string_view field, absl::string_view message) {
+absl::Status malformed_upload(absl::string_view field, absl::string_view message) {
   return refuse_argument(Reason::kMalformed, field, {}, message);
 }
 
 absl::Status check_count(uint32_t count, uint32_t limit, absl::string_view field, absl::string_view limit_name) {
-  if (count == 0) return malformed(field, "a mesh has at least one triangle; say how many come");
+  if (count == 0) return malformed_upload(field, "a mesh has at least one triangle; say how many come");
   if (count > limit) return refuse_limit(field, limit_name, limit, count);
   return absl::OkStatus();
 }
@@ -47,7 +47,7 @@ absl::Status check_parts(const v1::UploadMeshRequest& first) {
 absl::Status check_first(const v1::UploadMeshRequest& first) {
   RETURN_IF_ERROR(check_mesh_name(first.mesh(), "mesh"));
   if (!first.sha256().empty() && first.sha256().size() != std::tuple_size_v<Sha256>)
-    return malformed("sha256", "a SHA-256 has 32 bytes; leave it empty to have it computed");
+    return malformed_upload("sha256", "a SHA-256 has 32 bytes; leave it empty to have it computed");
   RETURN_IF_ERROR(check_count(first.vertex_count(), limits::kMaxMeshVertices, "vertex_count", "mesh_vertices"));
   RETURN_IF_ERROR(check_count(first.triangle_count(), limits::kMaxMeshTriangles, "triangle_count", "mesh_triangles"));
   return check_parts(first);
@@ -162,7 +162,7 @@ absl::Status MeshUpload::append_later(const v1::UploadMeshRequest& message) {
                       : message.triangle_count() != 0 ? "triangle_count"
                       : !message.parts().empty()      ? "parts"
                                                       : nullptr;
-  if (field != nullptr) return malformed(field, "belongs into the first message of an upload only");
+  if (field != nullptr) return malformed_upload(field, "belongs into the first message of an upload only");
   return append(message);
 }
 
@@ -185,7 +185,7 @@ absl::StatusOr<MeshUpload::Complete> MeshUpload::finish() {
 absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1::UploadMeshRequest>& reader,
                          v1::UploadMeshResponse* response) {
   v1::UploadMeshRequest message;
-  if (!reader.Read(&message)) return malformed("", "an upload has at least one message, which says what comes");
+  if (!reader.Read(&message)) return malformed_upload("", "an upload has at least one message, which says what comes");
   ASSIGN_OR_RETURN(MeshUpload upload, MeshUpload::begin(message));
   const absl::StatusOr<bool> answered = answer_early(host, upload, response);
   if (!answered.ok() || *answered) return answered.status();

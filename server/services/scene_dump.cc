@@ -65,7 +65,7 @@ void add_shape(const Shape& shape, v1::Insert* to) {
 // Fills pieces and passes each to `take` when it is full. Neighbours of equal shape or mesh share a run of columns.
 class Dump {
  public:
-  Dump(const SceneSnapshot& snapshot, const TakePiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
+  Dump(const SceneSnapshot& snapshot, const TakeDumpPiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
 
   void add(const Object& object) {
     if (!make_room()) return;
@@ -117,7 +117,7 @@ class Dump {
   }
 
   const SceneSnapshot& snapshot_;
-  const TakePiece& take_;
+  const TakeDumpPiece& take_;
   v1::DumpSceneResponse piece_;
   size_t things_ = 0;
   size_t pieces_ = 0;
@@ -128,7 +128,7 @@ class Dump {
 
 }  // namespace
 
-bool dump_snapshot(const SceneSnapshot& snapshot, const TakePiece& take) {
+bool dump_snapshot(const SceneSnapshot& snapshot, const TakeDumpPiece& take) {
   std::vector<GridRef> objects;
   objects.reserve(snapshot.objects.size());
   snapshot.objects.grid().for_each([&objects](const GridRef& object) {

@@ -15,11 +15,11 @@
 namespace locus::server {
 
 // Writes a piece to the caller; returns false to end the dump.
-using TakePiece = std::function<bool(const v1::DumpSceneResponse&)>;
+using TakeDumpPiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
 // Sends objects, then instances, each in ascending order of ids, in at least one piece. Returns false if `take` ended
 // the dump.
-bool dump_snapshot(const SceneSnapshot& snapshot, const TakePiece& take);
+bool dump_snapshot(const SceneSnapshot& snapshot, const TakeDumpPiece& take);
 
 absl::Status dump_scene(const Caller& caller, const v1::DumpSceneRequest& request,
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer);
