@@ -50,11 +50,11 @@ class BlockCheck {
     RETURN_IF_ERROR(check_column(fractions.size(), 1, n_, ColumnNeed::kOptional, name("as_of_fractions")));
     if (!fractions.empty() && block_.as_of_ticks.empty())
       return refuse_argument(Reason::kMalformed, name("as_of_fractions"), {},
-                             "go with as_of_ticks: give those, or neither");
+                             "need as_of_ticks: give both columns, or neither");
     for (size_t i = 0; i < fractions.size(); ++i) {
       if (!std::isfinite(fractions[i])) return wrong(Reason::kNotFinite, "as_of_fractions", i, "needs finite numbers");
       if (fractions[i] < 0 || fractions[i] >= 1)
-        return wrong(Reason::kOutOfRange, "as_of_fractions", i, "must lie within 0 and 1, and below 1");
+        return wrong(Reason::kOutOfRange, "as_of_fractions", i, "must be at least 0 and below 1");
     }
     return absl::OkStatus();
   }
@@ -98,7 +98,7 @@ class BlockCheck {
     for (size_t i = 0; i < values.size(); ++i) {
       if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, i / width, "needs finite numbers");
       if (values[i] < 0 || values[i] > limits::kMaxCoordinate)
-        return wrong(Reason::kOutOfRange, field, i / width, "must lie within 0 and 1e9");
+        return wrong(Reason::kOutOfRange, field, i / width, "must lie between 0 and 1e9");
     }
     return absl::OkStatus();
   }
@@ -186,11 +186,11 @@ class BlockCheck {
 
   absl::Status check_kind(const LookupColumns& lookup) const {
     if (lookup.ids.empty() == lookup.groups.empty())
-      return refuse_argument(Reason::kMalformed, name("lookup"), {}, "give ids or groups, one of them");
+      return refuse_argument(Reason::kMalformed, name("lookup"), {}, "give either ids or groups");
     for (size_t i = 0; i < lookup.ids.size(); ++i)
-      if (lookup.ids[i] == kNoId) return wrong(Reason::kOutOfRange, "lookup.ids", i, "0 is no id");
+      if (lookup.ids[i] == kNoId) return wrong(Reason::kOutOfRange, "lookup.ids", i, "0 is not an id");
     for (size_t i = 0; i < lookup.groups.size(); ++i)
-      if (lookup.groups[i] == 0) return wrong(Reason::kOutOfRange, "lookup.groups", i, "0 is no group");
+      if (lookup.groups[i] == 0) return wrong(Reason::kOutOfRange, "lookup.groups", i, "0 is not a group");
     return absl::OkStatus();
   }
 

@@ -35,11 +35,16 @@ void FoundObjects::restart(size_t max_count) {
   max_count_ = max_count;
   truncated_ = false;
   clear_scratch(found_);
+  check_invariants();
 }
 
 absl::Span<const FoundObject> FoundObjects::finish() {
   keep_lowest();
   sort();
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(found_.size(), max_count_);
+    for (size_t i = 1; i < found_.size(); ++i) LOCUS_DCHECK_LT(found_[i - 1].id, found_[i].id);
+  }
   return found_;
 }
 
@@ -48,6 +53,7 @@ void FoundObjects::keep_lowest() {
   truncated_ = true;
   std::nth_element(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(max_count_), found_.end(), lower_id);
   found_.resize(max_count_);
+  check_invariants();
 }
 
 // Sorts through buckets where possible: comparing ids in random order mispredicts every other branch, and filling
@@ -73,6 +79,7 @@ bool FoundObjects::sort_by_bucket() {
     bucket = before;
     before += count;
   }
+  LOCUS_DCHECK_EQ(before, found_.size());
   if (largest > kMaxPerBucket) return false;
   bucketed_.resize(std::max(bucketed_.size(), found_.size()));
   for (const FoundObject& object : found_) bucketed_[buckets[(object.id - lowest) >> shift]++] = object;

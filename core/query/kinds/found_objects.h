@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/ids.h"
 #include "core/index/hash_grid/brick_scan.h"
 
@@ -24,8 +25,10 @@ class FoundObjects {
 
   // Adds an object. Precondition: no object with its id was added since restart().
   void offer(const GridRef& object) {
+    LOCUS_DCHECK_NE(object.entry().id, kNoId);
     found_.push_back({object.entry().id, object});
     if (found_.size() > 2 * max_count_) keep_lowest();
+    check_invariants();
   }
   // Returns the kept objects, ascending by id. Valid until the next call of restart() or offer().
   absl::Span<const FoundObject> finish();
@@ -33,6 +36,7 @@ class FoundObjects {
   bool truncated() const { return truncated_; }
 
  private:
+  void check_invariants() const { LOCUS_DCHECK_LE(found_.size(), 2 * max_count_); }
   // Drops all but the max_count_ lowest.
   void keep_lowest();
   void sort();

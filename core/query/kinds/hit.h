@@ -6,6 +6,7 @@
 #include <limits>
 #include <tuple>
 
+#include "core/base/check.h"
 #include "core/base/ids.h"
 #include "core/scene/snapshot/scene_at_time.h"
 #include "core/scene/statics/instance.h"
@@ -22,7 +23,10 @@ struct Hit {
   const SceneAtTime* moment = nullptr;  // objects: time at which the object was found; null: as in the snapshot
 
   // Returns the shape of the object at the time of the hit. Precondition: the hit is on an object.
-  Shape object_shape() const { return moment == nullptr ? shape_of(object) : moment->shape(object); }
+  Shape object_shape() const {
+    LOCUS_DCHECK(static_cast<bool>(object));
+    return moment == nullptr ? shape_of(object) : moment->shape(object);
+  }
 };
 
 // Returns a hit on an object as it is in the snapshot. The second overload returns a hit on an object as it was at

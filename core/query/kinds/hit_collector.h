@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/geometry/float_step.h"
 #include "core/geometry/ray.h"
 #include "core/query/kinds/hit.h"
@@ -31,6 +32,8 @@ class HitCollector {
 
   // Offers a hit. Returns false if no further hit matters.
   bool offer(const Hit& hit) {
+    LOCUS_DCHECK_NE(hit.id, kNoId);
+    LOCUS_DCHECK(!(hit.t < 0));
     if (!(hit.t <= limit_)) return true;
     if (answer_.hits.size() == capacity_) {
       if (!nearer(hit, answer_.hits.front())) return true;
@@ -45,8 +48,10 @@ class HitCollector {
       else
         std::make_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
       is_heap_ = true;
+      LOCUS_DCHECK_LE(answer_.hits.front().t, limit_);
       limit_ = answer_.hits.front().t;
     }
+    check_invariants();
     return mode_ != RayMode::kAny;
   }
 
@@ -55,6 +60,7 @@ class HitCollector {
 
   // Returns the hits in order, at most the requested number. Leaves the collector empty; call it once.
   RayAnswer finish() {
+    check_invariants();
     std::sort(answer_.hits.begin(), answer_.hits.end(), nearer);
     answer_.truncated = mode_ == RayMode::kAll && answer_.hits.size() == capacity_;
     if (answer_.truncated) answer_.hits.pop_back();
@@ -62,6 +68,19 @@ class HitCollector {
   }
 
  private:
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      const auto& hits = answer_.hits;
+      LOCUS_DCHECK_LE(hits.size(), capacity_);
+      LOCUS_DCHECK_EQ(is_heap_, hits.size() == capacity_);
+      if (!is_heap_) return;
+      LOCUS_DCHECK_EQ(limit_, hits.front().t);
+      // The children of the top and the last hit; a check of the whole heap would cost more than the change.
+      for (const size_t child : {size_t{1}, size_t{2}, hits.size() - 1})
+        if (child < hits.size()) LOCUS_DCHECK(!nearer(hits.front(), hits[child]));
+    }
+  }
+
   const RayMode mode_;
   const size_t capacity_;
   float limit_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/query/kinds/placed_triangle.h"
 
 namespace locus {
@@ -104,6 +105,7 @@ class PlacedBoundsVisitor {
 
 void trace_instance(QueryTask& task, const RayRequest& request, const SlabRay<double>& slabs, const Instance& instance,
                     float nearest, HitCollector& collector) {
+  LOCUS_DCHECK_GE(nearest, 0.0f);
   const bool conservative = request.precision == Precision::kConservative;
   const TriangleRay ray(instance.transform, request.origin, request.direction,
                         conservative ? Cull::kNone : request.cull);

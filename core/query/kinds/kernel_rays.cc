@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/query/kinds/instance_rays.h"
 
 namespace locus {
@@ -27,6 +28,8 @@ class Rounds {
 
  public:
   Rounds(QueryTask& task, std::vector<PendingRay>& rays) : task_(task), rays_(rays) {
+    LOCUS_DCHECK(task.ray_kernels() != nullptr);
+    for (const PendingRay& ray : rays) LOCUS_DCHECK(ray.request.mode == mode());
     const Bvh<Instance>& instances = task.snapshot().statics->tree();
     if (instances.size() == 1) only_ = instances.values().data();
     slabs_.reserve(rays.size());
@@ -50,6 +53,7 @@ class Rounds {
     }
     while (!stops_.empty() && !task_.ended()) {
       current_.swap(stops_);
+      LOCUS_DCHECK_LE(current_.size(), rays_.size());
       stops_.clear();
       sort_by_tree();
       for (size_t first = 0; first < current_.size();) first = trace_tree(first);
@@ -124,6 +128,7 @@ class Rounds {
       kernels.all(tree, kernel_rays_.data(), hits_.data(), hits_.size(), rows_.get(), max_rows_);
     else
       (mode() == RayMode::kAny ? kernels.any : kernels.first)(tree, kernel_rays_.data(), hits_.data(), hits_.size());
+    LOCUS_DCHECK_EQ(kernel_rays_.size(), kernel_stops_.size());
     uint64_t tests = 0;
     for (size_t i = 0; i < kernel_stops_.size(); ++i) {
       task_.work().nodes += hits_[i].nodes;
@@ -155,6 +160,7 @@ class Rounds {
     const auto before = [&](const KernelRow& row) { return row.t < stop.nearest; };
     if (found.verdict == KernelVerdict::kUndecided || may_be_more || std::any_of(rows, end, before))
       return trace_triangles(stop);
+    LOCUS_DCHECK_LE(found.number, max_rows_);
     for (; rows != end; ++rows) {
       Hit hit = hit_on(*stop.instance, rows->t);
       hit.triangle = rows->number;

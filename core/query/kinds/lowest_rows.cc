@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
@@ -11,12 +13,15 @@ bool lower_id(const RowRun& a, const RowRun& b) { return a.row.id < b.row.id; }
 }  // namespace
 
 void LowestRows::offer(const Hit& row) {
+  LOCUS_DCHECK_NE(row.id, kNoId);
   answer_.runs.push_back({row});
   ++rows_;
   if (rows_ > 2 * max_results_) keep_lowest();
+  check_invariants();
 }
 
 void LowestRows::offer(const Hit& row, absl::Span<const uint32_t> triangles) {
+  LOCUS_DCHECK_NE(row.id, kNoId);
   if (triangles.empty()) return;
   if (answer_.runs.empty() || answer_.runs.back().row.id != row.id)
     answer_.runs.push_back({row, answer_.triangles.size(), 0});
@@ -24,6 +29,32 @@ void LowestRows::offer(const Hit& row, absl::Span<const uint32_t> triangles) {
   answer_.triangles.insert(answer_.triangles.end(), triangles.begin(), triangles.end());
   rows_ += triangles.size();
   if (rows_ > 2 * max_results_) keep_lowest();
+  check_invariants();
+}
+
+void LowestRows::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(rows_, 2 * max_results_);
+    LOCUS_DCHECK_LE(answer_.runs.size(), rows_);
+    LOCUS_DCHECK_LE(answer_.triangles.size(), rows_);
+    if (answer_.runs.empty() || answer_.runs.back().triangle_count == 0) return;
+    LOCUS_DCHECK_EQ(answer_.runs.back().first_triangle + answer_.runs.back().triangle_count, answer_.triangles.size());
+  }
+}
+
+void LowestRows::check_runs() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(rows_, max_results_);
+    LOCUS_DCHECK(std::is_sorted(answer_.runs.begin(), answer_.runs.end(), lower_id));
+    size_t rows = 0, triangles = 0;
+    for (const RowRun& run : answer_.runs) {
+      if (run.triangle_count != 0) LOCUS_DCHECK_EQ(run.first_triangle, triangles);
+      triangles += run.triangle_count;
+      rows += run.rows();
+    }
+    LOCUS_DCHECK_EQ(rows, rows_);
+    LOCUS_DCHECK_EQ(triangles, answer_.triangles.size());
+  }
 }
 
 bool LowestRows::in_order() const {
@@ -55,6 +86,7 @@ void LowestRows::keep_lowest() {
 
 OverlapAnswer LowestRows::finish() {
   keep_lowest();
+  check_runs();
   return std::move(answer_);
 }
 

@@ -42,7 +42,7 @@ class LowestRows {
   explicit LowestRows(uint32_t max_results, bool sorted_triangles)
       : max_results_(max_results), sorted_triangles_(sorted_triangles) {}
 
-  // Adds a row without a triangle. Precondition: no other row has its id.
+  // Adds a row without a triangle.
   void offer(const Hit& row);
   // Adds one row per triangle of an instance. Several calls for one instance add its triangles in storage order.
   void offer(const Hit& row, absl::Span<const uint32_t> triangles);
@@ -50,6 +50,10 @@ class LowestRows {
   OverlapAnswer finish();
 
  private:
+  // Checks what offer() changes: the last run.
+  void check_invariants() const;
+  // Checks all runs, in order.
+  void check_runs() const;
   bool in_order() const;
   // Sorts the runs, merges those of one instance, and drops rows beyond max_results_.
   void keep_lowest();

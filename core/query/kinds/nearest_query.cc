@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/geometry/point_triangle.h"
 #include "core/query/kinds/hit_collector.h"
 #include "core/query/kinds/placed_triangle.h"
@@ -24,6 +25,7 @@ class NearestRows {
         in_order_(request.count <= kMaxInOrder),
         farthest_(request.max_distance),
         limit_(squared_limit_of(farthest_)) {
+    LOCUS_DCHECK_GE(count_, size_t{1});
     rows_.reserve(std::min<size_t>(count_, kMaxInOrder));
   }
 
@@ -33,6 +35,7 @@ class NearestRows {
   double limit() const { return limit_; }
 
   void offer(const Hit& row) {
+    LOCUS_DCHECK_NE(row.id, kNoId);
     if (!(row.t <= farthest_)) return;
     if (rows_.size() == count_) {
       if (!nearer(row, last())) return;
@@ -40,19 +43,32 @@ class NearestRows {
       rows_.pop_back();
     }
     insert(row);
-    if (rows_.size() < count_ || last().t == farthest_) return;
-    farthest_ = last().t;
-    limit_ = squared_limit_of(farthest_);
+    if (rows_.size() == count_ && last().t != farthest_) {
+      LOCUS_DCHECK_LT(last().t, farthest_);
+      farthest_ = last().t;
+      limit_ = squared_limit_of(farthest_);
+    }
+    check_invariants();
   }
 
   std::vector<Hit> finish() {
     if (!in_order_) std::sort_heap(rows_.begin(), rows_.end(), nearer);
+    LOCUS_DCHECK(std::is_sorted(rows_.begin(), rows_.end(), nearer));
     return std::move(rows_);
   }
 
  private:
   // Up to this many rows are kept sorted, since objects are offered nearly in order; more are kept as a heap.
   static constexpr size_t kMaxInOrder = 32;
+
+  void check_invariants() const {
+    if constexpr (kDebugChecks) {
+      LOCUS_DCHECK_LE(rows_.size(), count_);
+      if (rows_.empty()) return;
+      LOCUS_DCHECK_LE(last().t, farthest_);
+      LOCUS_DCHECK(!nearer(last(), in_order_ ? rows_.front() : rows_.back()));
+    }
+  }
 
   const Hit& last() const { return in_order_ ? rows_.back() : rows_.front(); }
   void insert(const Hit& row) {
@@ -251,6 +267,7 @@ class InstancesNear {
 }  // namespace
 
 NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& nearest, size_t i) {
+  LOCUS_DCHECK_LT(3 * i, nearest.points.size());
   const float* offset = ColumnReader<float>(nearest.points, 3).entry(i);
   return {block.frame + Vec3d{offset[0], offset[1], offset[2]},
           ColumnReader<float>(nearest.max_distances, 1).value(i, std::numeric_limits<float>::infinity()),
@@ -284,6 +301,7 @@ Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
     shape.position = shape.position - point;
     return nearest_on_shape({}, shape);
   }
+  LOCUS_DCHECK(row.instance != nullptr);
   const Corners corners = corners_of(row.instance->transform, row.instance->mesh->triangle(row.triangle));
   if (conservative) return nearest_in(point, PlacedTriangles(*row.instance).bounds_of_corners(corners)) - point;
   return nearest_on_triangle({}, corners[0] - point, corners[1] - point, corners[2] - point);

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/index/regions.h"
 #include "core/query/kinds/placed_triangle.h"
@@ -25,6 +26,7 @@ struct ObjectBounds {
 
 // Returns the bounds of an object that is at most `displacement_bound` away from its stored position.
 ObjectBounds object_bounds(const GridRef& object, double displacement_bound) {
+  LOCUS_DCHECK_GE(displacement_bound, 0.0);
   const Vec3d position = object.entry().position;
   const double extent = object.reach();
   const double inner_radius = object.entry().kind == ShapeKind::kBall ? extent : 0;
@@ -323,6 +325,7 @@ OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const S
 template <class Kind>
 OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
                           const OverlapOptions& options, const Filter& filter) {
+  LOCUS_DCHECK_GE(options.max_results, 1u);
   LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
   if (options.source != Source::kDynamic) {
     InstanceSearch<Kind> search(task, shape, options, filter, rows);
@@ -364,11 +367,13 @@ GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapO
 }
 
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {
+  LOCUS_DCHECK_LT(3 * i, balls.centers.size());
   return {block.frame + point(ColumnReader<float>(balls.centers, 3).entry(i)),
           ColumnReader<float>(balls.radii, 1).value(i, 0)};
 }
 
 Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i) {
+  LOCUS_DCHECK_LT(3 * i, boxes.centers.size());
   Obbd box{block.frame + point(ColumnReader<float>(boxes.centers, 3).entry(i)),
            point(ColumnReader<float>(boxes.half_extents, 3).entry(i)),
            {}};

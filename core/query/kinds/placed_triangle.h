@@ -8,6 +8,7 @@
 
 #include <array>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/scene/statics/instance.h"
 
@@ -25,6 +26,7 @@ inline Corners corners_of(const Transform& transform, const Triangle& triangle) 
 // Returns the bounds of the corners, grown by `epsilon` on every side.
 inline Aabbd grown_around(const Corners& corners, double epsilon) {
   Aabbd bounds;
+  LOCUS_DCHECK_GE(epsilon, 0.0);
   for (const Vec3d corner : corners) bounds = merge(bounds, corner);
   return grown(bounds, epsilon);
 }
@@ -66,7 +68,9 @@ class LoosePlacedTriangles {
   explicit LoosePlacedTriangles(const Instance& instance, double query_extent = 0)
       : transform_(instance.transform),
         extent_(magnitude(instance.bounds) + query_extent),
-        epsilon_(kRelativeEpsilon * extent_ + kPlacementEpsilon * placement_magnitude(instance)) {}
+        epsilon_(kRelativeEpsilon * extent_ + kPlacementEpsilon * placement_magnitude(instance)) {
+    LOCUS_DCHECK_GE(query_extent, 0.0);
+  }
 
   Aabbd bounds_of_triangle(const Triangle& triangle) const {
     return grown_around(corners_of(transform_, triangle), epsilon_);

@@ -9,6 +9,7 @@ bool BatchControl::report_work(uint64_t work) {
   absl::Status status = stop_();
   if (status.ok()) return true;
   if (!stopping_.exchange(true)) {
+    LOCUS_DCHECK(!stopped());
     status_ = std::move(status);
     stopped_.store(true, std::memory_order_release);
   }
@@ -17,6 +18,7 @@ bool BatchControl::report_work(uint64_t work) {
 
 bool QueryTask::check() {
   const uint64_t done = work_.nodes + work_.cells + work_.tests;
+  LOCUS_DCHECK_GE(done, reported_work_);
   ended_ = ended_ || !control_.report_work(done - reported_work_);
   reported_work_ = done;
   return !ended_;

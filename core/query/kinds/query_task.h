@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "absl/status/status.h"
+#include "core/base/check.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
 #include "core/index/bvh/kernels/dispatch.h"
@@ -51,6 +52,7 @@ class BatchControl {
 
   // Adds `work` to the work done and polls the stop. Returns false if the batch ends: stopped, or out of work.
   bool report_work(uint64_t work);
+  // Returns whether the work budget is used up.
   bool out_of_work() const { return max_work_ != 0 && done_.load(std::memory_order_relaxed) >= max_work_; }
   // Returns the status that stopped the batch, or OK. Only after all threads have finished.
   absl::Status status() const { return status_; }
@@ -159,6 +161,7 @@ class QueryTask {
   // Makes visit_objects_in_region() take its regions from one walk over the regions of queries [begin, end), in order.
   // The walk prefetches the memory of the next regions while one is visited.
   void walk_regions(size_t begin, size_t end, const std::function<GridRegion(size_t)>& region_of) {
+    LOCUS_DCHECK_LT(begin, end);
     walk_.emplace(begin, end, region_of);
   }
 

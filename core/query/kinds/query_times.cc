@@ -52,6 +52,7 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
   const size_t n = query_count(block);
   if (block.as_of_ticks.empty() || n == 0) {
     result.scenes_.emplace_back(snapshot.objects);
+    result.check_invariants(n);
     return result;
   }
   const ColumnReader<uint64_t> ticks(block.as_of_ticks, 1);
@@ -59,6 +60,7 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
   const size_t entries = block.as_of_ticks.size() == 1 && block.as_of_fractions.size() <= 1 ? 1 : n;
   for (size_t i = 0; i < entries; ++i) {
     const AsOf asked{ticks.value(i, 0), fractions.value(i, 0)};
+    LOCUS_DCHECK(asked.fraction >= 0 && asked.fraction < 1);
     const AsOf time = nearest_kept(snapshot, asked);
     if (!(time == asked) && block.outside == OutsideHistory::kReject) return not_kept(snapshot, asked, field, i);
     const bool repeated = i > 0 && time == result.times_.back();
@@ -66,6 +68,7 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
     result.times_.push_back(time);
     result.clamped_.push_back(time == asked ? 0 : 1);
   }
+  result.check_invariants(n);
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/check.h"
 #include "core/query/query_batch.h"
 #include "core/scene/snapshot/scene_at_time.h"
 
@@ -24,14 +25,28 @@ class QueryTimes {
   // Returns the moving objects at the effective time of a query.
   const SceneAtTime& of(size_t query) const { return scenes_[entry_of(query)]; }
   // Returns the effective time of a query. Precondition: asks_past().
-  const AsOf& time(size_t query) const { return times_[entry_of(query)]; }
+  const AsOf& time(size_t query) const {
+    LOCUS_DCHECK(asks_past());
+    return times_[entry_of(query)];
+  }
   // Returns whether the block has as_of_ticks and queries; otherwise all queries see the latest state.
   bool asks_past() const { return !times_.empty(); }
   // Returns whether a query asked for a time outside the history. Precondition: asks_past().
-  bool clamped(size_t query) const { return clamped_[entry_of(query)] != 0; }
+  bool clamped(size_t query) const {
+    LOCUS_DCHECK(asks_past());
+    return clamped_[entry_of(query)] != 0;
+  }
 
  private:
-  size_t entry_of(size_t query) const { return scenes_.size() == 1 ? 0 : query; }
+  void check_invariants(size_t queries) const {
+    LOCUS_DCHECK(scenes_.size() == 1 || scenes_.size() == queries);
+    LOCUS_DCHECK(times_.empty() || times_.size() == scenes_.size());
+    LOCUS_DCHECK_EQ(clamped_.size(), times_.size());
+  }
+  size_t entry_of(size_t query) const {
+    LOCUS_DCHECK(scenes_.size() == 1 || query < scenes_.size());
+    return scenes_.size() == 1 ? 0 : query;
+  }
 
   std::vector<SceneAtTime> scenes_;
   std::vector<AsOf> times_;

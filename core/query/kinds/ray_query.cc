@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/query/kinds/hit_collector.h"
 #include "core/query/kinds/instance_rays.h"
 #include "core/query/kinds/kernel_rays.h"
@@ -94,6 +95,7 @@ Cull stored_cull(Cull cull, Winding winding) {
 }  // namespace
 
 RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i) {
+  LOCUS_DCHECK_LT(3 * i, rays.origins.size());
   RayRequest request;
   request.origin = block.frame + point(ColumnReader<float>(rays.origins, 3).entry(i));
   request.direction = point(ColumnReader<float>(rays.directions, 3).entry(i));
@@ -109,6 +111,7 @@ RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding 
 
 RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryTimes& times,
                     Winding winding, size_t begin, size_t end) {
+  LOCUS_DCHECK_LT(begin, end);
   std::vector<PendingRay> rays;
   rays.reserve(end - begin);
   for (size_t i = begin; i < end; ++i) rays.emplace_back(ray_request(block, columns, winding, i), Filter(block, i));
@@ -131,6 +134,7 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
     answers.push_back(ray.collector.finish());
     answers.back().truncated |= task.ended();
   }
+  LOCUS_DCHECK_EQ(answers.size(), end - begin);
   return answers;
 }
 

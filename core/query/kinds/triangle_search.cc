@@ -112,6 +112,8 @@ class BatchSearch {
             .many(tree_.tree(), regions, judges, count, triangles_.data() + used_, triangles_.size() - used_, counts);
     for (size_t i = 0; i < answered; ++i) used_ += counts[i];
     done_ += answered;
+    LOCUS_DCHECK_LE(answered, count);
+    LOCUS_DCHECK_LE(used_, triangles_.size());
     return answered == count;
   }
 

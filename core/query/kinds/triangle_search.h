@@ -14,6 +14,7 @@
 #define LOCUS_CORE_QUERY_KINDS_TRIANGLE_SEARCH_H_
 
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/geometry/triangle_overlap.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/bvh/triangle_bvh.h"
@@ -54,6 +55,7 @@ class TriangleSearch {
   // Precondition: served(tree, shape).
   TriangleSearch(const TriangleBvh& tree, const Shape& shape)
       : run_(kernel_for(shape).one), tree_(tree.tree()), region_(kernel_region(shape)) {
+    LOCUS_DCHECK(served(tree, shape));
     visit_.start(judge_of(shape));
   }
 
@@ -63,9 +65,12 @@ class TriangleSearch {
   // is over. `room` is at least kMinRegionRoom; any of it may be overwritten. Returns after about kMaxRegionTests
   // tests.
   size_t next(uint32_t* triangles, size_t room) {
+    LOCUS_DCHECK(!over());
+    LOCUS_DCHECK_GE(room, size_t{kMinRegionRoom});
     visit_.numbers = triangles;
     visit_.room = room;
     run_(tree_, region_, visit_);
+    LOCUS_DCHECK_LE(visit_.found, room);
     return visit_.found;
   }
   // Return the cost of the last next(): nodes opened, triangles tested, and how many of these needed the predicates.

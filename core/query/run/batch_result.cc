@@ -1,5 +1,7 @@
 #include "core/query/run/batch_result.h"
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
@@ -20,10 +22,12 @@ RowSpans add_rows(BlockResult& result, ColumnSet columns, size_t rows) {
 }
 
 RowSpans BatchResultSink::add_rows(size_t block, ColumnSet columns, size_t rows) {
+  LOCUS_DCHECK_LT(block, result_.blocks.size());
   return locus::add_rows(result_.blocks[block], columns, rows);
 }
 char* BatchResultSink::add_hits(size_t block, size_t queries) { return grow(result_.blocks[block].hits, queries); }
 uint32_t* BatchResultSink::add_counts(size_t block, size_t queries) {
+  LOCUS_DCHECK_LT(block, result_.blocks.size());
   return grow(result_.blocks[block].counts, queries);
 }
 uint32_t* BatchResultSink::add_truncated(size_t block, size_t queries) {

@@ -51,7 +51,9 @@ absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot&
   std::unique_ptr<BatchRun> run(new BatchRun(snapshot, batch, std::move(options), answer));
   for (QueryTimes& block_times : times) run->add_block(std::move(block_times));
   const MutexLock lock(run->mutex_);
+  LOCUS_DCHECK_EQ(run->blocks_.size(), batch.blocks.size());
   run->skip_empty_blocks();
+  run->check_invariants();
   return run;
 }
 
@@ -61,7 +63,9 @@ BatchRun::BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOp
       options_(std::move(options)),
       answer_(answer),
       control_(batch.max_work, options_.stop),
-      free_bytes_(reply_limit(batch) - fixed_reply_bytes(batch)) {}
+      free_bytes_(reply_limit(batch) - fixed_reply_bytes(batch)) {
+  LOCUS_DCHECK_LE(fixed_reply_bytes(batch), reply_limit(batch));
+}
 
 void BatchRun::add_block(QueryTimes times) {
   const size_t index = blocks_.size();
@@ -99,8 +103,10 @@ Progress BatchRun::work(uint64_t nanoseconds) {
     const bool time_is_up =
         !options_.clock || (now() - start >= nanoseconds && work_time() - work_time_before >= nanoseconds);
     const MutexLock lock(mutex_);
+    LOCUS_DCHECK_GT(active_threads_, 0u);
     --active_threads_;
     const Progress reached = progress();
+    check_invariants();
     const bool leave = reached != Progress::kMore || time_is_up;
     if (!leave) chunk = begin_chunk();
     if (leave || chunk->block != timing.block) end_timing(timing);
@@ -118,6 +124,7 @@ bool BatchRun::can_begin() const {
 }
 
 BatchRun::Chunks::iterator BatchRun::begin_chunk() {
+  LOCUS_DCHECK(can_begin());
   ++active_threads_;
   if (!unstarted_.empty()) return pop_unstarted();
   const Block& block = blocks_[next_block_];
@@ -129,12 +136,15 @@ BatchRun::Chunks::iterator BatchRun::begin_chunk() {
     next_query_ = 0;
     skip_empty_blocks();
   }
+  check_invariants();
   return std::prev(chunks_.end());
 }
 
 BatchRun::Chunks::iterator BatchRun::pop_unstarted() {
+  LOCUS_DCHECK(!unstarted_.empty());
   const Chunks::iterator chunk = unstarted_.front();
   unstarted_.erase(unstarted_.begin());
+  check_invariants();
   return chunk;
 }
 
@@ -156,6 +166,9 @@ size_t BatchRun::run(Chunk& chunk) {
 void BatchRun::end_chunk(Chunks::iterator chunk, size_t reached) {
   {
     const MutexLock lock(mutex_);
+    LOCUS_DCHECK(!chunk->done);
+    LOCUS_DCHECK_LT(chunk->begin, reached);
+    LOCUS_DCHECK_LE(reached, chunk->end);
     if (reached < chunk->end) split(chunk, reached);
     chunk->done = true;
     if (writing_ || !chunks_.front().done) return;
@@ -171,6 +184,7 @@ void BatchRun::split(Chunks::iterator chunk, size_t reached) {
     return std::tie(a->block, a->begin) < std::tie(b->block, b->begin);
   };
   unstarted_.insert(std::upper_bound(unstarted_.begin(), unstarted_.end(), rest, before), rest);
+  check_invariants();
 }
 
 void BatchRun::write_out() {
@@ -178,11 +192,13 @@ void BatchRun::write_out() {
     Chunks ready;
     {
       const MutexLock lock(mutex_);
+      LOCUS_DCHECK(writing_);
       const auto first_open =
           std::find_if(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return !chunk.done; });
       ready.splice(ready.end(), chunks_, chunks_.begin(), first_open);
       if (ready.empty()) {
         writing_ = false;
+        check_invariants();
         return;
       }
     }
@@ -192,6 +208,7 @@ void BatchRun::write_out() {
 }
 
 void BatchRun::write(const Chunk& chunk) {
+  LOCUS_DCHECK(chunk.done);
   Block& block = blocks_[chunk.block];
   block.cost.work += chunk.work;
   if (row_layout(batch_.blocks[chunk.block]) == RowLayout::kCounted) return write_counted(chunk);
@@ -201,6 +218,7 @@ void BatchRun::write(const Chunk& chunk) {
 
 // Writes the counts and rows of a chunk. Drops rows that do not fit the reply and lists their queries as truncated.
 void BatchRun::write_counted(const Chunk& chunk) {
+  LOCUS_DCHECK_EQ(chunk.rows.counts.size(), chunk.end - chunk.begin);
   const ColumnSet columns = returned_columns(batch_.blocks[chunk.block]);
   const uint32_t bytes = row_bytes(columns);
   uint64_t free_bytes = free_bytes_.load(std::memory_order_relaxed);
@@ -226,6 +244,8 @@ void BatchRun::write_counted(const Chunk& chunk) {
     first = row;
   }
   copy();
+  LOCUS_DCHECK(cut == chunk.rows.truncated.end());
+  LOCUS_DCHECK_LE(free_bytes, free_bytes_.load(std::memory_order_relaxed));
   free_bytes_.store(free_bytes, std::memory_order_relaxed);
 }
 
@@ -234,6 +254,43 @@ Progress BatchRun::progress() {
   if (active_threads_ > 0 || done_) return Progress::kBegun;
   done_ = true;
   return Progress::kDone;
+}
+
+void BatchRun::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    size_t open = 0;
+    const Chunk* before = nullptr;
+    for (const Chunk& chunk : chunks_) {
+      LOCUS_DCHECK_LT(chunk.begin, chunk.end);
+      LOCUS_DCHECK_LE(chunk.end, blocks_[chunk.block].queries);
+      if (before != nullptr) check_adjacent(before->block, before->end, chunk.block, chunk.begin);
+      open += chunk.done ? 0 : 1;
+      before = &chunk;
+    }
+    if (before != nullptr) check_adjacent(before->block, before->end, next_block_, next_query_);
+    LOCUS_DCHECK_LE(next_block_, blocks_.size());
+    LOCUS_DCHECK(next_block_ == blocks_.size() ? next_query_ == 0 : next_query_ < blocks_[next_block_].queries);
+    LOCUS_DCHECK_LE(unstarted_.size(), open);
+    LOCUS_DCHECK_LE(open - unstarted_.size(), size_t{active_threads_});
+    for (size_t i = 0; i < unstarted_.size(); ++i) {
+      LOCUS_DCHECK(!unstarted_[i]->done);
+      if (i == 0) continue;
+      const Chunk &a = *unstarted_[i - 1], &b = *unstarted_[i];
+      LOCUS_DCHECK(std::tie(a.block, a.begin) < std::tie(b.block, b.begin));
+    }
+    LOCUS_DCHECK(!done_ || active_threads_ == 0);
+    LOCUS_DCHECK(!done_ || chunks_.empty() || control_.stopped());
+  }
+}
+
+void BatchRun::check_adjacent(size_t before, size_t end, size_t block, size_t begin) const {
+  if constexpr (kDebugChecks) {
+    if (before == block) return LOCUS_CHECK(end == begin);
+    LOCUS_DCHECK_LT(before, block);
+    LOCUS_DCHECK_EQ(end, blocks_[before].queries);
+    LOCUS_DCHECK_EQ(begin, size_t{0});
+    for (size_t i = before + 1; i < block; ++i) LOCUS_DCHECK_EQ(blocks_[i].queries, size_t{0});
+  }
 }
 
 }  // namespace locus

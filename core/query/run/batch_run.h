@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/check.h"
 #include "core/base/mutex.h"
 #include "core/query/kinds/query_task.h"
 #include "core/query/kinds/query_times.h"
@@ -76,7 +77,10 @@ class BatchRun {
   // returned kDone.
   absl::Status status() const { return control_.stopped() ? control_.status() : absl::OkStatus(); }
   // Returns the cost of one block, or of the batch. Valid once work() has returned kDone.
-  const QueryCost& cost(size_t block) const { return blocks_[block].cost; }
+  const QueryCost& cost(size_t block) const {
+    LOCUS_DCHECK_LT(block, blocks_.size());
+    return blocks_[block].cost;
+  }
   QueryCost cost() const;
 
  private:
@@ -108,6 +112,11 @@ class BatchRun {
   BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOptions options, AnswerSink& answer);
   void add_block(QueryTimes times);
 
+  // Checks the invariants of the class comment; O(kMaxChunks).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
+  // Checks that the query `begin` of `block` is the next one in batch order after [.., end) of block `before`.
+  void check_adjacent(size_t before, size_t end, size_t block, size_t begin) const;
+
   // Returns whether a chunk may be started now.
   bool can_begin() const LOCUS_REQUIRES(mutex_);
   // Takes the first unstarted chunk, or cuts a new one. Precondition: can_begin().
@@ -130,7 +139,9 @@ class BatchRun {
   uint64_t now() const { return options_.clock ? options_.clock() : 0; }
   TimingSpan begin_timing(size_t block) const { return {block, work_time()}; }
   void end_timing(const TimingSpan& timing) LOCUS_REQUIRES(mutex_) {
-    blocks_[timing.block].cost.nanoseconds += work_time() - timing.start;
+    const uint64_t end = work_time();
+    LOCUS_DCHECK_GE(end, timing.start);
+    blocks_[timing.block].cost.nanoseconds += end - timing.start;
   }
   uint64_t work_time() const { return options_.work_clock ? options_.work_clock() : now(); }
 

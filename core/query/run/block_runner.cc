@@ -28,13 +28,30 @@ BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTi
       times_(times),
       output_(output),
       columns_(returned_columns(block)),
-      max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {}
+      max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {
+  LOCUS_DCHECK(row_layout(block) != RowLayout::kBytes || output.hits != nullptr);
+}
 
 size_t BlockRunner::run(size_t begin, size_t end) {
+  LOCUS_DCHECK_LT(begin, end);
+  LOCUS_DCHECK_LE(end, query_count(block_));
   task_.check();
   const size_t reached = std::visit([&](const auto& kind) { return run_queries(kind, begin, end); }, block_.kind);
   task_.check();  // reports the rest of the work, so that many small chunks use up a budget like a large one
+  LOCUS_DCHECK_LT(begin, reached);
+  LOCUS_DCHECK_LE(reached, end);
+  check_invariants(begin, reached);
   return reached;
+}
+
+void BlockRunner::check_invariants(size_t begin, size_t reached) const {
+  if constexpr (kDebugChecks) {
+    LOCUS_DCHECK_LE(rows_, max_rows_);
+    LOCUS_DCHECK_EQ(result_.counts.size(), row_layout(block_) == RowLayout::kCounted ? reached - begin : size_t{0});
+    const std::vector<uint32_t>& cut = result_.truncated;
+    for (size_t i = 1; i < cut.size(); ++i) LOCUS_DCHECK_LT(cut[i - 1], cut[i]);
+    if (!cut.empty()) LOCUS_DCHECK(cut.front() >= begin && cut.back() < reached);
+  }
 }
 
 uint64_t BlockRunner::work_done() const {
@@ -117,6 +134,7 @@ void BlockRunner::append_runs(const OverlapAnswer& answer, size_t i) {
 
 void BlockRunner::count_rows(size_t rows, bool cut, size_t i) {
   rows_ += rows;
+  LOCUS_DCHECK_LE(rows_, max_rows_);
   result_.counts.push_back(static_cast<uint32_t>(rows));
   if (cut) result_.truncated.push_back(static_cast<uint32_t>(i));
 }
@@ -137,6 +155,7 @@ size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end
 // Sets the number of rays so that the next call takes about kCallWork if its rays cost as much as the last ones. Grows
 // at most fourfold.
 void BlockRunner::adapt_rays_per_call(size_t rays, uint64_t work) {
+  LOCUS_DCHECK_GT(rays, size_t{0});
   const bool many_hits = std::get<RayColumns>(block_.kind).mode == RayMode::kAll;
   const uint64_t max_rays = many_hits ? kMaxRaysOfManyHits : kMaxRaysPerCall;
   const uint64_t fit = kCallWork * rays / std::max<uint64_t>(work, 1);

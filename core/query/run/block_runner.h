@@ -9,6 +9,7 @@
 #include <atomic>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/query/kinds/overlap_query.h"
 #include "core/query/kinds/query_task.h"
 #include "core/query/kinds/ray_query.h"
@@ -39,6 +40,8 @@ class BlockRunner {
   BlockResult take_rows() { return std::move(result_); }
 
  private:
+  // Checks the class invariants after the answers to queries [begin, reached).
+  void check_invariants(size_t begin, size_t reached) const;
   template <class Columns>
   size_t run_queries(const Columns& columns, size_t begin, size_t end);
   size_t run_queries(const RayColumns& rays, size_t begin, size_t end);
