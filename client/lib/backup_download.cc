@@ -26,9 +26,9 @@ bool equal(const Sha256& hash, absl::string_view bytes) {
 }
 
 // Passes received files on to the sink, and verifies sizes, paths and hashes against the announcement.
-class Receiver {
+class BackupReceiver {
  public:
-  explicit Receiver(BackupSink& sink) : sink_(sink) {}
+  explicit BackupReceiver(BackupSink& sink) : sink_(sink) {}
 
   absl::Status receive(const v1::BackupResponse& message) {
     if (message.has_announced() != first_) return damaged("the announcement is not exactly in the first message");
@@ -104,7 +104,7 @@ absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stu
   grpc::ClientContext context;
   context.set_deadline(absl::ToChronoTime(deadline));
   const auto reader = stub.Backup(&context, v1::BackupRequest());
-  Receiver receiver(sink);
+  BackupReceiver receiver(sink);
   v1::BackupResponse message;
   absl::Status received;
   while (received.ok() && reader->Read(&message)) received = receiver.receive(message);

@@ -24,9 +24,9 @@ bool append(const Repeated& column, size_t announced, std::vector<T>* to) {
   return true;
 }
 
-class Receiver {
+class MeshReceiver {
  public:
-  Receiver(absl::string_view name, const DownloadProgress& progress) : name_(name), progress_(progress) {}
+  MeshReceiver(absl::string_view name, const DownloadProgress& progress) : name_(name), progress_(progress) {}
 
   absl::Status receive(v1::DownloadMeshResponse& message) {
     if (message.has_mesh() != first_) return damaged(name_, "its description is not exactly in the first message");
@@ -93,7 +93,7 @@ absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& st
   v1::DownloadMeshRequest request;
   request.set_mesh(std::string(name));
   const auto reader = stub.DownloadMesh(&context, request);
-  Receiver receiver(name, progress);
+  MeshReceiver receiver(name, progress);
   v1::DownloadMeshResponse message;
   absl::Status received;
   while (received.ok() && reader->Read(&message)) received = receiver.receive(message);

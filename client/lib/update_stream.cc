@@ -11,7 +11,7 @@
 namespace locus::client {
 namespace {
 
-using Stream = PipelinedStream<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse, v1::UpdateAck>;
+using UpdatePipeline = PipelinedStream<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse, v1::UpdateAck>;
 
 uint64_t random_writer() {
   std::random_device device;
@@ -30,7 +30,7 @@ bool batch_number_is_unused(const absl::Status& failure) {
 
 }  // namespace
 
-class UpdateStream::Impl final : public Stream::Kind {
+class UpdateStream::Impl final : public UpdatePipeline::Kind {
  public:
   Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const UpdateStreamOptions& options)
       : stub_(v1::UpdateService::NewStub(std::move(channel))),
@@ -38,14 +38,14 @@ class UpdateStream::Impl final : public Stream::Kind {
         next_batch_(options.next_batch),
         stream_(*this, std::move(scene), {options.max_in_flight, options.reconnect, options.patience}) {}
 
-  Stream& stream() { return stream_; }
+  UpdatePipeline& stream() { return stream_; }
   uint64_t writer() const { return writer_; }
   std::optional<Revision> last_ack() const {
     std::lock_guard lock(ack_mutex_);
     return last_ack_;
   }
 
-  void start_call(grpc::ClientContext* context, Stream::Reactor* reactor) override {
+  void start_call(grpc::ClientContext* context, UpdatePipeline::Reactor* reactor) override {
     stub_->async()->StreamUpdates(context, reactor);
   }
 
@@ -61,7 +61,8 @@ class UpdateStream::Impl final : public Stream::Kind {
     return absl::DataLossError("the server answered a batch with neither an ack nor an error");
   }
 
-  absl::Status answered(const absl::StatusOr<v1::UpdateAck>& outcome, Stream::Items& items, size_t position) override {
+  absl::Status answered(const absl::StatusOr<v1::UpdateAck>& outcome, UpdatePipeline::Items& items,
+                        size_t position) override {
     if (outcome.ok()) {
       std::lock_guard lock(ack_mutex_);
       last_ack_ = Revision{outcome->epoch(), outcome->revision()};
@@ -84,7 +85,7 @@ class UpdateStream::Impl final : public Stream::Kind {
   uint64_t sequence_ = 0;  // guarded by the stream's lock
   mutable std::mutex ack_mutex_;
   std::optional<Revision> last_ack_;  // guarded by ack_mutex_
-  Stream stream_;                     // last: its thread uses everything above
+  UpdatePipeline stream_;             // last: its thread uses everything above
 };
 
 UpdateStream::UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene,
