@@ -77,18 +77,18 @@ UpdateAck SceneWriter::ack_now() const {
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch) {
   ASSIGN_OR_RETURN(std::optional<UpdateAck> known, writers_.admit(batch.writer, batch.batch));
   if (known) return Applied{old_ack(batch), nullptr};
-  const bool jumps = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
-                                                   [](const MoveColumns& move) { return move.teleport; });
-  absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !jumps ? apply_moves(batch) : apply_changes(batch);
+  const bool teleports = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
+                                                       [](const MoveColumns& move) { return move.teleport; });
+  absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !teleports ? apply_moves(batch) : apply_changes(batch);
   if (result.ok()) writers_.record(batch.writer, batch.batch, result->ack);
   return result;
 }
 
-template <class Application>
-absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Application& application, Applied& result) {
-  result.ack.applied = application.applied();
-  result.ack.refused = application.refused();
-  result.ack.errors = std::move(application.errors());
+template <class Applier>
+absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, Applied& result) {
+  result.ack.applied = applier.applied();
+  result.ack.refused = applier.refused();
+  result.ack.errors = std::move(applier.errors());
   if (!batch.all_or_nothing || result.ack.refused == 0) return absl::OkStatus();
   const ItemError& first = result.ack.errors.front();
   return refuse_argument(first.reason, first.field, first.index,
@@ -101,27 +101,27 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   moves_.run(objects_, batch);
   RETURN_IF_ERROR(fill_ack(batch, moves_, result));
   result.snapshot = publish_moves(batch);
-  UpdateAck reached = ack_now();
-  result.ack.epoch = reached.epoch;
-  result.ack.revision = reached.revision;
-  result.ack.tick = reached.tick;
+  const UpdateAck now = ack_now();
+  result.ack.epoch = now.epoch;
+  result.ack.revision = now.revision;
+  result.ack.tick = now.tick;
   return result;
 }
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatch& batch) {
   Applied result;
   flush_coalesced_moves();
-  BatchApplier application(objects_, *statics_, batch, recorder_.on() ? TrackLifetimes::kYes : TrackLifetimes::kNo);
-  application.run();
-  if (application.object_count() > max_objects_)
+  BatchApplier applier(objects_, *statics_, batch, recorder_.on() ? TrackLifetimes::kYes : TrackLifetimes::kNo);
+  applier.run();
+  if (applier.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
-                       static_cast<double>(application.object_count()), 0);
-  RETURN_IF_ERROR(fill_ack(batch, application, result));
-  const BatchApplier::Difference difference = application.difference();
-  const bool forgets_now = forgets(batch);
+                       static_cast<double>(applier.object_count()), 0);
+  RETURN_IF_ERROR(fill_ack(batch, applier, result));
+  const BatchApplier::Difference difference = applier.difference();
+  const bool dropped_history = drops_history(batch);
   start_tick(batch);
   replaced_bytes_ += objects_.apply(difference.removed, difference.added, difference.replaced);
-  publish_changes(batch, !difference.empty() || forgets_now, result);
+  publish_changes(batch, !difference.empty() || dropped_history, result);
   return result;
 }
 
@@ -141,7 +141,7 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     ack.applied = moves_.applied();
     ack.refused = moves_.refused();
     ack.errors = std::move(moves_.errors());
-    // The next of the same writer may be among them, or the same once more.
+    // Record the ack now: a later batch of the list may be the next one of this writer, or a duplicate.
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);
@@ -165,12 +165,12 @@ void SceneWriter::flush_coalesced_moves() {
 }
 
 SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch) {
-  Applied all;
+  Applied result;
   start_tick(batch);
   const bool changes = apply_staged_moves();
-  publish_changes(batch, changes, all);
+  publish_changes(batch, changes, result);
   moves_.clear();
-  return std::move(all.snapshot);
+  return std::move(result.snapshot);
 }
 
 void SceneWriter::record_ack(const UpdateBatch& batch, UpdateAck& ack) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kNumbersPerChunk = 3 * 65536;
 static_assert(kNumbersPerChunk * sizeof(float) + 64 <= UpdateLog::kMaxChunkBytes);
-// A chunk of parts ends after the one that takes it beyond this.
+// Size beyond which a chunk of parts ends.
 constexpr size_t kPartsChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kPartsChunk + limits::kMaxLabelLength + 64 <= UpdateLog::kMaxChunkBytes);
 constexpr size_t kMinPart = 2 * 8;

@@ -9,15 +9,15 @@
 namespace locus {
 namespace {
 
-// What a batch can take: each item in all columns, and each list's lengths.
+// Upper bounds of the encoded size of a batch: each item in all columns, and the lengths of each list.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);
 static_assert(uint64_t{limits::kMaxInstances} * 128 <= UpdateLog::kMaxRecordBytes);
 
 }  // namespace
 
-void SceneJournal::end_record(uint64_t epoch, const UpdateBatch& numbers) {
-  entries_.push_back({epoch, numbers.writer, numbers.batch, {}});
+void SceneJournal::end_record(uint64_t epoch, const UpdateBatch& batch) {
+  entries_.push_back({epoch, batch.writer, batch.batch, {}});
   ends_.push_back(bytes_.size());
 }
 
@@ -61,7 +61,7 @@ absl::Status SceneJournal::append(AckLevel level) {
       const MutexLock lock(mutex_);
       position_.sequence += entries_.size();
       position_.bytes += bytes_.size();
-      // A log that numbers otherwise is another scene's.
+      // A different sequence number would mean that the log belongs to another scene.
       LOCUS_CHECK_EQ(*last, position_.sequence);
     }
   }
@@ -86,12 +86,12 @@ uint64_t SceneJournal::total_bytes() const {
 
 void SceneJournal::snapshot_written(uint64_t sequence, uint64_t total_bytes) {
   const MutexLock lock(mutex_);
-  if (sequence < position_.snapshot_sequence) return;  // a later one is there already
+  if (sequence < position_.snapshot_sequence) return;  // a later snapshot was written meanwhile
   LOCUS_CHECK_LE(sequence, position_.sequence);
-  const uint64_t all = bytes_in_snapshots_ + position_.bytes;
-  LOCUS_CHECK_LE(total_bytes, all);
+  const uint64_t logged = bytes_in_snapshots_ + position_.bytes;
+  LOCUS_CHECK_LE(total_bytes, logged);
   position_.snapshot_sequence = sequence;
-  position_.bytes = all - total_bytes;
+  position_.bytes = logged - total_bytes;
   bytes_in_snapshots_ = total_bytes;
 }
 

@@ -6,12 +6,13 @@
 namespace locus {
 namespace {
 
+// Rounds up to a float.
 float at_least(double length) {
   return std::nextafter(static_cast<float>(length), std::numeric_limits<float>::infinity());
 }
 
-// Whatever the rotation, so that turning changes nothing of where an object is filed.
-float reach_of(const Shape& shape) {
+// Returns the extent of the shape under any rotation, so that a rotation never moves the object to another cell.
+float extent_of(const Shape& shape) {
   switch (shape.kind) {
     case ShapeKind::kPoint:
       return 0;
@@ -44,7 +45,7 @@ GridItem grid_item_of(const Object& object, uint32_t handle) {
   GridItem item;
   item.entry = {shape.position, object.id, object.group, object.tag, object.layers, shape.kind};
   item.handle = handle;
-  item.reach = reach_of(shape);
+  item.reach = extent_of(shape);
   item.form = {shape.rotation, shape.size, shape.kind == ShapeKind::kBall ? 0 : shape.radius};
   return item;
 }

@@ -9,19 +9,20 @@
 namespace locus {
 namespace {
 
-constexpr size_t kAhead = 16;  // objects whose memory is on its way before they are looked up
+constexpr size_t kAhead = 16;  // prefetch distance, in objects
 constexpr uint32_t kNewLife = ~0u;
 
-// For each of `inserted` the number among `removed` of the object that lives on as it; kNewLife where none does.
-std::vector<uint32_t> lives_that_go_on(absl::Span<const Object> removed, absl::Span<const Object> inserted,
-                                       const absl::flat_hash_set<Id>& replaced) {
+// Returns for each object of `inserted` the index in `removed` of the object that it updates; kNewLife if there is
+// none.
+std::vector<uint32_t> updated_objects(absl::Span<const Object> removed, absl::Span<const Object> inserted,
+                                      const absl::flat_hash_set<Id>& replaced) {
   std::vector<uint32_t> before(inserted.size(), kNewLife);
   if (removed.empty() || inserted.empty()) return before;
-  absl::flat_hash_map<Id, uint32_t> numbers;
+  absl::flat_hash_map<Id, uint32_t> indices;
   for (uint32_t i = 0; i < removed.size(); ++i)
-    if (!replaced.contains(removed[i].id)) numbers.emplace(removed[i].id, i);
+    if (!replaced.contains(removed[i].id)) indices.emplace(removed[i].id, i);
   for (size_t i = 0; i < inserted.size(); ++i)
-    if (const auto found = numbers.find(inserted[i].id); found != numbers.end()) before[i] = found->second;
+    if (const auto found = indices.find(inserted[i].id); found != indices.end()) before[i] = found->second;
   return before;
 }
 
@@ -47,7 +48,7 @@ void ObjectStore::free_handle(uint32_t handle) {
   }
 }
 
-// Sets from the end of a tick hold no life that ended in it.
+// A set made at the end of a tick holds no object that was removed in that tick, so `tick <= oldest_tick` is enough.
 void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   LOCUS_CHECK(moves_ != nullptr);
   tick_ = tick;
@@ -63,7 +64,7 @@ size_t ObjectStore::move(const GridMoves& moves) {
   return grid_.apply({{}, moves, {}});
 }
 
-// All of which are here.
+// Returns the handles of objects, all of which are present.
 std::vector<uint32_t> ObjectStore::handles_of(absl::Span<const Object> objects) const {
   std::vector<Id> ids;
   ids.reserve(objects.size());
@@ -89,10 +90,10 @@ GridItem ObjectStore::continue_life(const Object& object, uint32_t handle) {
 size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                           const absl::flat_hash_set<Id>& replaced) {
   const std::vector<uint32_t> leaving = handles_of(removed);
-  const std::vector<uint32_t> before = lives_that_go_on(removed, inserted, replaced);
+  const std::vector<uint32_t> before = updated_objects(removed, inserted, replaced);
   std::vector<uint8_t> ends(removed.size(), 1);
-  for (const uint32_t number : before)
-    if (number != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[number], uint8_t{0}), 1);
+  for (const uint32_t index : before)
+    if (index != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[index], uint8_t{0}), 1);
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) LOCUS_CHECK(handles_.erase(removed[i].id));
   handles_.fit(handles_.size() + static_cast<size_t>(std::count(before.begin(), before.end(), kNewLife)));
@@ -107,22 +108,22 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   return grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
 }
 
-bool ObjectStore::fill(std::vector<std::vector<Object>> pieces, double cell_size) {
+bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size) {
   LOCUS_CHECK_EQ(next_handle_, 0u);
   size_t count = 0;
-  for (const std::vector<Object>& piece : pieces) count += piece.size();
+  for (const std::vector<Object>& chunk : chunks) count += chunk.size();
   handles_.fit(count);
   std::vector<GridItem> items;
   items.reserve(count);
-  for (std::vector<Object>& piece : pieces) {
-    for (size_t i = 0; i < piece.size(); ++i) {
-      if (i + kAhead < piece.size()) handles_.prefetch(piece[i + kAhead].id);
+  for (std::vector<Object>& chunk : chunks) {
+    for (size_t i = 0; i < chunk.size(); ++i) {
+      if (i + kAhead < chunk.size()) handles_.prefetch(chunk[i + kAhead].id);
       const uint32_t handle = new_handle();
-      if (!handles_.set(piece[i].id, handle)) return false;
+      if (!handles_.set(chunk[i].id, handle)) return false;
       if (moves_ != nullptr) moves_->born(handle);
-      items.push_back(grid_item_of(piece[i], handle));
+      items.push_back(grid_item_of(chunk[i], handle));
     }
-    std::vector<Object>().swap(piece);
+    std::vector<Object>().swap(chunk);
   }
   grid_.fill(items, cell_size);
   handles_.take_replaced_bytes();

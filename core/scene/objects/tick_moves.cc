@@ -29,7 +29,7 @@ void TickMoves::moved(const GridRef& before, Vec3d to) {
   const double length = std::sqrt(squared_length(to - start.position));
   const bool listed = start.kind == Kind::kListed && !planted(PlantedBug::kRewindFastBox);
   if (listed || length > fast_length_) return add_fast(before.handle(), start, to, length);
-  displacement_.reach = std::max(displacement_.reach, length);
+  displacement_.bound = std::max(displacement_.bound, length);
 }
 
 void TickMoves::add_fast(uint32_t handle, Start& start, Vec3d to, double length) {
@@ -43,7 +43,7 @@ void TickMoves::add_fast(uint32_t handle, Start& start, Vec3d to, double length)
     return;
   }
   start.kind = Kind::kListed;
-  fast_.insert(at, {handle, start.reach, length, centers});
+  fast_.insert(at, {handle, start.extent, length, centers});
   if (fast_.size() > kMaxFast) list_fewer();
 }
 
@@ -52,7 +52,7 @@ void TickMoves::list_fewer() {
     fast_length_ *= 2;
     std::erase_if(fast_, [this](const FastMover& mover) {
       if (mover.length > fast_length_) return false;
-      displacement_.reach = std::max(displacement_.reach, mover.length);
+      displacement_.bound = std::max(displacement_.bound, mover.length);
       starts_[mover.handle].kind = Kind::kOrdinary;
       return true;
     });

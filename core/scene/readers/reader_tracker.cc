@@ -9,11 +9,11 @@
 namespace locus {
 namespace {
 
-// Bytes are counted again only once this part of the budget was replaced since the last time, so that pins just below
-// the budget do not make every batch count. What pins hold may pass the budget by as much.
+// Bytes are counted again only after 1 / kCountShare of the budget was replaced since the last count, so that pins just
+// below the budget do not cause a count for every batch. Pins may exceed the budget by that amount.
 constexpr uint64_t kCountShare = 64;
-// What a revision holds and a later one does not takes at most so many times what is known to be replaced in between:
-// the maps that find it are not known. Measured: up to 2.2 times.
+// Upper bound of the bytes that a revision holds and a later one does not, as a multiple of the bytes known to be
+// replaced in between, which do not include lookup tables. Measured: up to 2.2 times.
 constexpr uint64_t kMaxOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 
@@ -38,7 +38,7 @@ SnapshotPin::SnapshotPin(std::shared_ptr<ReaderTracker> tracker, SnapshotPtr sna
 
 SnapshotPin::~SnapshotPin() {
   if (tracker_ == nullptr) return;
-  // Freed before the writer may go on, and outside the lock: it takes a while.
+  // Free the snapshot before the writer may continue, and outside the lock, because it may take long.
   snapshot_.reset();
   tracker_->remove(entry_, revocation_.get());
 }
@@ -72,7 +72,8 @@ SnapshotPin::Entry ReaderTracker::add(const SnapshotPtr& snapshot) {
 
 void ReaderTracker::remove(SnapshotPin::Entry entry, const SnapshotPin::Revocation* revocation) {
   const MutexLock lock(mutex_);
-  if (revocation != nullptr) revocations_.remove_if([revocation](const auto& one) { return one.get() == revocation; });
+  if (revocation != nullptr)
+    revocations_.remove_if([revocation](const auto& other) { return other.get() == revocation; });
   if (--entry->second.pins > 0) return;
   const bool revoked = entry->second.revoked;
   pinned_.erase(entry);
@@ -100,8 +101,8 @@ std::vector<ReaderTracker::Holding> ReaderTracker::pinned_before(const SceneSnap
   return pinned;
 }
 
-// What was replaced between two pinned revisions is held by the older one, and by those before it that had it already:
-// so nothing is counted twice.
+// Bytes replaced between two consecutive pinned revisions are counted for the older one only, so that bytes which
+// several pinned revisions share are counted once.
 uint64_t ReaderTracker::count(std::vector<Holding>& pinned, const SceneSnapshot& latest) {
   uint64_t held = 0;
   for (size_t i = 0; i < pinned.size(); ++i) {
@@ -122,20 +123,20 @@ void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
     pinned = pinned_before(latest);
   }
   uint64_t held = count(pinned, latest);
-  // Measuring the scene takes longer than counting what is held.
+  // Measuring the scene takes longer than counting the held bytes, so it is measured only if it can matter.
   const uint64_t budget = budget_for(held <= budget_for(0) ? 0 : bytes_of(latest));
   const MutexLock lock(mutex_);
   budget_ = budget;
   counted_at_ = latest.replaced_bytes;
   const uint64_t held_by_all = held;
   for (size_t i = 0; held > budget; ++i) {
-    end(*pinned[i].snapshot, held_by_all);
+    revoke(*pinned[i].snapshot, held_by_all);
     held -= pinned[i].bytes;
   }
   counted_ = held;
 }
 
-void ReaderTracker::end(const SceneSnapshot& snapshot, uint64_t held) {
+void ReaderTracker::revoke(const SceneSnapshot& snapshot, uint64_t held) {
   const auto entry = pinned_.find(snapshot.revision);
   if (entry == pinned_.end() || entry->second.revoked) return;
   entry->second.budget = budget_;

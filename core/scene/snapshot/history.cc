@@ -5,7 +5,8 @@
 namespace locus {
 namespace {
 
-std::shared_ptr<const HistoryRecord> record_of(const HistoryRecord& record, const ObjectSet& next) {
+// Returns a copy of `record` with its bytes, given the objects of the next record or of the latest revision.
+std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, const ObjectSet& next) {
   HistoryRecord counted = record;
   counted.bytes = sizeof(HistoryRecord) + record.objects.unshared_bytes(next);
   if (record.to_next.fast != nullptr) counted.bytes += record.to_next.fast->size() * sizeof(FastMover);
@@ -22,7 +23,7 @@ void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displ
     next = *history_;
     HistoryRecord last = *next.records.back();
     last.to_next = since_last;
-    next.records.back() = record_of(last, objects);
+    next.records.back() = with_bytes(last, objects);
   }
   next.records.push_back(
       std::make_shared<const HistoryRecord>(HistoryRecord{tick, objects, {}, sizeof(HistoryRecord)}));
@@ -56,7 +57,7 @@ void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reaso
 void HistoryRecorder::measure(const ObjectSet& now) {
   if (std::exchange(measured_, true) || history_ == nullptr) return;
   History next = *history_;
-  next.records.back() = record_of(*next.records.back(), now);
+  next.records.back() = with_bytes(*next.records.back(), now);
   publish(std::move(next));
 }
 

@@ -6,9 +6,10 @@
 namespace locus {
 namespace {
 
-// Covers the rounding of lengths and of places between two: a few 2^-52 of the magnitudes.
-constexpr double kRelativeSlack = 1 + 0x1p-36;
-constexpr double kPlaceSlack = limits::kMaxCoordinate * 0x1p-49;
+// Allowances for the rounding of lengths (a factor) and of interpolated positions (a length): a few 2^-52 of the
+// magnitudes.
+constexpr double kEpsilonFactor = 1 + 0x1p-36;
+constexpr double kPositionEpsilon = limits::kMaxCoordinate * 0x1p-49;
 
 bool before(const AsOf& a, const AsOf& b) { return a.tick < b.tick || (a.tick == b.tick && a.fraction < b.fraction); }
 
@@ -18,15 +19,15 @@ SceneAtTime::SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weig
     : at_(&at),
       next_(&next),
       weight_(weight),
-      reach_(displacement.reach * weight * kRelativeSlack + kPlaceSlack),
+      displacement_bound_(displacement.bound * weight * kEpsilonFactor + kPositionEpsilon),
       fast_(displacement.fast.get()) {}
 
 GridRegion SceneAtTime::region(const Aabbd& bounds, const std::optional<Balld>& ball) const {
   if (next_ == nullptr) return {&at_->grid(), bounds, ball};
-  const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
+  const double bound = planted(PlantedBug::kRewindReach) ? 0 : displacement_bound_;
   std::optional<Balld> near = ball;
-  if (near) near->radius += reach;
-  return {&at_->grid(), grown(bounds, reach), near};
+  if (near) near->radius += bound;
+  return {&at_->grid(), grown(bounds, bound), near};
 }
 
 Shape SceneAtTime::shape_between(const GridRef& object) const {

@@ -8,7 +8,7 @@
 namespace locus {
 namespace {
 
-// Takes the mesh, so that its columns are gone before the tree is built.
+// Consumes the mesh, so that its columns are freed before the tree is built.
 std::vector<Triangle> triangles_of(TriangleMesh mesh) {
   std::vector<Triangle> triangles;
   triangles.reserve(mesh.triangle_count());

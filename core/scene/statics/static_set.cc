@@ -15,7 +15,7 @@
 namespace locus {
 namespace {
 
-// Placed bounds may reach a little beyond the world's positions, no farther.
+// Limit of the coordinates of a placed mesh's bounds, which may extend beyond the limit of positions.
 constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
 
 absl::Status check_columns(const PlacementColumns& place, const std::string& field) {
@@ -81,7 +81,7 @@ absl::Status refuse_group_zero(const StaticChange& change) {
                          static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
 }
 
-// The instances of a change: those kept and those placed, with their ids.
+// Instances after a change: the kept ones and the placed ones, with their ids.
 class Changing {
  public:
   Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, uint64_t seed)

@@ -8,7 +8,7 @@
 namespace locus {
 namespace {
 
-// Items that are looked up together, so that their memory is on its way before it is needed.
+// Number of items that are looked up together, so that their memory is prefetched.
 constexpr size_t kItemsAtOnce = 64;
 
 }  // namespace
@@ -59,13 +59,13 @@ inline void MoveApplier::move(const PoseReader& poses, uint32_t handle, const It
   Quaternion rotation;
   if (const Reason reason = poses.read_position(item.index, position); reason != Reason::kUnspecified)
     return refuse(poses.position_column(), item, reason);
-  if (poses.turns()) {
+  if (poses.has_rotations()) {
     if (const Reason reason = poses.read_rotation(item.index, rotation); reason != Reason::kUnspecified)
       return refuse(PoseReader::kRotationColumn, item, reason);
   }
   GridMove& move = move_of(handle);
   move.position = position;
-  if (poses.turns()) {
+  if (poses.has_rotations()) {
     move.rotation = static_cast<uint32_t>(rotations_.size());
     rotations_.push_back(rotation);
   }

@@ -58,7 +58,7 @@ void WriterTable::forget_oldest() {
   writers_.erase(oldest);
 }
 
-// The numbers stay, so that no batch is applied twice.
+// Drops the acks but keeps the batch numbers, so that no batch is applied twice.
 void WriterTable::forget_acks() {
   for (auto& [writer, last] : writers_) last.ack = {};
   kept_errors_ = 0;
