@@ -97,7 +97,10 @@ class Replay {
   }
 
  private:
-  uint64_t done() const { return last_ - stored_.snapshot_sequence; }
+  uint64_t done() const {
+    LOCUS_DCHECK_GE(last_, stored_.snapshot_sequence);
+    return last_ - stored_.snapshot_sequence;
+  }
 
   // Enters `epoch`. DATA_LOSS if it is 0 or an earlier epoch of the scene.
   absl::Status enter_epoch(uint64_t epoch) {

@@ -102,6 +102,7 @@ absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string&
 void Registry::put_in(const ScenePtr& scene) {
   if (log_ != nullptr) scene->check_meshes([this](const StaticMesh* mesh) { return is_kept(mesh); });
   const MutexLock lock(mutex_);
+  LOCUS_DCHECK(!scenes_.contains(scene->name()) && !damaged_scenes_.contains(scene->name()));
   scenes_.emplace(scene->name(), scene);
 }
 

@@ -179,6 +179,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* co
     if (pins_->over_budget()) continue;
     RETURN_IF_ERROR(log_joined(good));
     SceneWriter::Joined joined = writer_.apply_joined(good);
+    LOCUS_DCHECK_EQ(joined.acks.size(), good.size());
     if (joined.snapshot != nullptr) publish(joined.snapshot);
     auto next = joined.acks.begin();
     for (absl::StatusOr<UpdateAck>& ack : acks)
@@ -202,15 +203,21 @@ absl::Status Scene::admit_change(const StaticChange& change) {
     return refuse_full("scene", "pending_changes", limits::kMaxPendingChanges, pending_changes_ + 1.0, 100);
   ++pending_changes_;
   for (const PlacementColumns& place : change.place) meshes_to_place_.push_back(place.mesh.get());
+  check_invariants();
   return absl::OkStatus();
 }
 
 void Scene::leave_change(const StaticChange& change, const absl::Status& result) {
   const MutexLock lock(mutex_);
+  LOCUS_DCHECK_GT(pending_changes_, 0u);
   --pending_changes_;
-  for (const PlacementColumns& place : change.place)
-    meshes_to_place_.erase(std::find(meshes_to_place_.begin(), meshes_to_place_.end(), place.mesh.get()));
+  for (const PlacementColumns& place : change.place) {
+    const auto found = std::find(meshes_to_place_.begin(), meshes_to_place_.end(), place.mesh.get());
+    LOCUS_DCHECK(found != meshes_to_place_.end());
+    meshes_to_place_.erase(found);
+  }
   if (!result.ok()) last_build_error_ = std::string(result.message());
+  check_invariants();
 }
 
 bool Scene::in_use(const StaticMesh* mesh) const {
@@ -256,10 +263,25 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
   return result;
 }
 
+void Scene::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK(latest_ != nullptr && latest_->statics != nullptr);
+    LOCUS_CHECK_LE(latest_->oldest_tick(), latest_->tick);
+    LOCUS_CHECK(!recent_.empty() && recent_.back() == latest_);
+    LOCUS_CHECK_LE(recent_.size(), size_t{limits::kRecentRevisions});
+    LOCUS_CHECK_EQ(recent_.front()->revision + recent_.size() - 1, latest_->revision);
+    LOCUS_CHECK(watches_.empty() || (!closed_ && watches_.begin()->first > latest_->revision));
+    LOCUS_CHECK(pending_changes_ > 0 || meshes_to_place_.empty());
+  }
+}
+
 void Scene::publish(const SnapshotPtr& snapshot) {
   std::vector<SnapshotPtr> retired;  // freed after the lock, because freeing a large snapshot takes long
   {
     const MutexLock lock(mutex_);
+    LOCUS_DCHECK_EQ(snapshot->revision, latest_->revision + 1);
+    LOCUS_DCHECK_EQ(snapshot->epoch, latest_->epoch);
+    LOCUS_DCHECK_GE(snapshot->replaced_bytes, latest_->replaced_bytes);
     latest_ = snapshot;
     recent_.push_back(snapshot);
     const auto too_much = [&] {
@@ -272,6 +294,7 @@ void Scene::publish(const SnapshotPtr& snapshot) {
     }
     published_.notify_all();
     notify_watches(snapshot->revision);
+    check_invariants();
   }
   pins_->enforce_budget(*snapshot);
 }
@@ -308,6 +331,8 @@ SnapshotPtr Scene::latest() const {
 absl::StatusOr<SnapshotPtr> Scene::recent(uint64_t revision) const {
   const uint64_t oldest = recent_.front()->revision;
   if (revision < oldest || revision > latest_->revision) return outside_recent(oldest, latest_->revision, revision);
+  LOCUS_DCHECK_LT(revision - oldest, recent_.size());
+  LOCUS_DCHECK_EQ(recent_[revision - oldest]->revision, revision);
   return recent_[revision - oldest];
 }
 
@@ -335,6 +360,7 @@ void Scene::forget_recent() {
   const MutexLock lock(mutex_);
   forgotten.swap(recent_);
   recent_.push_back(latest_);
+  check_invariants();
 }
 
 void Scene::close() {
@@ -343,6 +369,7 @@ void Scene::close() {
   pins_->close();
   published_.notify_all();
   notify_watches(std::numeric_limits<uint64_t>::max());
+  check_invariants();
 }
 
 absl::Status Scene::remove() {

@@ -177,6 +177,9 @@ class Scene {
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
  private:
+  // Checks latest_, recent_ and watches_. O(1).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
+  // Makes the next revision visible, notifies waiters and watches, and enforces the budget of readers.
   void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   // Notifies the watches of `revision` and earlier ones.
   void notify_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);

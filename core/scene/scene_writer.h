@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/scene/log/scene_state.h"
 #include "core/scene/objects/object_store.h"
@@ -50,14 +51,20 @@ class SceneWriter {
 
   // Begins replay: until end_replay() no snapshots are built if the scene has no history; apply() and the others may
   // return null, and published() must not be called.
-  void begin_replay() { replaying_ = true; }
+  void begin_replay() {
+    LOCUS_DCHECK(!replaying_);
+    replaying_ = true;
+  }
   // Ends replay: applies the coalesced moves and builds the snapshot of the current revision.
   void end_replay();
   // Starts another epoch. Revision numbers continue.
   void restart(uint64_t epoch);
 
-  // Returns the snapshot of the current revision.
-  const SnapshotPtr& published() const { return published_; }
+  // Returns the snapshot of the current revision. Precondition: no replay is running.
+  const SnapshotPtr& published() const {
+    LOCUS_DCHECK(!replaying_);
+    return published_;
+  }
   uint64_t epoch() const { return epoch_; }
   const WriterTable& writers() const { return writers_; }
   // Returns true if restarting ticks would drop history, and so makes a revision.
@@ -67,6 +74,8 @@ class SceneWriter {
   const std::shared_ptr<const StaticSet>& statics() const { return statics_; }
 
  private:
+  // Checks the invariants of the class comment. O(1).
+  void check_invariants() const;
   SnapshotPtr freeze();
   SnapshotPtr next_revision();
   UpdateAck ack_now() const;

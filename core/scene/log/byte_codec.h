@@ -45,6 +45,7 @@ class ByteWriter {
   // Writes a column of `width` values for each entry, or a single entry if all entries are equal bit for bit.
   template <class T>
   void shared_column(absl::Span<const T> values, size_t width) {
+    LOCUS_DCHECK(width > 0 && values.size() % width == 0);
     column(all_same(values, width) ? values.subspan(0, width) : values);
   }
   void text(absl::string_view text) { column(absl::Span<const char>(text.data(), text.size())); }
@@ -93,7 +94,10 @@ class ByteReader {
     return 0;
   }
   // Reads the number of items that follow, each of at least `min_bytes`; fails if the remaining bytes cannot hold them.
-  uint64_t count(size_t min_bytes, const char* what) { return number_upto(left_.size() / min_bytes, what); }
+  uint64_t count(size_t min_bytes, const char* what) {
+    LOCUS_DCHECK_GT(min_bytes, 0u);
+    return number_upto(left_.size() / min_bytes, what);
+  }
   // Reads a column as a span of the bytes.
   template <class T>
   absl::Span<const T> column(const char* what) {
@@ -103,6 +107,7 @@ class ByteReader {
     const size_t padded = (bytes + ByteWriter::kAlignment - 1) / ByteWriter::kAlignment * ByteWriter::kAlignment;
     if (padded > left_.size()) fail(what, "is cut off");
     if (values == 0 || !good()) return {};
+    LOCUS_DCHECK(reinterpret_cast<uintptr_t>(left_.data()) % alignof(T) == 0);
     const auto* first = reinterpret_cast<const T*>(left_.data());
     left_.remove_prefix(padded);
     return {first, values};

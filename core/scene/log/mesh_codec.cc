@@ -21,7 +21,9 @@ constexpr size_t kMinPart = 2 * 8;
 }  // namespace
 
 MeshWriter::MeshWriter(std::shared_ptr<const StaticMesh> mesh)
-    : mesh_(std::move(mesh)), vertices_(mesh_->vertices()), indices_(mesh_->indices()) {}
+    : mesh_(std::move(mesh)), vertices_(mesh_->vertices()), indices_(mesh_->indices()) {
+  LOCUS_DCHECK_EQ(vertices_.size(), size_t{3} * mesh_->vertex_count());
+}
 
 absl::StatusOr<std::optional<std::string>> MeshWriter::next() {
   std::string chunk;

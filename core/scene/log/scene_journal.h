@@ -59,6 +59,8 @@ class SceneJournal {
   void snapshot_written(uint64_t sequence, uint64_t total_bytes) LOCUS_EXCLUDES(mutex_);
 
  private:
+  // Checks the invariants of the class comment. O(1).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
   // Ends the record that was encoded into bytes_ last. `batch` gives the writer and batch numbers of its entry.
   void end_record(uint64_t epoch, const UpdateBatch& batch);
   absl::Status append(AckLevel level) LOCUS_EXCLUDES(mutex_);

@@ -72,7 +72,9 @@ void write_objects(ByteWriter& writer, const std::vector<Object>& objects) {
 
 }  // namespace
 
-StateWriter::StateWriter(FrozenScene scene) : scene_(std::move(scene)), writers_(scene_.writers.writers()) {}
+StateWriter::StateWriter(FrozenScene scene) : scene_(std::move(scene)), writers_(scene_.writers.writers()) {
+  LOCUS_DCHECK(scene_.snapshot != nullptr);
+}
 
 absl::StatusOr<std::optional<std::string>> StateWriter::next() {
   std::string chunk;
@@ -152,6 +154,7 @@ std::string StateWriter::next_objects() {
   });
   LOCUS_CHECK(!objects.empty());
   objects_written_ += objects.size();
+  LOCUS_DCHECK_LE(objects_written_, scene_.snapshot->objects.size());
   std::string chunk;
   ByteWriter writer(chunk);
   write_kind(writer, BytesKind::kStateObjects);

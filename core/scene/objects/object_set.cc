@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
@@ -41,6 +43,7 @@ Object object_of(const GridRef& value) {
 }
 
 GridItem grid_item_of(const Object& object, uint32_t handle) {
+  LOCUS_DCHECK_NE(handle, PersistentIdTable<>::kNone);
   const Shape& shape = object.shape;
   GridItem item;
   item.entry = {shape.position, object.id, object.group, object.tag, object.layers, shape.kind};
@@ -52,7 +55,10 @@ GridItem grid_item_of(const Object& object, uint32_t handle) {
 
 GridRef ObjectSet::find_ref(Id id) const {
   const uint32_t handle = handles_.find(id);
-  return handle == PersistentIdTable<>::kNone ? GridRef() : grid_.at(handle);
+  if (handle == PersistentIdTable<>::kNone) return GridRef();
+  const GridRef object = grid_.at(handle);
+  LOCUS_DCHECK(!object || object.entry().id == id);
+  return object;
 }
 
 std::optional<Object> ObjectSet::find(Id id) const {

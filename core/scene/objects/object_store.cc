@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "absl/container/flat_hash_map.h"
-#include "core/base/check.h"
+#include "core/base/planted_bug.h"
 
 namespace locus {
 namespace {
@@ -28,6 +28,15 @@ std::vector<uint32_t> updated_objects(absl::Span<const Object> removed, absl::Sp
 
 }  // namespace
 
+void ObjectStore::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    if (!planted(PlantedBug::kGhostAfterMove)) LOCUS_CHECK_EQ(grid_.size(), handles_.size());
+    LOCUS_CHECK_EQ(size_t{next_handle_}, handles_.size() + free_handles_.size() + quarantined_handles_.size());
+    LOCUS_CHECK(moves_ != nullptr || quarantined_handles_.empty());
+    LOCUS_CHECK(free_handles_.empty() || free_handles_.back() < next_handle_);
+  }
+}
+
 std::optional<Object> ObjectStore::find(Id id) const {
   const uint32_t known = handle(id);
   return known == kNoHandle ? std::nullopt : std::optional<Object>(object_of(grid_.at(known)));
@@ -41,9 +50,11 @@ uint32_t ObjectStore::new_handle() {
 }
 
 void ObjectStore::free_handle(uint32_t handle) {
+  LOCUS_DCHECK_LT(handle, next_handle_);
   if (moves_ == nullptr) {
     free_handles_.push_back(handle);
   } else {
+    LOCUS_DCHECK(quarantined_handles_.empty() || quarantined_handles_.back().tick <= tick_);
     quarantined_handles_.push_back({handle, tick_});
   }
 }
@@ -56,12 +67,20 @@ void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   for (; !quarantined_handles_.empty() && quarantined_handles_.front().tick <= oldest_tick;
        quarantined_handles_.pop_front())
     free_handles_.push_back(quarantined_handles_.front().handle);
+  LOCUS_DCHECK(quarantined_handles_.empty() || quarantined_handles_.back().tick <= tick);
+  check_invariants();
 }
 
 size_t ObjectStore::move(const GridMoves& moves) {
+  for (const GridMove& move : moves.moves) {
+    LOCUS_DCHECK_LT(move.handle, next_handle_);
+    LOCUS_DCHECK(move.rotation == GridMove::kKeeps || move.rotation < moves.rotations.size());
+  }
   if (moves_ != nullptr)
     for (const GridMove& move : moves.moves) moves_->moved(grid_.at(move.handle), move.position);
-  return grid_.apply({{}, moves, {}});
+  const size_t replaced_bytes = grid_.apply({{}, moves, {}});
+  check_invariants();
+  return replaced_bytes;
 }
 
 // Returns the handles of objects, all of which are present.
@@ -105,7 +124,9 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   }
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) free_handle(leaving[i]);
-  return grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+  const size_t replaced_bytes = grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+  check_invariants();
+  return replaced_bytes;
 }
 
 bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size) {
@@ -127,6 +148,7 @@ bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size
   }
   grid_.fill(items, cell_size);
   handles_.take_replaced_bytes();
+  check_invariants();
   return true;
 }
 

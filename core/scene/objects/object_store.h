@@ -15,6 +15,7 @@
 
 #include "absl/container/flat_hash_set.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/index/hash_grid/hash_grid.h"
 #include "core/scene/objects/object_set.h"
 #include "core/scene/objects/tick_moves.h"
@@ -29,7 +30,10 @@ class ObjectStore {
   explicit ObjectStore(const HashGridOptions& options) : grid_(options) {}
 
   // Starts to track lifetimes and displacements, which queries about the past need. Call before the first insertion.
-  void track_lifetimes() { moves_ = std::make_unique<TickMoves>(); }
+  void track_lifetimes() {
+    LOCUS_DCHECK_EQ(next_handle_, 0u);
+    moves_ = std::make_unique<TickMoves>();
+  }
   // Begins `tick` and frees the handles that only sets older than `oldest_tick` may use. Requires track_lifetimes().
   void start_tick(uint64_t tick, uint64_t oldest_tick);
   // Returns how far objects moved since start_tick(); no displacement if lifetimes are not tracked.
@@ -41,10 +45,16 @@ class ObjectStore {
   // Returns kNoHandle for an unknown id. O(1), like contains().
   uint32_t handle(Id id) const { return handles_.find(id); }
   // Writes the handle of ids[i] to handles[i]: faster than one call for each id. The spans have one size.
-  void find_handles(absl::Span<const Id> ids, absl::Span<uint32_t> handles) const { handles_.find(ids, handles); }
+  void find_handles(absl::Span<const Id> ids, absl::Span<uint32_t> handles) const {
+    LOCUS_DCHECK_EQ(ids.size(), handles.size());
+    handles_.find(ids, handles);
+  }
   // Returns one more than the highest handle that was ever used.
   size_t handle_count() const { return next_handle_; }
-  GridRef at(uint32_t handle) const { return grid_.at(handle); }
+  GridRef at(uint32_t handle) const {
+    LOCUS_DCHECK_LT(handle, next_handle_);
+    return grid_.at(handle);
+  }
   // Prefetches the memory that at(handle) reads.
   [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
 
@@ -76,6 +86,8 @@ class ObjectStore {
   ObjectSet snapshot() { return {grid_.snapshot(), handles_.snapshot()}; }
 
  private:
+  // Checks the invariants of the class comment. O(1).
+  void check_invariants() const;
   uint32_t new_handle();
   void free_handle(uint32_t handle);
   std::vector<uint32_t> handles_of(absl::Span<const Object> objects) const;

@@ -52,6 +52,8 @@ class TickMoves {
     float extent = 0;
     Kind kind = Kind::kOrdinary;
   };
+  // Checks the invariants of the class comment. O(kMaxFast).
+  void check_invariants() const;
   Start& start_of(uint32_t handle);
   // Adds an object to fast_, or extends the box of one that is in fast_.
   void add_fast(uint32_t handle, Start& start, Vec3d to, double length);

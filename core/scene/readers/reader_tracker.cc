@@ -1,8 +1,10 @@
 #include "core/scene/readers/reader_tracker.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 #include "core/scene/snapshot/snapshot_bytes.h"
 
@@ -50,8 +52,18 @@ absl::Status SnapshotPin::status() const {
 }
 
 void SnapshotPin::on_revoke(std::function<void()> revocation) {
+  LOCUS_DCHECK(revocation_ == nullptr);
   revocation_ = std::make_shared<Revocation>(&entry_->second, std::move(revocation));
   tracker_->add_revocation(revocation_);
+}
+
+void ReaderTracker::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(size_t{revoked_}, pinned_.size());
+    LOCUS_CHECK_LE(counted_at_, enforced_at_);
+    LOCUS_CHECK_LE(counted_, budget_);
+    LOCUS_CHECK(fixed_ == 0 || budget_ == fixed_);
+  }
 }
 
 uint64_t ReaderTracker::budget_for(uint64_t scene_bytes) const {
@@ -63,10 +75,16 @@ SnapshotPin::Entry ReaderTracker::add(const SnapshotPtr& snapshot) {
   const auto [entry, added] = pinned_.try_emplace(snapshot->revision);
   SnapshotPin::Pinned& pinned = entry->second;
   ++pinned.pins;
-  if (!added) return entry;
+  if (!added) {
+    LOCUS_DCHECK_EQ(pinned.replaced_bytes, snapshot->replaced_bytes);
+    return entry;
+  }
   pinned.snapshot = snapshot;
   pinned.replaced_bytes = snapshot->replaced_bytes;
   if (snapshot->replaced_bytes < enforced_at_) late_bytes_ += enforced_at_ - snapshot->replaced_bytes;
+  LOCUS_DCHECK(entry == pinned_.begin() || std::prev(entry)->second.replaced_bytes <= pinned.replaced_bytes);
+  LOCUS_DCHECK(std::next(entry) == pinned_.end() || pinned.replaced_bytes <= std::next(entry)->second.replaced_bytes);
+  check_invariants();
   return entry;
 }
 
@@ -74,10 +92,13 @@ void ReaderTracker::remove(SnapshotPin::Entry entry, const SnapshotPin::Revocati
   const MutexLock lock(mutex_);
   if (revocation != nullptr)
     revocations_.remove_if([revocation](const auto& other) { return other.get() == revocation; });
+  LOCUS_DCHECK_GT(entry->second.pins, 0u);
   if (--entry->second.pins > 0) return;
   const bool revoked = entry->second.revoked;
   pinned_.erase(entry);
+  LOCUS_DCHECK(!revoked || revoked_ > 0);
   if (revoked && --revoked_ == 0) returned_.notify_all();
+  check_invariants();
 }
 
 void ReaderTracker::add_revocation(std::shared_ptr<SnapshotPin::Revocation> revocation) {
@@ -87,6 +108,8 @@ void ReaderTracker::add_revocation(std::shared_ptr<SnapshotPin::Revocation> revo
 
 bool ReaderTracker::may_exceed(const SceneSnapshot& latest) const {
   if (pinned_.empty() || pinned_.begin()->first >= latest.revision) return false;
+  LOCUS_DCHECK_GE(latest.replaced_bytes, counted_at_);
+  LOCUS_DCHECK_GE(latest.replaced_bytes, pinned_.begin()->second.replaced_bytes);
   const uint64_t since_count = latest.replaced_bytes - counted_at_;
   const uint64_t since_oldest = latest.replaced_bytes - pinned_.begin()->second.replaced_bytes;
   return since_count >= budget_ / kCountShare && kMaxOfReplaced * since_oldest > budget_ &&
@@ -117,6 +140,7 @@ void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
   std::vector<Holding> pinned;
   {
     const MutexLock lock(mutex_);
+    LOCUS_DCHECK_LE(enforced_at_, latest.replaced_bytes);
     enforced_at_ = latest.replaced_bytes;
     if (!may_exceed(latest)) return;
     late_bytes_ = 0;
@@ -130,10 +154,12 @@ void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
   counted_at_ = latest.replaced_bytes;
   const uint64_t held_by_all = held;
   for (size_t i = 0; held > budget; ++i) {
+    LOCUS_DCHECK_LT(i, pinned.size());
     revoke(*pinned[i].snapshot, held_by_all);
     held -= pinned[i].bytes;
   }
   counted_ = held;
+  check_invariants();
 }
 
 void ReaderTracker::revoke(const SceneSnapshot& snapshot, uint64_t held) {
@@ -143,6 +169,7 @@ void ReaderTracker::revoke(const SceneSnapshot& snapshot, uint64_t held) {
   entry->second.held = held;
   entry->second.revoked.store(true, std::memory_order_release);
   ++revoked_;
+  LOCUS_DCHECK_LE(size_t{revoked_}, pinned_.size());
 }
 
 bool ReaderTracker::over_budget() const {

@@ -105,6 +105,8 @@ class ReaderTracker {
     uint64_t bytes = 0;
   };
 
+  // Checks the invariants of the class comment, except the sum over all entries. O(1).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
   uint64_t budget_for(uint64_t scene_bytes) const;
   SnapshotPin::Entry add(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   void remove(SnapshotPin::Entry entry, const SnapshotPin::Revocation* revocation) LOCUS_EXCLUDES(mutex_);

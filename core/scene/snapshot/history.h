@@ -73,6 +73,8 @@ class HistoryRecorder {
   uint64_t oldest_tick(uint64_t present) const { return history_ == nullptr ? present : history_->records[0]->tick; }
 
  private:
+  // Checks the invariants of the published history. O(records).
+  void check_invariants() const;
   void drop_first(History& history, size_t count, PastLimit reason);
   void publish(History history);
 

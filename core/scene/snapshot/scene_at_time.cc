@@ -1,5 +1,6 @@
 #include "core/scene/snapshot/scene_at_time.h"
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/geometry/rotation.h"
 
@@ -20,7 +21,10 @@ SceneAtTime::SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weig
       next_(&next),
       weight_(weight),
       displacement_bound_(displacement.bound * weight * kEpsilonFactor + kPositionEpsilon),
-      fast_(displacement.fast.get()) {}
+      fast_(displacement.fast.get()) {
+  LOCUS_DCHECK(weight >= 0 && weight <= 1);
+  LOCUS_DCHECK_GE(displacement.bound, 0.0);
+}
 
 GridRegion SceneAtTime::region(const Aabbd& bounds, const std::optional<Balld>& ball) const {
   if (next_ == nullptr) return {&at_->grid(), bounds, ball};
@@ -46,10 +50,12 @@ std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const As
   const auto& records = snapshot.history->records;
   const auto next = std::upper_bound(records.begin(), records.end(), time.tick,
                                      [](uint64_t tick, const auto& record) { return tick < record->tick; });
+  LOCUS_DCHECK(next != records.begin());
   const HistoryRecord& at = **(next - 1);
   if (time == AsOf{at.tick, 0}) return SceneAtTime(at.objects);
   const bool last = next == records.end();
   const uint64_t next_tick = last ? snapshot.tick : (*next)->tick;
+  LOCUS_DCHECK_LT(at.tick, next_tick);
   const double weight =
       (static_cast<double>(time.tick - at.tick) + double{time.fraction}) / static_cast<double>(next_tick - at.tick);
   return SceneAtTime(at.objects, last ? snapshot.objects : (*next)->objects, weight,

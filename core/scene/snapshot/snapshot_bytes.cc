@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
@@ -33,6 +35,7 @@ uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& 
 }  // namespace
 
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
+  LOCUS_DCHECK_LE(held.revision, later.revision);
   const uint64_t statics = held.statics == later.statics ? 0 : held.statics->bytes();
   // The oldest object set at or after `held` that `later` keeps: it shares most.
   const HistoryRecord* next = first_record(later, held.tick);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 
 namespace locus {
@@ -66,10 +67,12 @@ void StaticMesh::number_blocks() {
 }
 
 Triangle StaticMesh::triangle(uint32_t number) const {
+  LOCUS_DCHECK_LT(number, triangle_count());
   const uint32_t* const numbers = tree_.tree().numbers;
   const TriangleBlock& block = tree_.tree().blocks[blocks_[number]];
   uint32_t place = 0;
   while (numbers[block.first + place] != number) ++place;
+  LOCUS_DCHECK_LT(uint32_t{place}, uint32_t{block.count});
   return tree_.triangle(block, place);
 }
 

@@ -63,6 +63,8 @@ class StaticSet {
 
  private:
   StaticSet() = default;
+  // Checks the invariants of the class comment. O(instances), like building the set.
+  void check_invariants() const;
 
   Bvh<Instance> tree_;
   absl::flat_hash_map<Id, uint32_t> positions_;  // index into tree_.values()

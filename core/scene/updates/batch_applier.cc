@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
 
@@ -35,14 +36,18 @@ BatchApplier::BatchApplier(const ObjectStore& objects, const StaticSet& statics,
       statics_(statics),
       batch_(batch),
       track_lifetimes_(track_lifetimes),
-      count_(batch.clear ? 0 : objects.size()) {}
+      count_(batch.clear ? 0 : objects.size()) {
+  LOCUS_DCHECK(check_form(batch).ok());
+}
 
 void BatchApplier::run() {
+  LOCUS_DCHECK(changed_.empty() && applied_ == 0 && refused_ == 0);  // called once
   remove_ids();
   remove_groups();
   for (size_t i = 0; i < batch_.inserts.size(); ++i) insert(batch_.inserts[i], absl::StrCat("inserts[", i, "]"));
   for (size_t i = 0; i < batch_.moves.size(); ++i) move(batch_.moves[i], absl::StrCat("moves[", i, "]"));
   for (size_t i = 0; i < batch_.relabels.size(); ++i) relabel(batch_.relabels[i], absl::StrCat("relabels[", i, "]"));
+  LOCUS_DCHECK_LE(errors_.size(), size_t{refused_});
 }
 
 std::optional<Object> BatchApplier::current(Id id) const {
@@ -198,6 +203,7 @@ BatchApplier::Difference BatchApplier::difference() {
     if (before && !batch_.clear) difference.removed.push_back(*before);
     if (object) difference.added.push_back(*object);
   }
+  LOCUS_DCHECK_EQ(count_ + difference.removed.size(), objects_.size() + difference.added.size());
   return difference;
 }
 

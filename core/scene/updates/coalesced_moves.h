@@ -22,6 +22,8 @@ class CoalescedMoves {
   void clear() { *this = CoalescedMoves(); }
 
  private:
+  // Checks the invariant of the class comment for the move of `handle`. O(1).
+  void check_invariants(uint32_t handle);
   // Returns the move of the object, or null.
   GridMove* find(uint32_t handle) {
     const uint32_t index = handle < move_of_handle_.size() ? move_of_handle_[handle] : 0;

@@ -47,6 +47,8 @@ class MoveApplier {
   std::vector<ItemError>& errors() { return errors_; }
 
  private:
+  // Checks that each handle has one move. O(moves).
+  void check_invariants() const;
   void run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list);
   struct Item {
     size_t list;

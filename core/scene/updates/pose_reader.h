@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
@@ -33,6 +34,7 @@ class PoseReader {
   // Read item i and return Reason::kUnspecified, or return the reason why its values are refused. A rotation is
   // normalized. read_rotation() requires has_rotations().
   Reason read_position(size_t i, Vec3d& position) const {
+    LOCUS_DCHECK(relative_ != nullptr || absolute_ != nullptr);
     const size_t at = i * stride_;
     position = absolute_ != nullptr ? Vec3d{absolute_[at], absolute_[at + 1], absolute_[at + 2]}
                                     : frame_ + Vec3d{relative_[at], relative_[at + 1], relative_[at + 2]};

@@ -45,6 +45,8 @@ class WriterTable {
   bool restore(Writer writer);
 
  private:
+  // Checks the invariants of the class comment, except the sum over all writers. O(1).
+  void check_invariants() const;
   struct Last {
     uint64_t batch = 0;
     uint64_t heard = 0;
