@@ -41,8 +41,8 @@ class BatchApplier {
   struct Difference {
     std::vector<Object> removed;
     std::vector<Object> added;
-    absl::flat_hash_set<Id>
-        replaced;  // with TrackLifetimes::kYes: ids whose old lifetime ends, teleported ones included
+    // Ids whose old lifetime ends, teleported objects included. Empty unless TrackLifetimes::kYes.
+    absl::flat_hash_set<Id> replaced;
     bool empty() const { return removed.empty() && added.empty(); }
   };
   Difference difference();
