@@ -27,13 +27,13 @@ std::string hex(const Sha256& sha256) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
 }
 
-// `what` in front of the message.
+// Puts `what` in front of the error message.
 absl::Status named(absl::string_view what, const absl::Status& status) {
   return status.ok() ? status : absl::Status(status.code(), absl::StrCat(what, ": ", status.message()));
 }
 
-// Finds meshes. For one that is not there it gives another in its place: its instances may have gone, and the mesh been
-// deleted, later than what is being made again.
+// Finder of meshes during replay. Returns a placeholder for a missing mesh: a later record may remove its instances,
+// after which the mesh was deleted.
 class Meshes {
  public:
   explicit Meshes(const FindMesh& find) : find_(find) {}
@@ -41,13 +41,13 @@ class Meshes {
   MeshPtr operator()(const MeshKey& key) {
     MeshPtr& mesh = known_[key];
     if (mesh == nullptr) mesh = find_(key);
-    if (mesh == nullptr) mesh = stand_in(key);
+    if (mesh == nullptr) mesh = placeholder(key);
     return mesh;
   }
 
-  // That all which are used are there.
+  // Returns DATA_LOSS if instances of `statics` use a missing mesh.
   absl::Status check(const StaticSet& statics) const {
-    for (const MeshPtr& mesh : stand_ins_)
+    for (const MeshPtr& mesh : placeholders_)
       if (statics.uses(mesh.get()) > 0)
         return data_loss(absl::StrCat("the mesh of content ", hex(mesh->sha256()),
                                       mesh->name().empty() ? "" : " named ", mesh->name(),
@@ -56,21 +56,21 @@ class Meshes {
   }
 
  private:
-  MeshPtr stand_in(const MeshKey& key) {
+  MeshPtr placeholder(const MeshKey& key) {
     absl::StatusOr<TriangleMesh> triangle = TriangleMesh::create({0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 1, 2}, {});
     LOCUS_CHECK(triangle.ok());
     absl::StatusOr<MeshPtr> mesh = StaticMesh::build(key.name, key.sha256, *std::move(triangle));
     LOCUS_CHECK(mesh.ok());
-    stand_ins_.push_back(*mesh);
+    placeholders_.push_back(*mesh);
     return *mesh;
   }
 
   const FindMesh& find_;
   std::map<MeshKey, MeshPtr> known_;
-  std::vector<MeshPtr> stand_ins_;
+  std::vector<MeshPtr> placeholders_;
 };
 
-// Applies records one after another to the state of a snapshot.
+// Replay of records, one after another, on the state of a snapshot.
 class Replay {
  public:
   Replay(const StoredScene& stored, SceneWriter& writer, Meshes& meshes, const RecoveryProgress& progress)
@@ -79,7 +79,7 @@ class Replay {
   absl::Status apply(const LogRecord& record) {
     if (record.sequence != last_ + 1)
       return data_loss(absl::StrCat("record ", record.sequence, " follows record ", last_));
-    absl::Status status = go_to_epoch(record.entry.epoch);
+    absl::Status status = enter_epoch(record.entry.epoch);
     absl::StatusOr<Record> decoded = Record::decode(record.entry.bytes);
     if (status.ok()) status = decoded.status();
     if (status.ok()) status = apply(decoded->content());
@@ -90,27 +90,30 @@ class Replay {
     return absl::OkStatus();
   }
 
-  // That all records came, and the log's epoch.
+  // Checks that all records were applied, and enters the epoch of the log.
   absl::Status finish() {
     if (last_ != stored_.last_sequence)
       return data_loss(absl::StrCat("records ", last_ + 1, " to ", stored_.last_sequence, " are not there"));
-    return go_to_epoch(stored_.epoch);
+    return enter_epoch(stored_.epoch);
   }
 
  private:
-  uint64_t done() const { return last_ - stored_.snapshot_sequence; }
+  uint64_t done() const {
+    LOCUS_DCHECK_GE(last_, stored_.snapshot_sequence);
+    return last_ - stored_.snapshot_sequence;
+  }
 
-  // One that was left does not come back.
-  absl::Status go_to_epoch(uint64_t epoch) {
+  // Enters `epoch`. DATA_LOSS if it is 0 or an earlier epoch of the scene.
+  absl::Status enter_epoch(uint64_t epoch) {
     if (epoch == writer_.epoch()) return absl::OkStatus();
-    left_.insert(writer_.epoch());
-    if (epoch == 0 || left_.contains(epoch))
+    ended_epochs_.insert(writer_.epoch());
+    if (epoch == 0 || ended_epochs_.contains(epoch))
       return data_loss(absl::StrCat("epoch ", epoch, " follows epoch ", writer_.epoch()));
     writer_.restart(epoch);
     return absl::OkStatus();
   }
 
-  // What was refused then is refused again: such a record has no effect.
+  // Applies one record. A batch that was refused when it was logged is refused again and has no effect.
   absl::Status apply(Record::Content& content) {
     if (const auto* batch = std::get_if<UpdateBatch>(&content); batch != nullptr) {
       writer_.apply(*batch).IgnoreError();
@@ -129,7 +132,7 @@ class Replay {
     for (size_t i = 0; i < change.meshes.size(); ++i) change.change.place[i].mesh = meshes_(change.meshes[i]);
     const auto is_object = [this](Id id) { return writer_.is_object(id); };
     absl::StatusOr<StaticSet::Changed> changed = writer_.statics()->apply(change.change, is_object, 0);
-    // It was found right before it was written.
+    // The change was valid when it was logged, so an error means damage.
     if (!changed.ok()) return data_loss(absl::StrCat("the change is wrong: ", changed.status().message()));
     writer_.replace_statics(std::move(changed->set));
     return absl::OkStatus();
@@ -139,8 +142,8 @@ class Replay {
   SceneWriter& writer_;
   Meshes& meshes_;
   const RecoveryProgress& progress_;
-  uint64_t last_;
-  std::set<uint64_t> left_;
+  uint64_t last_;  // sequence number of the last applied record
+  std::set<uint64_t> ended_epochs_;
 };
 
 absl::StatusOr<SceneWriter> read_snapshot(const UpdateLog& log, SceneKey key, const SceneSpec& spec, Meshes& meshes) {
@@ -173,7 +176,7 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
   return std::make_shared<Scene>(stored.name, *std::move(spec), std::move(writer), on);
 }
 
-// Null where the log has no outline that fits, whatever the reason: the tree is built then.
+// Restores a mesh from the cached topology. Returns null if there is none or it does not fit: then the tree is built.
 MeshPtr restore_mesh(const UpdateLog& log, const StoredMesh& stored, const TriangleMesh& columns,
                      const BvhOptions& options) {
   const std::optional<std::string> kept = log.read_outline(stored.sha256);

@@ -1,9 +1,8 @@
-// Makes scenes and meshes again from what a log has of them: the state of a snapshot, and after it every record,
-// applied as it was before. DATA_LOSS names the scene or the mesh and says what is wrong with it; other errors are the
-// log's.
+// Restores scenes and meshes from a log: reads the snapshot of a scene and replays every later record. DATA_LOSS names
+// the damaged scene or mesh and describes the damage; other errors are the log's.
 //
-// What has passed is not recorded: a scene that was made again can be asked about the past from its snapshot on.
-// Plain functions; any thread, several scenes at a time.
+// History is not part of a snapshot: the history of a restored scene begins at its snapshot. Plain functions; any
+// thread, several scenes at the same time.
 #ifndef LOCUS_CORE_SCENE_RECOVERY_H_
 #define LOCUS_CORE_SCENE_RECOVERY_H_
 
@@ -18,22 +17,21 @@
 
 namespace locus {
 
-// How many records of how many were applied; from time to time.
+// Called from time to time with the number of records applied so far and of all records.
 using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
 
-// The scene as it was when its last record was written, in the epoch that the log has of it. It goes on appending to
-// `log`, which outlives it. `find_mesh` is asked for each mesh that was ever used since the snapshot: only those that
-// still are used need to be there.
+// Returns the scene in the state after its last record, in the epoch of the log. It appends to `log`, which outlives
+// it. `find_mesh` is called for each mesh that was used since the snapshot and may return null for meshes that no
+// instance uses any more. O(snapshot + records).
 absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
                                        const RecoveryProgress& progress = nullptr);
 
 struct RecoveredMesh {
   MeshPtr mesh;
-  bool built = false;  // its tree; otherwise it was restored from the outline that the log kept
+  bool built = false;  // true: the tree was built; false: it was restored from the cached topology
 };
 
-// Makes the content of a mesh again. It has the parts that stand with the content, which are those of format 1. Where
-// the tree is built, the log is given its outline for the next time.
+// Returns a stored mesh. If its tree must be built, stores the topology in the log's cache for the next recovery.
 absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
 
 // Returns the mesh of a stored name with the parts of that name. `content` is what recover_mesh() made of any name of

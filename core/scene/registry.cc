@@ -26,7 +26,7 @@ absl::Status refuse_name(absl::StatusCode code, Reason reason, absl::string_view
 
 bool name_character(char c) { return absl::ascii_islower(c) || absl::ascii_isdigit(c); }
 
-// The entries of a map after a key, in order.
+// Returns the first entry of a map after a key.
 template <class Map>
 auto after_key(const Map& map, const std::string& after) {
   return after.empty() ? map.begin() : map.upper_bound(after);
@@ -86,7 +86,7 @@ absl::StatusOr<ScenePtr> Registry::log_scene(const std::string& name, const Scen
   return std::make_shared<Scene>(name, spec, std::move(writer), on);
 }
 
-// Others of the name, and deletions of meshes that `static_from` uses, wait for changes_mutex_ meanwhile.
+// Holds changes_mutex_, so that creations of the same name and deletions of meshes that `static_from` uses wait.
 absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string& name, const SceneSpec& spec,
                                                               uint64_t epoch, const std::string& static_from,
                                                               bool if_absent) {
@@ -102,6 +102,7 @@ absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string&
 void Registry::put_in(const ScenePtr& scene) {
   if (log_ != nullptr) scene->check_meshes([this](const StaticMesh* mesh) { return is_kept(mesh); });
   const MutexLock lock(mutex_);
+  LOCUS_DCHECK(!scenes_.contains(scene->name()) && !damaged_scenes_.contains(scene->name()));
   scenes_.emplace(scene->name(), scene);
 }
 
@@ -134,7 +135,7 @@ absl::Status Registry::delete_scene(const std::string& name) {
   if (!scene.ok())
     return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "name",
                        absl::StrCat("no scene is called '", name, "'"));
-  // Meanwhile it is found, and closed once its deletion is logged.
+  // The scene can be found until its deletion is logged, and is closed then.
   RETURN_IF_ERROR((*scene)->remove());
   const MutexLock lock(mutex_);
   scenes_.erase(name);
@@ -216,7 +217,7 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
   absl::StatusOr<MeshPtr> known = begin_mesh(name, mesh);
   if (!known.ok() || *known != nullptr) return known;
   if (log_ != nullptr) {
-    std::optional<MeshWriter> content;  // made only if it is asked for
+    std::optional<MeshWriter> content;  // made only if the log asks for the content
     const auto next = [&]() -> absl::StatusOr<std::optional<std::string>> {
       if (!content) content.emplace(mesh);
       return content->next();
@@ -263,7 +264,8 @@ absl::StatusOr<MeshPtr> Registry::take_mesh(const std::string& name) {
   return taken;
 }
 
-// The name goes first, so that no scene begins to use the mesh while the log forgets it, and comes back if it cannot.
+// Removes the name first, so that no scene starts to use the mesh while the log deletes it, and restores the name if
+// the log fails.
 absl::Status Registry::delete_mesh(const std::string& name) {
   const MutexLock mesh_change(mesh_changes_mutex_);
   const MutexLock change(changes_mutex_);

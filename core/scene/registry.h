@@ -1,11 +1,11 @@
-// What a server hosts: scenes by name, and meshes by name and by content. Scenes keep the meshes they use alive. With a
-// log, what is created is there once it is logged, and what is deleted is gone once that is.
+// Registry of a server: scenes by name, and meshes by name and by content. Scenes keep the meshes they use alive. With
+// a log, a scene or mesh becomes visible after its creation is logged, and disappears after its deletion is logged.
 //
-// Threads: every member may be called from any thread. Those that change scenes are serialised and wait for the log,
-// and so are those that change meshes, which may take seconds to be written; delete_scene() waits for a batch at work,
-// too, delete_mesh() for changes of both kinds; all others wait for nothing. mesh_changes_mutex_ is taken before
-// changes_mutex_, that before a scene's locks, mutex_ only to look something up or to put it in, before a scene's lock
-// for readers.
+// Threads: every member may be called from any thread. Members that change scenes are serialised and wait for the log,
+// and so are members that change meshes, which may take seconds to write; delete_scene() also waits for a batch that is
+// being applied, delete_mesh() for changes of both kinds; all others never wait. Lock order: mesh_changes_mutex_,
+// changes_mutex_, the locks of a scene; mutex_ is held only for a lookup or an insertion, and is taken before a scene's
+// reader lock.
 #ifndef LOCUS_CORE_SCENE_REGISTRY_H_
 #define LOCUS_CORE_SCENE_REGISTRY_H_
 
@@ -23,36 +23,39 @@ namespace locus {
 using ScenePtr = std::shared_ptr<Scene>;
 using MeshPtr = std::shared_ptr<const StaticMesh>;
 
-// Scene names: ^[a-z]([a-z0-9-]{0,61}[a-z0-9])?$. INVALID_ARGUMENT naming `field` otherwise.
+// Checks a scene name: ^[a-z]([a-z0-9-]{0,61}[a-z0-9])?$. INVALID_ARGUMENT naming `field` otherwise.
 absl::Status check_scene_name(absl::string_view name, absl::string_view field);
-// Mesh names: 1 to 63 printable characters without spaces.
+// Checks a mesh name: 1 to 63 printable characters without spaces. INVALID_ARGUMENT naming `field` otherwise.
 absl::Status check_mesh_name(absl::string_view name, absl::string_view field);
 
 class Registry {
  public:
-  // `log`, where there is one, outlives the registry and its scenes. The registry outlives the changes of its scenes.
+  // `log` may be null; otherwise it outlives the registry and its scenes. The registry outlives every change of its
+  // scenes.
   explicit Registry(UpdateLog* log = nullptr) : log_(log) {}
 
   struct CreatedScene {
     ScenePtr scene;
     bool existed = false;
   };
-  // ALREADY_EXISTS unless `if_absent`; NOT_FOUND when `static_from` (may be empty) does not exist; DATA_LOSS where a
-  // damaged scene has the name; or the log's error.
+  // Creates a scene, with the instances of the scene `static_from` unless that is empty. If the name is taken, returns
+  // the existing scene with `if_absent` and ALREADY_EXISTS otherwise. NOT_FOUND if `static_from` does not exist;
+  // DATA_LOSS if a damaged scene has one of the names; or the log's error.
   absl::StatusOr<CreatedScene> create_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                             const std::string& static_from, bool if_absent)
       LOCUS_EXCLUDES(changes_mutex_, mutex_);
-  // DATA_LOSS for one that is damaged.
+  // Returns the scene; NOT_FOUND, or DATA_LOSS for a damaged scene.
   absl::StatusOr<ScenePtr> find_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
-  // Closes and forgets it, damaged or not: waiters get NOT_FOUND. After the log's error it goes on.
+  // Closes and deletes a scene, damaged or not: its waiters get NOT_FOUND. After an error of the log the scene
+  // continues.
   absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
-  // In name order, after `after` (exclusive), at most `limit`.
+  // Returns at most `limit` scenes in name order, beginning after the name `after`.
   std::vector<ScenePtr> list_scenes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
-  // The damaged ones, in name order.
   struct Damaged {
     std::string name;
     absl::Status damage;
   };
+  // Returns the damaged scenes in name order.
   std::vector<Damaged> damaged_scenes() const LOCUS_EXCLUDES(mutex_);
   size_t scene_count() const LOCUS_EXCLUDES(mutex_);
 
@@ -61,11 +64,12 @@ class Registry {
   // Returns the mesh that has that name and that content, or null. Without a name as find_content().
   MeshPtr find_stored(const MeshKey& key) const LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
-  // Puts `mesh` under `name` and returns it as it is kept: sharing the content of a mesh of equal content that is there
-  // under another name, so that equal content is held once. Each name keeps its own parts. A known name of equal
-  // content and parts is returned as it is; other content or other parts under a known name are ALREADY_EXISTS.
+  // Adds `mesh` under `name` and returns the mesh that is registered: it shares the content of a mesh of equal content
+  // if there is any, so that equal content is held once, and has its own parts. Returns a known name of equal content
+  // and parts as it is. ALREADY_EXISTS if the name has other content or other parts.
   absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
-  // FAILED_PRECONDITION IN_USE with the count while instances of any scene use it, or are about to.
+  // Deletes a mesh. FAILED_PRECONDITION IN_USE, with the number of instances, while a scene uses it or a pending change
+  // places it.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
   struct NamedMesh {
     std::string name;
@@ -74,14 +78,14 @@ class Registry {
   };
   std::vector<NamedMesh> list_meshes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
   size_t mesh_count() const LOCUS_EXCLUDES(mutex_);
-  // Counts the instances in all scenes that were placed under the name of `mesh`.
+  // Returns the number of instances in all scenes that were placed under the name of `mesh`.
   uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
-  // What the log had when it was opened: see core/scene/recovery.h. Each name once; meshes first, so that scenes find
-  // them by find_stored(). Equal content is held once.
+  // Add the scenes and meshes that were recovered from the log: see core/scene/recovery.h. Each name once; meshes
+  // before scenes, because recover_scene() finds them by find_stored(). Equal content is held once.
   void restore_scene(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
   void restore_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
-  // A scene or a mesh that cannot be believed: its name answers with `damage`, DATA_LOSS, until it is deleted.
+  // Add a damaged scene or mesh: lookups of its name return `damage` (DATA_LOSS) until it is deleted.
   void restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
   void restore_damaged_mesh(const std::string& name, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
 
@@ -90,7 +94,7 @@ class Registry {
     SceneKey key;
     absl::Status damage;
   };
-  // What a new scene begins with, or why there can be none; the scene that is there already.
+  // Start of a new scene: its instances, or the scene that exists under the name.
   struct Beginning {
     ScenePtr existing;
     std::shared_ptr<const StaticSet> statics;
@@ -100,24 +104,25 @@ class Registry {
   absl::StatusOr<ScenePtr> log_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                      std::shared_ptr<const StaticSet> statics) LOCUS_REQUIRES(changes_mutex_);
   void put_in(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
-  // The damaged scene's key, where there is one of that name.
+  // Returns the key of the damaged scene of that name, or nullopt.
   std::optional<SceneKey> damaged_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
   absl::Status delete_damaged_scene(const std::string& name, SceneKey key) LOCUS_REQUIRES(changes_mutex_)
       LOCUS_EXCLUDES(mutex_);
-  // Returns the mesh that is under `name` already. Where there is none, returns null and makes `mesh` what is to be
-  // kept.
+  // Returns the mesh that is registered under `name`, or null if `mesh` may be added. In that case `mesh` shares the
+  // content of a registered mesh of equal content.
   absl::StatusOr<MeshPtr> begin_mesh(const std::string& name, MeshPtr& mesh) const LOCUS_EXCLUDES(mutex_);
-  // Returns `mesh` under `name`, sharing the content of a mesh that is kept where there is one.
+  // Returns `mesh` under `name`; it shares the content of a registered mesh of equal content if there is any.
   MeshPtr to_keep(const std::string& name, MeshPtr mesh) const LOCUS_REQUIRES(mutex_);
-  // The mesh's name is gone; what was there, null for one that is damaged.
+  // Removes the name of a mesh, unless the mesh is in use, and returns the mesh; returns null for a damaged mesh, whose
+  // name stays.
   absl::StatusOr<MeshPtr> take_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
   bool is_kept(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
   uint32_t count_uses(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
   MeshPtr content(const Sha256& sha256) const LOCUS_REQUIRES(mutex_);
 
   UpdateLog* const log_;
-  Mutex mesh_changes_mutex_;  // one change of meshes at a time
-  Mutex changes_mutex_;       // one change of scenes at a time, while no mesh is deleted
+  Mutex mesh_changes_mutex_;  // serialises changes of meshes
+  Mutex changes_mutex_;       // serialises changes of scenes and deletions of meshes
   mutable Mutex mutex_;
   std::map<std::string, ScenePtr> scenes_ LOCUS_GUARDED_BY(mutex_);
   std::map<std::string, DamagedScene> damaged_scenes_ LOCUS_GUARDED_BY(mutex_);

@@ -57,7 +57,7 @@ absl::Status readers_too_slow(uint64_t budget) {
       refusal);
 }
 
-// The placement that asked for the id at `position` of all placed ones.
+// Returns a refusal that names the placement whose id, at `position` of all placed ids, was taken.
 absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id) {
   size_t list = 0;
   while (position >= change.place[list].count()) position -= change.place[list++].count();
@@ -74,8 +74,9 @@ absl::Status mesh_is_gone(const StaticChange& change, size_t list) {
                 refusal);
 }
 
-// Those of right form; an entry for each, which says what is wrong with the others.
-std::vector<const UpdateBatch*> good_ones(absl::Span<const UpdateBatch* const> batches, Scene::Acks& acks) {
+// Returns the batches that pass check_form(), and appends an entry for each batch to `acks`: the error of its form, or
+// an empty ack.
+std::vector<const UpdateBatch*> well_formed(absl::Span<const UpdateBatch* const> batches, Scene::Acks& acks) {
   std::vector<const UpdateBatch*> good;
   good.reserve(batches.size());
   acks.reserve(batches.size());
@@ -121,12 +122,13 @@ absl::Status Scene::wait_for_readers(Deadline until) const {
 }
 
 absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until) {
-  const UpdateBatch* const one = &batch;
-  ASSIGN_OR_RETURN(Acks acks, apply_each({&one, 1}, until));
+  const UpdateBatch* const batches = &batch;
+  ASSIGN_OR_RETURN(Acks acks, apply_each({&batches, 1}, until));
   return std::move(acks.front());
 }
 
-// What the writer table can tell already is not logged. Once anything is, it may tell otherwise by then.
+// Skips leading batches that the writer table answers already. The ones after the first logged batch are all logged,
+// because applying it may change the answer.
 absl::Status Scene::log_each(absl::Span<const UpdateBatch* const> batches) {
   const WriterTable& writers = writer_.writers();
   while (!batches.empty() && !writers.is_new(batches.front()->writer, batches.front()->batch)) batches.remove_prefix(1);
@@ -135,16 +137,16 @@ absl::Status Scene::log_each(absl::Span<const UpdateBatch* const> batches) {
 
 absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until) {
   Acks acks;
-  const std::vector<const UpdateBatch*> good = good_ones(batches, acks);
+  const std::vector<const UpdateBatch*> good = well_formed(batches, acks);
   if (good.empty()) return acks;
   while (true) {
-    // Not under the writer's lock, where others could not wait for so long as they like.
+    // Wait without the writer's lock, so that each caller can keep its own deadline.
     RETURN_IF_ERROR(wait_for_readers(until));
     const MutexLock lock(writer_mutex_);
     RETURN_IF_ERROR(check_open());
-    if (pins_->over_budget()) continue;  // through another batch meanwhile
+    if (pins_->over_budget()) continue;  // another batch was applied meanwhile
     RETURN_IF_ERROR(log_each(good));
-    // What is logged is applied, whatever happens.
+    // From here on there is no error return: logged batches must be applied.
     auto next = good.begin();
     for (absl::StatusOr<UpdateAck>& ack : acks) {
       if (!ack.ok()) continue;
@@ -160,7 +162,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
 }
 
 absl::Status Scene::log_joined(absl::Span<const UpdateBatch* const> batches) {
-  // Where none is new, none becomes so through another.
+  // If no batch is new, applying another one does not make it new.
   const bool any_new = std::any_of(batches.begin(), batches.end(), [this](const UpdateBatch* batch) {
     return writer_.writers().is_new(batch->writer, batch->batch);
   });
@@ -169,7 +171,7 @@ absl::Status Scene::log_joined(absl::Span<const UpdateBatch* const> batches) {
 
 absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* const> batches, Deadline until) {
   Acks acks;
-  const std::vector<const UpdateBatch*> good = good_ones(batches, acks);
+  const std::vector<const UpdateBatch*> good = well_formed(batches, acks);
   while (true) {
     RETURN_IF_ERROR(wait_for_readers(until));
     const MutexLock lock(writer_mutex_);
@@ -177,6 +179,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* co
     if (pins_->over_budget()) continue;
     RETURN_IF_ERROR(log_joined(good));
     SceneWriter::Joined joined = writer_.apply_joined(good);
+    LOCUS_DCHECK_EQ(joined.acks.size(), good.size());
     if (joined.snapshot != nullptr) publish(joined.snapshot);
     auto next = joined.acks.begin();
     for (absl::StatusOr<UpdateAck>& ack : acks)
@@ -200,15 +203,21 @@ absl::Status Scene::admit_change(const StaticChange& change) {
     return refuse_full("scene", "pending_changes", limits::kMaxPendingChanges, pending_changes_ + 1.0, 100);
   ++pending_changes_;
   for (const PlacementColumns& place : change.place) meshes_to_place_.push_back(place.mesh.get());
+  check_invariants();
   return absl::OkStatus();
 }
 
 void Scene::leave_change(const StaticChange& change, const absl::Status& result) {
   const MutexLock lock(mutex_);
+  LOCUS_DCHECK_GT(pending_changes_, 0u);
   --pending_changes_;
-  for (const PlacementColumns& place : change.place)
-    meshes_to_place_.erase(std::find(meshes_to_place_.begin(), meshes_to_place_.end(), place.mesh.get()));
+  for (const PlacementColumns& place : change.place) {
+    const auto found = std::find(meshes_to_place_.begin(), meshes_to_place_.end(), place.mesh.get());
+    LOCUS_DCHECK(found != meshes_to_place_.end());
+    meshes_to_place_.erase(found);
+  }
   if (!result.ok()) last_build_error_ = std::string(result.message());
+  check_invariants();
 }
 
 bool Scene::in_use(const StaticMesh* mesh) const {
@@ -238,7 +247,7 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
   RETURN_IF_ERROR(wait_for_readers(ReaderTracker::kNever));
-  // Building takes a while: no revision is held meanwhile but for its instances.
+  // Building takes long: hold only the instances of the revision meanwhile, not its objects.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
   const std::shared_ptr<const StaticSet> statics = latest()->statics;
   ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, latest()->revision << 24));
@@ -254,10 +263,25 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
   return result;
 }
 
+void Scene::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK(latest_ != nullptr && latest_->statics != nullptr);
+    LOCUS_CHECK_LE(latest_->oldest_tick(), latest_->tick);
+    LOCUS_CHECK(!recent_.empty() && recent_.back() == latest_);
+    LOCUS_CHECK_LE(recent_.size(), size_t{limits::kRecentRevisions});
+    LOCUS_CHECK_EQ(recent_.front()->revision + recent_.size() - 1, latest_->revision);
+    LOCUS_CHECK(watches_.empty() || (!closed_ && watches_.begin()->first > latest_->revision));
+    LOCUS_CHECK(pending_changes_ > 0 || meshes_to_place_.empty());
+  }
+}
+
 void Scene::publish(const SnapshotPtr& snapshot) {
-  std::vector<SnapshotPtr> retired;  // freed after the lock: freeing a large snapshot takes a while
+  std::vector<SnapshotPtr> retired;  // freed after the lock, because freeing a large snapshot takes long
   {
     const MutexLock lock(mutex_);
+    LOCUS_DCHECK_EQ(snapshot->revision, latest_->revision + 1);
+    LOCUS_DCHECK_EQ(snapshot->epoch, latest_->epoch);
+    LOCUS_DCHECK_GE(snapshot->replaced_bytes, latest_->replaced_bytes);
     latest_ = snapshot;
     recent_.push_back(snapshot);
     const auto too_much = [&] {
@@ -270,6 +294,7 @@ void Scene::publish(const SnapshotPtr& snapshot) {
     }
     published_.notify_all();
     notify_watches(snapshot->revision);
+    check_invariants();
   }
   pins_->enforce_budget(*snapshot);
 }
@@ -290,12 +315,12 @@ Scene::Watch::Watch(const Scene& scene, uint64_t revision, std::function<void()>
   if (notified_)
     notify_();
   else
-    place_ = scene_.watches_.emplace(revision, this);
+    position_ = scene_.watches_.emplace(revision, this);
 }
 
 Scene::Watch::~Watch() {
   const MutexLock lock(scene_.mutex_);
-  if (!notified_) scene_.watches_.erase(place_);
+  if (!notified_) scene_.watches_.erase(position_);
 }
 
 SnapshotPtr Scene::latest() const {
@@ -306,6 +331,8 @@ SnapshotPtr Scene::latest() const {
 absl::StatusOr<SnapshotPtr> Scene::recent(uint64_t revision) const {
   const uint64_t oldest = recent_.front()->revision;
   if (revision < oldest || revision > latest_->revision) return outside_recent(oldest, latest_->revision, revision);
+  LOCUS_DCHECK_LT(revision - oldest, recent_.size());
+  LOCUS_DCHECK_EQ(recent_[revision - oldest]->revision, revision);
   return recent_[revision - oldest];
 }
 
@@ -333,6 +360,7 @@ void Scene::forget_recent() {
   const MutexLock lock(mutex_);
   forgotten.swap(recent_);
   recent_.push_back(latest_);
+  check_invariants();
 }
 
 void Scene::close() {
@@ -341,10 +369,11 @@ void Scene::close() {
   pins_->close();
   published_.notify_all();
   notify_watches(std::numeric_limits<uint64_t>::max());
+  check_invariants();
 }
 
 absl::Status Scene::remove() {
-  const MutexLock lock(writer_mutex_);  // so that nothing is logged or acknowledged after
+  const MutexLock lock(writer_mutex_);  // nothing is logged or acknowledged after the deletion
   RETURN_IF_ERROR(check_open());
   RETURN_IF_ERROR(journal_.remove());
   close();

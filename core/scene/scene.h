@@ -1,13 +1,15 @@
-// A named world: its current snapshot, its one writer at a time, and whoever waits for a revision.
+// Scene: a named world with its latest snapshot, its single writer, and the callers that wait for a revision.
 //
-// A scene with a log writes down what it is about to do before it does it, and does it only if that was written. What
-// it does depends on nothing but the state before and what was written, so that doing it all again makes the same
-// revisions, acks and refusals: see core/scene/recovery.h. A record may turn out to change nothing.
+// A scene with a log appends a record before it applies a change, and applies the change only if the append succeeded.
+// The result depends only on the state before and on the record, so that a replay makes the same revisions, acks and
+// refusals: see core/scene/recovery.h. A record may have no effect.
 //
-// Threads: every member may be called from any thread. apply() and change_instances() are serialised inside, and wait
-// for the log; latest() and view() never wait for a writer or for the log: they take a lock only to copy a pointer, and
-// the writer holds that lock only to swap it. Invariants: revisions of one epoch are published in order, each after it
-// is complete; nothing published changes; nothing is published or acknowledged that is not logged.
+// Threads: every member may be called from any thread. apply...() and change_instances() are serialised inside, and
+// wait for the log; latest() and view() never wait for the writer or the log, except for a revision that is asked for:
+// they take a lock only to copy a pointer, and the writer holds that lock only to replace it. Invariants: the revisions
+// of a scene are published in order without gaps, each after it is complete, with the writer's epoch; ticks never
+// decrease unless a batch restarts them; a published snapshot never changes; no change is published or acknowledged
+// before it is logged.
 #ifndef LOCUS_CORE_SCENE_SCENE_H_
 #define LOCUS_CORE_SCENE_SCENE_H_
 
@@ -27,16 +29,16 @@
 
 namespace locus {
 
-// What becomes of update batches that come faster than they can be applied.
+// Treatment of update batches that arrive faster than they can be applied.
 enum class OverloadPolicy : uint8_t {
-  kEveryBatch,  // each is a revision of its own; who sends waits
-  kLatestWins,  // batches that only move objects at one tick and wait together become one revision
+  kEveryBatch,  // each batch is a revision of its own; senders wait
+  kLatestWins,  // queued batches that only move objects at one tick become one revision
 };
 
-// What has become of an update when it is acknowledged, where the scene has a log.
+// Durability of an update at the time of its acknowledgement, for a scene with a log.
 enum class Durability : uint8_t {
-  kLocal,   // it is on this machine's disk
-  kMemory,  // it will be soon: an end of the machine may take the last moments
+  kLocal,   // synced to this machine's disk
+  kMemory,  // to be synced soon: a crash of the machine may lose the latest updates
 };
 
 constexpr AckLevel ack_level(Durability durability) {
@@ -47,12 +49,12 @@ struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
   HistoryOptions history = {};
-  uint64_t pinned_bytes = 0;  // as ReaderTracker takes it
+  uint64_t pinned_bytes = 0;  // budget of ReaderTracker; 0 = default
   OverloadPolicy overload = OverloadPolicy::kEveryBatch;
   Durability durability = Durability::kLocal;
 };
 
-// Which revision a caller wants. Epoch 0 is not checked.
+// Revision that a caller asks for. Epoch 0 matches every epoch.
 struct View {
   enum class Kind : uint8_t { kLatest, kAtLeast, kExactly };
   Kind kind = Kind::kLatest;
@@ -67,21 +69,22 @@ struct InstanceChange {
 };
 
 struct SceneStatus {
-  uint64_t memory_bytes = 0;   // of the latest revision, without meshes, which scenes share
-  uint64_t history_bytes = 0;  // of the past, beyond that
+  uint64_t memory_bytes = 0;   // memory of the latest revision without meshes, which scenes share
+  uint64_t history_bytes = 0;  // additional memory of the history
   uint32_t recorded_ticks = 0;
-  uint64_t pinned_bytes = 0;      // that older revisions hold because they are still read ...
-  uint64_t max_pinned_bytes = 0;  // ... and the most that may be
+  uint64_t pinned_bytes = 0;      // memory that only older revisions with readers hold
+  uint64_t max_pinned_bytes = 0;  // limit of pinned_bytes
   uint32_t pending_changes = 0;
-  uint64_t joined_updates = 0;   // batches that became visible only together with a later one
-  std::string last_build_error;  // of the latest change that failed, whatever came after it
+  uint64_t joined_updates = 0;   // number of batches that became visible only together with a later one
+  std::string last_build_error;  // message of the last static change that failed; later successes do not clear it
 };
 
 class Scene {
  public:
-  // `epoch` is not 0 and never used before for this name. `statics` may be shared with another scene.
+  // Creates a scene without a log. `epoch` is not 0 and was never used for this name. `statics` may be shared with
+  // another scene.
   Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics);
-  // A scene that goes on from where `writer` is, which is what `log` has of it.
+  // Creates a scene that continues from the state of `writer`, which equals the state in `log`.
   Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLog& log);
 
   const std::string& name() const { return name_; }
@@ -89,54 +92,54 @@ class Scene {
 
   using Deadline = std::chrono::steady_clock::time_point;
 
-  // One batch, one revision (none if it changes nothing). Waits while readers hold more than they may: see
-  // ReaderTracker. Refuses by check_form(), by writer and batch numbers (BATCH_GAP), by `all_or_nothing`,
-  // DEADLINE_EXCEEDED where it waited until `until`, NOT_FOUND once the scene is closed, or with the log's error; then
-  // nothing has changed.
+  // Applies one batch as one revision, or none if it changes nothing. Waits while readers exceed their budget: see
+  // ReaderTracker. Refuses the batch, without any change, with the error of check_form(), BATCH_GAP, an item's error if
+  // `all_or_nothing`, DEADLINE_EXCEEDED if it waited until `until`, NOT_FOUND once the scene is closed, or the log's
+  // error.
   absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using Acks = std::vector<absl::StatusOr<UpdateAck>>;
 
-  // Several batches one after another, each as apply() does, but logged at once: with one sync. An entry a batch; an
-  // error of all is as of apply(), and then nothing has changed.
+  // Applies several batches one after another like apply(), but logs them together with one sync. Returns one entry for
+  // each batch. An error of the whole call is one of apply() and means that nothing has changed.
   absl::StatusOr<Acks> apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Several batches that may_join(), one after another, as one revision, which their acks share: an entry a batch, with
-  // what apply() says of it. An error of all is as of apply(), and then nothing has changed.
+  // Applies several batches that may_join() as one revision, which their acks share. Returns one entry for each batch,
+  // like apply_each(). An error of the whole call is one of apply() and means that nothing has changed.
   absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                     Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Removes and places instances as one revision; builds outside the writer's lock, one change at a time. Waits
-  // for readers as apply() does, without an end. NOT_FOUND for a mesh that is not kept: see check_meshes().
+  // Removes and places instances as one revision. Builds the tree outside the writer's lock, one change at a time.
+  // Waits for readers like apply(), without a deadline. NOT_FOUND for a mesh that was deleted: see check_meshes().
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using IsKept = std::function<bool(const StaticMesh*)>;
-  // Before others know the scene: from now on only meshes that `is_kept` are placed. A mesh that is asked about is
-  // in_use() from before the question until it is placed or not.
+  // Refuses from now on to place meshes for which `is_kept` returns false. Call before other threads use the scene. A
+  // mesh is in_use() from before `is_kept` is called for it until its change has ended.
   void check_meshes(IsKept is_kept) { is_kept_ = std::move(is_kept); }
-  // Whether instances of the mesh are here or on their way.
+  // Returns true if the scene contains instances of the mesh, or a pending change places some.
   bool in_use(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
   SnapshotPtr latest() const LOCUS_EXCLUDES(mutex_);
 
-  // The snapshot a view names; at_least waits until `deadline`. FAILED_PRECONDITION SCENE_RESTARTED for another epoch,
-  // OUT_OF_RANGE for `exactly` outside the recent revisions, DEADLINE_EXCEEDED, or NOT_FOUND once the scene is closed.
+  // Returns the snapshot that a view names; kAtLeast waits until `deadline`. FAILED_PRECONDITION SCENE_RESTARTED for
+  // another epoch, OUT_OF_RANGE for kExactly outside the recent revisions, DEADLINE_EXCEEDED, or NOT_FOUND once the
+  // scene is closed.
   absl::StatusOr<SnapshotPtr> view(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
 
-  // The same for whoever reads for longer than a moment, and so must end when told to.
+  // Returns the snapshot like view(), with a pin: for readers that take long, and must poll SnapshotPin::status().
   absl::StatusOr<SnapshotPin> pin(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
-  // Until those who were told to end have, or the scene is closed; DEADLINE_EXCEEDED, naming the limit, from `until`
-  // on.
+  // Waits until all revoked pins are released or the scene is closed. DEADLINE_EXCEEDED, naming the limit, at `until`.
   absl::Status wait_for_readers(Deadline until) const LOCUS_EXCLUDES(mutex_);
-  // For whoever has waited too long: ReaderTracker::cut_off().
+  // Calls ReaderTracker::revoke_overdue(), for a writer that has waited too long.
   void revoke_overdue_readers() { pins_->revoke_overdue(); }
 
-  // Tells once that the scene reached a revision or was closed: for whoever may not block in view(). `tell` is called
-  // from any thread, at the latest when that revision is published, and under the scene's lock: it must be quick, take
-  // no lock that is held while a Watch comes or goes, and leave the scene alone. Never after the Watch is gone, which
-  // waits for a call in work. The scene outlives it.
+  // Notification that the scene reached a revision or was closed, for callers that must not block in view(). `notify`
+  // is called once, from any thread, at the latest when that revision is published, and under the scene's lock: it must
+  // be quick, must not take a lock that is held while a Watch is created or destroyed, and must not call the scene. It
+  // is never called after the destructor, which waits for a running call. The scene outlives the Watch.
   class Watch {
    public:
     Watch(const Scene& scene, uint64_t revision, std::function<void()> notify);
@@ -148,34 +151,37 @@ class Scene {
     friend class Scene;
     const Scene& scene_;
     const std::function<void()> notify_;
-    // Both guarded by the scene's mutex_; the place is of no meaning once told.
-    std::multimap<uint64_t, Watch*>::iterator place_;
+    // Guarded by the scene's mutex_, like notified_; valid until notified.
+    std::multimap<uint64_t, Watch*>::iterator position_;
     bool notified_ = false;
   };
 
-  // Keeps no revision but the latest for `exactly` views, until more come: gives memory back when it is short.
+  // Drops the recent revisions kept for kExactly views, except the latest. Frees memory when it is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
 
-  // The scene was deleted: wakes all who wait, refuses all that comes.
+  // Closes the scene after its deletion: wakes all waiters and refuses all later calls.
   void close() LOCUS_EXCLUDES(mutex_);
-  // Deletes it from its log, then closes it. After an error it goes on as if nothing had been asked.
+  // Deletes the scene from its log and closes it. After an error of the log the scene continues unchanged.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // What a snapshot of the log is made of: the latest revision, and which record it comes from. Waits for a batch at
-  // work; the scene goes on at once.
+  // Returns the state to be written as the log's next snapshot: the latest revision and the sequence number of its
+  // record. Waits for a batch that is being applied; does not block the scene afterwards.
   FrozenScene freeze() LOCUS_EXCLUDES(writer_mutex_, mutex_);
-  // How far the log reaches; moves on with each append.
+  // Returns the extent of the log.
   LogPosition log_position() const { return journal_.position(); }
-  // What was frozen is the log's snapshot now: `sequence` and `log_bytes` of FrozenScene.
+  // Records that a frozen state is now the log's snapshot. Takes `sequence` and `log_bytes` of FrozenScene.
   void snapshot_written(uint64_t sequence, uint64_t log_bytes) { journal_.snapshot_written(sequence, log_bytes); }
-  // 0 for a scene without a log.
+  // Returns 0 for a scene without a log.
   SceneKey log_key() const { return journal_.key(); }
 
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
  private:
+  // Checks latest_, recent_ and watches_. O(1).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
+  // Makes the next revision visible, notifies waiters and watches, and enforces the budget of readers.
   void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
-  // Those who wait for `revision` or an earlier one.
+  // Notifies the watches of `revision` and earlier ones.
   void notify_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);
   absl::Status closed_status() const;
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
@@ -195,14 +201,14 @@ class Scene {
   Mutex writer_mutex_;  // taken before mutex_
   SceneWriter writer_ LOCUS_GUARDED_BY(writer_mutex_);
   SceneJournal journal_;  // appended to under writer_mutex_
-  IsKept is_kept_;        // where it is asked
+  IsKept is_kept_;        // null: every mesh is kept
   mutable Mutex mutex_;
   mutable ConditionVariable published_;
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
   std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);                   // oldest first, latest_ last
-  mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);  // not yet told, by revision
+  mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);  // not yet notified, by revision
   uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
-  std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // of pending changes, once for each
+  std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // one entry for each pending placement
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;

@@ -15,8 +15,24 @@ namespace locus {
 SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics, size_t max_objects,
                          const HistoryOptions& history)
     : epoch_(epoch), max_objects_(max_objects), winding_(winding), statics_(std::move(statics)), recorder_(history) {
+  LOCUS_DCHECK(statics_ != nullptr);
+  LOCUS_DCHECK_NE(epoch_, uint64_t{0});
   if (recorder_.on()) objects_.track_lifetimes();
   published_ = freeze();
+  check_invariants();
+}
+
+void SceneWriter::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK(published_ != nullptr || defer_snapshots());
+    if (published_ != nullptr) {
+      LOCUS_CHECK_EQ(published_->revision, revision_);
+      LOCUS_CHECK_EQ(published_->tick, tick_);
+      LOCUS_CHECK(replaying_ || published_->epoch == epoch_);
+      LOCUS_CHECK(published_->statics == statics_);
+    }
+    LOCUS_CHECK(coalesced_moves_.empty() || defer_snapshots());
+  }
 }
 
 absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding winding, const HistoryOptions& history) {
@@ -31,18 +47,23 @@ absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding windi
   writer.writers_ = std::move(state.writers);
   writer.recorder_.restore(state.has_past);
   writer.published_ = writer.freeze();
+  writer.check_invariants();
   return writer;
 }
 
 void SceneWriter::end_replay() {
+  LOCUS_DCHECK(replaying_);
   flush_coalesced_moves();
   replaying_ = false;
   published_ = freeze();
+  check_invariants();
 }
 
 void SceneWriter::restart(uint64_t epoch) {
+  LOCUS_DCHECK_NE(epoch, uint64_t{0});
   epoch_ = epoch;
   if (!replaying_) published_ = freeze();
+  check_invariants();
 }
 
 SnapshotPtr SceneWriter::freeze() {
@@ -61,9 +82,12 @@ SnapshotPtr SceneWriter::next_revision() {
 }
 
 SnapshotPtr SceneWriter::replace_statics(std::shared_ptr<const StaticSet> statics) {
+  LOCUS_DCHECK(statics != nullptr);
   replaced_bytes_ += statics_->bytes();
   statics_ = std::move(statics);
-  return next_revision();
+  SnapshotPtr snapshot = next_revision();
+  check_invariants();
+  return snapshot;
 }
 
 UpdateAck SceneWriter::ack_now() const {
@@ -75,20 +99,22 @@ UpdateAck SceneWriter::ack_now() const {
 }
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch) {
+  LOCUS_DCHECK(check_form(batch).ok());
   ASSIGN_OR_RETURN(std::optional<UpdateAck> known, writers_.admit(batch.writer, batch.batch));
   if (known) return Applied{old_ack(batch), nullptr};
-  const bool jumps = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
-                                                   [](const MoveColumns& move) { return move.teleport; });
-  absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !jumps ? apply_moves(batch) : apply_changes(batch);
+  const bool teleports = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
+                                                       [](const MoveColumns& move) { return move.teleport; });
+  absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !teleports ? apply_moves(batch) : apply_changes(batch);
   if (result.ok()) writers_.record(batch.writer, batch.batch, result->ack);
+  check_invariants();
   return result;
 }
 
-template <class Application>
-absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Application& application, Applied& result) {
-  result.ack.applied = application.applied();
-  result.ack.refused = application.refused();
-  result.ack.errors = std::move(application.errors());
+template <class Applier>
+absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, Applied& result) {
+  result.ack.applied = applier.applied();
+  result.ack.refused = applier.refused();
+  result.ack.errors = std::move(applier.errors());
   if (!batch.all_or_nothing || result.ack.refused == 0) return absl::OkStatus();
   const ItemError& first = result.ack.errors.front();
   return refuse_argument(first.reason, first.field, first.index,
@@ -101,27 +127,27 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   moves_.run(objects_, batch);
   RETURN_IF_ERROR(fill_ack(batch, moves_, result));
   result.snapshot = publish_moves(batch);
-  UpdateAck reached = ack_now();
-  result.ack.epoch = reached.epoch;
-  result.ack.revision = reached.revision;
-  result.ack.tick = reached.tick;
+  const UpdateAck now = ack_now();
+  result.ack.epoch = now.epoch;
+  result.ack.revision = now.revision;
+  result.ack.tick = now.tick;
   return result;
 }
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatch& batch) {
   Applied result;
   flush_coalesced_moves();
-  BatchApplier application(objects_, *statics_, batch, recorder_.on() ? TrackLifetimes::kYes : TrackLifetimes::kNo);
-  application.run();
-  if (application.object_count() > max_objects_)
+  BatchApplier applier(objects_, *statics_, batch, recorder_.on() ? TrackLifetimes::kYes : TrackLifetimes::kNo);
+  applier.run();
+  if (applier.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
-                       static_cast<double>(application.object_count()), 0);
-  RETURN_IF_ERROR(fill_ack(batch, application, result));
-  const BatchApplier::Difference difference = application.difference();
-  const bool forgets_now = forgets(batch);
+                       static_cast<double>(applier.object_count()), 0);
+  RETURN_IF_ERROR(fill_ack(batch, applier, result));
+  const BatchApplier::Difference difference = applier.difference();
+  const bool dropped_history = drops_history(batch);
   start_tick(batch);
   replaced_bytes_ += objects_.apply(difference.removed, difference.added, difference.replaced);
-  publish_changes(batch, !difference.empty() || forgets_now, result);
+  publish_changes(batch, !difference.empty() || dropped_history, result);
   return result;
 }
 
@@ -131,6 +157,7 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
   const UpdateBatch* any_new = nullptr;
   moves_.begin(objects_);
   for (const UpdateBatch* batch : batches) {
+    LOCUS_DCHECK(check_form(*batch).ok() && may_join(*batches.front(), *batch));
     const absl::StatusOr<std::optional<UpdateAck>> known = writers_.admit(batch->writer, batch->batch);
     is_new.push_back(known.ok() && !*known);
     joined.acks.push_back(known.ok() ? absl::StatusOr<UpdateAck>(UpdateAck()) : known.status());
@@ -141,7 +168,7 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     ack.applied = moves_.applied();
     ack.refused = moves_.refused();
     ack.errors = std::move(moves_.errors());
-    // The next of the same writer may be among them, or the same once more.
+    // Record the ack now: a later batch of the list may be the next one of this writer, or a duplicate.
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);
@@ -150,6 +177,7 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     if (is_new[i]) record_ack(*batches[i], *joined.acks[i]);
   for (size_t i = 0; i < batches.size(); ++i)
     if (!is_new[i] && joined.acks[i].ok()) joined.acks[i] = old_ack(*batches[i]);
+  check_invariants();
   return joined;
 }
 
@@ -165,12 +193,12 @@ void SceneWriter::flush_coalesced_moves() {
 }
 
 SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch) {
-  Applied all;
+  Applied result;
   start_tick(batch);
   const bool changes = apply_staged_moves();
-  publish_changes(batch, changes, all);
+  publish_changes(batch, changes, result);
   moves_.clear();
-  return std::move(all.snapshot);
+  return std::move(result.snapshot);
 }
 
 void SceneWriter::record_ack(const UpdateBatch& batch, UpdateAck& ack) {
@@ -200,12 +228,14 @@ void SceneWriter::start_tick(const UpdateBatch& batch) {
     recorder_.drop();
     return objects_.start_tick(tick, std::numeric_limits<uint64_t>::max());
   }
+  LOCUS_DCHECK(published_ != nullptr);  // snapshots are never deferred with history
   recorder_.close(tick_, published_->objects, objects_.displacement(), tick);
   objects_.start_tick(tick, recorder_.oldest_tick(tick));
 }
 
 void SceneWriter::publish_changes(const UpdateBatch& batch, bool changes, Applied& result) {
   const uint64_t tick = tick_of(batch);
+  LOCUS_DCHECK(batch.restart_ticks || tick >= tick_);
   if (changes || tick != tick_) {
     tick_ = tick;
     result.snapshot = next_revision();

@@ -9,8 +9,8 @@ namespace locus {
 namespace {
 
 template <class Enum>
-Enum read_enum(ByteReader& reader, Enum highest, const char* what) {
-  return static_cast<Enum>(reader.number_upto(static_cast<uint64_t>(highest), what));
+Enum read_enum(ByteReader& reader, Enum max, const char* what) {
+  return static_cast<Enum>(reader.number_upto(static_cast<uint64_t>(max), what));
 }
 
 void read_labels(ByteReader& reader, SceneSpec& spec) {

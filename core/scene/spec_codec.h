@@ -1,4 +1,4 @@
-// A scene's specification as bytes, for its log. Plain functions; any thread.
+// Encodes and decodes the specification of a scene for its log. Plain functions; any thread.
 #ifndef LOCUS_CORE_SCENE_SPEC_CODEC_H_
 #define LOCUS_CORE_SCENE_SPEC_CODEC_H_
 
@@ -10,8 +10,9 @@
 
 namespace locus {
 
+// Returns the bytes of a specification.
 std::string encode_spec(const SceneSpec& spec);
-// DATA_LOSS saying what is wrong with the bytes.
+// Returns the specification; DATA_LOSS describes damage.
 absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes);
 
 }  // namespace locus

@@ -14,8 +14,8 @@ enum Flag : uint32_t {
   kAllFlags = 31,
 };
 
-// What a list takes at least: its kind and the lengths of its columns.
-constexpr size_t kMinList = 32;
+// Minimum size of a list in bytes: its kind and the lengths of its columns.
+constexpr size_t kMinListBytes = 32;
 
 uint32_t flag(bool set, Flag flag) { return set ? flag : 0u; }
 
@@ -91,7 +91,7 @@ RelabelColumns read_relabel(ByteReader& reader) {
 
 template <class Columns, class Read>
 void read_lists(ByteReader& reader, const char* what, std::vector<Columns>& lists, const Read& read) {
-  const uint64_t count = reader.count(kMinList, what);
+  const uint64_t count = reader.count(kMinListBytes, what);
   lists.reserve(count);
   for (uint64_t i = 0; i < count && reader.good(); ++i) lists.push_back(read(reader));
 }

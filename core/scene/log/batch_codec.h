@@ -1,4 +1,4 @@
-// Update batches as bytes: what record_codec.h is made of. Any thread.
+// Encodes and decodes update batches within records (record_codec.h, FORMAT.md). Plain functions; any thread.
 #ifndef LOCUS_CORE_SCENE_LOG_BATCH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_BATCH_CODEC_H_
 
@@ -7,9 +7,9 @@
 
 namespace locus {
 
-// `batch` has passed check_form(). O(columns), a copy of each.
+// Appends the batch. Precondition: `batch` has passed check_form(). O(bytes): copies each column.
 void write_batch(const UpdateBatch& batch, ByteWriter& writer);
-// Borrows from the bytes. One that passes check_form(), or the reader fails.
+// Reads a batch that borrows from the bytes. The batch passes check_form(), or the reader fails.
 UpdateBatch read_batch(ByteReader& reader);
 
 }  // namespace locus

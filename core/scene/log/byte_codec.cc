@@ -8,6 +8,7 @@ void ByteReader::fail(absl::string_view what, absl::string_view how) {
   if (!good()) return;
   status_ = data_loss(absl::StrCat(what, " ", how));
   left_ = {};
+  LOCUS_DCHECK(!good());
 }
 
 BytesKind read_kind(ByteReader& reader) {

@@ -1,9 +1,9 @@
-// What all that a scene writes to its log is made of: numbers of 8 bytes, little-endian, and columns of numbers that
-// start at multiples of 8, so that whoever reads them gets spans of the bytes themselves. For the codecs of records,
-// state and meshes beside it; one thread at a time.
+// Binary encoding of everything that a scene writes to its log: little-endian integers of 8 bytes, and columns aligned
+// to 8 bytes, which are read in place as spans of the bytes. Used by the codecs of records, state and meshes in this
+// folder; FORMAT.md describes the formats. One thread at a time.
 //
-// Bytes to be read are trusted with nothing: a disk may have damaged them. Once anything is wrong a reader gives zeros
-// and empty columns, and status() says what it was.
+// A reader validates everything, because a disk may damage the bytes. After the first error it returns zeros and empty
+// columns, and status() describes the error.
 #ifndef LOCUS_CORE_SCENE_LOG_BYTE_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_BYTE_CODEC_H_
 
@@ -21,57 +21,58 @@
 
 namespace locus {
 
-static_assert(std::endian::native == std::endian::little, "columns are read and written as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "columns are read and written in memory order");
 
 class ByteWriter {
  public:
   static constexpr size_t kAlignment = 8;
 
-  // Appends to `to`, whose size is a multiple of 8.
+  // Appends to `to`. Precondition: its size is a multiple of 8.
   explicit ByteWriter(std::string& to) : to_(to) { LOCUS_DCHECK(to.size() % kAlignment == 0); }
 
   void number(uint64_t value) { append(&value, sizeof(value)); }
   void number(double value) { append(&value, sizeof(value)); }
   void pair(uint32_t first, uint32_t second) { number(uint64_t{second} << 32 | first); }
-  // How many there are, and the numbers.
+  // Writes the number of values and the values, padded with zeros to a multiple of 8 bytes.
   template <class T>
-  void column(absl::Span<const T> numbers) {
+  void column(absl::Span<const T> values) {
     static_assert(std::is_trivially_copyable_v<T>);
-    number(uint64_t{numbers.size()});
-    if (numbers.empty()) return;
-    append(numbers.data(), numbers.size() * sizeof(T));
+    number(uint64_t{values.size()});
+    if (values.empty()) return;
+    append(values.data(), values.size() * sizeof(T));
     to_.append((kAlignment - to_.size() % kAlignment) % kAlignment, '\0');
   }
-  // The same of a column of `width` numbers an entry, but one entry for all where all are the same, bit for bit.
+  // Writes a column of `width` values for each entry, or a single entry if all entries are equal bit for bit.
   template <class T>
-  void shared_column(absl::Span<const T> numbers, size_t width) {
-    column(all_same(numbers, width) ? numbers.subspan(0, width) : numbers);
+  void shared_column(absl::Span<const T> values, size_t width) {
+    LOCUS_DCHECK(width > 0 && values.size() % width == 0);
+    column(all_same(values, width) ? values.subspan(0, width) : values);
   }
   void text(absl::string_view text) { column(absl::Span<const char>(text.data(), text.size())); }
 
  private:
   template <class T>
-  static bool all_same(absl::Span<const T> numbers, size_t width) {
-    // Each equals the one before it.
-    return numbers.size() > width &&
-           std::memcmp(numbers.data(), numbers.data() + width, (numbers.size() - width) * sizeof(T)) == 0;
+  static bool all_same(absl::Span<const T> values, size_t width) {
+    // Compares each entry with the one before it.
+    return values.size() > width &&
+           std::memcmp(values.data(), values.data() + width, (values.size() - width) * sizeof(T)) == 0;
   }
   void append(const void* bytes, size_t size) { to_.append(static_cast<const char*>(bytes), size); }
 
   std::string& to_;
 };
 
-// What is wrong with bytes that were read.
+// Returns DATA_LOSS for bytes that cannot be read.
 inline absl::Status data_loss(absl::string_view what) { return absl::DataLossError(what); }
 
 class ByteReader {
  public:
-  // Of bytes at a multiple of 8: see AlignedBytes.
+  // Borrows `bytes`. Precondition: their address is a multiple of 8; see AlignedBytes.
   explicit ByteReader(absl::string_view bytes) : left_(bytes) {
     LOCUS_DCHECK(reinterpret_cast<uintptr_t>(bytes.data()) % ByteWriter::kAlignment == 0);
   }
 
-  // `what` names what is read, for the message.
+  // Reads an integer. `what` names the value in the error message, here and below.
   uint64_t number(const char* what) {
     uint64_t value = 0;
     take(&value, sizeof(value), what);
@@ -85,40 +86,46 @@ class ByteReader {
     const uint64_t both = number(what);
     return {static_cast<uint32_t>(both), static_cast<uint32_t>(both >> 32)};
   }
-  // A number that is at most `most`.
-  uint64_t number_upto(uint64_t most, const char* what) {
+  // Reads an integer; fails if it is larger than `max`.
+  uint64_t number_upto(uint64_t max, const char* what) {
     const uint64_t value = number(what);
-    if (value <= most) return value;
+    if (value <= max) return value;
     fail(what, "is out of range");
     return 0;
   }
-  // How many things follow of which each takes at least `least_bytes`: no more than there is room for.
-  uint64_t count(size_t least_bytes, const char* what) { return number_upto(left_.size() / least_bytes, what); }
+  // Reads the number of items that follow, each of at least `min_bytes`; fails if the remaining bytes cannot hold them.
+  uint64_t count(size_t min_bytes, const char* what) {
+    LOCUS_DCHECK_GT(min_bytes, 0u);
+    return number_upto(left_.size() / min_bytes, what);
+  }
+  // Reads a column as a span of the bytes.
   template <class T>
   absl::Span<const T> column(const char* what) {
     static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= ByteWriter::kAlignment);
-    const uint64_t numbers = count(sizeof(T), what);
-    const size_t bytes = numbers * sizeof(T);
+    const uint64_t values = count(sizeof(T), what);
+    const size_t bytes = values * sizeof(T);
     const size_t padded = (bytes + ByteWriter::kAlignment - 1) / ByteWriter::kAlignment * ByteWriter::kAlignment;
     if (padded > left_.size()) fail(what, "is cut off");
-    if (numbers == 0 || !good()) return {};
+    if (values == 0 || !good()) return {};
+    LOCUS_DCHECK(reinterpret_cast<uintptr_t>(left_.data()) % alignof(T) == 0);
     const auto* first = reinterpret_cast<const T*>(left_.data());
     left_.remove_prefix(padded);
-    return {first, numbers};
+    return {first, values};
   }
-  // `entries` entries of `width` numbers, or one for all.
+  // Reads a column of `entries` entries of `width` values each, or of one entry for all.
   template <class T>
   absl::Span<const T> shared_column(size_t entries, size_t width, const char* what) {
-    const absl::Span<const T> numbers = column<T>(what);
-    if (good() && numbers.size() != entries * width && numbers.size() != width) fail(what, "has a wrong length");
-    return good() ? numbers : absl::Span<const T>();
+    const absl::Span<const T> values = column<T>(what);
+    if (good() && values.size() != entries * width && values.size() != width) fail(what, "has a wrong length");
+    return good() ? values : absl::Span<const T>();
   }
-  absl::string_view text(size_t most, const char* what) {
+  // Reads a text of at most `max` bytes.
+  absl::string_view text(size_t max, const char* what) {
     const absl::Span<const char> text = column<char>(what);
-    if (text.size() > most) fail(what, "is too long");
+    if (text.size() > max) fail(what, "is too long");
     return good() ? absl::string_view(text.data(), text.size()) : absl::string_view();
   }
-  // That nothing is left.
+  // Fails if bytes are left.
   void end(const char* what) {
     if (!left_.empty()) fail(what, "has bytes too many");
   }
@@ -126,7 +133,7 @@ class ByteReader {
   bool good() const { return status_.ok(); }
   const absl::Status& status() const { return status_; }
   size_t left() const { return left_.size(); }
-  // The first counts.
+  // Sets the error, unless there is one, and drops the remaining bytes.
   void fail(absl::string_view what, absl::string_view how);
 
  private:
@@ -141,7 +148,8 @@ class ByteReader {
   absl::Status status_;
 };
 
-// Bytes at a multiple of 8: the given ones, or a copy of them. What is read from it may be moved about with it.
+// Bytes at an address that is a multiple of 8: the given ones, which are borrowed, or an aligned copy of them. A move
+// keeps the address, so that spans of the bytes stay valid.
 class AlignedBytes {
  public:
   explicit AlignedBytes(absl::string_view bytes) : bytes_(bytes) {
@@ -162,7 +170,7 @@ class AlignedBytes {
   absl::string_view bytes_;
 };
 
-// How every piece of bytes begins: which kind it is and in which version of that kind it is written.
+// Kind of a record or chunk. Each begins with its kind and the version of its format.
 enum class BytesKind : uint32_t {
   kBatch = 0x4842'534c,
   kJoinedBatches = 0x4a42'534c,
@@ -171,7 +179,7 @@ enum class BytesKind : uint32_t {
   kSceneSpec = 0x5053'534c,
   kStateHeader = 0x4854'534c,
   kStateWriters = 0x5754'534c,
-  kStateInstances = 0x4954'534c,  // likewise
+  kStateInstances = 0x4954'534c,  // format 1: meshes by content; read only
   kNamedInstances = 0x494e'534c,
   kStateObjects = 0x4f54'534c,
   kMeshHeader = 0x484d'534c,
@@ -184,7 +192,7 @@ enum class BytesKind : uint32_t {
 inline constexpr uint32_t kBytesVersion = 1;
 
 inline void write_kind(ByteWriter& writer, BytesKind kind) { writer.pair(static_cast<uint32_t>(kind), kBytesVersion); }
-// Of any kind; fails for a version that is not known.
+// Reads the header of a record or chunk of any kind; fails if the version is unknown.
 BytesKind read_kind(ByteReader& reader);
 
 }  // namespace locus

@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kNumbersPerChunk = 3 * 65536;
 static_assert(kNumbersPerChunk * sizeof(float) + 64 <= UpdateLog::kMaxChunkBytes);
-// A chunk of parts ends after the one that takes it beyond this.
+// Size beyond which a chunk of parts ends.
 constexpr size_t kPartsChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kPartsChunk + limits::kMaxLabelLength + 64 <= UpdateLog::kMaxChunkBytes);
 constexpr size_t kMinPart = 2 * 8;
@@ -31,7 +31,9 @@ void read_parts(ByteReader& reader, std::vector<MeshPart>& parts) {
 }  // namespace
 
 MeshWriter::MeshWriter(std::shared_ptr<const StaticMesh> mesh)
-    : mesh_(std::move(mesh)), vertices_(mesh_->vertices()), indices_(mesh_->indices()) {}
+    : mesh_(std::move(mesh)), vertices_(mesh_->vertices()), indices_(mesh_->indices()) {
+  LOCUS_DCHECK_EQ(vertices_.size(), size_t{3} * mesh_->vertex_count());
+}
 
 absl::StatusOr<std::optional<std::string>> MeshWriter::next() {
   std::string chunk;

@@ -1,5 +1,5 @@
-// A mesh's columns as chunks for the log, and the mesh again from them; likewise the parts, which belong to a name and
-// not to the bytes. The tree is not among them: what saves building it again is tree_codec.h. One thread at a time.
+// Encodes the columns of a mesh, and the parts of one name, as chunks for the log, and decodes them. The tree is not
+// included: its topology is cached separately by tree_codec.h. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 
@@ -18,10 +18,10 @@ namespace locus {
 
 class MeshWriter {
  public:
-  // Unpacks the vertices; everything else a chunk at a time.
+  // Unpacks all vertices now, and everything else one chunk at a time.
   explicit MeshWriter(std::shared_ptr<const StaticMesh> mesh);
 
-  // The next chunk, at most UpdateLog::kMaxChunkBytes, or nothing at the end: to be called by a ChunkSource.
+  // Returns the next chunk, at most UpdateLog::kMaxChunkBytes, or nullopt at the end. Suitable as a ChunkSource.
   absl::StatusOr<std::optional<std::string>> next();
 
  private:
@@ -33,7 +33,7 @@ class MeshWriter {
   const std::vector<float> vertices_;
   PackedIndices::Reader indices_;
   bool begun_ = false;
-  size_t next_vertex_ = 0;  // number of a coordinate
+  size_t next_vertex_ = 0;  // index of a coordinate in vertices_
   size_t next_index_ = 0;
 };
 
@@ -54,16 +54,16 @@ class PartsWriter {
 // Reads what MeshWriter wrote, and meshes of format 1, whose parts stand with the columns.
 class MeshReader {
  public:
-  // The next chunk; all in the order in which they were written. DATA_LOSS saying what is wrong.
+  // Reads the next chunk, in the order in which they were written. DATA_LOSS describes damage.
   absl::Status add(absl::string_view chunk);
-  // Once all chunks came.
+  // Makes the mesh after all chunks were added. DATA_LOSS if chunks are missing or the mesh is not valid.
   absl::StatusOr<TriangleMesh> finish() &&;
 
  private:
   void read_header(ByteReader& reader);
 
   bool begun_ = false;
-  uint64_t vertex_numbers_ = 0;  // how many there are to be
+  uint64_t vertex_numbers_ = 0;  // expected counts, from the header
   uint64_t index_numbers_ = 0;
   uint64_t part_count_ = 0;
   std::vector<float> vertices_;

@@ -11,12 +11,12 @@
 namespace locus {
 namespace {
 
-constexpr size_t kMinBatch = 96;
-constexpr size_t kMinPlacement = 32 + 7 * 8;
+constexpr size_t kMinBatchBytes = 96;
+constexpr size_t kMinPlacementBytes = 32 + 7 * 8;
 
 Record::Joined read_joined(ByteReader& reader) {
   Record::Joined joined;
-  const uint64_t count = reader.count(kMinBatch, "the number of batches");
+  const uint64_t count = reader.count(kMinBatchBytes, "the number of batches");
   joined.batches.reserve(count);
   for (uint64_t i = 0; i < count && reader.good(); ++i) {
     joined.batches.push_back(read_batch(reader));
@@ -63,7 +63,7 @@ Record::Change read_change(ByteReader& reader, BytesKind kind) {
   Record::Change read;
   read.change.remove_ids = reader.column<uint64_t>("remove_ids");
   read.change.remove_groups = reader.column<uint64_t>("remove_groups");
-  const uint64_t count = reader.count(kMinPlacement, "the number of placements");
+  const uint64_t count = reader.count(kMinPlacementBytes, "the number of placements");
   read.change.place.reserve(count);
   for (uint64_t i = 0; i < count && reader.good(); ++i)
     read.change.place.push_back(read_placement(reader, kind, read.meshes.emplace_back()));

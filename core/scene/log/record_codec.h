@@ -1,9 +1,9 @@
-// What a record of a scene's log says: a batch, several that were joined, or a static change, each as it was when the
-// scene let it in. A record says everything that its application depends on beside the state before it, so that
-// applying it again to that state gives the same revision, acks and refused items.
+// Encodes and decodes the records of a scene's log: an update batch, several joined batches, or a static change, as the
+// scene admitted it. Applying a record depends only on the record and on the state before it, so that a replay gives
+// the same revision, acks and refused items. FORMAT.md describes the bytes.
 //
-// Decoding trusts the bytes with nothing: DATA_LOSS says what is wrong. Plain functions; any thread. Columns that a
-// shape's kind does not use are not kept.
+// Decoding validates everything: DATA_LOSS describes damage. Plain functions; any thread. Columns that the kind of a
+// shape does not use are not stored.
 #ifndef LOCUS_CORE_SCENE_LOG_RECORD_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_RECORD_CODEC_H_
 
@@ -20,14 +20,14 @@
 
 namespace locus {
 
-// Each appends one record to `to`, whose size is and stays a multiple of 8. Batches have passed check_form(); those of
-// the second may_join().
+// Append one record to `to`. Preconditions: the size of `to` is a multiple of 8, and stays so; batches have passed
+// check_form(); the batches of encode_joined() may_join().
 void encode_batch(const UpdateBatch& batch, std::string& to);
 void encode_joined(absl::Span<const UpdateBatch* const> batches, std::string& to);
-// `placed`: the ids that instances got, in order.
+// `placed`: ids of the placed instances, chosen ids included, in the order of the change.
 void encode_change(const StaticChange& change, absl::Span<const Id> placed, std::string& to);
 
-// A record again. What it says borrows from it, and it borrows from the bytes.
+// Decoded record. Its content borrows from the record, and the record borrows from the bytes.
 class Record {
  public:
   static absl::StatusOr<Record> decode(absl::string_view bytes);
@@ -36,8 +36,8 @@ class Record {
     std::vector<UpdateBatch> batches;  // at least one; all may_join()
   };
   struct Change {
-    StaticChange change;          // without meshes, with ids
-    std::vector<MeshKey> meshes;  // of each placement; without names in format 1
+    StaticChange change;          // with ids, without mesh pointers
+    std::vector<MeshKey> meshes;  // mesh of each placement; without names in format 1
   };
   using Content = std::variant<UpdateBatch, Joined, Change>;  // batches pass check_form()
   Content& content() { return content_; }

@@ -9,21 +9,29 @@
 namespace locus {
 namespace {
 
-// What a batch can take: each item in all columns, and each list's lengths.
+// Upper bounds of the encoded size of a batch: each item in all columns, and the lengths of each list.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);
 static_assert(uint64_t{limits::kMaxInstances} * 128 <= UpdateLog::kMaxRecordBytes);
 
 }  // namespace
 
-void SceneJournal::end_record(uint64_t epoch, const UpdateBatch& numbers) {
-  entries_.push_back({epoch, numbers.writer, numbers.batch, {}});
+void SceneJournal::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(position_.snapshot_sequence, position_.sequence);
+    LOCUS_CHECK(position_.bytes == 0 || position_.sequence > position_.snapshot_sequence);
+  }
+}
+
+void SceneJournal::end_record(uint64_t epoch, const UpdateBatch& batch) {
+  entries_.push_back({epoch, batch.writer, batch.batch, {}});
   ends_.push_back(bytes_.size());
 }
 
 absl::Status SceneJournal::append_each(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) {
   if (!on() || batches.empty()) return absl::OkStatus();
   for (const UpdateBatch* batch : batches) {
+    LOCUS_DCHECK(check_form(*batch).ok());
     encode_batch(*batch, bytes_);
     end_record(epoch, *batch);
   }
@@ -32,6 +40,7 @@ absl::Status SceneJournal::append_each(uint64_t epoch, absl::Span<const UpdateBa
 
 absl::Status SceneJournal::append_joined(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) {
   if (!on() || batches.empty()) return absl::OkStatus();
+  for (const UpdateBatch* batch : batches) LOCUS_DCHECK(check_form(*batch).ok() && may_join(*batches.front(), *batch));
   encode_joined(batches, bytes_);
   end_record(epoch, *batches.back());
   return append(log_.level);
@@ -45,9 +54,12 @@ absl::Status SceneJournal::append_change(uint64_t epoch, const StaticChange& cha
 }
 
 absl::Status SceneJournal::append(AckLevel level) {
+  LOCUS_DCHECK_EQ(entries_.size(), ends_.size());
+  LOCUS_DCHECK(!ends_.empty() && ends_.back() == bytes_.size());
   absl::Status status;
   size_t begin = 0;
   for (size_t i = 0; i < entries_.size(); ++i) {
+    LOCUS_DCHECK_LT(begin, ends_[i]);
     entries_[i].bytes = absl::string_view(bytes_).substr(begin, ends_[i] - begin);
     begin = ends_[i];
     if (entries_[i].bytes.size() > UpdateLog::kMaxRecordBytes)
@@ -61,8 +73,9 @@ absl::Status SceneJournal::append(AckLevel level) {
       const MutexLock lock(mutex_);
       position_.sequence += entries_.size();
       position_.bytes += bytes_.size();
-      // A log that numbers otherwise is another scene's.
+      // A different sequence number would mean that the log belongs to another scene.
       LOCUS_CHECK_EQ(*last, position_.sequence);
+      check_invariants();
     }
   }
   entries_.clear();
@@ -86,13 +99,14 @@ uint64_t SceneJournal::total_bytes() const {
 
 void SceneJournal::snapshot_written(uint64_t sequence, uint64_t total_bytes) {
   const MutexLock lock(mutex_);
-  if (sequence < position_.snapshot_sequence) return;  // a later one is there already
+  if (sequence < position_.snapshot_sequence) return;  // a later snapshot was written meanwhile
   LOCUS_CHECK_LE(sequence, position_.sequence);
-  const uint64_t all = bytes_in_snapshots_ + position_.bytes;
-  LOCUS_CHECK_LE(total_bytes, all);
+  const uint64_t logged = bytes_in_snapshots_ + position_.bytes;
+  LOCUS_CHECK_LE(total_bytes, logged);
   position_.snapshot_sequence = sequence;
-  position_.bytes = all - total_bytes;
+  position_.bytes = logged - total_bytes;
   bytes_in_snapshots_ = total_bytes;
+  check_invariants();
 }
 
 }  // namespace locus

@@ -1,7 +1,9 @@
-// What a scene writes down before it does it: the scene's side of its log. Without a log it does nothing.
+// Write-ahead journal of a scene: encodes what the scene is about to apply and appends it to the log. Without a log it
+// does nothing.
 //
-// Threads: append...() and remove() by the scene's one writer at a time, they wait for the disk; position() and
-// snapshot_written() by any thread, they never do.
+// Threads: only the scene's writer, one thread at a time, calls append_...() and remove(), which wait for the disk; any
+// thread may call position(), total_bytes() and snapshot_written(), which never wait. Invariants of the position:
+// snapshot_sequence <= sequence, and total_bytes() never decreases.
 #ifndef LOCUS_CORE_SCENE_LOG_SCENE_JOURNAL_H_
 #define LOCUS_CORE_SCENE_LOG_SCENE_JOURNAL_H_
 
@@ -17,19 +19,19 @@
 
 namespace locus {
 
-// How far a scene's log reaches.
+// Extent of a scene's log.
 struct LogPosition {
-  uint64_t sequence = 0;           // of the last record
-  uint64_t snapshot_sequence = 0;  // the snapshot holds all up to here
-  uint64_t bytes = 0;              // of the records after that
+  uint64_t sequence = 0;           // sequence number of the last record
+  uint64_t snapshot_sequence = 0;  // last record whose effect is in the snapshot
+  uint64_t bytes = 0;              // size of the records after the snapshot
 };
 
-// Where a scene is logged; without `log` it is not.
+// Log of one scene; null `log`: the scene is not logged.
 struct SceneLog {
   UpdateLog* log = nullptr;  // outlives the scene
   SceneKey key = 0;
   AckLevel level = AckLevel::kLocal;
-  LogPosition position;  // where it goes on
+  LogPosition position;  // position at which the scene continues
 };
 
 class SceneJournal {
@@ -39,36 +41,39 @@ class SceneJournal {
   bool on() const { return log_.log != nullptr; }
   SceneKey key() const { return log_.key; }
 
-  // Each batch as a record of its own, all or none, with one sync. After an error nothing is logged.
+  // Appends each batch as one record, all or none, with one sync. After an error nothing is logged.
   absl::Status append_each(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
-  // Batches that become one revision, as one record.
+  // Appends batches that become one revision as one record.
   absl::Status append_joined(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
-  // On the disk whatever the scene's level: a mesh that is used no more may be deleted next.
+  // Appends a static change and syncs it whatever the scene's level is, because a mesh that the change releases may be
+  // deleted next.
   absl::Status append_change(uint64_t epoch, const StaticChange& change, absl::Span<const Id> placed)
       LOCUS_EXCLUDES(mutex_);
-  // The scene with all that is kept of it.
+  // Deletes the scene from the log.
   absl::Status remove();
 
   LogPosition position() const LOCUS_EXCLUDES(mutex_);
-  // Of all records that were ever appended here, and of those it began with: grows only.
+  // Returns the bytes of all records appended here, plus those after the snapshot at the start. Never decreases.
   uint64_t total_bytes() const LOCUS_EXCLUDES(mutex_);
-  // The snapshot holds all up to `sequence` now, before which `total_bytes` had been logged.
+  // Records that the snapshot now contains all records up to `sequence`, when total_bytes() was `total_bytes`.
   void snapshot_written(uint64_t sequence, uint64_t total_bytes) LOCUS_EXCLUDES(mutex_);
 
  private:
-  // Ends the record that was written to bytes_ since the last one.
-  void end_record(uint64_t epoch, const UpdateBatch& numbers);
+  // Checks the invariants of the class comment. O(1).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
+  // Ends the record that was encoded into bytes_ last. `batch` gives the writer and batch numbers of its entry.
+  void end_record(uint64_t epoch, const UpdateBatch& batch);
   absl::Status append(AckLevel level) LOCUS_EXCLUDES(mutex_);
 
   const SceneLog log_;
-  // The records at work.
+  // Encoded records that are being appended, and the end of each in bytes_. Empty between calls.
   std::string bytes_;
   std::vector<LogEntry> entries_;
   std::vector<size_t> ends_;
 
   mutable Mutex mutex_;
   LogPosition position_ LOCUS_GUARDED_BY(mutex_);
-  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;
+  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;  // total_bytes() at the last snapshot
 };
 
 }  // namespace locus

@@ -1,5 +1,5 @@
-// All that a scene is at one moment, so that it can be put down in chunks and made again: what readers see, and what
-// its writer knows beside that. The past is not in it.
+// Complete state of a scene at one revision, to be written to a snapshot in chunks and read again: the part that
+// readers see, and the part that only the writer uses. The history is not included. Plain data.
 #ifndef LOCUS_CORE_SCENE_LOG_SCENE_STATE_H_
 #define LOCUS_CORE_SCENE_LOG_SCENE_STATE_H_
 
@@ -14,16 +14,16 @@
 
 namespace locus {
 
-// A scene held still: what is written. Cheap to hold, while the scene goes on.
+// Frozen scene, the input of StateWriter. Cheap to hold while the scene continues.
 struct FrozenScene {
   SnapshotPtr snapshot;
   WriterTable writers;
-  bool has_past = false;   // as SceneWriter::has_past()
-  uint64_t sequence = 0;   // of the last record whose effect is in it ...
-  uint64_t log_bytes = 0;  // ... and all that was logged so far: for Scene::snapshot_written()
+  bool has_past = false;   // SceneWriter::has_past()
+  uint64_t sequence = 0;   // sequence number of the last record whose effect is included, and ...
+  uint64_t log_bytes = 0;  // ... bytes logged so far, both for Scene::snapshot_written()
 };
 
-// A scene read again: what a SceneWriter is made from.
+// Decoded scene snapshot, the input of SceneWriter::restore().
 struct SceneState {
   uint64_t epoch = 0;
   uint64_t revision = 0;
@@ -31,8 +31,8 @@ struct SceneState {
   bool has_past = false;
   WriterTable writers;
   std::shared_ptr<const StaticSet> statics;
-  double cell_size = 0;                      // of the grid
-  std::vector<std::vector<Object>> objects;  // in pieces, as they were read
+  double cell_size = 0;                      // cell size of the grid
+  std::vector<std::vector<Object>> objects;  // one vector for each chunk read
 };
 
 }  // namespace locus

@@ -14,8 +14,8 @@
 namespace locus {
 namespace {
 
-constexpr size_t kMinWriter = 8 * 8;
-constexpr size_t kMinError = 3 * 8;
+constexpr size_t kMinWriterBytes = 8 * 8;
+constexpr size_t kMinErrorBytes = 3 * 8;
 
 UpdateAck read_ack(ByteReader& reader) {
   UpdateAck ack;
@@ -25,7 +25,7 @@ UpdateAck read_ack(ByteReader& reader) {
   const ByteReader::Pair counts = reader.pair("the counts of an ack");
   ack.applied = counts.first;
   ack.refused = counts.second;
-  const uint64_t errors = reader.count(kMinError, "the number of errors of an ack");
+  const uint64_t errors = reader.count(kMinErrorBytes, "the number of errors of an ack");
   if (errors > limits::kMaxListedItemErrors) reader.fail("the number of errors of an ack", "is out of range");
   for (uint64_t i = 0; i < errors && reader.good(); ++i) {
     ItemError& error = ack.errors.emplace_back();
@@ -39,30 +39,30 @@ UpdateAck read_ack(ByteReader& reader) {
   return ack;
 }
 
-// NaN fails, too.
+// Returns false for NaN, too.
 template <class T>
-bool all_within(absl::Span<const T> numbers, double low, double high) {
-  bool right = true;
-  for (const T number : numbers) right &= number >= low && number <= high;
-  return right;
+bool all_within(absl::Span<const T> values, double min, double max) {
+  bool valid = true;
+  for (const T value : values) valid &= value >= min && value <= max;
+  return valid;
 }
 
 bool all_unit(absl::Span<const float> quaternions) {
-  bool right = true;
-  for (size_t at = 0; at < quaternions.size(); at += 4) {
-    const float* q = &quaternions[at];
-    right &= unit_deviation({q[0], q[1], q[2], q[3]}) <= limits::kMaxQuaternionDeviation;
+  bool valid = true;
+  for (size_t i = 0; i < quaternions.size(); i += 4) {
+    const float* q = &quaternions[i];
+    valid &= unit_deviation({q[0], q[1], q[2], q[3]}) <= limits::kMaxQuaternionDeviation;
   }
-  return right;
+  return valid;
 }
 
 struct LabelColumns {
   absl::Span<const uint64_t> ids, groups, tags;
   absl::Span<const uint32_t> layers;
 
-  LabelColumns(ByteReader& reader, size_t most) {
+  LabelColumns(ByteReader& reader, size_t max) {
     ids = reader.column<uint64_t>("ids");
-    if (ids.empty() || ids.size() > most) reader.fail("ids", "are too many, or none");
+    if (ids.empty() || ids.size() > max) reader.fail("ids", "are too many, or none");
     if (std::find(ids.begin(), ids.end(), kNoId) != ids.end()) reader.fail("an id", "is 0");
     groups = reader.shared_column<uint64_t>(ids.size(), 1, "groups");
     tags = reader.shared_column<uint64_t>(ids.size(), 1, "tags");
@@ -133,13 +133,13 @@ void StateReader::read_header(ByteReader& reader) {
 }
 
 void StateReader::read_writers(ByteReader& reader) {
-  while (reader.good() && reader.left() >= kMinWriter) {
+  while (reader.good() && reader.left() >= kMinWriterBytes) {
     WriterTable::Writer writer;
     writer.number = reader.number("a writer");
     writer.batch = reader.number("the last batch of a writer");
     writer.heard = reader.number("when a writer was heard");
     writer.ack = read_ack(reader);
-    if (reader.good() && !state_.writers.restore(std::move(writer))) reader.fail("a writer", "is there twice, or 0");
+    if (reader.good() && !state_.writers.restore(std::move(writer))) reader.fail("a writer", "occurs twice, or is 0");
   }
 }
 
@@ -150,15 +150,15 @@ void StateReader::read_instances(ByteReader& reader, BytesKind kind) {
     for (MeshKey& mesh : meshes) mesh.name = std::string(reader.text(limits::kMaxNameLength, "the name of a mesh"));
   const LabelColumns labels(reader, kInstancesPerChunk);
   const size_t n = labels.ids.size();
-  const auto numbers = reader.shared_column<uint32_t>(n, 1, "the meshes of instances");
+  const auto mesh_indices = reader.shared_column<uint32_t>(n, 1, "the meshes of instances");
   const auto translations = reader.shared_column<double>(n, 3, "translations");
   const auto rotations = reader.shared_column<float>(n, 4, "rotations");
   const auto scales = reader.shared_column<float>(n, 1, "scales");
-  if (reader.good() && !all_within(numbers, 0, static_cast<double>(meshes.size()) - 1))
+  if (reader.good() && !all_within(mesh_indices, 0, static_cast<double>(meshes.size()) - 1))
     reader.fail("the mesh of an instance", "is unknown");
   if (!reader.good()) return;
   for (size_t i = 0; i < n; ++i) {
-    Placed& placed = placed_[meshes[*ColumnReader<uint32_t>(numbers, 1).entry(i)]];
+    Placed& placed = placed_[meshes[*ColumnReader<uint32_t>(mesh_indices, 1).entry(i)]];
     placed.ids.push_back(labels.ids[i]);
     append(placed.groups, ColumnReader<uint64_t>(labels.groups, 1), i, 1);
     append(placed.tags, ColumnReader<uint64_t>(labels.tags, 1), i, 1);
@@ -201,7 +201,7 @@ void StateReader::read_objects(ByteReader& reader) {
   objects_read_ += n;
 }
 
-// As the scene had them: a transform is stored as it is placed.
+// Places the instances again. Transforms are stored exactly as placed, so that the result is the same.
 absl::Status StateReader::place(const FindMesh& find_mesh) {
   StaticChange change;
   for (const auto& [mesh, placed] : placed_) {
@@ -220,8 +220,9 @@ absl::Status StateReader::place(const FindMesh& find_mesh) {
 absl::StatusOr<SceneState> StateReader::finish(const FindMesh& find_mesh) && {
   if (!begun_) return data_loss("the header is not there");
   if (state_.writers.size() != writers_ || instances_read_ != instances_ || objects_read_ != objects_)
-    return data_loss(absl::StrCat("of ", writers_, " writers, ", instances_, " instances and ", objects_, " objects ",
-                                  state_.writers.size(), ", ", instances_read_, " and ", objects_read_, " are there"));
+    return data_loss(absl::StrCat("the header counts ", writers_, " writers, ", instances_, " instances and ", objects_,
+                                  " objects, the chunks contain ", state_.writers.size(), ", ", instances_read_,
+                                  " and ", objects_read_));
   RETURN_IF_ERROR(place(find_mesh));
   return std::move(state_);
 }

@@ -1,5 +1,5 @@
-// Makes a scene's state again from the chunks that StateWriter put down. Trusts them with nothing: DATA_LOSS says what
-// is wrong. One thread at a time.
+// Decodes a scene's state from the chunks that StateWriter wrote. Validates everything: DATA_LOSS describes damage. One
+// thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_STATE_READER_H_
 #define LOCUS_CORE_SCENE_LOG_STATE_READER_H_
 
@@ -20,13 +20,14 @@ using FindMesh = std::function<std::shared_ptr<const StaticMesh>(const MeshKey&)
 
 class StateReader {
  public:
-  // The next chunk; all in the order in which they were written.
+  // Reads the next chunk, in the order in which they were written.
   absl::Status add(absl::string_view chunk);
-  // Once all chunks came: builds the tree of instances. `find_mesh` knows every mesh there is.
+  // Makes the state after all chunks were added, and builds the tree of instances. DATA_LOSS if chunks are missing or
+  // `find_mesh` does not find a mesh.
   absl::StatusOr<SceneState> finish(const FindMesh& find_mesh) &&;
 
  private:
-  // The placements of one mesh.
+  // Placements of one mesh.
   struct Placed {
     std::vector<uint64_t> ids, groups, tags;
     std::vector<uint32_t> layers;
@@ -41,7 +42,7 @@ class StateReader {
 
   SceneState state_;
   bool begun_ = false;
-  uint64_t writers_ = 0;  // how many there are to be
+  uint64_t writers_ = 0;  // expected counts, from the header
   uint64_t instances_ = 0;
   uint64_t objects_ = 0;
   uint64_t instances_read_ = 0;

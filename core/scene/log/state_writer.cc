@@ -12,7 +12,7 @@
 namespace locus {
 namespace {
 
-// A chunk of writers ends after the one that takes it beyond this.
+// Size beyond which a chunk of writers ends.
 constexpr size_t kWritersChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kWritersChunk + size_t{limits::kMaxListedItemErrors} * kMaxBytesOfError + 1024 <=
               UpdateLog::kMaxChunkBytes);
@@ -32,47 +32,49 @@ void write_ack(const UpdateAck& ack, ByteWriter& writer) {
   }
 }
 
-// What get(thing) says of each thing, an array of N numbers, as one column.
-template <class Things, class Get>
-void write_each(ByteWriter& writer, const Things& things, const Get& get) {
-  using Entry = std::decay_t<decltype(get(things[0]))>;
-  using Number = typename Entry::value_type;
+// Writes get(item), an array of N values, for each item as one column.
+template <class Items, class Get>
+void write_each(ByteWriter& writer, const Items& items, const Get& get) {
+  using Entry = std::decay_t<decltype(get(items[0]))>;
+  using Value = typename Entry::value_type;
   std::vector<Entry> entries;
-  entries.reserve(things.size());
-  for (const auto& thing : things) entries.push_back(get(thing));
+  entries.reserve(items.size());
+  for (const auto& item : items) entries.push_back(get(item));
   constexpr size_t width = std::tuple_size_v<Entry>;
-  writer.shared_column(absl::MakeConstSpan(reinterpret_cast<const Number*>(entries.data()), entries.size() * width),
+  writer.shared_column(absl::MakeConstSpan(reinterpret_cast<const Value*>(entries.data()), entries.size() * width),
                        width);
 }
 
 template <class T, size_t N>
-using Numbers = std::array<T, N>;
+using Values = std::array<T, N>;
 
-template <class Things>
-void write_labels(ByteWriter& writer, const Things& things) {
-  write_each(writer, things, [](const auto& thing) { return Numbers<uint64_t, 1>{thing.id}; });
-  write_each(writer, things, [](const auto& thing) { return Numbers<uint64_t, 1>{thing.group}; });
-  write_each(writer, things, [](const auto& thing) { return Numbers<uint64_t, 1>{thing.tag}; });
-  write_each(writer, things, [](const auto& thing) { return Numbers<uint32_t, 1>{thing.layers}; });
+template <class Items>
+void write_labels(ByteWriter& writer, const Items& items) {
+  write_each(writer, items, [](const auto& item) { return Values<uint64_t, 1>{item.id}; });
+  write_each(writer, items, [](const auto& item) { return Values<uint64_t, 1>{item.group}; });
+  write_each(writer, items, [](const auto& item) { return Values<uint64_t, 1>{item.tag}; });
+  write_each(writer, items, [](const auto& item) { return Values<uint32_t, 1>{item.layers}; });
 }
 
-Numbers<double, 3> numbers(const Vec3d& v) { return {v.x, v.y, v.z}; }
-Numbers<float, 3> numbers(const Vec3f& v) { return {v.x, v.y, v.z}; }
-Numbers<float, 4> numbers(const Quaternion& q) { return {q.x, q.y, q.z, q.w}; }
+Values<double, 3> components(const Vec3d& v) { return {v.x, v.y, v.z}; }
+Values<float, 3> components(const Vec3f& v) { return {v.x, v.y, v.z}; }
+Values<float, 4> components(const Quaternion& q) { return {q.x, q.y, q.z, q.w}; }
 
 void write_objects(ByteWriter& writer, const std::vector<Object>& objects) {
   write_labels(writer, objects);
   write_each(writer, objects,
-             [](const Object& object) { return Numbers<uint8_t, 1>{static_cast<uint8_t>(object.shape.kind)}; });
-  write_each(writer, objects, [](const Object& object) { return numbers(object.shape.position); });
-  write_each(writer, objects, [](const Object& object) { return numbers(object.shape.rotation); });
-  write_each(writer, objects, [](const Object& object) { return numbers(object.shape.size); });
-  write_each(writer, objects, [](const Object& object) { return Numbers<float, 1>{object.shape.radius}; });
+             [](const Object& object) { return Values<uint8_t, 1>{static_cast<uint8_t>(object.shape.kind)}; });
+  write_each(writer, objects, [](const Object& object) { return components(object.shape.position); });
+  write_each(writer, objects, [](const Object& object) { return components(object.shape.rotation); });
+  write_each(writer, objects, [](const Object& object) { return components(object.shape.size); });
+  write_each(writer, objects, [](const Object& object) { return Values<float, 1>{object.shape.radius}; });
 }
 
 }  // namespace
 
-StateWriter::StateWriter(FrozenScene scene) : scene_(std::move(scene)), writers_(scene_.writers.writers()) {}
+StateWriter::StateWriter(FrozenScene scene) : scene_(std::move(scene)), writers_(scene_.writers.writers()) {
+  LOCUS_DCHECK(scene_.snapshot != nullptr);
+}
 
 absl::StatusOr<std::optional<std::string>> StateWriter::next() {
   std::string chunk;
@@ -112,24 +114,24 @@ std::string StateWriter::next_writers() {
   ByteWriter writer(chunk);
   write_kind(writer, BytesKind::kStateWriters);
   for (; next_writer_ < writers_.size() && chunk.size() < kWritersChunk; ++next_writer_) {
-    const WriterTable::Writer& one = writers_[next_writer_];
-    writer.number(one.number);
-    writer.number(one.batch);
-    writer.number(one.heard);
-    write_ack(one.ack, writer);
+    const WriterTable::Writer& entry = writers_[next_writer_];
+    writer.number(entry.number);
+    writer.number(entry.batch);
+    writer.number(entry.heard);
+    write_ack(entry.ack, writer);
   }
   return chunk;
 }
 
 std::string StateWriter::next_instances() {
   const absl::Span<const Instance> all = scene_.snapshot->statics->tree().values();
-  const absl::Span<const Instance> things = all.subspan(next_instance_, kInstancesPerChunk);
-  next_instance_ += things.size();
-  absl::flat_hash_map<const StaticMesh*, uint32_t> numbers_of_meshes;
+  const absl::Span<const Instance> instances = all.subspan(next_instance_, kInstancesPerChunk);
+  next_instance_ += instances.size();
+  absl::flat_hash_map<const StaticMesh*, uint32_t> mesh_indices;
   std::vector<Sha256> contents;
   std::vector<absl::string_view> names;
-  for (const Instance& instance : things) {
-    if (!numbers_of_meshes.emplace(instance.mesh.get(), static_cast<uint32_t>(contents.size())).second) continue;
+  for (const Instance& instance : instances) {
+    if (!mesh_indices.emplace(instance.mesh.get(), static_cast<uint32_t>(contents.size())).second) continue;
     contents.push_back(instance.mesh->sha256());
     names.push_back(instance.mesh->name());
   }
@@ -138,12 +140,12 @@ std::string StateWriter::next_instances() {
   write_kind(writer, BytesKind::kNamedInstances);
   writer.column(absl::MakeConstSpan(contents));
   for (const absl::string_view name : names) writer.text(name);
-  write_labels(writer, things);
-  write_each(writer, things,
-             [&](const Instance& one) { return Numbers<uint32_t, 1>{numbers_of_meshes.at(one.mesh.get())}; });
-  write_each(writer, things, [](const Instance& one) { return numbers(one.transform.translation); });
-  write_each(writer, things, [](const Instance& one) { return numbers(one.transform.quaternion); });
-  write_each(writer, things, [](const Instance& one) { return Numbers<float, 1>{one.transform.scale}; });
+  write_labels(writer, instances);
+  write_each(writer, instances,
+             [&](const Instance& one) { return Values<uint32_t, 1>{mesh_indices.at(one.mesh.get())}; });
+  write_each(writer, instances, [](const Instance& one) { return components(one.transform.translation); });
+  write_each(writer, instances, [](const Instance& one) { return components(one.transform.quaternion); });
+  write_each(writer, instances, [](const Instance& one) { return Values<float, 1>{one.transform.scale}; });
   return chunk;
 }
 
@@ -156,6 +158,7 @@ std::string StateWriter::next_objects() {
   });
   LOCUS_CHECK(!objects.empty());
   objects_written_ += objects.size();
+  LOCUS_DCHECK_LE(objects_written_, scene_.snapshot->objects.size());
   std::string chunk;
   ByteWriter writer(chunk);
   write_kind(writer, BytesKind::kStateObjects);

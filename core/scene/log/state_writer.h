@@ -1,8 +1,8 @@
-// Puts a scene's state down in chunks, one at a time, from a snapshot that never changes: the scene goes on meanwhile,
-// and no more than a chunk is in memory. One thread at a time.
+// Encodes a scene's state in chunks, one at a time, from an immutable snapshot: the scene continues meanwhile, and only
+// one chunk is in memory. One thread at a time.
 //
-// Chunks: a header that says how much of everything follows; writers; instances; objects, in the order the grid has
-// them. Read again by StateReader (core/scene/log/state_reader.h).
+// Chunks: a header with the counts; writers; instances; objects in grid order. Decoded by StateReader
+// (core/scene/log/state_reader.h); FORMAT.md describes the bytes.
 #ifndef LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
 #define LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
 
@@ -20,9 +20,9 @@ class StateWriter {
  public:
   explicit StateWriter(FrozenScene scene);
 
-  // The next chunk, at most UpdateLog::kMaxChunkBytes, or nothing at the end: to be called by a ChunkSource.
+  // Returns the next chunk, at most UpdateLog::kMaxChunkBytes, or nullopt at the end. Suitable as a ChunkSource.
   absl::StatusOr<std::optional<std::string>> next();
-  // Of all chunks so far.
+  // Returns the size of all chunks so far.
   uint64_t bytes() const { return bytes_; }
 
  private:

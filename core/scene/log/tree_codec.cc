@@ -6,7 +6,7 @@ namespace locus {
 
 std::string encode_outline(const TreeTopology& topology) {
   std::string bytes;
-  // With room for what stands before each column, and for filling up to multiples of 8.
+  // 64 bytes for the header, the lengths of the columns and their padding.
   bytes.reserve(topology.numbers.size() * sizeof(uint32_t) + topology.block_sizes.size() +
                 topology.nodes.size() * sizeof(NodeOutline) + 64);
   ByteWriter writer(bytes);
@@ -20,7 +20,7 @@ std::string encode_outline(const TreeTopology& topology) {
 
 absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes) {
   ByteReader reader(bytes.bytes());
-  if (read_kind(reader) != BytesKind::kTreeOutline) reader.fail("the outline of a tree", "is something else");
+  if (read_kind(reader) != BytesKind::kTreeOutline) reader.fail("the topology of a tree", "is of another kind");
   const uint64_t version = reader.number("the version of the builder");
   if (reader.good() && version != kBvhBuilderVersion)
     return absl::FailedPreconditionError(
@@ -31,7 +31,7 @@ absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes) {
   topology.block_sizes.assign(sizes.begin(), sizes.end());
   const auto nodes = reader.column<NodeOutline>("the nodes");
   topology.nodes.assign(nodes.begin(), nodes.end());
-  reader.end("the outline of a tree");
+  reader.end("the topology of a tree");
   if (!reader.good()) return reader.status();
   return topology;
 }

@@ -3,15 +3,18 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
+// Rounds up to a float.
 float at_least(double length) {
   return std::nextafter(static_cast<float>(length), std::numeric_limits<float>::infinity());
 }
 
-// Whatever the rotation, so that turning changes nothing of where an object is filed.
-float reach_of(const Shape& shape) {
+// Returns the extent of the shape under any rotation, so that a rotation never moves the object to another cell.
+float extent_of(const Shape& shape) {
   switch (shape.kind) {
     case ShapeKind::kPoint:
       return 0;
@@ -40,18 +43,22 @@ Object object_of(const GridRef& value) {
 }
 
 GridItem grid_item_of(const Object& object, uint32_t handle) {
+  LOCUS_DCHECK_NE(handle, PersistentIdTable<>::kNone);
   const Shape& shape = object.shape;
   GridItem item;
   item.entry = {shape.position, object.id, object.group, object.tag, object.layers, shape.kind};
   item.handle = handle;
-  item.reach = reach_of(shape);
+  item.reach = extent_of(shape);
   item.form = {shape.rotation, shape.size, shape.kind == ShapeKind::kBall ? 0 : shape.radius};
   return item;
 }
 
 GridRef ObjectSet::find_ref(Id id) const {
   const uint32_t handle = handles_.find(id);
-  return handle == PersistentIdTable<>::kNone ? GridRef() : grid_.at(handle);
+  if (handle == PersistentIdTable<>::kNone) return GridRef();
+  const GridRef object = grid_.at(handle);
+  LOCUS_DCHECK(!object || object.entry().id == id);
+  return object;
 }
 
 std::optional<Object> ObjectSet::find(Id id) const {

@@ -1,5 +1,5 @@
-// The moving objects of a scene at one revision: by id, and in the grid. Immutable, any thread; what it shares with
-// other revisions is not seen. A SpatialIndex (core/index/spatial_index.h) of objects.
+// The moving objects of a scene at one revision, indexed by id and by a grid. Immutable and safe to read from any
+// thread; shares unchanged memory with other revisions. A SpatialIndex (core/index/spatial_index.h) of objects.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
 
@@ -13,10 +13,10 @@
 
 namespace locus {
 
-// The shape, or the whole object, that the grid keeps as a reference says.
+// Return the shape, or the complete object, that a grid reference points to.
 Shape shape_of(const GridRef& value);
 Object object_of(const GridRef& value);
-// The object as the grid takes it.
+// Converts an object to the grid's form, under `handle`.
 GridItem grid_item_of(const Object& object, uint32_t handle);
 
 class ObjectSet {
@@ -28,16 +28,16 @@ class ObjectSet {
 
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
-  // Nothing where no object has the id. O(1) and a look through the keys of one brick.
+  // Returns a null reference if no object has the id. O(1), plus a search through the keys of one brick.
   GridRef find_ref(Id id) const;
   std::optional<Object> find(Id id) const;
-  // Whether the object is here, at its position.
+  // Returns true if an object with this id is stored at exactly this position.
   bool contains(const Object& object) const {
     const GridRef known = find_ref(object.id);
     return known && known.entry().position == object.shape.position;
   }
 
-  // fn(object) for each, in an order that depends on the grid's history only. O(size).
+  // Calls fn(object) for each object, in an order that depends only on the history of the grid. O(size).
   template <class Fn>
   void for_each(Fn&& fn) const {
     grid_.for_each([&fn](const GridRef& value) {
@@ -46,13 +46,13 @@ class ObjectSet {
     });
   }
 
-  // The same from a cursor on, which it moves, until fn is false: to be gone on with.
+  // Calls fn(object) from `cursor` on until fn returns false, and advances `cursor`, so that a later call continues.
   template <class Fn>
   void for_each_from(GridCursor& cursor, const Fn& fn) const {
     grid_.for_each_from(cursor, [&fn](const GridRef& value) { return fn(object_of(value)); });
   }
 
-  // As SpatialIndex asks.
+  // Implement the visits that SpatialIndex requires.
   template <RayVisitor<Object> Visitor>
   void visit_ray(const SlabRay<double>& ray, Visitor& visitor, Work& work) const {
     grid_.visit_ray(
@@ -73,9 +73,9 @@ class ObjectSet {
   }
 
   GridStatistics statistics() const { return grid_.statistics(); }
-  // Of objects, bricks and what finds them. O(bricks).
+  // Returns the memory of objects, bricks and the tables that find them. O(bricks).
   size_t bytes() const { return unshared_bytes(ObjectSet()); }
-  // Of what `other`, a set of the same scene, does not share. O(what differs).
+  // Returns the memory that `other`, a set of the same scene, does not share. O(size of the difference).
   size_t unshared_bytes(const ObjectSet& other) const {
     return grid_.unshared_bytes(other.grid_) + handles_.unshared_bytes(other.handles_);
   }

@@ -4,28 +4,38 @@
 #include <utility>
 
 #include "absl/container/flat_hash_map.h"
-#include "core/base/check.h"
+#include "core/base/planted_bug.h"
 
 namespace locus {
 namespace {
 
-constexpr size_t kAhead = 16;  // objects whose memory is on its way before they are looked up
+constexpr size_t kAhead = 16;  // prefetch distance, in objects
 constexpr uint32_t kNewLife = ~0u;
 
-// For each of `inserted` the number among `removed` of the object that lives on as it; kNewLife where none does.
-std::vector<uint32_t> lives_that_go_on(absl::Span<const Object> removed, absl::Span<const Object> inserted,
-                                       const absl::flat_hash_set<Id>& replaced) {
+// Returns for each object of `inserted` the index in `removed` of the object that it updates; kNewLife if there is
+// none.
+std::vector<uint32_t> updated_objects(absl::Span<const Object> removed, absl::Span<const Object> inserted,
+                                      const absl::flat_hash_set<Id>& replaced) {
   std::vector<uint32_t> before(inserted.size(), kNewLife);
   if (removed.empty() || inserted.empty()) return before;
-  absl::flat_hash_map<Id, uint32_t> numbers;
+  absl::flat_hash_map<Id, uint32_t> indices;
   for (uint32_t i = 0; i < removed.size(); ++i)
-    if (!replaced.contains(removed[i].id)) numbers.emplace(removed[i].id, i);
+    if (!replaced.contains(removed[i].id)) indices.emplace(removed[i].id, i);
   for (size_t i = 0; i < inserted.size(); ++i)
-    if (const auto found = numbers.find(inserted[i].id); found != numbers.end()) before[i] = found->second;
+    if (const auto found = indices.find(inserted[i].id); found != indices.end()) before[i] = found->second;
   return before;
 }
 
 }  // namespace
+
+void ObjectStore::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    if (!planted(PlantedBug::kGhostAfterMove)) LOCUS_CHECK_EQ(grid_.size(), handles_.size());
+    LOCUS_CHECK_EQ(size_t{next_handle_}, handles_.size() + free_handles_.size() + quarantined_handles_.size());
+    LOCUS_CHECK(moves_ != nullptr || quarantined_handles_.empty());
+    LOCUS_CHECK(free_handles_.empty() || free_handles_.back() < next_handle_);
+  }
+}
 
 std::optional<Object> ObjectStore::find(Id id) const {
   const uint32_t known = handle(id);
@@ -40,14 +50,16 @@ uint32_t ObjectStore::new_handle() {
 }
 
 void ObjectStore::free_handle(uint32_t handle) {
+  LOCUS_DCHECK_LT(handle, next_handle_);
   if (moves_ == nullptr) {
     free_handles_.push_back(handle);
   } else {
+    LOCUS_DCHECK(quarantined_handles_.empty() || quarantined_handles_.back().tick <= tick_);
     quarantined_handles_.push_back({handle, tick_});
   }
 }
 
-// Sets from the end of a tick hold no life that ended in it.
+// A set made at the end of a tick holds no object that was removed in that tick, so `tick <= oldest_tick` is enough.
 void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   LOCUS_CHECK(moves_ != nullptr);
   tick_ = tick;
@@ -55,15 +67,23 @@ void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   for (; !quarantined_handles_.empty() && quarantined_handles_.front().tick <= oldest_tick;
        quarantined_handles_.pop_front())
     free_handles_.push_back(quarantined_handles_.front().handle);
+  LOCUS_DCHECK(quarantined_handles_.empty() || quarantined_handles_.back().tick <= tick);
+  check_invariants();
 }
 
 size_t ObjectStore::move(const GridMoves& moves) {
+  for (const GridMove& move : moves.moves) {
+    LOCUS_DCHECK_LT(move.handle, next_handle_);
+    LOCUS_DCHECK(move.rotation == GridMove::kKeeps || move.rotation < moves.rotations.size());
+  }
   if (moves_ != nullptr)
     for (const GridMove& move : moves.moves) moves_->moved(grid_.at(move.handle), move.position);
-  return grid_.apply({{}, moves, {}});
+  const size_t replaced_bytes = grid_.apply({{}, moves, {}});
+  check_invariants();
+  return replaced_bytes;
 }
 
-// All of which are here.
+// Returns the handles of objects, all of which are present.
 std::vector<uint32_t> ObjectStore::handles_of(absl::Span<const Object> objects) const {
   std::vector<Id> ids;
   ids.reserve(objects.size());
@@ -89,10 +109,10 @@ GridItem ObjectStore::continue_life(const Object& object, uint32_t handle) {
 size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                           const absl::flat_hash_set<Id>& replaced) {
   const std::vector<uint32_t> leaving = handles_of(removed);
-  const std::vector<uint32_t> before = lives_that_go_on(removed, inserted, replaced);
+  const std::vector<uint32_t> before = updated_objects(removed, inserted, replaced);
   std::vector<uint8_t> ends(removed.size(), 1);
-  for (const uint32_t number : before)
-    if (number != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[number], uint8_t{0}), 1);
+  for (const uint32_t index : before)
+    if (index != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[index], uint8_t{0}), 1);
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) LOCUS_CHECK(handles_.erase(removed[i].id));
   handles_.fit(handles_.size() + static_cast<size_t>(std::count(before.begin(), before.end(), kNewLife)));
@@ -104,28 +124,31 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   }
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) free_handle(leaving[i]);
-  return grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+  const size_t replaced_bytes = grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+  check_invariants();
+  return replaced_bytes;
 }
 
-bool ObjectStore::fill(std::vector<std::vector<Object>> pieces, double cell_size) {
+bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size) {
   LOCUS_CHECK_EQ(next_handle_, 0u);
   size_t count = 0;
-  for (const std::vector<Object>& piece : pieces) count += piece.size();
+  for (const std::vector<Object>& chunk : chunks) count += chunk.size();
   handles_.fit(count);
   std::vector<GridItem> items;
   items.reserve(count);
-  for (std::vector<Object>& piece : pieces) {
-    for (size_t i = 0; i < piece.size(); ++i) {
-      if (i + kAhead < piece.size()) handles_.prefetch(piece[i + kAhead].id);
+  for (std::vector<Object>& chunk : chunks) {
+    for (size_t i = 0; i < chunk.size(); ++i) {
+      if (i + kAhead < chunk.size()) handles_.prefetch(chunk[i + kAhead].id);
       const uint32_t handle = new_handle();
-      if (!handles_.set(piece[i].id, handle)) return false;
+      if (!handles_.set(chunk[i].id, handle)) return false;
       if (moves_ != nullptr) moves_->born(handle);
-      items.push_back(grid_item_of(piece[i], handle));
+      items.push_back(grid_item_of(chunk[i], handle));
     }
-    std::vector<Object>().swap(piece);
+    std::vector<Object>().swap(chunk);
   }
   grid_.fill(items, cell_size);
   handles_.take_replaced_bytes();
+  check_invariants();
   return true;
 }
 

@@ -1,9 +1,10 @@
-// The writer's side of a scene's objects: finds them by id and applies batches of changes, from which it makes sets for
-// readers. One thread at a time; sets belong to anybody.
+// Writer's store of a scene's objects: finds objects by id, applies batches of changes and makes immutable sets for
+// readers. One thread at a time uses the store; any thread may use the sets.
 //
-// A handle names one life of an object, from its birth to its end. Invariant: every object has a handle of its own,
-// which no other life gets while a set that holds it may be asked by it; handles_ of the store and of its sets say
-// which. A store that follows lives keeps the handles of ended ones until release_handles().
+// A handle names one lifetime of an object, from its insertion to its removal. Invariants: every object has a handle of
+// its own, below handle_count(); the table from ids to handles and the grid hold the same objects; every handle below
+// handle_count() belongs to an object, is free, or is quarantined. A store that tracks lifetimes quarantines the handle
+// of a removed object until no kept set holds the object any more: no other object gets the handle before that.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 
@@ -14,6 +15,7 @@
 
 #include "absl/container/flat_hash_set.h"
 #include "absl/types/span.h"
+#include "core/base/check.h"
 #include "core/index/hash_grid/hash_grid.h"
 #include "core/scene/objects/object_set.h"
 #include "core/scene/objects/tick_moves.h"
@@ -27,41 +29,51 @@ class ObjectStore {
   ObjectStore() = default;
   explicit ObjectStore(const HashGridOptions& options) : grid_(options) {}
 
-  // From now on, before the first object comes: keeps what questions about the past need.
-  void track_lifetimes() { moves_ = std::make_unique<TickMoves>(); }
-  // For a store that follows lives: `tick` begins; nothing asks sets from before `oldest_tick` any more.
+  // Starts to track lifetimes and displacements, which queries about the past need. Call before the first insertion.
+  void track_lifetimes() {
+    LOCUS_DCHECK_EQ(next_handle_, 0u);
+    moves_ = std::make_unique<TickMoves>();
+  }
+  // Begins `tick` and frees the handles that only sets older than `oldest_tick` may use. Requires track_lifetimes().
   void start_tick(uint64_t tick, uint64_t oldest_tick);
-  // How far objects moved since then; none for a store that does not follow lives.
+  // Returns how far objects moved since start_tick(); no displacement if lifetimes are not tracked.
   Displacement displacement() { return moves_ == nullptr ? Displacement() : moves_->displacement(); }
 
   size_t size() const { return grid_.size(); }
   std::optional<Object> find(Id id) const;
   bool contains(const Object& object) const { return handle(object.id) != kNoHandle; }
-  // kNoHandle for an unknown id. Both O(1).
+  // Returns kNoHandle for an unknown id. O(1), like contains().
   uint32_t handle(Id id) const { return handles_.find(id); }
-  // Of many, handles[i] for ids[i]: sooner than one by one.
-  void find_handles(absl::Span<const Id> ids, absl::Span<uint32_t> handles) const { handles_.find(ids, handles); }
-  // One more than the highest handle that was ever given out.
+  // Writes the handle of ids[i] to handles[i]: faster than one call for each id. The spans have one size.
+  void find_handles(absl::Span<const Id> ids, absl::Span<uint32_t> handles) const {
+    LOCUS_DCHECK_EQ(ids.size(), handles.size());
+    handles_.find(ids, handles);
+  }
+  // Returns one more than the highest handle that was ever used.
   size_t handle_count() const { return next_handle_; }
-  GridRef at(uint32_t handle) const { return grid_.at(handle); }
-  // Asks for the memory of at(), some time before it is needed.
+  GridRef at(uint32_t handle) const {
+    LOCUS_DCHECK_LT(handle, next_handle_);
+    return grid_.at(handle);
+  }
+  // Prefetches the memory that at(handle) reads.
   [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
 
-  // Removes the objects of one span, as they are, and inserts those of the other: a changed object is in both, under
-  // its id, and lives on unless it is among the `reborn`. All removed ones must be here, no inserted one may remain
-  // here. O(n) and the bricks that are touched. Returns the bytes of what the sets so far hold and later ones will not.
+  // Replaces the objects `removed` by `inserted`. An id in both is an update of one object, unless it is in `replaced`:
+  // then its lifetime ends and another begins. Preconditions: every removed object is present; no inserted id remains
+  // present after the removals. O(n), plus the bricks that change. Returns the bytes that existing sets hold and later
+  // sets will not.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                const absl::flat_hash_set<Id>& replaced = {});
-  // Returns as apply().
+  // Moves objects. Precondition: the handles belong to objects and are distinct. Returns the same count as apply().
   size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
-  // The first objects of a store, all at once, in cells of about that size; `pieces` are gone after. False where an id
-  // occurs twice: then the store is of no use any more.
-  bool fill(std::vector<std::vector<Object>> pieces, double cell_size);
-  // False, and no change, when contains() is false.
+  // Inserts the first objects of an empty store, in cells of about `cell_size`. Frees each chunk once it is inserted.
+  // Returns false if an id occurs twice: then the store must not be used any more.
+  bool fill(std::vector<std::vector<Object>> chunks, double cell_size);
+  // Returns false and changes nothing if contains() is false.
   bool remove(const Object& object);
 
-  // fn(object) for each. O(size).
+  // Calls fn(object) for each object. O(size).
   template <class Fn>
   void for_each(Fn&& fn) const {
     grid_.for_each([&fn](const GridRef& value) {
@@ -70,10 +82,12 @@ class ObjectStore {
     });
   }
 
-  // What readers get. O(1) in the number of objects.
+  // Returns an immutable set of the current objects. O(1) in the number of objects.
   ObjectSet snapshot() { return {grid_.snapshot(), handles_.snapshot()}; }
 
  private:
+  // Checks the invariants of the class comment. O(1).
+  void check_invariants() const;
   uint32_t new_handle();
   void free_handle(uint32_t handle);
   std::vector<uint32_t> handles_of(absl::Span<const Object> objects) const;
@@ -88,9 +102,9 @@ class ObjectStore {
     uint32_t handle;
     uint64_t tick;
   };
-  std::deque<QuarantinedHandle> quarantined_handles_;  // of lives that ended, ascending by tick
-  uint64_t tick_ = 0;                                  // as start_tick() said
-  std::unique_ptr<TickMoves> moves_;                   // null unless lives are followed
+  std::deque<QuarantinedHandle> quarantined_handles_;  // handles of removed objects, ascending by tick
+  uint64_t tick_ = 0;                                  // tick of the last start_tick()
+  std::unique_ptr<TickMoves> moves_;                   // null unless lifetimes are tracked
 };
 
 }  // namespace locus

@@ -1,8 +1,10 @@
-// How far objects moved since the last tick was recorded: what bounds a search for where they were in between. Kept by
+// Displacements of objects since the last recorded tick: they bound the search for positions between two ticks. Used by
 // the writer of a scene with history; one thread at a time.
 //
-// Most objects move little, and one number bounds them all. The few that moved farther than a cell are listed, so that
-// no single one makes all searches wide; where too many would be listed, "farther" comes to mean twice as far.
+// Most objects move little, and one bound covers all of them. The few that moved farther than a cell are listed one by
+// one, so that a single fast object does not widen every search. If the list gets longer than kMaxFast, the length that
+// counts as fast is doubled until the list is short. Invariants: the list is ascending by handle, holds at most
+// kMaxFast objects, and holds exactly the objects that are marked as listed.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_TICK_MOVES_H_
 #define LOCUS_CORE_SCENE_OBJECTS_TICK_MOVES_H_
 
@@ -13,49 +15,53 @@
 
 namespace locus {
 
-// An object that moved far: every place where its centre was, and how far it extends from there, whatever its rotation.
+// An object that moved far: the box of all positions of its centre, and its extent from there under any rotation.
 struct FastMover {
   uint32_t handle = 0;
-  float reach = 0;
-  double length = 0;  // how far it moved
+  float extent = 0;
+  double length = 0;  // largest distance from the position at the start of the tick
   Aabbd centers;
 };
 
-// Of all objects between two moments.
+// Displacements of all objects between two recorded states.
 struct Displacement {
-  double reach = 0;                                    // no object that is not listed moved farther
-  std::shared_ptr<const std::vector<FastMover>> fast;  // ascending by handle; null where there are none
+  double bound = 0;                                    // upper bound for every object that is not in `fast`
+  std::shared_ptr<const std::vector<FastMover>> fast;  // ascending by handle; null if there are none
 };
 
 class TickMoves {
  public:
   static constexpr size_t kMaxFast = 64;
 
-  // A new tick begins. Objects that move farther than `fast_length` in it are fast.
+  // Begins a tick and forgets all moves. Objects that move farther than `fast_length` in the tick are fast.
   void start_tick(double fast_length);
-  // `handle` is a new life: it was not there when the tick began, so that it moves in no search.
+  // Records a new object. It did not exist when the tick began, so that its moves do not count in this tick.
   void born(uint32_t handle);
-  // The object moves to `to`. `before` is what it is until then.
+  // Records a move to `to`. `before` is the object as it is before the move.
   void moved(const GridRef& before, Vec3d to);
-  // Of all moves since start_tick().
+  // Returns the displacement since start_tick().
   const Displacement& displacement();
 
  private:
-  // A listed object is in fast_: every further move has to widen its box, however short the move is.
+  // Role of an object in this tick. kListed: the object is in fast_, and every further move extends its box, however
+  // short the move is.
   enum class Kind : uint8_t { kOrdinary, kListed, kNewborn };
   struct Start {
     Vec3d position;
-    uint64_t tick = 0;  // counted by start_tick(); of another one this says nothing
-    float reach = 0;
+    uint64_t tick = 0;  // value of tick_ when this was written; otherwise the entry is stale
+    float extent = 0;
     Kind kind = Kind::kOrdinary;
   };
+  // Checks the invariants of the class comment. O(kMaxFast).
+  void check_invariants() const;
   Start& start_of(uint32_t handle);
-  // Lists an object, or extends the box of a listed one.
+  // Adds an object to fast_, or extends the box of one that is in fast_.
   void add_fast(uint32_t handle, Start& start, Vec3d to, double length);
+  // Raises fast_length_ until at most half of kMaxFast objects are listed.
   void list_fewer();
 
   std::vector<Start> starts_;  // by handle
-  uint64_t tick_ = 1;
+  uint64_t tick_ = 1;          // number of start_tick() calls, plus 1
   double fast_length_ = 0;
   std::vector<FastMover> fast_;
   bool fast_changed_ = false;

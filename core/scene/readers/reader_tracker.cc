@@ -1,19 +1,21 @@
 #include "core/scene/readers/reader_tracker.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 #include "core/scene/snapshot/snapshot_bytes.h"
 
 namespace locus {
 namespace {
 
-// Bytes are counted again only once this part of the budget was replaced since the last time, so that pins just below
-// the budget do not make every batch count. What pins hold may pass the budget by as much.
+// Bytes are counted again only after 1 / kCountShare of the budget was replaced since the last count, so that pins just
+// below the budget do not cause a count for every batch. Pins may exceed the budget by that amount.
 constexpr uint64_t kCountShare = 64;
-// What a revision holds and a later one does not takes at most so many times what is known to be replaced in between:
-// the maps that find it are not known. Measured: up to 2.2 times.
+// Upper bound of the bytes that a revision holds and a later one does not, as a multiple of the bytes known to be
+// replaced in between, which do not include lookup tables. Measured: up to 2.2 times.
 constexpr uint64_t kMaxOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 
@@ -38,7 +40,7 @@ SnapshotPin::SnapshotPin(std::shared_ptr<ReaderTracker> tracker, SnapshotPtr sna
 
 SnapshotPin::~SnapshotPin() {
   if (tracker_ == nullptr) return;
-  // Freed before the writer may go on, and outside the lock: it takes a while.
+  // Free the snapshot before the writer may continue, and outside the lock, because it may take long.
   snapshot_.reset();
   tracker_->remove(entry_, revocation_.get());
 }
@@ -50,8 +52,18 @@ absl::Status SnapshotPin::status() const {
 }
 
 void SnapshotPin::on_revoke(std::function<void()> revocation) {
+  LOCUS_DCHECK(revocation_ == nullptr);
   revocation_ = std::make_shared<Revocation>(&entry_->second, std::move(revocation));
   tracker_->add_revocation(revocation_);
+}
+
+void ReaderTracker::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(size_t{revoked_}, pinned_.size());
+    LOCUS_CHECK_LE(counted_at_, enforced_at_);
+    LOCUS_CHECK_LE(counted_, budget_);
+    LOCUS_CHECK(fixed_ == 0 || budget_ == fixed_);
+  }
 }
 
 uint64_t ReaderTracker::budget_for(uint64_t scene_bytes) const {
@@ -63,20 +75,30 @@ SnapshotPin::Entry ReaderTracker::add(const SnapshotPtr& snapshot) {
   const auto [entry, added] = pinned_.try_emplace(snapshot->revision);
   SnapshotPin::Pinned& pinned = entry->second;
   ++pinned.pins;
-  if (!added) return entry;
+  if (!added) {
+    LOCUS_DCHECK_EQ(pinned.replaced_bytes, snapshot->replaced_bytes);
+    return entry;
+  }
   pinned.snapshot = snapshot;
   pinned.replaced_bytes = snapshot->replaced_bytes;
   if (snapshot->replaced_bytes < enforced_at_) late_bytes_ += enforced_at_ - snapshot->replaced_bytes;
+  LOCUS_DCHECK(entry == pinned_.begin() || std::prev(entry)->second.replaced_bytes <= pinned.replaced_bytes);
+  LOCUS_DCHECK(std::next(entry) == pinned_.end() || pinned.replaced_bytes <= std::next(entry)->second.replaced_bytes);
+  check_invariants();
   return entry;
 }
 
 void ReaderTracker::remove(SnapshotPin::Entry entry, const SnapshotPin::Revocation* revocation) {
   const MutexLock lock(mutex_);
-  if (revocation != nullptr) revocations_.remove_if([revocation](const auto& one) { return one.get() == revocation; });
+  if (revocation != nullptr)
+    revocations_.remove_if([revocation](const auto& other) { return other.get() == revocation; });
+  LOCUS_DCHECK_GT(entry->second.pins, 0u);
   if (--entry->second.pins > 0) return;
   const bool revoked = entry->second.revoked;
   pinned_.erase(entry);
+  LOCUS_DCHECK(!revoked || revoked_ > 0);
   if (revoked && --revoked_ == 0) returned_.notify_all();
+  check_invariants();
 }
 
 void ReaderTracker::add_revocation(std::shared_ptr<SnapshotPin::Revocation> revocation) {
@@ -86,6 +108,8 @@ void ReaderTracker::add_revocation(std::shared_ptr<SnapshotPin::Revocation> revo
 
 bool ReaderTracker::may_exceed(const SceneSnapshot& latest) const {
   if (pinned_.empty() || pinned_.begin()->first >= latest.revision) return false;
+  LOCUS_DCHECK_GE(latest.replaced_bytes, counted_at_);
+  LOCUS_DCHECK_GE(latest.replaced_bytes, pinned_.begin()->second.replaced_bytes);
   const uint64_t since_count = latest.replaced_bytes - counted_at_;
   const uint64_t since_oldest = latest.replaced_bytes - pinned_.begin()->second.replaced_bytes;
   return since_count >= budget_ / kCountShare && kMaxOfReplaced * since_oldest > budget_ &&
@@ -100,8 +124,8 @@ std::vector<ReaderTracker::Holding> ReaderTracker::pinned_before(const SceneSnap
   return pinned;
 }
 
-// What was replaced between two pinned revisions is held by the older one, and by those before it that had it already:
-// so nothing is counted twice.
+// Bytes replaced between two consecutive pinned revisions are counted for the older one only, so that bytes which
+// several pinned revisions share are counted once.
 uint64_t ReaderTracker::count(std::vector<Holding>& pinned, const SceneSnapshot& latest) {
   uint64_t held = 0;
   for (size_t i = 0; i < pinned.size(); ++i) {
@@ -116,32 +140,36 @@ void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
   std::vector<Holding> pinned;
   {
     const MutexLock lock(mutex_);
+    LOCUS_DCHECK_LE(enforced_at_, latest.replaced_bytes);
     enforced_at_ = latest.replaced_bytes;
     if (!may_exceed(latest)) return;
     late_bytes_ = 0;
     pinned = pinned_before(latest);
   }
   uint64_t held = count(pinned, latest);
-  // Measuring the scene takes longer than counting what is held.
+  // Measuring the scene takes longer than counting the held bytes, so it is measured only if it can matter.
   const uint64_t budget = budget_for(held <= budget_for(0) ? 0 : bytes_of(latest));
   const MutexLock lock(mutex_);
   budget_ = budget;
   counted_at_ = latest.replaced_bytes;
   const uint64_t held_by_all = held;
   for (size_t i = 0; held > budget; ++i) {
-    end(*pinned[i].snapshot, held_by_all);
+    LOCUS_DCHECK_LT(i, pinned.size());
+    revoke(*pinned[i].snapshot, held_by_all);
     held -= pinned[i].bytes;
   }
   counted_ = held;
+  check_invariants();
 }
 
-void ReaderTracker::end(const SceneSnapshot& snapshot, uint64_t held) {
+void ReaderTracker::revoke(const SceneSnapshot& snapshot, uint64_t held) {
   const auto entry = pinned_.find(snapshot.revision);
   if (entry == pinned_.end() || entry->second.revoked) return;
   entry->second.budget = budget_;
   entry->second.held = held;
   entry->second.revoked.store(true, std::memory_order_release);
   ++revoked_;
+  LOCUS_DCHECK_LE(size_t{revoked_}, pinned_.size());
 }
 
 bool ReaderTracker::over_budget() const {

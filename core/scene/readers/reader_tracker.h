@@ -1,9 +1,10 @@
-// Which revisions of a scene are being read, and what that keeps from being freed: so that slow readers cannot make
-// memory grow without end while updates stream in. Once they hold more than their budget, the oldest are told to end,
-// and the writer waits until they have.
+// Tracks the revisions of a scene that are being read and the memory that they keep from being freed, so that slow
+// readers cannot make memory grow without limit while updates stream in. If pinned revisions hold more than the budget,
+// the pins of the oldest ones are revoked, and the writer waits until they are released.
 //
-// Threads: every member may be called from any thread, judge() from one at a time. Readers and the writer wait for each
-// other only for as long as it takes to look at a small map: memory is counted outside the lock.
+// Threads: every member may be called from any thread; enforce_budget() from one thread at a time. Readers and the
+// writer block each other only for the access to a small map: memory is counted outside the lock. Invariants: each
+// entry of pinned_ has at least one pin; revoked_ is the number of revoked entries; a revoked entry stays revoked.
 #ifndef LOCUS_CORE_SCENE_READERS_READER_TRACKER_H_
 #define LOCUS_CORE_SCENE_READERS_READER_TRACKER_H_
 
@@ -25,7 +26,7 @@ namespace locus {
 
 class ReaderTracker;
 
-// A reader's hold on a snapshot: on the ledger until it is dropped.
+// Reader's hold on a snapshot: registered with the tracker until it is destroyed. One thread at a time.
 class SnapshotPin {
  public:
   SnapshotPin(std::shared_ptr<ReaderTracker> tracker, SnapshotPtr snapshot);
@@ -37,21 +38,21 @@ class SnapshotPin {
   const SceneSnapshot* operator->() const { return snapshot_.get(); }
   const SnapshotPtr& snapshot() const { return snapshot_; }
 
-  // OK, or RESOURCE_EXHAUSTED naming the limit pinned_bytes once the reader is to end. Cheap: to be asked all the time.
+  // Returns OK, or RESOURCE_EXHAUSTED naming the limit pinned_bytes once the pin is revoked. Cheap: readers poll it.
   absl::Status status() const;
 
-  // For readers that wait for others, such as for a client that takes what they send: `cut` is called, under the
-  // ledger's lock and at most once, where the reader was told to end and has not. At most one a pin.
+  // Registers a callback for readers that may block, for example on a slow client. revoke_overdue() calls it under the
+  // tracker's lock, at most once, if the pin is revoked but not released. Call at most once for each pin.
   void on_revoke(std::function<void()> revocation);
 
  private:
   friend class ReaderTracker;
   struct Pinned {
     std::weak_ptr<const SceneSnapshot> snapshot;
-    uint64_t replaced_bytes;  // as the snapshot says
+    uint64_t replaced_bytes;  // SceneSnapshot::replaced_bytes
     uint32_t pins = 0;
     std::atomic<bool> revoked{false};
-    // Written before `ended`: what made it so.
+    // Values at the time of the revocation. Written before `revoked`.
     uint64_t budget = 0;
     uint64_t held = 0;
   };
@@ -69,63 +70,68 @@ class ReaderTracker {
   using Time = std::chrono::steady_clock::time_point;
   static constexpr Time kNever = Time::max();
 
-  // `budget` in bytes; 0 = the larger of limits::kPinnedBytes and limits::kPinnedShare times what the scene takes.
+  // `budget` in bytes; 0 = the larger of limits::kPinnedBytes and limits::kPinnedShare times the memory of the scene.
   explicit ReaderTracker(uint64_t budget) : fixed_(budget), budget_(budget_for(0)) {}
 
-  // The writer's, after `latest` was published. Usually O(1); where what was replaced since the oldest pin could pass
-  // the budget, O(what the pinned revisions do not share), and where they do pass it the oldest pins are told to end,
-  // as many as it takes. `latest` and what is pinned belong to one scene.
+  // Revokes the oldest pins until the memory held by pins fits the budget. The writer calls it after publishing
+  // `latest`. Usually O(1); O(memory that the pinned revisions do not share) if the bytes replaced since the oldest pin
+  // could exceed the budget. `latest` and all pinned snapshots belong to one scene.
   void enforce_budget(const SceneSnapshot& latest) LOCUS_EXCLUDES(mutex_);
 
-  // Whether a pin that was told to end has not.
+  // Returns true while a revoked pin is not released, unless the tracker is closed.
   bool over_budget() const LOCUS_EXCLUDES(mutex_);
-  // Waits until over() is false or close() was called; false when `until` comes first.
+  // Waits until over_budget() is false; returns false at `until` otherwise.
   bool wait_until_returned(Time until) const LOCUS_EXCLUDES(mutex_);
-  // As of the last count.
+  // Returns the budget of the last count, in bytes.
   uint64_t budget() const LOCUS_EXCLUDES(mutex_);
-  // Cuts those that were told to end and still are there.
+  // Calls the callbacks of pins that are revoked but not released, once each.
   void revoke_overdue() LOCUS_EXCLUDES(mutex_);
-  // Nobody needs to wait any more.
+  // Ends all waiting, now and later.
   void close() LOCUS_EXCLUDES(mutex_);
 
   struct Use {
-    uint64_t held = 0;    // bytes that would be free if nobody read
-    uint64_t budget = 0;  // the most they may come to
+    uint64_t held = 0;    // bytes that only pinned revisions before the latest hold
+    uint64_t budget = 0;  // maximum of `held`, in bytes
   };
-  // `latest_bytes` as bytes_of(latest). O(what the pinned revisions do not share).
+  // Returns the memory held by pins. `latest_bytes` is bytes_of(latest). O(memory that the pinned revisions do not
+  // share).
   Use use(const SceneSnapshot& latest, uint64_t latest_bytes) const LOCUS_EXCLUDES(mutex_);
 
  private:
   friend class SnapshotPin;
-  // Bytes of a pinned revision that neither the next pinned one nor the latest shares.
+  // Pinned revision, with the bytes that the next pinned revision, or else the latest one, does not share.
   struct Holding {
     SnapshotPtr snapshot;
     uint64_t bytes = 0;
   };
 
+  // Checks the invariants of the class comment, except the sum over all entries. O(1).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
   uint64_t budget_for(uint64_t scene_bytes) const;
   SnapshotPin::Entry add(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   void remove(SnapshotPin::Entry entry, const SnapshotPin::Revocation* revocation) LOCUS_EXCLUDES(mutex_);
   void add_revocation(std::shared_ptr<SnapshotPin::Revocation> revocation) LOCUS_EXCLUDES(mutex_);
-  // Whether pins may hold more than the budget, by what was replaced.
+  // Returns true if pins may hold more than the budget, estimated from the replaced bytes.
   bool may_exceed(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
-  // Before `latest`, oldest first.
+  // Returns the pinned revisions before `latest`, oldest first.
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
+  // Fills in the bytes of each of `pinned` and returns their sum.
   static uint64_t count(std::vector<Holding>& pinned, const SceneSnapshot& latest);
-  void end(const SceneSnapshot& snapshot, uint64_t held) LOCUS_REQUIRES(mutex_);
+  void revoke(const SceneSnapshot& snapshot, uint64_t held) LOCUS_REQUIRES(mutex_);
 
   const uint64_t fixed_;
   mutable Mutex mutex_;
   mutable ConditionVariable returned_;
   std::map<uint64_t, SnapshotPin::Pinned> pinned_ LOCUS_GUARDED_BY(mutex_);  // by revision
   std::list<std::shared_ptr<SnapshotPin::Revocation>> revocations_ LOCUS_GUARDED_BY(mutex_);
-  uint32_t revoked_ LOCUS_GUARDED_BY(mutex_) = 0;  // of pinned_, told to end
+  uint32_t revoked_ LOCUS_GUARDED_BY(mutex_) = 0;  // number of revoked entries of pinned_
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
-  // The last count: what pins held that were not told to end, when so much had been replaced, under which budget.
+  // Last count: bytes held by pins that are not revoked, replaced_bytes of the latest snapshot then, and the budget.
   uint64_t counted_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t counted_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t budget_ LOCUS_GUARDED_BY(mutex_);
-  // Of the latest revision that was judged; and what pins added since the last count held from before it.
+  // replaced_bytes of the last snapshot passed to enforce_budget(), and the bytes that pins which were added for an
+  // older revision since the last count may hold from before it.
   uint64_t enforced_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t late_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

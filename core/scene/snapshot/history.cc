@@ -2,10 +2,13 @@
 
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
-std::shared_ptr<const HistoryRecord> record_of(const HistoryRecord& record, const ObjectSet& next) {
+// Returns a copy of `record` with its bytes, given the objects of the next record or of the latest revision.
+std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, const ObjectSet& next) {
   HistoryRecord counted = record;
   counted.bytes = sizeof(HistoryRecord) + record.objects.unshared_bytes(next);
   if (record.to_next.fast != nullptr) counted.bytes += record.to_next.fast->size() * sizeof(FastMover);
@@ -14,15 +17,34 @@ std::shared_ptr<const HistoryRecord> record_of(const HistoryRecord& record, cons
 
 }  // namespace
 
+void HistoryRecorder::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    if (history_ == nullptr) return;
+    LOCUS_CHECK(on() && has_past_);
+    LOCUS_CHECK(!history_->records.empty());
+    LOCUS_CHECK_LE(uint64_t{history_->bytes}, options_.bytes);
+    size_t bytes = 0;
+    const HistoryRecord* previous = nullptr;
+    for (const std::shared_ptr<const HistoryRecord>& record : history_->records) {
+      if (previous != nullptr) LOCUS_CHECK_LT(previous->tick, record->tick);
+      bytes += record->bytes;
+      previous = record.get();
+    }
+    LOCUS_CHECK_EQ(bytes, history_->bytes);
+  }
+}
+
 void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last,
                             uint64_t next_tick) {
+  LOCUS_DCHECK_LT(tick, next_tick);
+  LOCUS_DCHECK(history_ == nullptr || history_->records.back()->tick < tick);
   has_past_ = true;
   History next;
   if (history_ != nullptr) {
     next = *history_;
     HistoryRecord last = *next.records.back();
     last.to_next = since_last;
-    next.records.back() = record_of(last, objects);
+    next.records.back() = with_bytes(last, objects);
   }
   next.records.push_back(
       std::make_shared<const HistoryRecord>(HistoryRecord{tick, objects, {}, sizeof(HistoryRecord)}));
@@ -36,6 +58,7 @@ void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displ
 }
 
 void HistoryRecorder::restore(bool has_past) {
+  LOCUS_DCHECK(history_ == nullptr && !has_past_);
   has_past_ = has_past;
   if (has_past) limit_ = PastLimit::kRestored;
 }
@@ -49,6 +72,7 @@ void HistoryRecorder::drop() {
 
 void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reason) {
   if (count > 0) limit_ = reason;
+  LOCUS_DCHECK_LE(count, history.records.size());
   for (size_t i = 0; i < count; ++i) dropped_bytes_ += history.records[i]->bytes;
   history.records.erase(history.records.begin(), history.records.begin() + static_cast<std::ptrdiff_t>(count));
 }
@@ -56,7 +80,7 @@ void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reaso
 void HistoryRecorder::measure(const ObjectSet& now) {
   if (std::exchange(measured_, true) || history_ == nullptr) return;
   History next = *history_;
-  next.records.back() = record_of(*next.records.back(), now);
+  next.records.back() = with_bytes(*next.records.back(), now);
   publish(std::move(next));
 }
 
@@ -67,6 +91,7 @@ void HistoryRecorder::publish(History history) {
     history.bytes += history.records[--first]->bytes;
   drop_first(history, first, PastLimit::kBytes);
   history_ = history.records.empty() ? nullptr : std::make_shared<const History>(std::move(history));
+  check_invariants();
 }
 
 }  // namespace locus

@@ -1,6 +1,7 @@
-// The past of a scene: what its objects were at the end of each of the last ticks, and what is kept of it. Records
-// share with each other and with the present whatever has not changed between them, so that one costs what the tick
-// changed. Immutable once published; any thread.
+// History of a scene: the objects at the end of each of the last ticks. Records share unchanged memory with each other
+// and with the latest revision, so that a record costs as much memory as its tick changed. A History is immutable once
+// published and may be read by any thread. Invariants: records are ascending by tick; History::bytes is the sum of
+// the records' bytes and at most HistoryOptions::bytes.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
 
@@ -16,66 +17,70 @@ namespace locus {
 struct HistoryRecord {
   uint64_t tick = 0;
   ObjectSet objects;     // at the end of that tick
-  Displacement to_next;  // from there to the next record. Of the last one the snapshot says it, for its own moment
-  size_t bytes = 0;      // of what the next record, or the present, does not share
+  Displacement to_next;  // displacement up to the next record; unset in the last one: see SceneSnapshot::since_close
+  size_t bytes = 0;      // memory that the next record, or the latest revision, does not share
 };
 
 struct History {
-  std::vector<std::shared_ptr<const HistoryRecord>> records;  // ascending by tick, all below the scene's
-  size_t bytes = 0;                                           // of all records
+  std::vector<std::shared_ptr<const HistoryRecord>> records;  // ascending by tick, all below the scene's tick
+  size_t bytes = 0;                                           // memory of all records
 };
 using HistoryPtr = std::shared_ptr<const History>;
 
-// Why the past of a scene begins at its oldest tick: the reason that no tick before that is kept.
+// Reason why no tick before the oldest one of a history is kept.
 enum class PastLimit : uint8_t {
-  kOff,       // the scene keeps no past
+  kOff,       // the scene keeps no history
   kBegan,     // there is no tick before: the scene began there, or restarted its ticks
   kTicks,     // older ticks are further back than HistoryOptions::ticks
   kBytes,     // older ticks did not fit into HistoryOptions::bytes
-  kRestored,  // the scene was read from a snapshot on disk, which holds nothing of the past
+  kRestored,  // the scene was read from a snapshot on disk, which contains no history
 };
 
 struct HistoryOptions {
-  // How many ticks back the past can be asked about. 0 keeps none, and costs nothing.
+  // Number of ticks before the current one that queries may ask about. 0 keeps no history and costs nothing.
   uint32_t ticks = 0;
-  // Of memory that records may hold; beyond it the oldest go. One tick at a time is counted, when it ends, and once
-  // when the next one begins.
+  // Maximum memory of all records; the oldest are dropped beyond it. The memory of a record is counted when its tick
+  // ends and again when the next tick begins.
   uint64_t bytes = 0;
 };
 
-// The writer's side: adds records, drops old ones. One thread at a time.
+// Recorder of the history, used by the writer: adds records and drops old ones. One thread at a time.
 class HistoryRecorder {
  public:
   explicit HistoryRecorder(const HistoryOptions& options) : options_(options) {}
 
   bool on() const { return options_.ticks != 0; }
-  // Null when nothing is kept.
+  // Returns the kept history, or null if no record is kept.
   const HistoryPtr& history() const { return history_; }
 
-  // `tick` ended as `objects`, `since_last` after the last record, and `next_tick` begins. O(records and what the tick
-  // changed).
+  // Appends the objects at the end of `tick`, and drops the records that are too old for `next_tick`. `since_last` is
+  // the displacement since the last record. Precondition: last record's tick < `tick` < `next_tick`. O(records + memory
+  // that the tick changed).
   void close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last, uint64_t next_tick);
-  // What the present is now, so that memory is counted for the last record, too. Once after close().
+  // Counts the memory of the last record, given the current objects `now`. Has an effect once after each close().
   void measure(const ObjectSet& now);
+  // Drops all records.
   void drop();
-  // Whether a tick ended since drop(), kept or not: unlike what is kept, which goes by memory, this says the same for
-  // the same batches at any time.
+  // Returns true if close() was called since drop(), even if no record is kept: this depends on the batches alone and
+  // not on the memory limit, so that a replay of the same batches gives the same result.
   bool has_past() const { return has_past_; }
-  // Begins with a scene read from disk, whose past, if it had one, is lost.
+  // Starts with a scene that was read from disk. Its history, if `has_past`, is lost.
   void restore(bool has_past);
   PastLimit limit() const { return on() ? limit_ : PastLimit::kOff; }
-  // Of all records so far that are not kept any more.
+  // Returns the memory of all records dropped so far. Never decreases.
   uint64_t dropped_bytes() const { return dropped_bytes_; }
-  // Nothing that is only in records below this tick is kept.
+  // Returns the tick of the oldest record, or `present` if there is none.
   uint64_t oldest_tick(uint64_t present) const { return history_ == nullptr ? present : history_->records[0]->tick; }
 
  private:
+  // Checks the invariants of the published history. O(records).
+  void check_invariants() const;
   void drop_first(History& history, size_t count, PastLimit reason);
   void publish(History history);
 
   HistoryOptions options_;
   HistoryPtr history_;
-  bool measured_ = true;
+  bool measured_ = true;  // false between close() and measure()
   bool has_past_ = false;
   PastLimit limit_ = PastLimit::kBegan;
   uint64_t dropped_bytes_ = 0;

@@ -1,14 +1,16 @@
 #include "core/scene/snapshot/scene_at_time.h"
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/geometry/rotation.h"
 
 namespace locus {
 namespace {
 
-// Covers the rounding of lengths and of places between two: a few 2^-52 of the magnitudes.
-constexpr double kRelativeSlack = 1 + 0x1p-36;
-constexpr double kPlaceSlack = limits::kMaxCoordinate * 0x1p-49;
+// Allowances for the rounding of lengths (a factor) and of interpolated positions (a length): a few 2^-52 of the
+// magnitudes.
+constexpr double kEpsilonFactor = 1 + 0x1p-36;
+constexpr double kPositionEpsilon = limits::kMaxCoordinate * 0x1p-49;
 
 bool before(const AsOf& a, const AsOf& b) { return a.tick < b.tick || (a.tick == b.tick && a.fraction < b.fraction); }
 
@@ -18,15 +20,18 @@ SceneAtTime::SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weig
     : at_(&at),
       next_(&next),
       weight_(weight),
-      reach_(displacement.reach * weight * kRelativeSlack + kPlaceSlack),
-      fast_(displacement.fast.get()) {}
+      displacement_bound_(displacement.bound * weight * kEpsilonFactor + kPositionEpsilon),
+      fast_(displacement.fast.get()) {
+  LOCUS_DCHECK(weight >= 0 && weight <= 1);
+  LOCUS_DCHECK_GE(displacement.bound, 0.0);
+}
 
 GridRegion SceneAtTime::region(const Aabbd& bounds, const std::optional<Balld>& ball) const {
   if (next_ == nullptr) return {&at_->grid(), bounds, ball};
-  const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
+  const double bound = planted(PlantedBug::kRewindReach) ? 0 : displacement_bound_;
   std::optional<Balld> near = ball;
-  if (near) near->radius += reach;
-  return {&at_->grid(), grown(bounds, reach), near};
+  if (near) near->radius += bound;
+  return {&at_->grid(), grown(bounds, bound), near};
 }
 
 Shape SceneAtTime::shape_between(const GridRef& object) const {
@@ -45,10 +50,12 @@ std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const As
   const auto& records = snapshot.history->records;
   const auto next = std::upper_bound(records.begin(), records.end(), time.tick,
                                      [](uint64_t tick, const auto& record) { return tick < record->tick; });
+  LOCUS_DCHECK(next != records.begin());
   const HistoryRecord& at = **(next - 1);
   if (time == AsOf{at.tick, 0}) return SceneAtTime(at.objects);
   const bool last = next == records.end();
   const uint64_t next_tick = last ? snapshot.tick : (*next)->tick;
+  LOCUS_DCHECK_LT(at.tick, next_tick);
   const double weight =
       (static_cast<double>(time.tick - at.tick) + double{time.fraction}) / static_cast<double>(next_tick - at.tick);
   return SceneAtTime(at.objects, last ? snapshot.objects : (*next)->objects, weight,

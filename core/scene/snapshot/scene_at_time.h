@@ -1,9 +1,10 @@
-// The moving objects of a scene at one moment, which may lie between two recorded ticks: what queries ask. Borrows from
-// a snapshot; cheap to copy; any thread.
+// View of the moving objects of a scene at one time, which may lie between two recorded ticks. Queries run on it.
+// Borrows from a snapshot; cheap to copy; any thread.
 //
-// An object is there if it lived when the tick before the moment ended; it moves, in a straight line, only if the same
-// life is there when the next one does. So the set at the tick before is searched, as much wider as objects moved, and
-// each object found is put where it was. At a recorded tick and now nothing moves, and nothing is wider.
+// An object exists at a time if it existed at the end of the recorded tick before. It moves, in a straight line, only
+// if the same lifetime exists at the next recorded tick. A search runs on the stored set of the tick before, widened by
+// the displacement bound, and each object found is interpolated. At a recorded tick, and at the latest revision,
+// nothing is interpolated or widened.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 
@@ -18,7 +19,7 @@
 
 namespace locus {
 
-// A time: a tick, and how far from there to the next, 0 <= fraction < 1.
+// Point in time: a tick and the fraction of the way to the next tick, 0 <= fraction < 1.
 struct AsOf {
   uint64_t tick = 0;
   float fraction = 0;
@@ -28,32 +29,33 @@ struct AsOf {
 
 class SceneAtTime {
  public:
-  // When `objects` were as they are.
+  // View of `objects` at their stored positions.
   explicit SceneAtTime(const ObjectSet& objects) : at_(&objects) {}
-  // Part `weight` of the way from `at` to `next`, between which objects moved by `displacement`.
+  // View of the objects `at`, interpolated towards `next`: 0 <= weight < 1. `displacement` is from `at` to `next`.
   SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement);
 
-  // Whether it lies between two ticks, so that objects may be elsewhere than in objects().
+  // Returns true if the time lies between two records, so that objects may be away from their stored positions.
   bool between() const { return next_ != nullptr; }
-  // Who lives.
+  // Returns the objects that exist at this time, at their stored positions.
   const ObjectSet& objects() const { return *at_; }
-  // Where an object of objects() is, and how it is turned.
+  // Returns the shape of an object of objects() at its interpolated position and rotation.
   Shape shape(const GridRef& object) const { return next_ == nullptr ? shape_of(object) : shape_between(object); }
 
-  // How far from its place in objects() an object may be, but for the rounding of places; 0 where nothing moves.
+  // Returns an upper bound of the distance between an object's interpolated and stored positions: 0 if nothing is
+  // interpolated, infinity for a fast mover. Callers add their own allowance for the rounding of coordinates.
   double displacement_bound(const GridRef& object) const {
     if (fast_ != nullptr && is_fast(object.handle())) return std::numeric_limits<double>::infinity();
-    return reach_;
+    return displacement_bound_;
   }
 
-  // What a query that asks for the objects in a box or, where there is one, in a ball with those bounds, asks of the
-  // grid of objects().
+  // Returns the region of the grid of objects() to search for a query in the box `bounds` or, if given, in `ball`,
+  // whose bounds are `bounds`.
   GridRegion region(const Aabbd& bounds, const std::optional<Balld>& ball) const;
-  // visit(GridRef) for the objects in such a box or ball: those of which ask(visit) gives what region() names, and
-  // others that moved far.
+  // Calls visit(GridRef) for the objects in that box or ball: the fast movers that may be in `bounds`, and the objects
+  // that ask(visit) finds in region(). Each object once.
   template <class Ask, class Visit>
   void visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const;
-  // As GridSnapshot's, of objects() where they are at this moment.
+  // Like the members of GridSnapshot, for objects() at their interpolated positions.
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
   template <class Limit, class Visit>
@@ -66,28 +68,30 @@ class SceneAtTime {
                                      [](const FastMover& mover, uint32_t value) { return mover.handle < value; });
     return at != fast_->end() && at->handle == handle;
   }
-  // visit() of fast movers whose whole way might_meet(bounds); false once visit() was.
+  // Calls visit() for the fast movers for which might_meet(bounds of all their positions). Returns false once visit()
+  // returned false.
   template <class MightMeet, class Visit>
   bool visit_fast(const MightMeet& might_meet, Work& work, const Visit& visit) const;
 
   const ObjectSet* at_;
   const ObjectSet* next_ = nullptr;
   double weight_ = 0;
-  double reach_ = 0;                              // how far from its place in at_ an object may be
-  const std::vector<FastMover>* fast_ = nullptr;  // but for these, ascending by handle
+  double displacement_bound_ = 0;                 // maximum distance of an object from its position in at_ ...
+  const std::vector<FastMover>* fast_ = nullptr;  // ... except for these, ascending by handle
 };
 
-// What the snapshot keeps of that time; nothing before its oldest tick and after its own. O(log records).
+// Returns the view of that time, or nullopt if it is before the oldest kept tick or after the snapshot's own tick.
+// O(log records).
 std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const AsOf& time);
-// `time`, or the nearest one that find_moment() finds.
+// Returns the time nearest to `time` for which find_scene_at() returns a view.
 AsOf nearest_kept(const SceneSnapshot& snapshot, const AsOf& time);
 
 template <class MightMeet, class Visit>
 bool SceneAtTime::visit_fast(const MightMeet& might_meet, Work& work, const Visit& visit) const {
   for (const FastMover& mover : *fast_) {
     ++work.cells;
-    const double growth = internal::kBoundsGrowth * (magnitude(mover.centers) + double{mover.reach});
-    if (!might_meet(grown(mover.centers, double{mover.reach} + growth))) continue;
+    const double epsilon = internal::kBoundsGrowth * (magnitude(mover.centers) + double{mover.extent});
+    if (!might_meet(grown(mover.centers, double{mover.extent} + epsilon))) continue;
     ++work.tests;
     if (!visit(at_->grid().at(mover.handle))) return false;
   }
@@ -97,29 +101,29 @@ bool SceneAtTime::visit_fast(const MightMeet& might_meet, Work& work, const Visi
 template <class Ask, class Visit>
 void SceneAtTime::visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const {
   if (fast_ == nullptr) return ask(visit);
-  if (!visit_fast([&bounds](const Aabbd& way) { return overlaps(way, bounds); }, work, visit)) return;
+  if (!visit_fast([&bounds](const Aabbd& path) { return overlaps(path, bounds); }, work, visit)) return;
   ask([&](const GridRef& object) { return is_fast(object.handle()) || visit(object); });
 }
 
 template <class Limit, class Visit>
 void SceneAtTime::visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const {
   if (next_ == nullptr) return at_->grid().visit_ray(ray, limit, work, visit);
-  const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
-  if (fast_ == nullptr) return at_->grid().visit_ray(ray, limit, work, visit, reach);
+  const double bound = planted(PlantedBug::kRewindReach) ? 0 : displacement_bound_;
+  if (fast_ == nullptr) return at_->grid().visit_ray(ray, limit, work, visit, bound);
   const auto might_meet = [&](const Aabbd& bounds) {
     const Interval<double> part = ray.interval(bounds);
     return part.near <= part.far && part.far >= 0 && part.near <= limit();
   };
   if (!visit_fast(might_meet, work, visit)) return;
   at_->grid().visit_ray(
-      ray, limit, work, [&](const GridRef& object) { return is_fast(object.handle()) || visit(object); }, reach);
+      ray, limit, work, [&](const GridRef& object) { return is_fast(object.handle()) || visit(object); }, bound);
 }
 
 template <class Limit, class Visit>
 void SceneAtTime::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
   if (next_ == nullptr) return at_->grid().visit_nearest(point, limit, work, visit);
-  const double reach = planted(PlantedBug::kRewindReach) ? 0 : reach_;
-  const auto wider = [&limit, reach] { return squared_limit(std::sqrt(limit()) + reach) * (1 + 0x1p-40); };
+  const double bound = planted(PlantedBug::kRewindReach) ? 0 : displacement_bound_;
+  const auto wider = [&limit, bound] { return squared_limit(std::sqrt(limit()) + bound) * (1 + 0x1p-40); };
   if (fast_ == nullptr) return at_->grid().visit_nearest(point, wider, work, visit);
   const auto might_meet = [&](const Aabbd& bounds) { return squared_distance(point, bounds) <= limit(); };
   if (!visit_fast(might_meet, work, visit)) return;

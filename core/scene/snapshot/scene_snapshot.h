@@ -1,5 +1,5 @@
-// Everything a scene is at one revision. Immutable, shared: whoever holds it sees that revision for as long as it is
-// held, whatever the writer does meanwhile.
+// Complete state of a scene at one revision. Immutable and shared: a holder reads that revision from any thread for as
+// long as it holds the snapshot, while the writer continues.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_SNAPSHOT_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_SNAPSHOT_H_
 
@@ -20,14 +20,14 @@ struct SceneSnapshot {
   Winding winding = Winding::kCounterClockwise;
   std::shared_ptr<const StaticSet> statics;
   ObjectSet objects;
-  HistoryPtr history;        // null where nothing of the past is kept
-  Displacement since_close;  // from the last record to here
-  // Of what revisions up to this one replaced, but for the maps that find it. What was born and replaced between two
-  // revisions, or is kept in the past, is in it, so that neither holds all of it alone.
+  HistoryPtr history;        // null if no history is kept
+  Displacement since_close;  // displacement from the last record to this revision
+  // Total memory replaced by the revisions up to this one, without lookup tables. Includes memory that was allocated
+  // and replaced between two revisions, and memory that the history still holds. Never decreases.
   uint64_t replaced_bytes = 0;
-  PastLimit past_limit = PastLimit::kOff;  // why nothing before oldest_tick() is kept
+  PastLimit past_limit = PastLimit::kOff;  // reason why no tick before oldest_tick() is kept
 
-  // The oldest moment that can be asked about.
+  // Returns the oldest tick that queries may ask about.
   uint64_t oldest_tick() const { return history == nullptr ? tick : history->records.front()->tick; }
 };
 

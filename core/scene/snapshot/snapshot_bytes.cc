@@ -2,10 +2,12 @@
 
 #include <algorithm>
 
+#include "core/base/check.h"
+
 namespace locus {
 namespace {
 
-// The first record of `snapshot` that is not from before `tick`; null where there is none.
+// Returns the first record of `snapshot` at or after `tick`; null if there is none.
 const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) {
   if (snapshot.history == nullptr) return nullptr;
   const auto& records = snapshot.history->records;
@@ -15,14 +17,15 @@ const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) 
   return first == records.end() ? nullptr : first->get();
 }
 
-// What a record's bytes leave out is in the next one, which counts it or is kept.
-uint64_t past_apart_from(const SceneSnapshot& held, const SceneSnapshot& later) {
+// Returns the bytes of records of `held` that `later` does not keep. HistoryRecord::bytes leaves out memory shared with
+// the next record, which is counted there, or kept.
+uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   if (held.history == nullptr || held.history == later.history) return 0;
   uint64_t bytes = 0;
   for (const std::shared_ptr<const HistoryRecord>& record : held.history->records) {
     const HistoryRecord* kept = first_record(later, record->tick);
     if (kept == record.get()) continue;
-    // The last record is made anew when the next one comes, of the same objects.
+    // The last record is replaced by one with the same objects when the next record is added.
     const bool same_tick = kept != nullptr && kept->tick == record->tick;
     bytes += same_tick ? record->objects.unshared_bytes(kept->objects) : record->bytes;
   }
@@ -32,11 +35,12 @@ uint64_t past_apart_from(const SceneSnapshot& held, const SceneSnapshot& later) 
 }  // namespace
 
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
+  LOCUS_DCHECK_LE(held.revision, later.revision);
   const uint64_t statics = held.statics == later.statics ? 0 : held.statics->bytes();
-  // The first that the later revision still has of all that came after: it shares most.
+  // The oldest object set at or after `held` that `later` keeps: it shares most.
   const HistoryRecord* next = first_record(later, held.tick);
   return statics + held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
-         past_apart_from(held, later);
+         unshared_history_bytes(held, later);
 }
 
 uint64_t bytes_of(const SceneSnapshot& snapshot) { return snapshot.statics->bytes() + snapshot.objects.bytes(); }

@@ -1,4 +1,4 @@
-// What a snapshot keeps from being freed. Any thread.
+// Memory accounting of snapshots. Plain functions; any thread.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SNAPSHOT_BYTES_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SNAPSHOT_BYTES_H_
 
@@ -8,12 +8,12 @@
 
 namespace locus {
 
-// Of what `held` holds and `later`, a later revision of the same scene, does not: objects, instances and the past, but
-// not meshes, which scenes share. Exact but for the past across a restart of ticks, of which it may say too much.
-// O(what differs).
+// Returns the bytes that `held` holds and `later`, a later revision of the same scene, does not: objects, instances and
+// history, but not meshes, which scenes share. Exact, except that it may overestimate the history across a restart of
+// ticks. O(size of the difference).
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later);
 
-// Of all that the snapshot holds but its past and its meshes. O(objects).
+// Returns the bytes of the snapshot without its history and meshes. O(objects).
 uint64_t bytes_of(const SceneSnapshot& snapshot);
 
 }  // namespace locus

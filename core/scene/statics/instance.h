@@ -1,4 +1,4 @@
-// A mesh placed in a scene. Plain data, immutable once in a static set.
+// Placement of a mesh in a scene. Plain data, immutable once in a static set.
 #ifndef LOCUS_CORE_SCENE_STATICS_INSTANCE_H_
 #define LOCUS_CORE_SCENE_STATICS_INSTANCE_H_
 
@@ -18,7 +18,7 @@ struct Instance {
   Layers layers = kDefaultLayers;
   std::shared_ptr<const StaticMesh> mesh;
   Transform transform;
-  Aabbd bounds;  // world, of the whole mesh
+  Aabbd bounds;  // world bounds of the whole mesh
 };
 
 template <>

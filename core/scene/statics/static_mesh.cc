@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 
 namespace locus {
 namespace {
 
-// Takes the mesh, so that its columns are gone before the tree is built.
+// Consumes the mesh, so that its columns are freed before the tree is built.
 std::vector<Triangle> triangles_of(TriangleMesh mesh) {
   std::vector<Triangle> triangles;
   triangles.reserve(mesh.triangle_count());
@@ -77,10 +78,12 @@ void StaticMesh::Content::number_blocks() {
 }
 
 Triangle StaticMesh::triangle(uint32_t number) const {
+  LOCUS_DCHECK_LT(number, triangle_count());
   const uint32_t* const numbers = tree().tree().numbers;
   const TriangleBlock& block = tree().tree().blocks[content_->blocks[number]];
   uint32_t place = 0;
   while (numbers[block.first + place] != number) ++place;
+  LOCUS_DCHECK_LT(uint32_t{place}, uint32_t{block.count});
   return tree().triangle(block, place);
 }
 

@@ -1,8 +1,8 @@
-// A named mesh with its parts and its tree, ready to be asked: built once from the uploaded bytes, shared by all scenes
-// and instances. Meshes of equal bytes share the tree and all else that comes from the bytes, and keep names and parts
-// of their own: see share(). The tree holds every corner of every triangle, so the columns are not kept beside it: what
-// it does not tell is kept packed, and the columns come back as they were uploaded, byte for byte. Immutable; safe to
-// share between threads.
+// Named mesh with its parts and its tree, ready for queries: built once from the uploaded bytes and shared by all
+// scenes and instances. Meshes of equal bytes share the tree and everything else that follows from the bytes, and have
+// names and parts of their own: see share(). The tree stores every corner of every triangle, so the uploaded columns
+// are not stored: the data that the tree lacks is stored packed, and the columns can be restored byte for byte.
+// Immutable; safe to share between threads.
 #ifndef LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 #define LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 
@@ -31,11 +31,11 @@ struct MeshKey {
 
 class StaticMesh {
  public:
-  // Builds the tree. Errors: as TriangleBvh::build(). `sha256` names the bytes and is taken on trust.
+  // Builds the tree. Errors: those of TriangleBvh::build(). `sha256` is the hash of the uploaded bytes; not verified.
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> build(std::string name, const Sha256& sha256,
                                                                  TriangleMesh mesh, const BvhOptions& options = {});
 
-  // The same from the outline of the tree of that very mesh. Errors: as TriangleBvh::restore().
+  // Restores the tree from the topology that was stored for the same mesh. Errors: those of TriangleBvh::restore().
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> restore(std::string name, const Sha256& sha256,
                                                                    const TriangleMesh& mesh,
                                                                    const TreeTopology& topology,
@@ -49,22 +49,23 @@ class StaticMesh {
   const std::string& name() const { return name_; }
   const Sha256& sha256() const { return content_->sha256; }
   MeshKey key() const { return {sha256(), name_}; }
-  // Its storage order is the order of TRIANGLES rows.
+  // Returns the tree. Its storage order is the order of TRIANGLES rows.
   const TriangleBvh& tree() const { return content_->tree; }
   uint32_t vertex_count() const { return content_->vertex_count; }
   uint32_t triangle_count() const { return static_cast<uint32_t>(tree().size()); }
   uint32_t zero_area_count() const { return content_->zero_area_count; }
-  // Of all triangles.
+  // Returns the bounds of all triangles.
   const Aabbf& bounds() const { return tree().bounds(); }
   const std::vector<MeshPart>& parts() const { return parts_; }
-  // By its number in the uploaded index list, below triangle_count().
+  // Returns the triangle at that position of the uploaded index list. Precondition: number < triangle_count().
   Triangle triangle(uint32_t number) const;
 
-  // The uploaded columns, made anew: 3 coordinates a vertex; 3 vertex numbers a triangle, read in order. O(size).
+  // Restore the uploaded columns: 3 coordinates for each vertex; 3 vertex indices for each triangle, read in order.
+  // O(size).
   std::vector<float> vertices() const;
   PackedIndices::Reader indices() const { return PackedIndices::Reader(content_->indices); }
 
-  // Returns all memory that stays taken.
+  // Returns the memory of the mesh and its tree.
   uint64_t bytes() const;
   // Returns the part of bytes() that meshes of equal bytes share.
   uint64_t shared_bytes() const;

@@ -15,7 +15,7 @@
 namespace locus {
 namespace {
 
-// Placed bounds may reach a little beyond the world's positions, no farther.
+// Limit of the coordinates of a placed mesh's bounds, which may extend beyond the limit of positions.
 constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
 
 absl::Status check_columns(const PlacementColumns& place, const std::string& field) {
@@ -81,7 +81,7 @@ absl::Status refuse_group_zero(const StaticChange& change) {
                          static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
 }
 
-// The instances of a change: those kept and those placed, with their ids.
+// Instances after a change: the kept ones and the placed ones, with their ids.
 class Changing {
  public:
   Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, uint64_t seed)
@@ -153,6 +153,21 @@ class Changing {
 
 }  // namespace
 
+void StaticSet::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_EQ(positions_.size(), tree_.size());
+    for (uint32_t i = 0; i < tree_.values().size(); ++i) {
+      const Instance& instance = tree_.values()[i];
+      LOCUS_CHECK_NE(instance.id, kNoId);
+      LOCUS_CHECK(instance.mesh != nullptr);
+      LOCUS_CHECK_EQ(positions_.at(instance.id), i);
+    }
+    size_t uses = 0;
+    for (const auto& [mesh, count] : uses_) uses += count;
+    LOCUS_CHECK_EQ(uses, tree_.size());
+  }
+}
+
 std::shared_ptr<const StaticSet> StaticSet::empty() { return std::shared_ptr<const StaticSet>(new StaticSet()); }
 
 absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
@@ -170,12 +185,15 @@ absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
     ++set->uses_[instance.mesh.get()];
     set->triangle_count_ += instance.mesh->triangle_count();
   }
+  set->check_invariants();
   return Changed{std::move(set), std::move(changing.placed())};
 }
 
 const Instance* StaticSet::find(Id id) const {
   const auto found = positions_.find(id);
-  return found == positions_.end() ? nullptr : &tree_.values()[found->second];
+  if (found == positions_.end()) return nullptr;
+  LOCUS_DCHECK_EQ(tree_.values()[found->second].id, id);
+  return &tree_.values()[found->second];
 }
 
 uint32_t StaticSet::uses(const StaticMesh* mesh) const {

@@ -1,5 +1,6 @@
-// The static part of a scene: instances of meshes and the tree over them. Immutable and shared by snapshots; a change
-// makes a new set, so that a failed change leaves the old one as it was.
+// Static part of a scene: instances of meshes and a tree over them. Immutable, shared by snapshots, any thread; a
+// change makes a new set, so that a failed change has no effect. Invariants: ids are distinct and not 0; positions_ has
+// one entry for each instance; the counts of uses_ add up to size().
 #ifndef LOCUS_CORE_SCENE_STATICS_STATIC_SET_H_
 #define LOCUS_CORE_SCENE_STATICS_STATIC_SET_H_
 
@@ -16,8 +17,8 @@
 
 namespace locus {
 
-// Columns of one mesh's placements, borrowed. N is the number of ids, or of translations where there are no ids;
-// another column has N entries, one for all, or none for the default in brackets.
+// Borrowed columns of the placements of one mesh. N is the number of ids, or of translations if there are no ids.
+// Another column has N entries, one entry for all placements, or none for the default in brackets.
 struct PlacementColumns {
   std::shared_ptr<const StaticMesh> mesh;
   absl::Span<const uint64_t> ids;         // [chosen, bit 63 set]
@@ -39,15 +40,15 @@ struct StaticChange {
 
 class StaticSet {
  public:
-  // The set without instances.
+  // Returns the set without instances.
   static std::shared_ptr<const StaticSet> empty();
 
   struct Changed {
     std::shared_ptr<const StaticSet> set;
     std::vector<Id> placed;  // in the order of the request, chosen ids included
   };
-  // Removes, then places. `is_object` tells whether an id is taken by an object; `seed` starts the choice of ids.
-  // Refuses the whole change with the field and index of what is wrong.
+  // Removes instances, then places new ones. `is_object` returns true for ids of objects; `seed` is the start of the
+  // choice of ids. Refuses the whole change, naming the field and index of the wrong value. O(instances).
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
                                 uint64_t seed) const;
 
@@ -55,16 +56,18 @@ class StaticSet {
   const Instance* find(Id id) const;
   size_t size() const { return tree_.size(); }
   uint64_t triangle_count() const { return triangle_count_; }
-  // Instances of that mesh.
+  // Returns the number of instances of that mesh.
   uint32_t uses(const StaticMesh* mesh) const;
-  // Without the meshes, which sets share.
+  // Returns the memory of the set without the meshes, which sets share.
   uint64_t bytes() const;
 
  private:
   StaticSet() = default;
+  // Checks the invariants of the class comment. O(instances), like building the set.
+  void check_invariants() const;
 
   Bvh<Instance> tree_;
-  absl::flat_hash_map<Id, uint32_t> positions_;  // into tree_.values()
+  absl::flat_hash_map<Id, uint32_t> positions_;  // index into tree_.values()
   absl::flat_hash_map<const StaticMesh*, uint32_t> uses_;
   uint64_t triangle_count_ = 0;
 };

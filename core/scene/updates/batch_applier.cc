@@ -3,17 +3,18 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
 
 namespace locus {
 namespace {
 
-// OK is kUnspecified.
-Reason check_numbers(const float* numbers, size_t count, float lowest) {
+// Returns kUnspecified if all values are finite and within [min, kMaxCoordinate], otherwise the reason of a refusal.
+Reason check_values(const float* values, size_t count, float min) {
   for (size_t i = 0; i < count; ++i) {
-    if (!std::isfinite(numbers[i])) return Reason::kNotFinite;
-    if (numbers[i] < lowest || numbers[i] > limits::kMaxCoordinate) return Reason::kOutOfRange;
+    if (!std::isfinite(values[i])) return Reason::kNotFinite;
+    if (values[i] < min || values[i] > limits::kMaxCoordinate) return Reason::kOutOfRange;
   }
   return Reason::kUnspecified;
 }
@@ -30,19 +31,23 @@ void read_labels(const Columns& columns, size_t i, Object& object) {
 }  // namespace
 
 BatchApplier::BatchApplier(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
-                           TrackLifetimes lives)
+                           TrackLifetimes track_lifetimes)
     : objects_(objects),
       statics_(statics),
       batch_(batch),
-      track_lifetimes_(lives),
-      count_(batch.clear ? 0 : objects.size()) {}
+      track_lifetimes_(track_lifetimes),
+      count_(batch.clear ? 0 : objects.size()) {
+  LOCUS_DCHECK(check_form(batch).ok());
+}
 
 void BatchApplier::run() {
+  LOCUS_DCHECK(changed_.empty() && applied_ == 0 && refused_ == 0);  // called once
   remove_ids();
   remove_groups();
   for (size_t i = 0; i < batch_.inserts.size(); ++i) insert(batch_.inserts[i], absl::StrCat("inserts[", i, "]"));
   for (size_t i = 0; i < batch_.moves.size(); ++i) move(batch_.moves[i], absl::StrCat("moves[", i, "]"));
   for (size_t i = 0; i < batch_.relabels.size(); ++i) relabel(batch_.relabels[i], absl::StrCat("relabels[", i, "]"));
+  LOCUS_DCHECK_LE(errors_.size(), size_t{refused_});
 }
 
 std::optional<Object> BatchApplier::current(Id id) const {
@@ -93,7 +98,7 @@ bool BatchApplier::read_pose(const PoseReader& poses, uint32_t index, Id id, con
     refuse(absl::StrCat(field, ".", poses.position_column()), index, id, reason);
     return false;
   }
-  if (!poses.turns()) return true;
+  if (!poses.has_rotations()) return true;
   if (const Reason reason = poses.read_rotation(index, shape.rotation); reason != Reason::kUnspecified) {
     refuse(absl::StrCat(field, ".", PoseReader::kRotationColumn), index, id, reason);
     return false;
@@ -107,15 +112,15 @@ bool BatchApplier::read_shape(const InsertColumns& columns, uint32_t index, Id i
   const bool capsule = columns.kind == ShapeKind::kCapsule;
   if (columns.kind == ShapeKind::kBall || capsule) {
     shape.radius = ColumnReader<float>(columns.radii, 1).value(index, 0);
-    if (const Reason reason = check_numbers(&shape.radius, 1, 0); reason != Reason::kUnspecified) {
+    if (const Reason reason = check_values(&shape.radius, 1, 0); reason != Reason::kUnspecified) {
       refuse(field + (capsule ? ".capsule.radii" : ".ball.radii"), index, id, reason);
       return false;
     }
   }
   if (columns.kind != ShapeKind::kBox && !capsule) return true;
   const float* extents = ColumnReader<float>(columns.extents, 3).entry(index);
-  const float lowest = capsule ? -static_cast<float>(limits::kMaxCoordinate) : 0;
-  if (const Reason reason = check_numbers(extents, 3, lowest); reason != Reason::kUnspecified) {
+  const float min = capsule ? -static_cast<float>(limits::kMaxCoordinate) : 0;
+  if (const Reason reason = check_values(extents, 3, min); reason != Reason::kUnspecified) {
     refuse(field + (capsule ? ".capsule.half_axes" : ".box.half_extents"), index, id, reason);
     return false;
   }
@@ -198,6 +203,7 @@ BatchApplier::Difference BatchApplier::difference() {
     if (before && !batch_.clear) difference.removed.push_back(*before);
     if (object) difference.added.push_back(*object);
   }
+  LOCUS_DCHECK_EQ(count_ + difference.removed.size(), objects_.size() + difference.added.size());
   return difference;
 }
 

@@ -1,5 +1,5 @@
-// One batch being applied: an overlay of changed objects over the revision before, so that a refused batch leaves no
-// trace and the index hears of each object once.
+// Application of one update batch as an overlay of changed objects over the current revision: a refused batch changes
+// nothing, and the index is updated once for each object. One thread.
 #ifndef LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 #define LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 
@@ -16,31 +16,33 @@
 
 namespace locus {
 
-// Whether it matters that an object ended and another one began under its id in one batch, or that it jumped: only to
-// questions about the past.
+// Controls whether difference() reports objects that were replaced under the same id or teleported. Only scenes with
+// history need it.
 enum class TrackLifetimes : uint8_t { kNo, kYes };
 
 class BatchApplier {
  public:
-  // All three are borrowed for the life of this object. `batch` has passed check_form().
+  // Borrows all three for the lifetime of this object. Precondition: `batch` has passed check_form().
   BatchApplier(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
-               TrackLifetimes lives = TrackLifetimes::kNo);
+               TrackLifetimes track_lifetimes = TrackLifetimes::kNo);
 
-  // Clear, removes, inserts, moves, relabels: in this order, once.
+  // Applies clear, removes, inserts, moves and relabels, in this order. Call once.
   void run();
 
-  // Objects there are now. Only inserts add any, and nothing removes after them: at its highest after run().
+  // Returns the number of objects after the batch. Nothing is removed after the inserts, so that the final count is the
+  // highest.
   size_t object_count() const { return count_; }
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
   std::vector<ItemError>& errors() { return errors_; }
 
-  // What run() came to: objects that go, as they were, and objects that come, as they are. A changed object is in both,
-  // one that ended as it began in neither, unless it was reborn.
+  // Result of run(): objects to remove in their old state, and objects to add in their new state. A changed object is
+  // in both lists. An object that ends in its old state is in neither, unless it was replaced.
   struct Difference {
     std::vector<Object> removed;
     std::vector<Object> added;
-    absl::flat_hash_set<Id> replaced;  // where lives are told: new lives under ids of old ones, those that jumped too
+    // Ids whose old lifetime ends, teleported objects included. Empty unless TrackLifetimes::kYes.
+    absl::flat_hash_set<Id> replaced;
     bool empty() const { return removed.empty() && added.empty(); }
   };
   Difference difference();
@@ -66,8 +68,8 @@ class BatchApplier {
   const UpdateBatch& batch_;
   const TrackLifetimes track_lifetimes_;
   absl::flat_hash_set<Id> replaced_;
-  size_t count_;                                            // objects there are after what was applied so far
-  absl::flat_hash_map<Id, std::optional<Object>> changed_;  // nothing = removed
+  size_t count_;                                            // number of objects after the items applied so far
+  absl::flat_hash_map<Id, std::optional<Object>> changed_;  // nullopt: removed
   uint32_t applied_ = 0;
   uint32_t refused_ = 0;
   std::vector<ItemError> errors_;

@@ -1,5 +1,5 @@
-// Moves of many batches that nobody has seen yet, so that the grid need hear of each object once: what makes replaying
-// a log sooner done than it took to write it. One thread at a time.
+// Moves of several batches, coalesced during replay: the grid is updated once for each object, which makes replaying a
+// log faster than writing it was. One thread at a time. Invariant: each handle has at most one move.
 #ifndef LOCUS_CORE_SCENE_UPDATES_COALESCED_MOVES_H_
 #define LOCUS_CORE_SCENE_UPDATES_COALESCED_MOVES_H_
 
@@ -11,26 +11,29 @@ namespace locus {
 
 class CoalescedMoves {
  public:
-  // Adds a batch's moves, of objects of `store`. Whether any of them changes anything after those before. O(moves).
+  // Adds the moves of one batch for objects of `store`. Returns true if any of them changes a position or rotation, as
+  // left by the moves before. O(moves).
   bool add(const GridMoves& batch, const ObjectStore& store);
 
   bool empty() const { return moves_.empty(); }
-  // What all came to.
-  GridMoves moves() const { return {moves_, rotations_, numbers_}; }
-  // Gives the memory back, too.
+  // Returns the final move of each object.
+  GridMoves moves() const { return {moves_, rotations_, move_of_handle_}; }
+  // Removes all moves and frees their memory.
   void clear() { *this = CoalescedMoves(); }
 
  private:
-  // The object's move, or null.
+  // Checks the invariant of the class comment for the move of `handle`. O(1).
+  void check_invariants(uint32_t handle);
+  // Returns the move of the object, or null.
   GridMove* find(uint32_t handle) {
-    const uint32_t number = handle < numbers_.size() ? numbers_[handle] : 0;
-    return number < moves_.size() && moves_[number].handle == handle ? &moves_[number] : nullptr;
+    const uint32_t index = handle < move_of_handle_.size() ? move_of_handle_[handle] : 0;
+    return index < moves_.size() && moves_[index].handle == handle ? &moves_[index] : nullptr;
   }
   bool differs(const GridMove& move, const Quaternion* rotation, const GridMove* before, const GridRef& stored) const;
 
-  std::vector<GridMove> moves_;  // of distinct handles
+  std::vector<GridMove> moves_;  // distinct handles
   std::vector<Quaternion> rotations_;
-  std::vector<uint32_t> numbers_;  // by handle; counts only if the move of that number is of that handle
+  std::vector<uint32_t> move_of_handle_;  // index into moves_ by handle; valid only if that move has the handle
 };
 
 }  // namespace locus

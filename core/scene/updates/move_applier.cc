@@ -3,15 +3,26 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 
 namespace locus {
 namespace {
 
-// Items that are looked up together, so that their memory is on its way before it is needed.
+// Number of items that are looked up together, so that their memory is prefetched.
 constexpr size_t kItemsAtOnce = 64;
 
 }  // namespace
+
+void MoveApplier::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    for (size_t i = 0; i < moves_.size(); ++i) {
+      LOCUS_CHECK_EQ(size_t{last_move_[moves_[i].handle]}, i);
+      LOCUS_CHECK(moves_[i].rotation == GridMove::kKeeps || moves_[i].rotation < rotations_.size());
+    }
+    LOCUS_CHECK_LE(errors_.size(), size_t{refused_});
+  }
+}
 
 bool MoveApplier::serves(const UpdateBatch& batch) {
   return !batch.clear && !batch.restart_ticks && batch.remove_ids.empty() && batch.remove_groups.empty() &&
@@ -25,6 +36,8 @@ void MoveApplier::begin(const ObjectStore& objects) {
 }
 
 void MoveApplier::add(const ObjectStore& objects, const UpdateBatch& batch) {
+  LOCUS_DCHECK(serves(batch) && check_form(batch).ok());
+  LOCUS_DCHECK_GE(last_move_.size(), objects.handle_count());  // begin() was called for this store
   applied_ = refused_ = 0;
   errors_.clear();
   for (size_t list = 0; list < batch.moves.size(); ++list) run(objects, batch.frame, batch.moves[list], list);
@@ -36,6 +49,7 @@ void MoveApplier::finish(const ObjectStore& objects) {
     return !(move.position == now.entry().position) ||
            (move.rotation != GridMove::kKeeps && !(rotations_[move.rotation] == now.form().rotation));
   });
+  check_invariants();
 }
 
 void MoveApplier::refuse(const char* column, const Item& item, Reason reason) {
@@ -59,13 +73,13 @@ inline void MoveApplier::move(const PoseReader& poses, uint32_t handle, const It
   Quaternion rotation;
   if (const Reason reason = poses.read_position(item.index, position); reason != Reason::kUnspecified)
     return refuse(poses.position_column(), item, reason);
-  if (poses.turns()) {
+  if (poses.has_rotations()) {
     if (const Reason reason = poses.read_rotation(item.index, rotation); reason != Reason::kUnspecified)
       return refuse(PoseReader::kRotationColumn, item, reason);
   }
   GridMove& move = move_of(handle);
   move.position = position;
-  if (poses.turns()) {
+  if (poses.has_rotations()) {
     move.rotation = static_cast<uint32_t>(rotations_.size());
     rotations_.push_back(rotation);
   }

@@ -1,7 +1,7 @@
-// One batch that only moves objects: the common case at every tick, read straight from its columns into moves of the
-// grid. Like BatchApplier otherwise: nothing changes until the moves are handed to the store.
+// Application of a batch that only moves objects, the common case at every tick: reads the columns directly into moves
+// of the grid. Like BatchApplier, it changes nothing; ObjectStore::move() applies the moves.
 //
-// Keeps its memory from batch to batch; one thread.
+// Reuses its memory from batch to batch; one thread. Invariant: each handle has at most one move.
 #ifndef LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_
 #define LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_
 
@@ -17,35 +17,38 @@ namespace locus {
 
 class MoveApplier {
  public:
+  // Returns true if the batch only moves objects.
   static bool serves(const UpdateBatch& batch);
 
-  // `batch` has passed check_form(), and serves() is true of it. O(items).
+  // Reads one batch. Preconditions: it has passed check_form(), and serves(batch). O(items).
   void run(const ObjectStore& objects, const UpdateBatch& batch) {
     begin(objects);
     add(objects, batch);
     finish(objects);
   }
-  // The same of several batches, one after another, between a begin() and a finish().
+  // Read several batches: begin(), add() for each batch in order, finish().
   void begin(const ObjectStore& objects);
   void add(const ObjectStore& objects, const UpdateBatch& batch);
   void finish(const ObjectStore& objects);
 
-  // Forgets what the last run() came to.
+  // Removes the moves of the last run().
   void clear() {
     clear_scratch(moves_);
     clear_scratch(rotations_);
   }
 
-  // What the last run() came to. A handle occurs once: of several moves of one object the last counts.
+  // Returns the moves of the last run(). A handle occurs once: the last of several moves of one object counts.
   GridMoves moves() const { return {moves_, rotations_, last_move_}; }
-  // Whether any of them changes anything.
+  // Returns true if any of moves() changes a position or a rotation.
   bool changes() const { return changes_; }
-  // Of the last batch.
+  // Return the counts and the errors of the last batch.
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
   std::vector<ItemError>& errors() { return errors_; }
 
  private:
+  // Checks that each handle has one move. O(moves).
+  void check_invariants() const;
   void run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list);
   struct Item {
     size_t list;
@@ -58,8 +61,8 @@ class MoveApplier {
 
   std::vector<GridMove> moves_;
   std::vector<Quaternion> rotations_;
-  std::vector<uint32_t> last_move_;  // by handle; counts only if the move of that number is of that handle
-  std::vector<uint32_t> handles_;    // of the items at work
+  std::vector<uint32_t> last_move_;  // index into moves_ by handle; valid only if that move has the handle
+  std::vector<uint32_t> handles_;    // handles of the items being read
   bool changes_ = false;
   uint32_t applied_ = 0;
   uint32_t refused_ = 0;

@@ -7,6 +7,7 @@
 namespace locus {
 
 Reason PoseReader::read_rotation(size_t i, Quaternion& rotation) const {
+  LOCUS_DCHECK(has_rotations());
   const float* q = rotations_.entry(i);
   const Quaternion given{q[0], q[1], q[2], q[3]};
   const double deviation = unit_deviation(given);

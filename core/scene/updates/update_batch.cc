@@ -60,7 +60,7 @@ size_t item_count(const UpdateBatch& batch) {
   return items;
 }
 
-absl::Status check_numbers(const UpdateBatch& batch) {
+absl::Status check_header(const UpdateBatch& batch) {
   if (!is_finite(batch.frame)) return refuse_argument(Reason::kNotFinite, "frame", {}, "a frame needs finite numbers");
   if (max_component(abs(batch.frame)) > limits::kMaxCoordinate)
     return refuse_argument(Reason::kOutOfRange, "frame", {}, "frames must lie within +-1e9");
@@ -73,7 +73,7 @@ absl::Status check_numbers(const UpdateBatch& batch) {
   return absl::OkStatus();
 }
 
-bool moves_alone(const UpdateBatch& batch) {
+bool only_moves(const UpdateBatch& batch) {
   if (batch.clear || batch.restart_ticks || batch.all_or_nothing || batch.moves.empty()) return false;
   if (!batch.remove_ids.empty() || !batch.remove_groups.empty() || !batch.inserts.empty() || !batch.relabels.empty())
     return false;
@@ -83,11 +83,11 @@ bool moves_alone(const UpdateBatch& batch) {
 }  // namespace
 
 bool may_join(const UpdateBatch& first, const UpdateBatch& second) {
-  return first.tick == second.tick && moves_alone(first) && moves_alone(second);
+  return first.tick == second.tick && only_moves(first) && only_moves(second);
 }
 
 absl::Status check_form(const UpdateBatch& batch) {
-  RETURN_IF_ERROR(check_numbers(batch));
+  RETURN_IF_ERROR(check_header(batch));
   for (size_t i = 0; i < batch.inserts.size(); ++i)
     RETURN_IF_ERROR(check_insert(batch.inserts[i], absl::StrCat("inserts[", i, "]")));
   for (size_t i = 0; i < batch.moves.size(); ++i)

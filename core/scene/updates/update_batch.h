@@ -1,5 +1,5 @@
-// One batch of updates as borrowed columns, and what became of it. The columns live as long as the call that takes
-// them. Order of application: clear, removes, inserts, moves, relabels; all become one revision.
+// Update batch as borrowed columns, and its acknowledgement. Plain data; the columns outlive the call that takes the
+// batch. Order of application: clear, removes, inserts, moves, relabels; all become one revision.
 #ifndef LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 #define LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 
@@ -14,11 +14,12 @@
 
 namespace locus {
 
-// A column has N entries (N = number of ids), one for all, or none for the default in brackets.
+// Columns of objects to insert. A column has N entries (N = number of ids), one entry for all items, or none for the
+// default in brackets.
 struct InsertColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const float> positions;       // 3N relative to the frame; this or the next
-  absl::Span<const double> positions_f64;  // 3N absolute
+  absl::Span<const float> positions;       // 3N, relative to the frame; either this or positions_f64
+  absl::Span<const double> positions_f64;  // 3N, absolute
   absl::Span<const float> rotations;       // 4N, x y z w [identity]
   ShapeKind kind = ShapeKind::kPoint;
   absl::Span<const float> radii;      // N, balls and capsules, >= 0
@@ -38,7 +39,7 @@ struct MoveColumns {
 
 struct RelabelColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const uint32_t> layers;  // [kept], likewise below
+  absl::Span<const uint32_t> layers;  // [kept], as groups and tags
   absl::Span<const uint64_t> groups;
   absl::Span<const uint64_t> tags;
 };
@@ -55,12 +56,12 @@ struct UpdateBatch {
   bool upsert = false;
   bool all_or_nothing = false;
   bool restart_ticks = false;
-  uint64_t writer = 0;  // with `batch`: applied once however often it is sent
-  uint64_t batch = 0;
+  uint64_t writer = 0;  // random id of the sender, 0 = none; a (writer, batch) pair is applied once
+  uint64_t batch = 0;   // sequence number within the writer, from 1 without gaps; 0 = none
 };
 
 struct ItemError {
-  std::string field;  // for example inserts[0].positions
+  std::string field;  // column of the value, for example inserts[0].positions
   uint32_t index = 0;
   Id id = kNoId;
   Reason reason = Reason::kUnspecified;
@@ -70,17 +71,17 @@ struct UpdateAck {
   uint64_t epoch = 0;
   uint64_t revision = 0;
   uint64_t tick = 0;
-  uint32_t applied = 0;  // items
+  uint32_t applied = 0;  // number of items, likewise `refused`
   uint32_t refused = 0;
   std::vector<ItemError> errors;  // at most limits::kMaxListedItemErrors
   bool duplicate = false;
 };
 
-// Whether both only move objects, at one tick and item by item, so that they may become one revision: what the second
-// moves is where the second says, and all else where the first says.
+// Returns true if the two batches may be applied as one revision: both only move objects, without teleport,
+// all_or_nothing or restart_ticks, at the same tick. The second batch wins for objects that both move.
 bool may_join(const UpdateBatch& first, const UpdateBatch& second);
 
-// The form of a batch: column lengths, frame and limits. INVALID_ARGUMENT naming the field.
+// Checks the form of a batch: column lengths, frame, writer and limits. INVALID_ARGUMENT names the wrong field.
 absl::Status check_form(const UpdateBatch& batch);
 
 }  // namespace locus

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/refusal.h"
 
 namespace locus {
@@ -23,7 +24,17 @@ absl::Status gap(uint64_t expected, uint64_t batch) {
 
 }  // namespace
 
+void WriterTable::check_invariants() const {
+  if constexpr (kDebugChecks) {
+    LOCUS_CHECK_LE(writers_.size(), size_t{limits::kMaxWriters});
+    LOCUS_CHECK_LE(kept_errors_, kMaxKeptErrors);
+    LOCUS_CHECK(!writers_.empty() || kept_errors_ == 0);
+    LOCUS_CHECK(!writers_.contains(0));
+  }
+}
+
 absl::StatusOr<std::optional<UpdateAck>> WriterTable::admit(uint64_t writer, uint64_t batch) const {
+  LOCUS_DCHECK(writer == 0 || batch != 0);  // by check_form()
   if (writer == 0) return std::optional<UpdateAck>();
   const auto known = writers_.find(writer);
   const uint64_t last = known == writers_.end() ? 0 : known->second.batch;
@@ -43,22 +54,27 @@ bool WriterTable::is_new(uint64_t writer, uint64_t batch) const {
 
 void WriterTable::record(uint64_t writer, uint64_t batch, const UpdateAck& ack) {
   if (writer == 0) return;
+  LOCUS_DCHECK_NE(batch, uint64_t{0});
+  LOCUS_DCHECK_LE(ack.errors.size(), size_t{limits::kMaxListedItemErrors});
   if (writers_.size() >= limits::kMaxWriters && !writers_.contains(writer)) forget_oldest();
   Last& last = writers_[writer];
+  LOCUS_DCHECK_GE(kept_errors_, last.ack.errors.size());
   kept_errors_ -= last.ack.errors.size();
   if (kept_errors_ + ack.errors.size() > kMaxKeptErrors) forget_acks();
   kept_errors_ += ack.errors.size();
   last = {batch, ++clock_, ack};
+  check_invariants();
 }
 
 void WriterTable::forget_oldest() {
+  LOCUS_DCHECK(!writers_.empty());
   const auto oldest = std::min_element(writers_.begin(), writers_.end(),
                                        [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; });
   kept_errors_ -= oldest->second.ack.errors.size();
   writers_.erase(oldest);
 }
 
-// The numbers stay, so that no batch is applied twice.
+// Drops the acks but keeps the batch numbers, so that no batch is applied twice.
 void WriterTable::forget_acks() {
   for (auto& [writer, last] : writers_) last.ack = {};
   kept_errors_ = 0;
@@ -78,6 +94,7 @@ bool WriterTable::restore(Writer writer) {
   kept_errors_ += writer.ack.errors.size();
   clock_ = std::max(clock_, writer.heard);
   writers_[writer.number] = {writer.batch, writer.heard, std::move(writer.ack)};
+  check_invariants();
   return true;
 }
 

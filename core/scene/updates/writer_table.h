@@ -1,6 +1,8 @@
-// What each known writer sent last, so that a batch sent twice is applied once. Bounded: the writer heard longest ago
-// is forgotten first, and its next batch is refused rather than risked. Old acks go earlier if they list too many
-// errors. A value type: a copy is the table at that moment.
+// Table of the last batch and ack of each known writer, so that a batch that is sent twice is applied once. Bounded:
+// the writer that was least recently active is evicted first, and its next batch is refused, because it may be a
+// duplicate. Acks are dropped before writers if they list more than kMaxKeptErrors errors. A value type; one thread at
+// a time. Invariants: at most limits::kMaxWriters writers, none of them 0, each with an activity count of at most
+// clock_; kept_errors_ is the number of errors in all kept acks, at most kMaxKeptErrors.
 #ifndef LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 #define LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 
@@ -17,29 +19,34 @@ namespace locus {
 
 class WriterTable {
  public:
-  // Item errors listed by all acks that are kept.
+  // Maximum number of item errors in all kept acks.
   static constexpr size_t kMaxKeptErrors = size_t{64} * limits::kMaxListedItemErrors;
 
-  // Nothing if the batch is new and next in order; the old ack (or one marked duplicate) if it was applied before;
-  // FAILED_PRECONDITION BATCH_GAP if a batch before it is missing.
+  // Returns nullopt if the batch is the next one of its writer, or has no writer; the stored ack, or an empty one, both
+  // marked duplicate, if it was applied before; FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
   absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
-  // Whether admit() would say nothing.
+  // Returns true if admit() would return nullopt. Faster than admit().
   bool is_new(uint64_t writer, uint64_t batch) const;
+  // Stores the ack of the latest batch of a writer, and evicts others to stay within the limits. Does nothing for
+  // writer 0.
   void record(uint64_t writer, uint64_t batch, const UpdateAck& ack);
 
   struct Writer {
     uint64_t number = 0;
     uint64_t batch = 0;
-    uint64_t heard = 0;  // higher for whoever was heard later
-    UpdateAck ack;       // its epoch is 0 where it was forgotten
+    uint64_t heard = 0;  // activity count: higher for a writer that was active later
+    UpdateAck ack;       // epoch 0: the ack was dropped
   };
-  // All that are known, by number.
+  // Returns all known writers, ascending by number. O(writers).
   std::vector<Writer> writers() const;
   size_t size() const { return writers_.size(); }
-  // Puts back what writers() gave. False, and no change, for more than fits, or for a writer that is known.
+  // Inserts an entry of writers() again. Returns false and changes nothing if the table is full, the writer is known,
+  // or a number is 0.
   bool restore(Writer writer);
 
  private:
+  // Checks the invariants of the class comment, except the sum over all writers. O(1).
+  void check_invariants() const;
   struct Last {
     uint64_t batch = 0;
     uint64_t heard = 0;
@@ -50,7 +57,7 @@ class WriterTable {
 
   absl::flat_hash_map<uint64_t, Last> writers_;
   uint64_t clock_ = 0;
-  size_t kept_errors_ = 0;  // of all acks in writers_
+  size_t kept_errors_ = 0;  // number of errors in all acks of writers_
 };
 
 }  // namespace locus

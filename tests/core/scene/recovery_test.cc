@@ -10,7 +10,7 @@
 namespace locus::test {
 namespace {
 
-TEST(RecoveryTest, AScenePutTogetherAgainIsTheOneThatAppliedWhatTheLogHas) {
+TEST(RecoveryTest, ARecoveredSceneEqualsTheSceneThatAppliedTheLoggedRecords) {
   uint64_t crashes = 0, lost = 0, turned_up = 0;
   for (uint64_t seed = 0; seed < scaled_count(60); ++seed) {
     RecoveryLockstep lockstep(seed);
@@ -40,7 +40,7 @@ class RecoverTest : public SceneFixture {
     again_ = std::make_unique<MemoryLog>(kept);
     return recover_scene(*again_, again_->stored_scenes().front(), find_, progress);
   }
-  // What recovery says of damage, which is always DATA_LOSS.
+  // Returns the error message of recovery, and expects DATA_LOSS.
   std::string message(const MemoryLog::Kept& kept) {
     const absl::Status status = recover(kept).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << status;
@@ -56,7 +56,7 @@ class RecoverTest : public SceneFixture {
   FindMesh find_ = [this](const MeshKey& key) { return key == mesh_->key() ? mesh_ : nullptr; };
 };
 
-TEST_F(RecoverTest, ARecordThatIsMissingIsSeen) {
+TEST_F(RecoverTest, AMissingLastRecordIsDetected) {
   for (Id id = 1; id <= 3; ++id) apply(with(points({id}, {0, 0, 0})));
   MemoryLog::Kept kept = log_.crash();
   MemoryLog fewer(kept);
@@ -66,8 +66,8 @@ TEST_F(RecoverTest, ARecordThatIsMissingIsSeen) {
             absl::DataLossError("scene arena: records 4 to 5 are not there"));
 }
 
-// Gives records with a hole, as no log may.
-class HoleyLog : public MemoryLog {
+// Log that breaks its contract: it leaves out a record.
+class GappedLog : public MemoryLog {
  public:
   using MemoryLog::MemoryLog;
   absl::Status read(SceneKey key, uint64_t from, RecordSink sink) const override {
@@ -76,14 +76,14 @@ class HoleyLog : public MemoryLog {
   }
 };
 
-TEST_F(RecoverTest, AHoleInTheRecordsIsSeen) {
+TEST_F(RecoverTest, AGapInTheRecordsIsDetected) {
   for (Id id = 1; id <= 3; ++id) apply(with(points({id}, {0, 0, 0})));
-  HoleyLog holey(log_.crash());
+  GappedLog holey(log_.crash());
   EXPECT_EQ(recover_scene(holey, holey.stored_scenes().front(), find_).status(),
             absl::DataLossError("scene arena: record 3 follows record 1"));
 }
 
-TEST_F(RecoverTest, DamagedRecordsSnapshotsAndSpecificationsAreNamed) {
+TEST_F(RecoverTest, ErrorsNameTheDamagedRecordSnapshotOrSpecification) {
   apply(with(points({1}, {0, 0, 0})));
   const MemoryLog::Kept kept = log_.crash();
   MemoryLog::Kept wrong = kept;
@@ -97,7 +97,7 @@ TEST_F(RecoverTest, DamagedRecordsSnapshotsAndSpecificationsAreNamed) {
   EXPECT_EQ(message(wrong), "scene arena: specification: the kind is cut off");
 }
 
-TEST_F(RecoverTest, WhatTheLogFoundDamagedIsNotLookedAt) {
+TEST_F(RecoverTest, ScenesAndMeshesMarkedAsDamagedAreNotRead) {
   MemoryLog again(log_.crash());
   StoredScene damaged = again.stored_scenes().front();
   damaged.damage = absl::DataLossError("a file is gone");
@@ -107,8 +107,8 @@ TEST_F(RecoverTest, WhatTheLogFoundDamagedIsNotLookedAt) {
   EXPECT_EQ(recover_mesh(again, mesh).status(), absl::DataLossError("mesh m: a file is gone"));
 }
 
-// One that was kept by another builder, that is damaged, or gone: the tree is built and kept again.
-TEST_F(RecoverTest, AnOutlineThatDoesNotFitIsMadeAnew) {
+// If the cached topology is from another builder version, damaged or missing, the tree is built and cached again.
+TEST_F(RecoverTest, AnUnusableTopologyIsReplacedByThatOfARebuiltTree) {
   const MemoryLog::Kept kept = log_.crash();
   ASSERT_EQ(kept.topologies.size(), 1u);
   const std::string right = kept.topologies.at(mesh_->sha256());
@@ -133,7 +133,7 @@ TEST_F(RecoverTest, AnOutlineThatDoesNotFitIsMadeAnew) {
   EXPECT_EQ(again.read_outline(mesh_->sha256()), right);
 }
 
-TEST_F(RecoverTest, ASceneOfWhichSomethingWasLostGoesOnInAnotherEpoch) {
+TEST_F(RecoverTest, ASceneWithLostRecordsContinuesInAnotherEpoch) {
   const UpdateBatch insert = numbered(with(points({1}, {0, 0, 0})), 9, 1);
   apply(insert);
   ASSERT_TRUE(log_.restart_scene(logged_->log_key(), 99).ok());
@@ -149,7 +149,7 @@ TEST_F(RecoverTest, ASceneOfWhichSomethingWasLostGoesOnInAnotherEpoch) {
   EXPECT_EQ((*third)->latest()->revision, 2u);
 }
 
-TEST_F(RecoverTest, AnEpochThatWasLeftDoesNotComeBack) {
+TEST_F(RecoverTest, AnEarlierEpochIsRefusedAsDamage) {
   for (Id id = 1; id <= 3; ++id) apply(with(points({id}, {0, 0, 0})));
   MemoryLog::Kept kept = log_.crash();
   stored(kept).records[1].epoch = 99;
@@ -158,7 +158,7 @@ TEST_F(RecoverTest, AnEpochThatWasLeftDoesNotComeBack) {
   EXPECT_EQ(message(kept), "scene arena: record 3: epoch 0 follows epoch 99");
 }
 
-TEST_F(RecoverTest, AMeshMayHaveGoneThatNothingUsesAnyMore) {
+TEST_F(RecoverTest, AMissingMeshWithoutInstancesIsAccepted) {
   ASSERT_TRUE(logged_->change_instances(placing(placement({5}, {1, 2, 3}))).ok());
   MemoryLog::Kept used = log_.crash();
   StaticChange removal;
@@ -171,14 +171,14 @@ TEST_F(RecoverTest, AMeshMayHaveGoneThatNothingUsesAnyMore) {
   EXPECT_EQ((*scene)->latest()->statics->size(), 0u);
 }
 
-TEST_F(RecoverTest, AStaticChangeThatDoesNotFitIsDamage) {
+TEST_F(RecoverTest, AnInvalidStaticChangeIsDamage) {
   ASSERT_TRUE(logged_->change_instances(placing(placement({5}, {1, 2, 3}))).ok());
   MemoryLog::Kept kept = log_.crash();
   stored(kept).records.push_back(stored(kept).records[0]);
   EXPECT_THAT(message(kept), HasSubstr("scene arena: record 2: the change is wrong"));
 }
 
-TEST_F(RecoverTest, ThePastReachesBackToTheSnapshot) {
+TEST_F(RecoverTest, TheHistoryBeginsAtTheSnapshot) {
   SceneSpec spec;
   spec.history = {50, uint64_t{1} << 30};
   const ScenePtr remembering = registry_.create_scene("remembering", spec, kEpoch, "", false)->scene;

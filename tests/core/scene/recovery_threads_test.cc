@@ -1,5 +1,5 @@
-// Everybody at once, with a log that takes its time: writers, readers, snapshots and static changes; and what was
-// acknowledged is there afterwards.
+// Tests writers, readers, snapshots and static changes at the same time with a slow log: everything acknowledged is
+// recovered.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -27,7 +27,7 @@ class RecoveryThreadsTest : public SceneFixture {
     log_.take(std::chrono::microseconds(200));
   }
 
-  // Each writer has an object of its own, whose x is the number of the last batch.
+  // Each writer moves its own object; x is the number of its last batch.
   void write(uint64_t writer, uint64_t batches) {
     for (uint64_t number = 1; number <= batches; number += 2) {
       std::vector<Id> ids = {writer};
@@ -96,7 +96,7 @@ class RecoveryThreadsTest : public SceneFixture {
   ScenePtr logged_;
 };
 
-TEST_F(RecoveryThreadsTest, WhatWasAcknowledgedWhileAllWereAtWorkIsThereAfterwards) {
+TEST_F(RecoveryThreadsTest, AllAcknowledgedUpdatesAreRecovered) {
   const uint64_t batches = 2 * scaled_count(300);
   std::atomic<bool> done{false};
   std::vector<std::thread> writers, others;

@@ -1,4 +1,4 @@
-// A registry with a log: what is there after a restart is what was acknowledged.
+// Tests a registry with a log: after a restart it contains exactly what was acknowledged.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -31,7 +31,7 @@ class RegistryLogTest : public SceneFixture {
     return names;
   }
 
-  // The machine stops and starts.
+  // Simulates a crash of the machine and a restart.
   void restart() {
     auto log = std::make_unique<MemoryLog>(log_->crash());
     registry_ = std::make_unique<Registry>(log.get());
@@ -57,7 +57,7 @@ class RegistryLogTest : public SceneFixture {
 
 const absl::Status kFull = absl::ResourceExhaustedError("the disk is full");
 
-TEST_F(RegistryLogTest, ScenesMeshesAndWhatWasPlacedAreThereAfterARestart) {
+TEST_F(RegistryLogTest, ScenesMeshesAndInstancesSurviveARestart) {
   ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
   ASSERT_TRUE(registry_->add_mesh("alias", mesh_).ok());
   const ScenePtr first = create("first")->scene;
@@ -146,7 +146,7 @@ TEST_F(RegistryLogTest, WhatWasDeletedStaysSo) {
   EXPECT_EQ(registry_->mesh_count(), 0u);
 }
 
-TEST_F(RegistryLogTest, WhereTheLogRefusesNothingHasChanged) {
+TEST_F(RegistryLogTest, AfterALogErrorNothingHasChanged) {
   ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
   const ScenePtr scene = create("a")->scene;
   log_->fail_with(kFull);
@@ -163,7 +163,7 @@ TEST_F(RegistryLogTest, WhereTheLogRefusesNothingHasChanged) {
   EXPECT_TRUE(create("b").ok());
 }
 
-TEST_F(RegistryLogTest, OthersAreFoundWhileASceneIsCreated) {
+TEST_F(RegistryLogTest, OtherScenesAreFoundWhileASceneIsCreated) {
   const ScenePtr known = create("known")->scene;
   log_->hold();
   std::thread creator([this] { EXPECT_TRUE(create("new").ok()); });
@@ -176,13 +176,13 @@ TEST_F(RegistryLogTest, OthersAreFoundWhileASceneIsCreated) {
   EXPECT_TRUE(registry_->find_scene("new").ok());
 }
 
-TEST_F(RegistryLogTest, AMeshThatWasDeletedIsNotPlaced) {
+TEST_F(RegistryLogTest, ADeletedMeshIsNotPlaced) {
   ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
   const ScenePtr scene = create("a")->scene;
   ASSERT_TRUE(registry_->delete_mesh("m").ok());
   expect_refusal(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status(), absl::StatusCode::kNotFound,
                  Reason::kNotFound, "place[0].mesh");
-  // Nor is it once another of the same content came: uses are counted by the one that is kept.
+  // The old pointer stays refused after equal content is added, because uses are counted for the registered mesh.
   ASSERT_TRUE(registry_->add_mesh("m", make_mesh("m", 1)).ok());
   EXPECT_EQ(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status().code(), absl::StatusCode::kNotFound);
 }
@@ -234,19 +234,19 @@ TEST_F(RegistryLogTest, ADamagedMeshAnswersWithItsDamageUntilItIsDeleted) {
   EXPECT_TRUE(registry_->add_mesh("m", mesh_).ok());
 }
 
-// Writes meshes only when it is told to.
+// Log that blocks in add_mesh() until the test releases it.
 class SlowMeshLog : public MemoryLog {
  public:
   absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
                         ChunkSource parts) override {
     begun.release();
-    go_on.acquire();
+    resume.acquire();
     return MemoryLog::add_mesh(name, sha256, content, parts);
   }
-  std::binary_semaphore begun{0}, go_on{0};
+  std::binary_semaphore begun{0}, resume{0};
 };
 
-TEST_F(RegistryLogTest, ScenesComeAndGoWhileALargeMeshIsWrittenAndItsDeletionWaits) {
+TEST_F(RegistryLogTest, ScenesAreCreatedAndDeletedWhileALargeMeshIsWrittenAndItsDeletionWaits) {
   SlowMeshLog log;
   Registry registry(&log);
   std::thread uploader([&] { EXPECT_TRUE(registry.add_mesh("m", mesh_).ok()); });
@@ -257,7 +257,7 @@ TEST_F(RegistryLogTest, ScenesComeAndGoWhileALargeMeshIsWrittenAndItsDeletionWai
   EXPECT_EQ(registry.find_content(mesh_->sha256()), nullptr) << "not before it is written";
   std::thread deleter([&] { EXPECT_TRUE(registry.delete_mesh("m").ok()) << "it waits for the upload"; });
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  log.go_on.release();
+  log.resume.release();
   uploader.join();
   deleter.join();
   EXPECT_EQ(registry.find_content(mesh_->sha256()), nullptr);

@@ -69,7 +69,7 @@ TEST_F(RegistryTest, ATakenNameIsRefused) {
   expect_refusal(create("arena").status(), absl::StatusCode::kAlreadyExists, Reason::kAlreadyExists, "name");
 }
 
-TEST_F(RegistryTest, IfAbsentReturnsTheSceneThatIsThere) {
+TEST_F(RegistryTest, IfAbsentReturnsTheExistingScene) {
   const ScenePtr scene = created("arena");
   const auto again = create("arena", "nowhere", true);
   ASSERT_TRUE(again.ok());
@@ -99,7 +99,7 @@ TEST_F(RegistryTest, ScenesAreListedByNamePageByPage) {
   for (const char* name : {"d", "b", "a", "c"}) created(name);
   EXPECT_EQ(names(registry_.list_scenes("", 3)), (Names{"a", "b", "c"}));
   EXPECT_EQ(names(registry_.list_scenes("c", 3)), (Names{"d"}));
-  EXPECT_EQ(names(registry_.list_scenes("bb", 1)), (Names{"c"}));  // a scene deleted meanwhile does no harm
+  EXPECT_EQ(names(registry_.list_scenes("bb", 1)), (Names{"c"}));  // `after` need not be the name of a scene
   EXPECT_TRUE(registry_.list_scenes("d", 3).empty());
 }
 
@@ -113,7 +113,7 @@ TEST_F(RegistryTest, StaticFromSharesInstancesAndNotObjects) {
   EXPECT_EQ(copy->latest()->revision, 0u);
 }
 
-TEST_F(RegistryTest, ChangesOfASharedStaticPartShowInOneSceneOnly) {
+TEST_F(RegistryTest, ChangesOfSharedInstancesAffectOneSceneOnly) {
   const ScenePtr source = created("source");
   ASSERT_TRUE(source->change_instances(placing(placement({8}, {0, 0, 0}))).ok());
   const ScenePtr copy = created("copy", "source");
@@ -138,7 +138,7 @@ TEST_F(RegistryTest, AMeshIsFoundByNameAndByContent) {
                  "place[0].mesh");
 }
 
-TEST_F(RegistryTest, TheSameContentUnderItsNameIsFine) {
+TEST_F(RegistryTest, TheSameContentUnderTheSameNameIsAccepted) {
   ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
   EXPECT_EQ(*registry_.add_mesh("m", make_mesh("m", 1)), mesh_);
   EXPECT_EQ(registry_.mesh_count(), 1u);

@@ -1,4 +1,4 @@
-// Batches of moves that become one revision together, beside the same batches one after another.
+// Tests batches that are joined into one revision, compared with the same batches applied one by one.
 #include <gmock/gmock.h>
 
 #include <limits>
@@ -116,7 +116,7 @@ TEST_F(SceneJoinedTest, MovesThatChangeNothingMakeNoRevision) {
   EXPECT_EQ(acks[1].revision, before);
 }
 
-TEST_F(SceneJoinedTest, TheirTickIsTheScenes) {
+TEST_F(SceneJoinedTest, TheTickOfJoinedBatchesBecomesTheSceneTick) {
   std::vector<UpdateBatch> batches = {with(move_to({1}, {1, 0, 0})), with(move_to({2}, {1, 0, 0}))};
   for (UpdateBatch& batch : batches) batch.tick = 7;
   EXPECT_EQ(join(batches)[0].tick, 7u);
@@ -153,8 +153,8 @@ TEST_F(SceneJoinedTest, AClosedSceneRefusesAll) {
             absl::StatusCode::kNotFound);
 }
 
-// Random moves of random objects, known and unknown, with and without rotations, with and without writers.
-TEST_F(SceneJoinedTest, JoinedBatchesEndWhereTheSameBatchesEndOneAfterAnother) {
+// Uses random moves of known and unknown objects, with and without rotations and writers.
+TEST_F(SceneJoinedTest, JoinedBatchesLeaveTheSameStateAsTheBatchesOneByOne) {
   Random random(6);
   Scene alone("alone", SceneSpec(), kEpoch, StaticSet::empty());
   UpdateBatch insert;

@@ -1,4 +1,4 @@
-// Views of a scene, those who wait for a revision, and its end.
+// Tests views of a scene, waiting for a revision, and closing.
 #include "core/scene/scene.h"
 
 #include <atomic>
@@ -15,7 +15,7 @@ using Deadline = std::chrono::steady_clock::time_point;
 class SceneTest : public SceneFixture {
  protected:
   static constexpr Deadline kNow = Deadline::min();
-  // Late enough that a test that reaches it hangs for good reason.
+  // Deadline so late that only a deadlock reaches it.
   static Deadline far_away() { return std::chrono::steady_clock::now() + std::chrono::minutes(10); }
 
   static View exactly(uint64_t revision) { return {View::Kind::kExactly, revision, 0}; }
@@ -54,7 +54,7 @@ TEST_F(SceneTest, AtLeastALaterRevisionEndsAtTheDeadline) {
                  "view.at_least");
 }
 
-TEST_F(SceneTest, AtLeastWaitsUntilTheRevisionIsThere) {
+TEST_F(SceneTest, AtLeastWaitsUntilTheRevisionIsPublished) {
   std::atomic<bool> seen{false};
   std::thread waiter([&] {
     const auto snapshot = scene_.view(at_least(2), far_away());
@@ -69,7 +69,7 @@ TEST_F(SceneTest, AtLeastWaitsUntilTheRevisionIsThere) {
   EXPECT_TRUE(seen);
 }
 
-TEST_F(SceneTest, AStaticChangeWakesThoseWhoWaitForItsRevision) {
+TEST_F(SceneTest, AStaticChangeWakesWaitersOfItsRevision) {
   std::thread waiter([&] {
     const auto snapshot = scene_.view(at_least(1), far_away());
     ASSERT_TRUE(snapshot.ok());
@@ -79,7 +79,7 @@ TEST_F(SceneTest, AStaticChangeWakesThoseWhoWaitForItsRevision) {
   waiter.join();
 }
 
-TEST_F(SceneTest, ExactlyGivesARecentRevisionAsItWas) {
+TEST_F(SceneTest, ExactlyReturnsARecentRevisionUnchanged) {
   apply(with(points({1}, {1, 0, 0})));
   apply(with(move_to({1}, {2, 0, 0})));
   apply(removing({1}));
@@ -94,15 +94,15 @@ TEST_F(SceneTest, ExactlyTheNextRevisionIsOutOfRange) {
   expect_outside(4, "0 to 3");
 }
 
-TEST_F(SceneTest, AsManyRevisionsAreKeptAsTheLimitSays) {
+TEST_F(SceneTest, AtMostTheLimitOfRecentRevisionsIsKept) {
   tick(limits::kRecentRevisions + 5);
   const uint64_t newest = limits::kRecentRevisions + 5, oldest = newest - limits::kRecentRevisions + 1;
   EXPECT_EQ((*scene_.view(exactly(oldest), kNow))->revision, oldest);
   expect_outside(oldest - 1, std::to_string(oldest) + " to " + std::to_string(newest));
 }
 
-TEST_F(SceneTest, RevisionsAreKeptWhileWhatTheyReplacedTakesAtMostTheLimit) {
-  // Between a sixth and a fifth of the limit each time that all objects move.
+TEST_F(SceneTest, RecentRevisionsAreDroppedBeyondTheLimitOfReplacedBytes) {
+  // Each move of all objects replaces between a sixth and a fifth of the limit.
   std::vector<Id> all(limits::kRecentBytes / 420);
   for (uint64_t i = 0; i < all.size(); ++i) all[i] = i + 1;
   apply(with(points(all, {0, 0, 0})));
@@ -113,7 +113,7 @@ TEST_F(SceneTest, RevisionsAreKeptWhileWhatTheyReplacedTakesAtMostTheLimit) {
   EXPECT_EQ((*scene_.view(exactly(2), kNow))->objects.find(1)->shape.position.x, 1);
 }
 
-TEST_F(SceneTest, ForgettingKeepsTheLatestRevisionAndThoseToCome) {
+TEST_F(SceneTest, ForgetRecentKeepsTheLatestRevisionAndLaterOnes) {
   tick(3);
   scene_.forget_recent();
   expect_outside(2, "3 to 3");
@@ -129,9 +129,9 @@ TEST_F(SceneTest, AnotherEpochIsRefusedByEveryView) {
                    Reason::kSceneRestarted, "view.epoch");
 }
 
-TEST_F(SceneTest, TheSameEpochIsFine) { EXPECT_TRUE(scene_.view({View::Kind::kExactly, 0, kEpoch}, kNow).ok()); }
+TEST_F(SceneTest, TheSameEpochIsAccepted) { EXPECT_TRUE(scene_.view({View::Kind::kExactly, 0, kEpoch}, kNow).ok()); }
 
-TEST_F(SceneTest, CloseWakesThoseWhoWait) {
+TEST_F(SceneTest, CloseWakesAllWaiters) {
   std::vector<std::thread> waiters;
   for (int i = 0; i < 3; ++i)
     waiters.emplace_back([&] {
@@ -180,7 +180,7 @@ TEST_F(SceneTest, WrongFormIsRefusedAndChangesNothing) {
   EXPECT_TRUE(ids().empty());
 }
 
-TEST_F(SceneTest, TheFailureOfAChangeIsRememberedWhateverComesAfter) {
+TEST_F(SceneTest, TheLastBuildErrorIsKeptAfterLaterSuccesses) {
   EXPECT_EQ(scene_.status().last_build_error, "");
   EXPECT_FALSE(scene_.change_instances(placing(placement({0}, {0, 0, 0}))).ok());
   EXPECT_TRUE(scene_.change_instances(placing(placement({1}, {0, 0, 0}))).ok());

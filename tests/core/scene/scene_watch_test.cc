@@ -1,4 +1,4 @@
-// Those who are told that a scene reached a revision, instead of waiting for it.
+// Tests Scene::Watch, the notification that a scene reached a revision.
 #include <atomic>
 #include <optional>
 #include <thread>
@@ -18,64 +18,64 @@ class SceneWatchTest : public SceneFixture {
   }
 
   std::function<void()> count() {
-    return [this] { ++told_; };
+    return [this] { ++notified_; };
   }
 
-  std::atomic<int> told_{0};
+  std::atomic<int> notified_{0};
 };
 
-TEST_F(SceneWatchTest, AWatchTellsAtOnceWhereTheRevisionIsReached) {
+TEST_F(SceneWatchTest, AWatchNotifiesAtOnceIfTheRevisionIsReached) {
   tick();
   const Scene::Watch reached(scene_, 1, count());
-  EXPECT_EQ(told_, 1);
+  EXPECT_EQ(notified_, 1);
   const Scene::Watch passed(scene_, 0, count());
-  EXPECT_EQ(told_, 2);
+  EXPECT_EQ(notified_, 2);
 }
 
-TEST_F(SceneWatchTest, AWatchTellsOnceWhenItsRevisionIsPublishedAndNotSooner) {
+TEST_F(SceneWatchTest, AWatchNotifiesOnceWhenItsRevisionIsPublished) {
   const Scene::Watch watch(scene_, 2, count());
   tick();
-  EXPECT_EQ(told_, 0);
+  EXPECT_EQ(notified_, 0);
   tick();
-  EXPECT_EQ(told_, 1);
+  EXPECT_EQ(notified_, 1);
   tick();
-  EXPECT_EQ(told_, 1);
+  EXPECT_EQ(notified_, 1);
 }
 
-TEST_F(SceneWatchTest, EveryWatchOfARevisionTells) {
+TEST_F(SceneWatchTest, EveryWatchOfARevisionNotifies) {
   const Scene::Watch first(scene_, 1, count());
   const Scene::Watch second(scene_, 1, count());
   const Scene::Watch later(scene_, 2, count());
   tick();
-  EXPECT_EQ(told_, 2);
+  EXPECT_EQ(notified_, 2);
 }
 
-TEST_F(SceneWatchTest, AWatchThatIsGoneDoesNotTell) {
+TEST_F(SceneWatchTest, ADestroyedWatchDoesNotNotify) {
   { const Scene::Watch watch(scene_, 1, count()); }
   tick();
-  EXPECT_EQ(told_, 0);
+  EXPECT_EQ(notified_, 0);
 }
 
-TEST_F(SceneWatchTest, AWatchTellsWhenTheSceneIsClosed) {
+TEST_F(SceneWatchTest, AWatchNotifiesWhenTheSceneIsClosed) {
   const Scene::Watch before(scene_, 99, count());
   scene_.close();
-  EXPECT_EQ(told_, 1);
+  EXPECT_EQ(notified_, 1);
   const Scene::Watch after(scene_, 99, count());
-  EXPECT_EQ(told_, 2);
+  EXPECT_EQ(notified_, 2);
 }
 
-TEST_F(SceneWatchTest, WatchesComeAndGoWhileTheSceneIsWritten) {
+TEST_F(SceneWatchTest, WatchesAreCreatedAndDestroyedDuringUpdates) {
   constexpr uint64_t kRevisions = 2000;
   std::atomic<bool> over{false};
   std::thread watcher([&] {
     for (uint64_t revision = 1; !over; revision = scene_.latest()->revision + 1) {
-      std::atomic<int> told{0};
+      std::atomic<int> notified{0};
       std::optional<Scene::Watch> watch;
-      watch.emplace(scene_, revision, [&told] { ++told; });
+      watch.emplace(scene_, revision, [&notified] { ++notified; });
       if (revision % 2 == 0) watch.reset();
-      while (watch && told == 0 && !over) std::this_thread::yield();
+      while (watch && notified == 0 && !over) std::this_thread::yield();
       watch.reset();
-      EXPECT_LE(told, 1);
+      EXPECT_LE(notified, 1);
     }
   });
   for (uint64_t i = 0; i < kRevisions; ++i) tick();

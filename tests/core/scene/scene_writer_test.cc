@@ -1,4 +1,4 @@
-// Revisions, ticks and writers' numbers, asked of a scene.
+// Tests revisions, ticks and batch numbers of writers, through a scene.
 #include "core/scene/scene_writer.h"
 
 #include "core/base/limits.h"
@@ -44,7 +44,7 @@ TEST_F(SceneWriterTest, AnEmptyBatchMakesNoRevision) {
   EXPECT_EQ(scene_.latest(), before);
 }
 
-TEST_F(SceneWriterTest, AMoveToTheSamePlaceMakesNoRevision) {
+TEST_F(SceneWriterTest, AMoveToTheSamePositionMakesNoRevision) {
   apply(with(points({1}, {1, 2, 3})));
   const UpdateAck ack = apply(with(move_to({1}, {1, 2, 3})));
   EXPECT_EQ(ack.applied, 1u);
@@ -147,7 +147,7 @@ TEST_F(SceneWriterTest, AGapIsRefusedWithTheNumberExpected) {
   EXPECT_TRUE(ids().empty());
 }
 
-TEST_F(SceneWriterTest, AnUnknownWriterBeginsAtOne) { expect_gap(numbered({}, 9, 2), 1); }
+TEST_F(SceneWriterTest, AnUnknownWriterMustStartAtBatchOne) { expect_gap(numbered({}, 9, 2), 1); }
 
 TEST_F(SceneWriterTest, ARefusedBatchDoesNotUseUpItsNumber) {
   UpdateBatch batch = numbered(removing({1}), 9, 1);
@@ -164,7 +164,7 @@ TEST_F(SceneWriterTest, ABatchThatChangesNothingUsesUpItsNumber) {
   EXPECT_TRUE(ids().empty());
 }
 
-TEST_F(SceneWriterTest, WritersCountForThemselves) {
+TEST_F(SceneWriterTest, WritersNumberTheirBatchesIndependently) {
   apply(numbered(with(points({1}, {0, 0, 0})), 1, 1));
   apply(numbered(with(points({2}, {0, 0, 0})), 2, 1));
   apply(numbered(with(points({3}, {0, 0, 0})), 1, 2));
@@ -178,7 +178,7 @@ TEST_F(SceneWriterTest, BatchesWithoutWriterAreAppliedEachTime) {
   EXPECT_EQ(apply(with(points({1}, {0, 0, 0}))).refused, 1u);
 }
 
-TEST_F(SceneWriterTest, AcksThatListTooManyErrorsAreForgottenButNotTheirNumbers) {
+TEST_F(SceneWriterTest, AcksWithTooManyErrorsAreDroppedButBatchNumbersAreKept) {
   const std::vector<Id> unknown(limits::kMaxListedItemErrors, 5);
   const uint64_t writers = WriterTable::kMaxKeptErrors / limits::kMaxListedItemErrors + 1;
   for (uint64_t writer = 1; writer <= writers; ++writer) apply(numbered(removing(unknown), writer, 1));
@@ -190,9 +190,9 @@ TEST_F(SceneWriterTest, AcksThatListTooManyErrorsAreForgottenButNotTheirNumbers)
   EXPECT_EQ(apply(numbered({}, writers, 1)).errors.size(), limits::kMaxListedItemErrors);
 }
 
-TEST_F(SceneWriterTest, TheWritersThatWroteLastAreRemembered) {
+TEST_F(SceneWriterTest, TheLeastRecentlyActiveWriterIsEvicted) {
   for (uint64_t writer = 1; writer <= limits::kMaxWriters; ++writer) apply(numbered({}, writer, 1));
-  apply(numbered({}, 1, 2));  // so that writer 2 is the one heard longest ago
+  apply(numbered({}, 1, 2));  // now writer 2 is the least recently active one
   apply(numbered({}, limits::kMaxWriters + 1, 1));
   expect_gap(numbered({}, 2, 2), 1);
   EXPECT_TRUE(apply(numbered({}, 1, 2)).duplicate);

@@ -19,7 +19,7 @@ SceneSpec full_spec() {
   return spec;
 }
 
-TEST(SpecCodecTest, ASpecificationComesBackAsItWas) {
+TEST(SpecCodecTest, ASpecificationRoundTrips) {
   const absl::StatusOr<SceneSpec> spec = decode_spec(encode_spec(full_spec()));
   ASSERT_TRUE(spec.ok()) << spec.status();
   EXPECT_EQ(spec->labels, full_spec().labels);

@@ -34,7 +34,7 @@ absl::StatusOr<std::vector<MeshPart>> read_parts(const std::vector<std::string>&
   return std::move(reader).finish(triangles);
 }
 
-// Vertices that no triangle uses, parts, and triangles without area.
+// Makes a mesh with unused vertices, parts, and triangles without area.
 std::shared_ptr<const StaticMesh> random_mesh(Random& random, uint32_t vertices, uint32_t triangles, size_t parts) {
   std::vector<float> numbers(size_t{3} * vertices);
   for (float& number : numbers) number = random.float_between(-100, 100);
@@ -46,7 +46,7 @@ std::shared_ptr<const StaticMesh> random_mesh(Random& random, uint32_t vertices,
   return *StaticMesh::build("mesh", {}, *TriangleMesh::create(numbers, indices, runs));
 }
 
-TEST(MeshCodecTest, AMeshComesBackAsItWasUploadedHoweverManyChunksItTakes) {
+TEST(MeshCodecTest, AMeshOfAnyNumberOfChunksRoundTrips) {
   Random random(1);
   for (const uint32_t triangles : {1u, 300u, 150'000u}) {
     const auto mesh = random_mesh(random, 200'000, triangles, triangles / 20);

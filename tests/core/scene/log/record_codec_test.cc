@@ -1,4 +1,4 @@
-// Records of batches and static changes: there and back, and back from damaged bytes.
+// Tests encoding and decoding of records, and decoding of damaged bytes.
 #include "core/scene/log/record_codec.h"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ std::string encoded(const UpdateBatch& batch) {
   return bytes;
 }
 
-// NaNs are numbers like others here.
+// Compares bits, so that equal NaNs compare equal.
 template <class T>
 bool same(absl::Span<const T> a, absl::Span<const T> b) {
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
@@ -52,7 +52,7 @@ bool all_same(const List& a, const List& b, const Same& is_same) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), is_same);
 }
 
-// `b` may lack what `a` has to no purpose.
+// Returns true if `b` equals `a`, except for columns that the shape's kind does not use.
 bool same_batch(const UpdateBatch& a, const UpdateBatch& b) {
   return a.frame == b.frame && a.tick == b.tick && a.clear == b.clear && same(a.remove_ids, b.remove_ids) &&
          same(a.remove_groups, b.remove_groups) && all_same(a.inserts, b.inserts, same_insert) &&
@@ -63,7 +63,7 @@ bool same_batch(const UpdateBatch& a, const UpdateBatch& b) {
 
 class RecordCodecTest : public SceneFixture {};
 
-TEST_F(RecordCodecTest, RandomBatchesComeBackAsTheyWere) {
+TEST_F(RecordCodecTest, RandomBatchesRoundTrip) {
   Random random(1);
   RandomUpdates updates(random, 40);
   for (uint64_t i = 0; i < scaled_count(2000); ++i) {
@@ -98,7 +98,7 @@ TEST_F(RecordCodecTest, BytesAtAnyAddressAreReadAndTheRecordMayBeMoved) {
   }
 }
 
-TEST_F(RecordCodecTest, JoinedBatchesStayApart) {
+TEST_F(RecordCodecTest, JoinedBatchesAreDecodedSeparately) {
   const UpdateBatch first = numbered(with(move_to({1}, {1, 0, 0})), 3, 1);
   const UpdateBatch second = numbered(with(move_to({2}, {2, 0, 0})), 3, 2);
   const UpdateBatch* const both[] = {&first, &second};
@@ -176,14 +176,14 @@ TEST_F(RecordCodecTest, WhatIsWrongIsNamed) {
   EXPECT_EQ(Record::decode(bytes).status(), absl::DataLossError("the kind of a record is not known"));
 }
 
-TEST_F(RecordCodecTest, ABatchOfWrongFormIsRefusedWithTheFieldThatIs) {
+TEST_F(RecordCodecTest, ABatchOfWrongFormIsRefusedNamingTheField) {
   UpdateBatch wrong = with(points({1, 2, 3}, {0, 0, 0, 1, 1, 1}));
   const absl::Status status = Record::decode(encoded(wrong)).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
   EXPECT_THAT(status.message(), HasSubstr("inserts[0].positions"));
 }
 
-// What is found in damaged bytes, if anything, can be applied like anything else.
+// A batch decoded from damaged bytes can be applied like any other.
 TEST_F(RecordCodecTest, DamagedBytesNeverHarm) {
   Random random(2);
   RandomUpdates updates(random, 40);

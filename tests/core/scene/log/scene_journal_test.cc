@@ -1,4 +1,4 @@
-// A scene with a log: what it writes down and when, and what becomes of it when it cannot.
+// Tests which records a scene appends to its log, when, and how it handles log errors.
 #include "core/scene/log/scene_journal.h"
 
 #include <gmock/gmock.h>
@@ -54,7 +54,7 @@ TEST_F(SceneJournalTest, EachRevisionIsARecordWithItsEpochAndBatch) {
   EXPECT_EQ(sequence(), 2u);
 }
 
-TEST_F(SceneJournalTest, WhatTheWriterTableCanTellIsNotLogged) {
+TEST_F(SceneJournalTest, BatchesAnsweredByTheWriterTableAreNotLogged) {
   const UpdateBatch first = numbered(with(points({1}, {0, 0, 0})), 9, 1);
   ASSERT_TRUE(logged_->apply(first).ok());
   EXPECT_TRUE(logged_->apply(first)->duplicate);
@@ -69,7 +69,7 @@ TEST_F(SceneJournalTest, ABatchOfWrongFormIsNotLogged) {
   EXPECT_EQ(sequence(), 0u);
 }
 
-TEST_F(SceneJournalTest, SeveralBatchesAreLoggedByOneAppendAndGetWhatTheyWouldAlone) {
+TEST_F(SceneJournalTest, SeveralBatchesAreLoggedByOneAppendAndGetTheSameAcksAsAlone) {
   const UpdateBatch first = numbered(with(points({1}, {0, 0, 0})), 9, 1);
   const UpdateBatch refused = [&] {
     UpdateBatch batch = removing({77});
@@ -91,7 +91,7 @@ TEST_F(SceneJournalTest, SeveralBatchesAreLoggedByOneAppendAndGetWhatTheyWouldAl
   EXPECT_EQ(sequence(), 5u);
 }
 
-TEST_F(SceneJournalTest, OfSeveralBatchesThoseThatWereAppliedBeforeAreNotLogged) {
+TEST_F(SceneJournalTest, LeadingDuplicatesAmongSeveralBatchesAreNotLogged) {
   const UpdateBatch first = numbered(with(points({1}, {0, 0, 0})), 9, 1);
   ASSERT_TRUE(logged_->apply(first).ok());
   const auto acks = logged_->apply_each(borrowed({first, first}));
@@ -99,12 +99,12 @@ TEST_F(SceneJournalTest, OfSeveralBatchesThoseThatWereAppliedBeforeAreNotLogged)
   EXPECT_EQ(log_.appends(), 1u);
 }
 
-TEST_F(SceneJournalTest, NoBatchesAreNoRecord) {
+TEST_F(SceneJournalTest, AnEmptyListOfBatchesAppendsNoRecord) {
   EXPECT_THAT(*logged_->apply_each({}), IsEmpty());
   EXPECT_EQ(log_.appends(), 0u);
 }
 
-TEST_F(SceneJournalTest, WhereTheLogRefusesNothingHasChangedAndItWorksOnceTheLogDoes) {
+TEST_F(SceneJournalTest, AfterALogErrorNothingHasChangedAndTheNextAttemptSucceeds) {
   registry_.add_mesh("m", mesh_).IgnoreError();
   const UpdateBatch insert = numbered(with(points({1}, {0, 0, 0})), 9, 1);
   const UpdateBatch move = numbered(with(move_to({1}, {1, 0, 0})), 9, 1);
@@ -123,7 +123,7 @@ TEST_F(SceneJournalTest, WhereTheLogRefusesNothingHasChangedAndItWorksOnceTheLog
   EXPECT_EQ(sequence(), 2u);
 }
 
-TEST_F(SceneJournalTest, OnlyWhatWasSyncedOutlivesTheMachineAndAStaticChangeSyncsWhatWasBefore) {
+TEST_F(SceneJournalTest, OnlySyncedRecordsSurviveACrashAndAStaticChangeSyncsEarlierRecords) {
   registry_.add_mesh("m", mesh_).IgnoreError();
   SceneSpec spec;
   spec.durability = Durability::kMemory;
@@ -136,7 +136,7 @@ TEST_F(SceneJournalTest, OnlyWhatWasSyncedOutlivesTheMachineAndAStaticChangeSync
   EXPECT_EQ(log_.crash().scenes.at(key_).records.size(), 1u);
 }
 
-TEST_F(SceneJournalTest, ThePositionTellsHowMuchWasLoggedSinceTheSnapshot) {
+TEST_F(SceneJournalTest, ThePositionCountsTheBytesLoggedSinceTheSnapshot) {
   ASSERT_TRUE(logged_->apply(with(points({1}, {0, 0, 0}))).ok());
   const uint64_t first = logged_->log_position().bytes;
   EXPECT_EQ(first, records(key_)[0].bytes->size());
@@ -155,7 +155,7 @@ TEST_F(SceneJournalTest, ThePositionTellsHowMuchWasLoggedSinceTheSnapshot) {
   EXPECT_EQ(logged_->log_position().snapshot_sequence, 2u);
 }
 
-TEST_F(SceneJournalTest, ReadersSeeTheRevisionBeforeWhileTheDiskIsWaitedFor) {
+TEST_F(SceneJournalTest, ReadersSeeThePreviousRevisionWhileTheWriterWaitsForTheDisk) {
   ASSERT_TRUE(logged_->apply(with(points({1}, {0, 0, 0}))).ok());
   log_.hold();
   std::thread writer([&] { EXPECT_EQ(logged_->apply(with(move_to({1}, {1, 0, 0})))->revision, 2u); });
@@ -171,7 +171,7 @@ TEST_F(SceneJournalTest, ReadersSeeTheRevisionBeforeWhileTheDiskIsWaitedFor) {
   EXPECT_EQ(logged_->latest()->revision, 2u);
 }
 
-TEST_F(SceneJournalTest, ASceneIsDeletedOnlyOnceWhatIsAtWorkIsAcknowledged) {
+TEST_F(SceneJournalTest, DeletingASceneWaitsUntilRunningUpdatesAreAcknowledged) {
   log_.hold();
   std::thread writer([&] { EXPECT_TRUE(logged_->apply(with(points({1}, {0, 0, 0}))).ok()); });
   log_.wait_for_writer();

@@ -1,4 +1,4 @@
-// A scene's state in chunks, written by StateWriter and read again: whole, cut to pieces, and damaged.
+// Tests StateWriter and StateReader together: complete, incomplete and damaged chunks.
 #include "core/scene/log/state_reader.h"
 
 #include <gmock/gmock.h>
@@ -73,7 +73,7 @@ TEST_F(StateReaderTest, AnEmptySceneIsOneChunk) {
   EXPECT_EQ(scene_difference(**again, scene_, random_), "");
 }
 
-TEST_F(StateReaderTest, RandomScenesComeBackAsTheyWereAndGoOnAlike) {
+TEST_F(StateReaderTest, RestoredRandomScenesEqualTheOriginalsAndContinueAlike) {
   for (uint64_t seed = 0; seed < scaled_count(40); ++seed) {
     live(seed, 60);
     const auto again = read(written());
@@ -173,7 +173,7 @@ TEST_F(StateReaderTest, AChunkThatIsMissingOrThereTwiceIsSeen) {
   }
 }
 
-TEST_F(StateReaderTest, AMeshThatIsNotThereIsSeen) {
+TEST_F(StateReaderTest, AMissingMeshIsDetected) {
   live(1, 5);
   mesh_ = nullptr;
   EXPECT_THAT(read(written()).status().message(), HasSubstr("a mesh that instances use is not there"));

@@ -25,7 +25,7 @@ std::string encoded(const std::vector<Triangle>& triangles) {
   return encode_outline(TriangleBvh::build(triangles)->topology());
 }
 
-TEST(TreeCodecTest, AnOutlineComesBackAndTakesFiveBytesATriangle) {
+TEST(TreeCodecTest, ATopologyRoundTripsAndTakesFiveBytesATriangle) {
   for (const std::vector<Triangle>& triangles : {bumpy_sphere(40, 0.05, 6), box_city(1, 1)}) {
     const TriangleBvh built = *TriangleBvh::build(triangles);
     const std::string bytes = encode_outline(built.topology());
@@ -39,14 +39,14 @@ TEST(TreeCodecTest, AnOutlineComesBackAndTakesFiveBytesATriangle) {
   }
 }
 
-TEST(TreeCodecTest, TheOutlineOfAnotherBuilderIsRefused) {
+TEST(TreeCodecTest, TheTopologyOfAnotherBuilderVersionIsRefused) {
   std::string bytes = encoded(box_city(1, 1));
   ++bytes[8];
   EXPECT_EQ(restore(bytes, box_city(1, 1)).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-// Why an outline does not say on which one it was made.
-TEST(TreeCodecTest, EveryInstructionSetMakesTheSameOutline) {
+// A topology does not record the instruction set, because the trees are equal.
+TEST(TreeCodecTest, EveryInstructionSetMakesTheSameTopology) {
   const std::string bytes = encoded(bumpy_sphere(40, 0.05, 6));
   for (const std::string& name : instruction_sets()) {
     ASSERT_TRUE(use_instruction_set(name).ok());
@@ -55,15 +55,15 @@ TEST(TreeCodecTest, EveryInstructionSetMakesTheSameOutline) {
   ASSERT_TRUE(use_instruction_set("").ok());
 }
 
-class DamagedOutlineTest : public ::testing::Test {
+class DamagedTopologyTest : public ::testing::Test {
  protected:
-  DamagedOutlineTest() : scene_(make_scene<Triangle>(random_scene(random_), random_)) {
+  DamagedTopologyTest() : scene_(make_scene<Triangle>(random_scene(random_), random_)) {
     number_in_order(scene_.values);
     oracle_ = make_list(scene_.values);
     bytes_ = encoded(scene_.values);
   }
 
-  // Whether a tree comes of them; if so, one that answers right.
+  // Returns true if a tree can be restored from the bytes, and expects correct answers from it.
   bool is_taken(const std::string& bytes) {
     const absl::StatusOr<TriangleBvh> tree = restore(bytes, scene_.values);
     if (!tree.ok()) return false;
@@ -77,8 +77,8 @@ class DamagedOutlineTest : public ::testing::Test {
   std::string bytes_;
 };
 
-// Kind, builder and count, then the numbers.
-TEST_F(DamagedOutlineTest, NumbersThatChangedPlacesAreTakenAndAnswersStayRight) {
+// The triangle numbers follow the kind, the builder version and their count.
+TEST_F(DamagedTopologyTest, ASwapOfTriangleNumbersIsAcceptedAndAnswersStayCorrect) {
   constexpr size_t kNumbers = 24;
   ASSERT_GT(scene_.values.size(), 20u);
   for (uint64_t i = 0; i < scaled_count(300); ++i) {
@@ -93,15 +93,15 @@ TEST_F(DamagedOutlineTest, NumbersThatChangedPlacesAreTakenAndAnswersStayRight) 
   }
 }
 
-TEST_F(DamagedOutlineTest, AnyBytesAreRefusedOrAnswersStayRight) {
+TEST_F(DamagedTopologyTest, RandomDamageIsRefusedOrAnswersStayCorrect) {
   uint64_t refused = 0;
   for (uint64_t i = 0; i < scaled_count(20'000); ++i) refused += is_taken(damaged(bytes_, random_)) ? 0 : 1;
   EXPECT_GT(refused, scaled_count(10'000));
 }
 
-// If this fails, the builder makes other trees than it did: raise kBvhBuilderVersion and put the new number here, so
-// that data directories with outlines of the trees before get the new ones.
-TEST(TreeCodecTest, TheBuilderOfThisVersionMakesTheseTrees) {
+// If this fails, the builder makes different trees: raise kBvhBuilderVersion and update the values here, so that
+// topologies cached in data directories are rebuilt.
+TEST(TreeCodecTest, TheTreesOfThisBuilderVersionHaveTheRecordedHash) {
   uint64_t hash = 14'695'981'039'346'656'037u;  // FNV-1a
   for (const char byte : encoded(box_city(9, 3))) hash = (hash ^ static_cast<uint8_t>(byte)) * 1'099'511'628'211u;
   EXPECT_EQ(kBvhBuilderVersion, 1u);

@@ -36,32 +36,33 @@ void expect_holds(const ObjectSet& set, const std::map<Id, Object>& model) {
   for (const auto& [id, object] : model) EXPECT_EQ(set.find(id), object) << id;
 }
 
-// Every part of an object comes back as it was given, whatever shares its brick and however often that is sorted anew.
-TEST(ObjectStoreTest, SetsHoldWhatAMapHoldsThroughRandomChanges) {
+// Every field of an object is returned as stored, whatever else its brick contains and however often that is rebuilt.
+TEST(ObjectStoreTest, SetsEqualAReferenceMapAfterRandomChanges) {
   Random random(11);
   ObjectStore store;
   std::map<Id, Object> model;
   std::vector<std::pair<ObjectSet, std::map<Id, Object>>> kept;
   for (int batch = 0; batch < 300; ++batch) {
-    std::vector<Object> gone, come;
+    std::vector<Object> removed, added;
     for (int i = 0; i < 20; ++i) {
       const Id id = 1 + random.below(600);
       const auto taken = [id](const Object& object) { return object.id == id; };
-      if (std::any_of(come.begin(), come.end(), taken) || std::any_of(gone.begin(), gone.end(), taken)) continue;
+      if (std::any_of(added.begin(), added.end(), taken) || std::any_of(removed.begin(), removed.end(), taken))
+        continue;
       const auto known = model.find(id);
-      if (known != model.end()) gone.push_back(known->second);
-      if (known == model.end() || random.chance(0.7)) come.push_back(random_object(id, random));
+      if (known != model.end()) removed.push_back(known->second);
+      if (known == model.end() || random.chance(0.7)) added.push_back(random_object(id, random));
     }
-    store.apply(gone, come);
-    for (const Object& object : gone) model.erase(object.id);
-    for (const Object& object : come) model[object.id] = object;
+    store.apply(removed, added);
+    for (const Object& object : removed) model.erase(object.id);
+    for (const Object& object : added) model[object.id] = object;
     if (batch % 50 == 0) kept.emplace_back(store.snapshot(), model);
   }
   expect_holds(store.snapshot(), model);
   for (const auto& [set, expected] : kept) expect_holds(set, expected);
 }
 
-TEST(ObjectStoreTest, MovesOfFewAmongManyLeaveTheOthersWhereTheyAre) {
+TEST(ObjectStoreTest, MovesOfAFewObjectsLeaveAllOthersUnchanged) {
   Random random(12);
   ObjectStore store;
   std::vector<Object> objects;
@@ -102,7 +103,7 @@ TEST(ObjectStoreTest, AnUnknownIdHasNoHandleAndNoObject) {
   EXPECT_FALSE(store.snapshot().find_ref(5));
 }
 
-TEST(ObjectStoreTest, AHandleThatIsUsedAgainNamesTheNewObjectAndInOlderSetsTheOld) {
+TEST(ObjectStoreTest, AReusedHandleNamesTheNewObjectAndTheOldOneInOlderSets) {
   ObjectStore store;
   Object first, second;
   first.id = 1;

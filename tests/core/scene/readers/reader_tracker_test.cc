@@ -1,4 +1,4 @@
-// Through a scene: what readers may hold of it, and what becomes of updates meanwhile.
+// Tests ReaderTracker through a scene: the memory that readers may hold, and the updates that wait for them.
 #include "core/scene/readers/reader_tracker.h"
 
 #include <atomic>
@@ -15,7 +15,7 @@ class ReaderTrackerTest : public SceneFixture {
  protected:
   static constexpr Scene::Deadline kNow = Scene::Deadline::min();
 
-  // Four times what all objects take.
+  // Budget of four times the memory of all objects.
   static constexpr uint64_t kObjects = 2'000;
   static constexpr uint64_t kBudget = 4 * 300 * kObjects;
   static SceneSpec bounded(uint64_t budget) {
@@ -33,16 +33,16 @@ class ReaderTrackerTest : public SceneFixture {
     apply(with(points(all_, positions)));
   }
 
-  // Moves all objects: nothing of the revision before remains.
+  // Returns a batch that moves all objects, so that no object of the previous revision is shared.
   UpdateBatch step() {
     return with(move_to(all_, std::vector<float>(3 * all_.size(), float(scene_.latest()->revision))));
   }
-  // Where it need not wait.
+  // Applies a step; fails if it would have to wait.
   absl::Status step_now() { return scene_.apply(step(), kNow).status(); }
 
   SnapshotPin pin(const View& view = {}) { return *scene_.pin(view, kNow); }
 
-  // Pins a revision, replaces it, and so on until a pin is told to end.
+  // Pins each revision and replaces it until a pin is revoked.
   std::vector<SnapshotPin> pin_too_much() {
     std::vector<SnapshotPin> pins;
     while (pins.empty() || pins.front().status().ok()) {
@@ -55,18 +55,18 @@ class ReaderTrackerTest : public SceneFixture {
   std::vector<Id> all_;
 };
 
-class PinLedgerDefaultTest : public ReaderTrackerTest {
+class ReaderTrackerDefaultTest : public ReaderTrackerTest {
  protected:
-  PinLedgerDefaultTest() : ReaderTrackerTest(0) {}
+  ReaderTrackerDefaultTest() : ReaderTrackerTest(0) {}
 };
 
-TEST_F(ReaderTrackerTest, WhoReadsTheLatestRevisionHoldsNothingBack) {
+TEST_F(ReaderTrackerTest, ReadersOfTheLatestRevisionHoldNothing) {
   const SnapshotPin latest = pin();
   EXPECT_EQ(scene_.status().pinned_bytes, 0u);
   EXPECT_EQ(scene_.status().max_pinned_bytes, kBudget);
 }
 
-TEST_F(ReaderTrackerTest, WhatReadersHoldIsCountedOnce) {
+TEST_F(ReaderTrackerTest, SharedMemoryOfReadersIsCountedOnce) {
   const SnapshotPin first = pin(), again = pin();
   EXPECT_TRUE(step_now().ok());
   const SnapshotPin second = pin();
@@ -74,7 +74,7 @@ TEST_F(ReaderTrackerTest, WhatReadersHoldIsCountedOnce) {
   EXPECT_EQ(scene_.status().pinned_bytes, unshared_bytes(*first, *second) + unshared_bytes(*second, *scene_.latest()));
 }
 
-TEST_F(ReaderTrackerTest, AReaderWithinTheBudgetIsNeverToldToEndHoweverMuchIsReplaced) {
+TEST_F(ReaderTrackerTest, AReaderWithinTheBudgetIsNeverRevoked) {
   const SnapshotPin reader = pin();
   while (scene_.latest()->replaced_bytes - reader->replaced_bytes < 10 * kBudget) ASSERT_TRUE(step_now().ok());
   EXPECT_TRUE(reader.status().ok());
@@ -82,20 +82,20 @@ TEST_F(ReaderTrackerTest, AReaderWithinTheBudgetIsNeverToldToEndHoweverMuchIsRep
   EXPECT_EQ(reader->objects.find(1)->shape.position.x, 1);
 }
 
-TEST_F(ReaderTrackerTest, TheOldestAreToldToEndAndNoMoreThanItTakes) {
+TEST_F(ReaderTrackerTest, OnlyTheOldestPinsAreRevokedUntilTheRestFitsTheBudget) {
   const std::vector<SnapshotPin> pins = pin_too_much();
   ASSERT_GE(pins.size(), 3u);
   for (size_t i = 1; i < pins.size(); ++i) EXPECT_TRUE(pins[i].status().ok()) << i;
 }
 
-TEST_F(ReaderTrackerTest, AllWhoReadThatRevisionAreToldToEnd) {
+TEST_F(ReaderTrackerTest, AllReadersOfARevokedRevisionAreRevoked) {
   const SnapshotPin first = pin();
   const std::vector<SnapshotPin> pins = pin_too_much();
   EXPECT_FALSE(first.status().ok());
   EXPECT_FALSE(pins.front().status().ok());
 }
 
-TEST_F(ReaderTrackerTest, WhoIsToldToEndLearnsTheLimit) {
+TEST_F(ReaderTrackerTest, ARevokedReaderGetsAnErrorThatNamesTheLimit) {
   const absl::Status status = pin_too_much().front().status();
   expect_refusal(status, absl::StatusCode::kResourceExhausted, Reason::kLimit, "");
   const Refusal refusal = *refusal_of(status);
@@ -106,7 +106,7 @@ TEST_F(ReaderTrackerTest, WhoIsToldToEndLearnsTheLimit) {
   EXPECT_NE(status.message().find("Ask again, in smaller batches"), absl::string_view::npos) << status;
 }
 
-TEST_F(ReaderTrackerTest, UpdatesWaitUntilThoseToldToEndHave) {
+TEST_F(ReaderTrackerTest, UpdatesWaitUntilRevokedPinsAreReleased) {
   std::vector<SnapshotPin> pins = pin_too_much();
   const uint64_t before = revision();
   const absl::Status status = step_now();
@@ -120,14 +120,14 @@ TEST_F(ReaderTrackerTest, UpdatesWaitUntilThoseToldToEndHave) {
   EXPECT_TRUE(step_now().ok());
 }
 
-TEST_F(ReaderTrackerTest, QueriesAreServedMeanwhile) {
+TEST_F(ReaderTrackerTest, QueriesAreServedWhileUpdatesWaitForReaders) {
   const std::vector<SnapshotPin> pins = pin_too_much();
   const SnapshotPin latest = pin();
   EXPECT_EQ(latest->revision, revision());
   EXPECT_TRUE(latest.status().ok());
 }
 
-TEST_F(ReaderTrackerTest, AWaitingUpdateGoesOnWhenTheReaderEnds) {
+TEST_F(ReaderTrackerTest, AWaitingUpdateContinuesWhenTheReaderEnds) {
   std::vector<SnapshotPin> pins = pin_too_much();
   const uint64_t before = revision();
   std::thread writer([&, batch = step()] { EXPECT_TRUE(scene_.apply(batch).ok()); });
@@ -157,14 +157,14 @@ TEST_F(ReaderTrackerTest, ClosingWakesAWaitingUpdate) {
   writer.join();
 }
 
-TEST_F(ReaderTrackerTest, WhoPinsAnOlderRevisionHoldsWhatItKeeps) {
+TEST_F(ReaderTrackerTest, APinOfAnOlderRevisionCountsTheBytesReplacedBefore) {
   EXPECT_TRUE(step_now().ok());
   EXPECT_TRUE(step_now().ok());
   const SnapshotPin old = pin({View::Kind::kExactly, 1, 0});
   EXPECT_EQ(scene_.status().pinned_bytes, unshared_bytes(*old, *scene_.latest()));
 }
 
-TEST_F(ReaderTrackerTest, OnlyWhoWasToldToEndIsCutOffAndOnlyOnce) {
+TEST_F(ReaderTrackerTest, OnRevokeIsCalledOnceAndOnlyForRevokedPins) {
   std::vector<SnapshotPin> pins = pin_too_much();
   int first = 0, last = 0;
   pins.front().on_revoke([&first] { ++first; });
@@ -175,7 +175,7 @@ TEST_F(ReaderTrackerTest, OnlyWhoWasToldToEndIsCutOffAndOnlyOnce) {
   EXPECT_EQ(last, 0);
 }
 
-TEST_F(ReaderTrackerTest, WhoIsGoneIsNotCutOff) {
+TEST_F(ReaderTrackerTest, OnRevokeIsNotCalledAfterThePinIsReleased) {
   int cut = 0;
   {
     SnapshotPin reader = pin();
@@ -195,7 +195,7 @@ TEST_F(ReaderTrackerTest, APinMayOutliveItsScene) {
   EXPECT_EQ((*reader)->epoch, 1u);
 }
 
-TEST_F(PinLedgerDefaultTest, TheBudgetFollowsTheSceneWhereItIsLarge) {
+TEST_F(ReaderTrackerDefaultTest, TheDefaultBudgetGrowsWithALargeScene) {
   EXPECT_EQ(scene_.status().max_pinned_bytes, limits::kPinnedBytes);
   ReaderTracker tracker(0);
   const uint64_t large = limits::kPinnedBytes;

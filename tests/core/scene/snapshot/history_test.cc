@@ -1,4 +1,4 @@
-// What a scene keeps of its past, and when it forgets.
+// Tests which history a scene keeps, and when it drops records.
 #include "core/scene/snapshot/history.h"
 
 #include "tests/support/scene_fixture.h"
@@ -14,7 +14,7 @@ class HistoryTest : public ::testing::Test {
     return spec;
   }
 
-  // A scene of 1000 points that all move at every tick.
+  // Advances a scene of 1000 points, all of which move at every tick.
   static void live(Scene& scene, uint64_t ticks, uint64_t stride = 1) {
     std::vector<uint64_t> ids(1000);
     for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
@@ -42,14 +42,14 @@ TEST_F(HistoryTest, IsOffByDefault) {
   EXPECT_EQ(scene.latest()->oldest_tick(), 5u);
 }
 
-TEST_F(HistoryTest, KeepsAsManyTicksAsItIsTold) {
+TEST_F(HistoryTest, KeepsTheConfiguredNumberOfTicks) {
   Scene scene("scene", spec(4, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 20);
   EXPECT_EQ(recorded(scene), 4u);
   EXPECT_EQ(scene.latest()->oldest_tick(), 16u);
 }
 
-TEST_F(HistoryTest, CountsTicksThatWereLeftOut) {
+TEST_F(HistoryTest, SkippedTicksCountTowardsTheLimit) {
   Scene scene("scene", spec(10, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 20, 5);
   EXPECT_EQ(scene.latest()->oldest_tick(), 90u);
@@ -57,7 +57,7 @@ TEST_F(HistoryTest, CountsTicksThatWereLeftOut) {
   EXPECT_EQ(scene.latest()->oldest_tick(), 100u);
 }
 
-TEST_F(HistoryTest, KeepsNoMoreThanTheBytesItIsGiven) {
+TEST_F(HistoryTest, KeepsAtMostTheConfiguredBytes) {
   constexpr uint64_t kBytes = 1'000'000;
   Scene scene("scene", spec(1000, kBytes), 1, StaticSet::empty());
   live(scene, 100);
@@ -68,14 +68,14 @@ TEST_F(HistoryTest, KeepsNoMoreThanTheBytesItIsGiven) {
   EXPECT_EQ(scene.latest()->oldest_tick(), 100 - recorded(scene));
 }
 
-TEST_F(HistoryTest, KeepsNothingWhereOneTickIsTooMuch) {
+TEST_F(HistoryTest, KeepsNoRecordIfOneTickExceedsTheBytes) {
   Scene scene("scene", spec(10, 1000), 1, StaticSet::empty());
   live(scene, 5);
   EXPECT_EQ(recorded(scene), 0u);
   EXPECT_EQ(scene.latest()->oldest_tick(), 5u);
 }
 
-TEST_F(HistoryTest, ATickThatChangesNothingCostsNextToNothing) {
+TEST_F(HistoryTest, ATickWithoutChangesCostsAlmostNoMemory) {
   Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 1);
   const uint64_t before = scene.status().history_bytes;
@@ -88,7 +88,7 @@ TEST_F(HistoryTest, ATickThatChangesNothingCostsNextToNothing) {
   EXPECT_LT(scene.status().history_bytes - before, 10'000u);
 }
 
-TEST_F(HistoryTest, RestartingTicksForgetsEverything) {
+TEST_F(HistoryTest, RestartingTicksDropsTheHistory) {
   Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 5);
   UpdateBatch restart;
@@ -103,7 +103,7 @@ TEST_F(HistoryTest, RestartingTicksForgetsEverything) {
   EXPECT_EQ(scene.latest()->tick, 5u);
 }
 
-TEST_F(HistoryTest, RestartingAtTheSameTickForgetsTooAndIsARevision) {
+TEST_F(HistoryTest, RestartingAtTheSameTickDropsTheHistoryAndIsARevision) {
   Scene scene("scene", spec(100, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 5);
   UpdateBatch restart;
@@ -114,7 +114,7 @@ TEST_F(HistoryTest, RestartingAtTheSameTickForgetsTooAndIsARevision) {
   EXPECT_EQ(scene.apply(restart)->revision, before + 1);
 }
 
-TEST_F(HistoryTest, ThePastSaysWhyItBeginsWhereItDoes) {
+TEST_F(HistoryTest, TheHistoryReportsWhyItBeginsAtItsOldestTick) {
   constexpr uint64_t kPlenty = uint64_t{1} << 30;
   Scene off("scene", {}, 1, StaticSet::empty());
   Scene young("scene", spec(10, kPlenty), 1, StaticSet::empty());
@@ -131,7 +131,7 @@ TEST_F(HistoryTest, ThePastSaysWhyItBeginsWhereItDoes) {
   EXPECT_EQ(old.latest()->past_limit, PastLimit::kBegan);
 }
 
-TEST_F(HistoryTest, ARestoredPastIsLimitedByTicksOnceItIsLongEnough) {
+TEST_F(HistoryTest, ARestoredHistoryReportsTheTickLimitOnceItIsLongEnough) {
   HistoryRecorder recorder({2, uint64_t{1} << 30});
   recorder.restore(true);
   recorder.close(5, {}, {}, 6);
@@ -141,14 +141,14 @@ TEST_F(HistoryTest, ARestoredPastIsLimitedByTicksOnceItIsLongEnough) {
   EXPECT_EQ(recorder.limit(), PastLimit::kTicks);
 }
 
-TEST_F(HistoryTest, ARestoredSceneThatHadNoPastLostNone) {
+TEST_F(HistoryTest, ARestoredSceneWithoutHistoryReportsNoLoss) {
   HistoryRecorder recorder({2, uint64_t{1} << 30});
   recorder.restore(false);
   EXPECT_EQ(recorder.limit(), PastLimit::kBegan);
 }
 
-// Whatever room there was: what a batch does goes by batches alone, so that a log of them does the same again.
-TEST_F(HistoryTest, RestartingIsARevisionEvenWhereNothingCouldBeKept) {
+// The effect of a batch must not depend on the memory limit, so that a replay of the log has the same effect.
+TEST_F(HistoryTest, RestartingTicksIsARevisionEvenIfNoRecordIsKept) {
   Scene scene("scene", spec(100, 1), 1, StaticSet::empty());
   live(scene, 5);
   EXPECT_EQ(recorded(scene), 0u);

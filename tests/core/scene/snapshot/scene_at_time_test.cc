@@ -1,4 +1,4 @@
-// Where objects were: at recorded ticks, between them, and through births, ends, jumps and changes.
+// Tests the positions of objects at recorded ticks and between them, with insertions, removals, teleports and updates.
 #include "core/scene/snapshot/scene_at_time.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ class SceneAtTimeTest : public SceneFixture {
     return with(move);
   }
 
-  // Where it was; nothing if it was not there.
+  // Returns the shape of the object at that time, nullopt if it did not exist.
   std::optional<Shape> shape(Id id, uint64_t tick, float fraction = 0) const {
     const SnapshotPtr snapshot = scene_.latest();
     const std::optional<SceneAtTime> moment = find_scene_at(*snapshot, {tick, fraction});
@@ -59,7 +59,7 @@ TEST_F(SceneAtTimeTest, NowIsTheSnapshotItself) {
   EXPECT_EQ(x(1, 5), 3);
 }
 
-TEST_F(SceneAtTimeTest, ATickIsAsItWasWhenItEnded) {
+TEST_F(SceneAtTimeTest, ATickShowsTheStateAtItsEnd) {
   apply(at_tick(1, with(points({1}, {1, 0, 0}))));
   apply(with(move_to({1}, {2, 0, 0})));
   apply(at_tick(2, with(move_to({1}, {3, 0, 0}))));
@@ -74,40 +74,40 @@ TEST_F(SceneAtTimeTest, BetweenTicksAnObjectIsOnTheStraightLine) {
   EXPECT_EQ(shape(1, 2, 0.5f)->position, (Vec3d{8, 6, 0}));
 }
 
-TEST_F(SceneAtTimeTest, TicksThatWereLeftOutLieBetweenTheirNeighbours) {
+TEST_F(SceneAtTimeTest, SkippedTicksAreInterpolatedBetweenTheirNeighbours) {
   apply(at_tick(10, with(points({1}, {0, 0, 0}))));
   apply(at_tick(14, with(move_to({1}, {8, 0, 0}))));
   EXPECT_EQ(x(1, 11), 2);
   EXPECT_EQ(x(1, 12, 0.5f), 5);
 }
 
-TEST_F(SceneAtTimeTest, TurnsGoTheShorterWayRound) {
+TEST_F(SceneAtTimeTest, RotationsFollowTheShorterArc) {
   InsertColumns insert = points({1}, {0, 0, 0});
   insert.rotations = columns_.floats({0, 0, 0, 1});
   apply(at_tick(1, with(insert)));
   MoveColumns turn = move_to({1}, {0, 0, 0});
-  turn.rotations = columns_.floats({0, 0, -0.70710678f, -0.70710678f});  // a quarter, told the long way
+  turn.rotations = columns_.floats({0, 0, -0.70710678f, -0.70710678f});  // a quarter turn, with the negated quaternion
   apply(at_tick(2, with(turn)));
   const Quaternion half = shape(1, 1, 0.5f)->rotation;
   EXPECT_NEAR(half.z, 0.38268343f, 1e-6);
   EXPECT_NEAR(half.w, 0.92387953f, 1e-6);
 }
 
-TEST_F(SceneAtTimeTest, WhatIsBornInBetweenIsNotThereBefore) {
+TEST_F(SceneAtTimeTest, AnObjectInsertedBetweenTicksIsAbsentBefore) {
   apply(at_tick(1, with(points({1}, {0, 0, 0}))));
   apply(at_tick(2, with(points({2}, {5, 0, 0}))));
   EXPECT_EQ(shape(2, 1, 0.9f), std::nullopt);
   EXPECT_EQ(x(2, 2), 5);
 }
 
-TEST_F(SceneAtTimeTest, WhatEndsInBetweenStaysWhereItWas) {
+TEST_F(SceneAtTimeTest, AnObjectRemovedBetweenTicksStaysAtItsLastPosition) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, removing({1})));
   EXPECT_EQ(x(1, 1, 0.9f), 4);
   EXPECT_EQ(shape(1, 2), std::nullopt);
 }
 
-TEST_F(SceneAtTimeTest, WhatJumpsStaysWhereItWasUntilItIsElsewhere) {
+TEST_F(SceneAtTimeTest, ATeleportedObjectStaysAtItsOldPositionUntilTheTick) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, jump(move_to({1}, {100, 0, 0}))));
   apply(at_tick(3, with(move_to({1}, {102, 0, 0}))));
@@ -116,7 +116,7 @@ TEST_F(SceneAtTimeTest, WhatJumpsStaysWhereItWasUntilItIsElsewhere) {
   EXPECT_EQ(x(1, 2, 0.5f), 101);
 }
 
-TEST_F(SceneAtTimeTest, AnIdThatIsRemovedAndInsertedInOneBatchIsANewLife) {
+TEST_F(SceneAtTimeTest, AnIdRemovedAndInsertedInOneBatchBeginsANewLifetime) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   UpdateBatch batch = with(points({1}, {8, 0, 0}));
   batch.remove_ids = columns_.ids({1});
@@ -125,7 +125,7 @@ TEST_F(SceneAtTimeTest, AnIdThatIsRemovedAndInsertedInOneBatchIsANewLife) {
   EXPECT_EQ(x(1, 2), 8);
 }
 
-TEST_F(SceneAtTimeTest, ANewLifeInTheSamePlaceIsARevision) {
+TEST_F(SceneAtTimeTest, ANewLifetimeAtTheSamePositionIsARevision) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   UpdateBatch batch = with(points({1}, {4, 0, 0}));
   batch.remove_ids = columns_.ids({1});
@@ -133,7 +133,7 @@ TEST_F(SceneAtTimeTest, ANewLifeInTheSamePlaceIsARevision) {
   EXPECT_EQ(apply(batch).revision, before + 1);
 }
 
-TEST_F(SceneAtTimeTest, AnUpsertGoesOnWithTheLifeButNotBackwardsWithItsShape) {
+TEST_F(SceneAtTimeTest, AnUpsertContinuesTheLifetimeAndItsShapeCountsFromItsTickOn) {
   apply(at_tick(1, with(balls({1}, {1}))));
   InsertColumns other = balls({1}, {3});
   other.positions = columns_.floats({8, 0, 0});
@@ -144,7 +144,7 @@ TEST_F(SceneAtTimeTest, AnUpsertGoesOnWithTheLifeButNotBackwardsWithItsShape) {
   EXPECT_EQ(shape(1, 1, 0.5f)->radius, 1);
 }
 
-TEST_F(SceneAtTimeTest, AnUpsertWithoutRotationTurnsTheObjectBackOnItsWay) {
+TEST_F(SceneAtTimeTest, AnUpsertWithoutRotationIsInterpolatedToTheIdentity) {
   InsertColumns turned = points({1}, {0, 0, 0});
   turned.rotations = columns_.floats({0, 0, 0.70710678f, 0.70710678f});
   apply(at_tick(1, with(turned)));
@@ -167,7 +167,7 @@ TEST_F(SceneAtTimeTest, AnUpsertShowsItsLabelsFromItsTickOn) {
   EXPECT_EQ(find_scene_at(*snapshot, {2, 0})->objects().find_ref(1).entry().tag, 9u);
 }
 
-TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInItsBatchBeginsANewLife) {
+TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInItsBatchBeginsANewLifetime) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   UpdateBatch batch = with(points({1}, {8, 0, 0}));
   batch.remove_ids = columns_.ids({1});
@@ -177,7 +177,7 @@ TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInItsBatchBeginsANewLife) {
   EXPECT_EQ(x(1, 2), 8);
 }
 
-TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInAnEarlierBatchOfTheTickBeginsANewLife) {
+TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInAnEarlierBatchOfTheTickBeginsANewLifetime) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, removing({1})));
   UpdateBatch batch = with(points({1}, {8, 0, 0}));
@@ -187,7 +187,7 @@ TEST_F(SceneAtTimeTest, AnUpsertAfterARemoveInAnEarlierBatchOfTheTickBeginsANewL
   EXPECT_EQ(x(1, 2), 8);
 }
 
-TEST_F(SceneAtTimeTest, AnUpsertInABatchThatClearsBeginsANewLife) {
+TEST_F(SceneAtTimeTest, AnUpsertInABatchThatClearsBeginsANewLifetime) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   UpdateBatch batch = with(points({1}, {8, 0, 0}));
   batch.clear = true;
@@ -197,7 +197,7 @@ TEST_F(SceneAtTimeTest, AnUpsertInABatchThatClearsBeginsANewLife) {
   EXPECT_EQ(x(1, 2), 8);
 }
 
-TEST_F(SceneAtTimeTest, AnUpsertThatIsMovedByATeleportOfItsBatchBeginsANewLife) {
+TEST_F(SceneAtTimeTest, AnUpsertTeleportedInItsBatchBeginsANewLifetime) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   UpdateBatch batch = jump(move_to({1}, {12, 0, 0}));
   batch.inserts = {points({1}, {8, 0, 0})};
@@ -207,7 +207,7 @@ TEST_F(SceneAtTimeTest, AnUpsertThatIsMovedByATeleportOfItsBatchBeginsANewLife) 
   EXPECT_EQ(x(1, 2), 12);
 }
 
-TEST_F(SceneAtTimeTest, AHandleOfAnEndedLifeIsNotTakenForIt) {
+TEST_F(SceneAtTimeTest, AReusedHandleIsNotTakenForTheOldLifetime) {
   apply(at_tick(1, with(points({1}, {4, 0, 0}))));
   apply(at_tick(2, removing({1})));
   apply(with(points({2}, {50, 0, 0})));
@@ -228,26 +228,26 @@ TEST_F(SceneAtTimeTest, LabelsAreThoseOfTheTick) {
   EXPECT_EQ(find_scene_at(*snapshot, {2, 0})->objects().find_ref(1).entry().tag, 8u);
 }
 
-TEST_F(SceneAtTimeTest, ASearchFindsWhatMovesPast) {
+TEST_F(SceneAtTimeTest, ASearchFindsObjectsThatMoveThroughItsRegion) {
   apply(at_tick(1, with(points({1, 2}, {0, 0, 0, 3, 0, 0}))));
   apply(at_tick(2, with(move_to({1, 2}, {1, 0, 0, 3, 4, 0}))));
   EXPECT_EQ(found_near({0.5, 0, 0}, 1, 0.5f), std::vector<Id>{1});
   EXPECT_EQ(found_near({3, 2, 0}, 1, 0.5f), std::vector<Id>{2});
 }
 
-TEST_F(SceneAtTimeTest, ASearchFindsTheFewThatMoveVeryFar) {
+TEST_F(SceneAtTimeTest, ASearchFindsFastMovers) {
   apply(at_tick(1, with(points({1, 2}, {0, 0, 0, 3, 0, 0}))));
   apply(at_tick(2, with(move_to({1, 2}, {100000, 0, 0, 3, 1, 0}))));
   EXPECT_EQ(found_near({50000, 0, 0}, 1, 0.5f), std::vector<Id>{1});
 }
 
-TEST_F(SceneAtTimeTest, ASearchHandsOverEachObjectOnce) {
+TEST_F(SceneAtTimeTest, ASearchVisitsEachObjectOnce) {
   apply(at_tick(1, with(points({1}, {0, 0, 0}))));
   apply(at_tick(2, with(move_to({1}, {20, 0, 0}))));
   EXPECT_EQ(found_near({10, 0, 0}, 1, 0.5f), std::vector<Id>{1});
 }
 
-TEST_F(SceneAtTimeTest, WhatIsToComeAndWhatIsForgottenIsNotKept) {
+TEST_F(SceneAtTimeTest, FutureTimesAndDroppedTicksHaveNoView) {
   for (uint64_t tick = 1; tick <= 30; ++tick) apply(at_tick(tick));
   EXPECT_TRUE(is_kept(20));
   EXPECT_TRUE(is_kept(30));
@@ -256,7 +256,7 @@ TEST_F(SceneAtTimeTest, WhatIsToComeAndWhatIsForgottenIsNotKept) {
   EXPECT_FALSE(is_kept(31));
 }
 
-TEST_F(SceneAtTimeTest, TheNearestKeptIsAtOneEndOrTheOther) {
+TEST_F(SceneAtTimeTest, TheNearestKeptTimeIsTheOldestOrTheLatest) {
   for (uint64_t tick = 1; tick <= 30; ++tick) apply(at_tick(tick));
   const SnapshotPtr snapshot = scene_.latest();
   EXPECT_EQ(nearest_kept(*snapshot, {3, 0.5f}), (AsOf{20, 0}));
@@ -264,7 +264,7 @@ TEST_F(SceneAtTimeTest, TheNearestKeptIsAtOneEndOrTheOther) {
   EXPECT_EQ(nearest_kept(*snapshot, {25, 0.5f}), (AsOf{25, 0.5f}));
 }
 
-TEST_F(SceneAtTimeTest, ASnapshotKeepsItsOwnPast) {
+TEST_F(SceneAtTimeTest, ASnapshotKeepsTheHistoryOfItsRevision) {
   apply(at_tick(1, with(points({1}, {1, 0, 0}))));
   apply(at_tick(2, with(move_to({1}, {2, 0, 0}))));
   const SnapshotPtr kept = scene_.latest();

@@ -1,4 +1,4 @@
-// A writer at full speed, and readers that ask about random times of the past: whatever they see was so.
+// Tests readers that query random past times beside a fast writer: every answer matches the recorded state.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,14 +14,14 @@ namespace {
 
 constexpr uint64_t kObjects = 500;
 
-// At tick t object i is at (t, i, 0), and no object is there but those with i % 7 != t % 7.
+// At tick t, object i is at (t, i, 0), and exactly the objects with i % 7 != t % 7 exist.
 bool lives(uint64_t id, uint64_t tick) { return id % 7 != tick % 7; }
 
 void apply_tick(Scene& scene, uint64_t tick) {
-  std::vector<uint64_t> ids, gone;
+  std::vector<uint64_t> ids, removed;
   std::vector<double> places;
   for (uint64_t id = 1; id <= kObjects; ++id) {
-    if (!lives(id, tick) && tick > 1 && lives(id, tick - 1)) gone.push_back(id);
+    if (!lives(id, tick) && tick > 1 && lives(id, tick - 1)) removed.push_back(id);
     if (!lives(id, tick)) continue;
     ids.push_back(id);
     places.insert(places.end(), {static_cast<double>(tick), static_cast<double>(id), 0});
@@ -32,7 +32,7 @@ void apply_tick(Scene& scene, uint64_t tick) {
   insert.positions_f64 = places;
   batch.inserts.push_back(insert);
   batch.upsert = true;
-  batch.remove_ids = gone;
+  batch.remove_ids = removed;
   batch.tick = tick;
   ASSERT_TRUE(scene.apply(batch).ok());
 }
@@ -56,7 +56,7 @@ void expect_past(const SceneSnapshot& snapshot, Random& random) {
   EXPECT_EQ(found, lives(id, tick) ? 1u : 0u) << "object " << id << " at tick " << tick << "+" << fraction;
 }
 
-TEST(MomentThreadsTest, ReadersFindThePastWhileTheWriterGoesOn) {
+TEST(SceneAtTimeThreadsTest, ReadersFindThePastWhileTheWriterContinues) {
   SceneSpec spec;
   spec.history = {12, uint64_t{1} << 30};
   Scene scene("scene", spec, 1, StaticSet::empty());

@@ -1,5 +1,5 @@
-// One writer at full speed, static changes in between, and readers that never wait for either: whatever they look at,
-// they see one revision, whole.
+// Tests readers that run beside a fast writer and static changes: they never wait, and every read sees one complete
+// revision.
 #include "core/scene/snapshot/scene_snapshot.h"
 
 #include <atomic>
@@ -33,7 +33,7 @@ void expect_object_of(const Object& object, uint64_t tick) {
   EXPECT_EQ(object.shape.position.x, place_of(object.id, tick)) << "object " << object.id;
 }
 
-// By the grid and by the map.
+// Reads the objects through the grid and through the id table, and expects one complete revision.
 void expect_whole(const SceneSnapshot& snapshot) {
   WorldVisitor visitor;
   Work work;
@@ -48,7 +48,8 @@ void expect_whole(const SceneSnapshot& snapshot) {
   EXPECT_EQ(in_map, kObjects);
 }
 
-// By a batch of three blocks: a lookup of all objects, a ball around all, and rays down each object's line.
+// Expects one complete revision from a batch of three blocks: a lookup of all objects, a ball around all, and a ray
+// along the line of each object.
 void expect_answers_of_one_revision(const SceneSnapshot& snapshot) {
   std::vector<uint64_t> ids;
   std::vector<float> origins;
@@ -103,7 +104,7 @@ class SceneSnapshotTest : public SceneFixture {
     return positions_;
   }
 
-  // Moves all objects to where they are at `tick`, by one of several ways that come to the same.
+  // Moves all objects to their positions at `tick`, in one of several equivalent ways.
   void write(uint64_t tick) {
     UpdateBatch batch;
     batch.tick = tick;
@@ -130,7 +131,7 @@ class SceneSnapshotTest : public SceneFixture {
     EXPECT_EQ(apply(batch).refused, 0u);
   }
 
-  // Far above the objects' lines.
+  // Places an instance far above the lines of the objects.
   void place(Id id) {
     const double translation[] = {0, 0, 1000};
     StaticChange change = placing({mesh_, {&id, 1}, translation, {}, {}, {}, {}, {}});
@@ -148,7 +149,7 @@ class SceneSnapshotTest : public SceneFixture {
   std::vector<double> positions_;
 };
 
-TEST_F(SceneSnapshotTest, ReadersSeeWholeRevisionsWhileTheWriterGoesOn) {
+TEST_F(SceneSnapshotTest, ReadersSeeCompleteRevisionsWhileTheWriterContinues) {
   std::atomic<bool> done{false};
   std::atomic<uint64_t> reads{0};
   const auto read = [&](bool batches) {
@@ -177,7 +178,7 @@ TEST_F(SceneSnapshotTest, ReadersSeeWholeRevisionsWhileTheWriterGoesOn) {
   EXPECT_EQ(scene_.latest()->tick, tick);
 }
 
-TEST_F(SceneSnapshotTest, OldSnapshotsStayAsTheyWereWhileTheWriterGoesOn) {
+TEST_F(SceneSnapshotTest, OldSnapshotsDoNotChangeWhileTheWriterContinues) {
   std::vector<SnapshotPtr> kept;
   std::vector<uint64_t> ticks;
   for (uint64_t tick = 1; tick <= 30; ++tick) {
@@ -200,7 +201,7 @@ TEST_F(SceneSnapshotTest, OldSnapshotsStayAsTheyWereWhileTheWriterGoesOn) {
   writer.join();
 }
 
-TEST_F(SceneSnapshotTest, SnapshotsMayBeDroppedByAnyThreadWhileTheWriterGoesOn) {
+TEST_F(SceneSnapshotTest, AnyThreadMayDropSnapshotsWhileTheWriterContinues) {
   std::atomic<bool> done{false};
   const auto read = [&] {
     std::vector<SnapshotPtr> kept(16);
@@ -217,7 +218,7 @@ TEST_F(SceneSnapshotTest, SnapshotsMayBeDroppedByAnyThreadWhileTheWriterGoesOn) 
   second.join();
 }
 
-TEST_F(SceneSnapshotTest, WritersOfDisjointObjectsBothGetThrough) {
+TEST_F(SceneSnapshotTest, WritersOfDisjointObjectsBothSucceed) {
   const uint64_t count = scaled_count(500);
   const auto run = [&](Id id) {
     for (uint64_t i = 1; i <= count; ++i) {

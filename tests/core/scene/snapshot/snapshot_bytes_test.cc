@@ -5,7 +5,7 @@
 namespace locus::test {
 namespace {
 
-// Points far from each other, so that they do not all lie in one piece of memory.
+// Uses points far from each other, so that they are stored in different bricks.
 class SnapshotBytesTest : public SceneFixture {
  protected:
   static constexpr uint64_t kObjects = 2'000;
@@ -21,7 +21,7 @@ class SnapshotBytesTest : public SceneFixture {
     apply(batch);
     return scene_.latest();
   }
-  // All objects, at the next tick.
+  // Returns a batch that moves all objects, at the next tick.
   UpdateBatch step(float to) {
     UpdateBatch batch = with(move_to(all_, std::vector<float>(3 * all_.size(), to)));
     batch.tick = scene_.latest()->tick + 1;
@@ -42,12 +42,12 @@ class SnapshotBytesWithPastTest : public SnapshotBytesTest {
   SnapshotBytesWithPastTest() : SnapshotBytesTest(remembering()) {}
 };
 
-TEST_F(SnapshotBytesTest, ARevisionHoldsNothingApartFromItself) {
-  // Each level of the grid has a few words of its own.
+TEST_F(SnapshotBytesTest, ARevisionHasNoUnsharedBytesWithItself) {
+  // Each level of the grid has a few words of overhead.
   EXPECT_LT(unshared_bytes(*scene_.latest(), *scene_.latest()), 1'000u);
 }
 
-TEST_F(SnapshotBytesTest, WhatAllWasReplacedIsHeldOnce) {
+TEST_F(SnapshotBytesTest, FullyReplacedObjectsAreCountedOnce) {
   const SnapshotPtr held = scene_.latest();
   const uint64_t after_one = unshared_bytes(*held, *after(step(1)));
   for (int i = 2; i < 20; ++i) apply(step(float(i)));
@@ -55,13 +55,13 @@ TEST_F(SnapshotBytesTest, WhatAllWasReplacedIsHeldOnce) {
   EXPECT_LE(unshared_bytes(*held, *scene_.latest()), after_one + 1'000);
 }
 
-TEST_F(SnapshotBytesTest, LittleIsHeldWhereLittleWasReplaced) {
+TEST_F(SnapshotBytesTest, SmallReplacementsLeaveFewUnsharedBytes) {
   const SnapshotPtr held = scene_.latest();
   const uint64_t of_one = unshared_bytes(*held, *after(with(move_to({1}, {1, 0, 0}))));
   EXPECT_LT(3 * of_one, unshared_bytes(*held, *after(step(1))));
 }
 
-TEST_F(SnapshotBytesTest, IsAtMostFourTimesWhatRevisionsReplaced) {
+TEST_F(SnapshotBytesTest, UnsharedBytesAreAtMostFourTimesTheReplacedBytes) {
   const SnapshotPtr held = scene_.latest();
   for (int i = 1; i < 5; ++i) {
     apply(step(float(i)));
@@ -77,13 +77,13 @@ TEST_F(SnapshotBytesTest, ReplacedInstancesAreHeld) {
   EXPECT_GE(scene_.latest()->replaced_bytes - held->replaced_bytes, held->statics->bytes());
 }
 
-TEST_F(SnapshotBytesWithPastTest, WhatThePastKeepsIsNotHeldByReaders) {
+TEST_F(SnapshotBytesWithPastTest, ObjectsKeptByTheHistoryAreNotCountedForReaders) {
   const SnapshotPtr held = scene_.latest();
   for (uint32_t i = 1; i <= kTicks; ++i) apply(step(float(i)));
   EXPECT_LT(unshared_bytes(*held, *scene_.latest()), 1'000u);
 }
 
-TEST_F(SnapshotBytesWithPastTest, APastThatIsNotKeptAnyMoreIsHeldByReaders) {
+TEST_F(SnapshotBytesWithPastTest, DroppedHistoryIsCountedForReaders) {
   for (uint32_t i = 1; i <= 2 * kTicks; ++i) apply(step(float(i)));
   const SnapshotPtr held = scene_.latest();
   const uint64_t past = held->history->bytes;
@@ -92,7 +92,7 @@ TEST_F(SnapshotBytesWithPastTest, APastThatIsNotKeptAnyMoreIsHeldByReaders) {
   EXPECT_LE(unshared_bytes(*held, *scene_.latest()), 4 * (scene_.latest()->replaced_bytes - held->replaced_bytes));
 }
 
-TEST_F(SnapshotBytesWithPastTest, APastOfOtherTicksThatHadTheSameNumbersIsHeld) {
+TEST_F(SnapshotBytesWithPastTest, HistoryFromBeforeARestartOfTicksIsCountedForReaders) {
   for (uint32_t i = 1; i <= 2 * kTicks; ++i) apply(step(float(i)));
   const SnapshotPtr held = scene_.latest();
   UpdateBatch restart = step(50);

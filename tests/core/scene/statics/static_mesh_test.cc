@@ -49,7 +49,7 @@ double bytes_a_triangle(const std::vector<Triangle>& triangles) {
   return static_cast<double>(build(columns.vertices, columns.indices)->bytes()) / static_cast<double>(triangles.size());
 }
 
-TEST(StaticMeshTest, GivesItsColumnsBackAsTheyWereUploaded) {
+TEST(StaticMeshTest, ReturnsTheUploadedColumnsUnchanged) {
   const Columns columns = welded(box_city(9, 3));
   const auto mesh = build(columns.vertices, columns.indices);
   EXPECT_EQ(mesh->vertices(), columns.vertices);
@@ -95,13 +95,13 @@ TEST(StaticMeshTest, KeepsNameHashPartsAndBounds) {
   EXPECT_EQ(mesh->parts()[1].first_triangle, 1u);
 }
 
-TEST(StaticMeshTest, TakesAtMost72BytesATriangleWithEverythingItKeeps) {
+TEST(StaticMeshTest, UsesAtMost72BytesATriangleInTotal) {
   EXPECT_LE(bytes_a_triangle(box_city(32, 1)), 72);
   EXPECT_LE(bytes_a_triangle(bumpy_sphere(64, 0.02, 1)), 72);
   EXPECT_LE(bytes_a_triangle(bumpy_sphere(130, 0.2, 3)), 72);
 }
 
-TEST(StaticMeshTest, CountsWhatItKeepsBesideTheTree) {
+TEST(StaticMeshTest, CountsTheMemoryBesideTheTree) {
   const auto lean = build({0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2});
   const auto rich = build({0, 0, 0, 1, 0, 0, 0, 1, 0, 9, 9, 9}, {0, 1, 2}, {{std::string(200, 'p'), 0}});
   EXPECT_GT(lean->bytes(), lean->tree().bytes());
@@ -143,7 +143,7 @@ TEST(StaticMeshTest, RestoredFromItsOutlineItIsTheSameToTheLastByteItGives) {
     ASSERT_EQ((*restored)->triangle(number), built->triangle(number));
 }
 
-TEST(StaticMeshTest, TheOutlineOfAnotherMeshMakesNone) {
+TEST(StaticMeshTest, TheTopologyOfAnotherMeshIsRefused) {
   const Columns columns = welded(box_city(3, 3));
   const auto other = build({0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2});
   const absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create(columns.vertices, columns.indices, {});
@@ -151,7 +151,7 @@ TEST(StaticMeshTest, TheOutlineOfAnotherMeshMakesNone) {
             absl::StatusCode::kInvalidArgument);
 }
 
-TEST(StaticMeshTest, ACancelledBuildMakesNone) {
+TEST(StaticMeshTest, ACancelledBuildReturnsAnError) {
   const std::atomic<bool> cancel = true;
   BvhOptions options;
   options.cancel = &cancel;

@@ -1,4 +1,4 @@
-// Static changes: removes and places as one revision or not at all.
+// Tests static changes: removes and placements become one revision or are refused together.
 #include "core/scene/statics/static_set.h"
 
 #include <limits>
@@ -21,7 +21,7 @@ class StaticSetTest : public SceneFixture {
     return changed.ok() ? *changed : InstanceChange{};
   }
 
-  // Also expects that the scene stays at the very same snapshot.
+  // Also expects that the scene keeps the same snapshot.
   void expect_refused(const StaticChange& what, Reason reason, const std::string& field, std::optional<uint32_t> index,
                       absl::StatusCode code = absl::StatusCode::kInvalidArgument) {
     const SnapshotPtr before = scene_.latest();
@@ -53,7 +53,7 @@ TEST_F(StaticSetTest, PlacesWithDefaults) {
   EXPECT_EQ(instance(6)->mesh, mesh_);
 }
 
-TEST_F(StaticSetTest, OneEntryOfAColumnIsForAll) {
+TEST_F(StaticSetTest, ASingleEntryOfAColumnAppliesToAllPlacements) {
   PlacementColumns place = placement({5, 6}, {1, 2, 3});
   place.scales = columns_.floats({2});
   place.rotations = columns_.floats({0, 0, 1, 0});
@@ -141,7 +141,7 @@ TEST_F(StaticSetTest, AnUnknownIdRefusesAllRemovesAndPlaces) {
   expect_refused(what, Reason::kUnknownId, "remove_ids", 1);
 }
 
-TEST_F(StaticSetTest, TheIdOfAnObjectIsNoInstanceToRemove) {
+TEST_F(StaticSetTest, TheIdOfAnObjectIsRefusedAsAnInstanceToRemove) {
   apply(with(points({4}, {0, 0, 0})));
   expect_refused(removing_instances({4}), Reason::kUnknownId, "remove_ids", 0);
 }
@@ -178,7 +178,7 @@ TEST_F(StaticSetTest, ScalesMustBeFiniteAndPositive) {
   expect_refused(placing(place), Reason::kNotFinite, "place[0].scales", 1);
 }
 
-TEST_F(StaticSetTest, APlacedMeshMustNotReachFarBeyondTheWorld) {
+TEST_F(StaticSetTest, APlacedMeshMustNotExtendFarBeyondTheWorld) {
   PlacementColumns place = placement({1, 2}, {0, 0, 0});
   place.scales = columns_.floats({1, 3e9f});
   expect_refused(placing(place), Reason::kOutOfRange, "place[0].scales", 1);
@@ -233,7 +233,7 @@ TEST_F(StaticSetTest, TooManyInstancesNameTheLimit) {
 }
 
 TEST_F(StaticSetTest, AnObjectInsertedDuringTheBuildKeepsItsId) {
-  // The change and the insert race for the id: one of them must lose, whoever it is.
+  // The change and the insert race for the id: exactly one of them must be refused.
   for (Id id = 1; id <= 50; ++id) {
     const StaticChange what = placing(placement({100 + id, id}, {0, 0, 0}));
     const UpdateBatch batch = with(points({id}, {0, 0, 0}));
@@ -248,7 +248,7 @@ TEST_F(StaticSetTest, AnObjectInsertedDuringTheBuildKeepsItsId) {
   }
 }
 
-TEST_F(StaticSetTest, ConcurrentChangesAllHappen) {
+TEST_F(StaticSetTest, ConcurrentChangesAreAllApplied) {
   std::vector<StaticChange> changes;
   for (Id id = 1; id <= 16; ++id) changes.push_back(placing(placement({id}, {double(id), 0, 0})));
   std::vector<std::thread> threads;
@@ -273,10 +273,10 @@ TEST_F(StaticSetTest, UsesCountInstancesOfAMesh) {
   EXPECT_EQ(scene_.latest()->statics->uses(other.get()), 0u);
 }
 
-TEST_F(StaticSetTest, BoundsHoldTheScaledTurnedAndMovedMesh) {
+TEST_F(StaticSetTest, BoundsContainTheScaledRotatedAndTranslatedMesh) {
   PlacementColumns place = placement({1}, {100, 0, 0});
   place.scales = columns_.floats({10});
-  place.rotations = columns_.floats({0, 0, 1, 0});  // half a turn about z: x and y change sign
+  place.rotations = columns_.floats({0, 0, 1, 0});  // half a turn about z, which negates x and y
   change(placing(place));
   const Aabbd bounds = instance(1)->bounds;
   EXPECT_NEAR(bounds.min.x, 90, 1e-6);

@@ -1,4 +1,5 @@
-// What becomes of the items of a batch, asked of a scene: order, refused items, kept and default columns, rounding.
+// Tests the application of the items of a batch, through a scene: order, refused items, kept and default columns,
+// rounding.
 #include "core/scene/updates/batch_applier.h"
 
 #include <limits>
@@ -16,7 +17,7 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class BatchApplierTest : public SceneFixture {
  protected:
-  // Applies a batch of which one item is refused, and says which.
+  // Applies a batch with one refused item and returns its error.
   ItemError only_error(const UpdateBatch& batch) {
     const UpdateAck ack = apply(batch);
     EXPECT_EQ(ack.refused, 1u);
@@ -74,7 +75,7 @@ TEST_F(BatchApplierTest, AppliesRemovesThenInsertsThenMovesThenRelabels) {
   EXPECT_EQ(object(1)->tag, 42u);
 }
 
-TEST_F(BatchApplierTest, ClearComesBeforeRemoves) {
+TEST_F(BatchApplierTest, ClearIsAppliedBeforeRemoves) {
   apply(with(points({1, 2}, {0, 0, 0})));
   UpdateBatch batch = removing({1});
   batch.clear = true;
@@ -100,7 +101,7 @@ TEST_F(BatchApplierTest, ClearLeavesInstances) {
   EXPECT_NE(scene_.latest()->statics->find(8), nullptr);
 }
 
-TEST_F(BatchApplierTest, OfTwoMovesOfOneObjectTheLaterStays) {
+TEST_F(BatchApplierTest, TheLaterOfTwoMovesOfOneObjectWins) {
   apply(with(points({1}, {0, 0, 0})));
   EXPECT_EQ(apply(with(move_to({1, 1}, {1, 1, 1, 2, 2, 2}))).applied, 2u);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{2, 2, 2}));
@@ -218,7 +219,7 @@ TEST_F(BatchApplierTest, MovesOfInstancesAndUnknownIdsAreRefused) {
   expect_error(with(move_to({3}, {0, 0, 0})), "moves[0].ids", 0, 3, Reason::kUnknownId);
 }
 
-TEST_F(BatchApplierTest, RemovesOfUnknownIdsAreRefusedTheSecondOfTwoIncluded) {
+TEST_F(BatchApplierTest, RemovesOfUnknownIdsAndSecondRemovesAreRefused) {
   apply(with(points({1}, {0, 0, 0})));
   expect_error(removing({1, 1}), "remove_ids", 1, 1, Reason::kUnknownId);
   EXPECT_TRUE(ids().empty());
@@ -320,7 +321,7 @@ TEST_F(BatchApplierTest, RotationsAreStoredNormalised) {
   EXPECT_LT(unit_deviation(object(1)->shape.rotation), 1e-7);
 }
 
-TEST_F(BatchApplierTest, AStoredRotationComesBackBitForBitWhenItIsSentAgain) {
+TEST_F(BatchApplierTest, AStoredRotationThatIsSentAgainKeepsItsBits) {
   Random random(17);
   for (int i = 0; i < 2000; ++i) {
     InsertColumns insert = points({1}, {0, 0, 0});
@@ -355,7 +356,7 @@ TEST_F(BatchApplierTest, AMoveKeepsShapeAndLabels) {
   EXPECT_EQ(object(1)->tag, 5u);
 }
 
-TEST_F(BatchApplierTest, RelabelKeepsWhatHasNoColumn) {
+TEST_F(BatchApplierTest, RelabelKeepsLabelsWithoutAColumn) {
   InsertColumns insert = balls({1}, {2});
   insert.layers = columns_.words({4});
   insert.groups = columns_.ids({5});

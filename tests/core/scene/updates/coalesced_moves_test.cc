@@ -1,4 +1,4 @@
-// Moves that are put off, beside the same moves made at once.
+// Tests coalesced moves, compared with the same moves applied at once.
 #include "core/scene/updates/coalesced_moves.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 class CoalescedMovesTest : public ::testing::Test {
  protected:
   CoalescedMovesTest() {
-    for (ObjectStore* store : {&at_once_, &put_off_}) {
+    for (ObjectStore* store : {&at_once_, &deferred_}) {
       for (Id id = 1; id <= 5; ++id) {
         Object object;
         object.id = id;
@@ -23,13 +23,13 @@ class CoalescedMovesTest : public ::testing::Test {
     }
   }
 
-  // Whether the batch changes anything, made at once and put off.
+  // Returns whether the batch changes anything, for the store that applies it and for the coalesced moves.
   std::pair<bool, bool> move(const UpdateBatch& batch) {
     moves_.run(at_once_, batch);
     const bool changes = moves_.changes();
     if (changes) at_once_.move(moves_.moves());
-    moves_.run(put_off_, batch);
-    return {changes, pending_.add(moves_.moves(), put_off_)};
+    moves_.run(deferred_, batch);
+    return {changes, pending_.add(moves_.moves(), deferred_)};
   }
 
   UpdateBatch to(std::vector<Id> ids, std::vector<float> positions, std::vector<float> rotations = {}) {
@@ -47,7 +47,7 @@ class CoalescedMovesTest : public ::testing::Test {
   static constexpr Both kNothing{false, false};
 
   Columns columns_;
-  ObjectStore at_once_, put_off_;
+  ObjectStore at_once_, deferred_;
   MoveApplier moves_;
   CoalescedMoves pending_;
 };
@@ -62,7 +62,7 @@ TEST_F(CoalescedMovesTest, AMoveBackIsAChangeAndAMoveToTheSamePlaceIsNone) {
   EXPECT_EQ(move(to({2}, {0, 0, 0}, {0, 0, 0, 1})), kNothing);
 }
 
-TEST_F(CoalescedMovesTest, RandomMovesComeToTheSame) {
+TEST_F(CoalescedMovesTest, RandomMovesLeaveTheSameStateAsUncoalescedMoves) {
   Random random(1);
   for (uint64_t round = 0; round < scaled_count(300); ++round) {
     for (uint64_t i = random.below(6); i > 0; --i) {
@@ -79,9 +79,9 @@ TEST_F(CoalescedMovesTest, RandomMovesComeToTheSame) {
       const Both changes = move(to(ids, positions, rotations));
       ASSERT_EQ(changes.first, changes.second) << round;
     }
-    if (!pending_.empty()) put_off_.move(pending_.moves());
+    if (!pending_.empty()) deferred_.move(pending_.moves());
     pending_.clear();
-    for (Id id = 1; id <= 5; ++id) ASSERT_EQ(put_off_.find(id), at_once_.find(id)) << round;
+    for (Id id = 1; id <= 5; ++id) ASSERT_EQ(deferred_.find(id), at_once_.find(id)) << round;
   }
 }
 

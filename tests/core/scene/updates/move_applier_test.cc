@@ -1,4 +1,4 @@
-// Batches of moves alone, which take a way of their own: what it says and does is what BatchApplier says and does.
+// Tests MoveApplier, the fast path for batches of moves: its effects and acks equal those of BatchApplier.
 #include "core/scene/updates/move_applier.h"
 
 #include <limits>
@@ -22,7 +22,7 @@ std::string ack_text(const UpdateAck& ack) {
   return text;
 }
 
-TEST_F(MoveApplierTest, ServesMovesAlone) {
+TEST_F(MoveApplierTest, ServesOnlyBatchesOfMoves) {
   EXPECT_TRUE(MoveApplier::serves(with(move_to({1}, {0, 0, 0}))));
   EXPECT_FALSE(MoveApplier::serves(UpdateBatch()));
   UpdateBatch both = with(move_to({1}, {0, 0, 0}));
@@ -30,7 +30,7 @@ TEST_F(MoveApplierTest, ServesMovesAlone) {
   EXPECT_FALSE(MoveApplier::serves(both));
 }
 
-TEST_F(MoveApplierTest, OfSeveralMovesOfOneObjectTheLastCountsAndAllAreApplied) {
+TEST_F(MoveApplierTest, TheLastOfSeveralMovesOfOneObjectWinsAndAllAreCountedAsApplied) {
   const UpdateAck ack = apply(with(move_to({1, 2, 1}, {5, 5, 5, 6, 6, 6, 7, 7, 7})));
   EXPECT_EQ(ack.applied, 3u);
   EXPECT_EQ(object(1)->shape.position, (Vec3d{7, 7, 7}));
@@ -42,7 +42,7 @@ TEST_F(MoveApplierTest, AMoveThereAndBackMakesNoRevision) {
   EXPECT_EQ(apply(with(move_to({1, 1}, {5, 5, 5, 1, 1, 1}))).revision, before);
 }
 
-TEST_F(MoveApplierTest, ATurnAloneIsAChangeAndIsKeptByLaterMoves) {
+TEST_F(MoveApplierTest, ARotationAloneIsAChangeAndLaterMovesKeepIt) {
   MoveColumns turn = move_to({2}, {2, 2, 2});
   turn.rotations = columns_.floats({0, 0, 1, 0});
   const uint64_t before = revision();
@@ -63,7 +63,7 @@ TEST_F(MoveApplierTest, AllOrNothingRefusesTheBatchAndChangesNothing) {
   EXPECT_EQ(object(1)->shape.position, (Vec3d{1, 1, 1}));
 }
 
-TEST_F(MoveApplierTest, ComesToWhatTheGeneralWayComesTo) {
+TEST_F(MoveApplierTest, GivesTheSameResultAsBatchApplier) {
   Random random(5);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   Scene other("other", {}, kEpoch, StaticSet::empty());
@@ -87,7 +87,7 @@ TEST_F(MoveApplierTest, ComesToWhatTheGeneralWayComesTo) {
       batch.moves.push_back(move);
     }
     const absl::StatusOr<UpdateAck> fast = scene_.apply(batch);
-    batch.relabels.emplace_back();  // of nothing: sends the same batch the general way
+    batch.relabels.emplace_back();  // an empty list: the same batch takes the general path
     const absl::StatusOr<UpdateAck> general = other.apply(batch);
     ASSERT_TRUE(fast.ok() && general.ok());
     ASSERT_EQ(ack_text(*fast), ack_text(*general)) << "seed 5, round " << round;

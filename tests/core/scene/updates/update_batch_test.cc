@@ -1,4 +1,4 @@
-// The form of update batches: which column lengths, frames and numbers are refused, and how the refusal names them.
+// Tests check_form(): refused column lengths, frames and values, and the field that the refusal names.
 #include "core/scene/updates/update_batch.h"
 
 #include <limits>
@@ -25,7 +25,7 @@ class UpdateFormTest : public ::testing::Test {
 
   InsertColumns& insert() { return batch_.inserts[0]; }
 
-  // The field of the refusal, empty when the form is right.
+  // Returns the field of the refusal, empty if the form is accepted.
   std::string refused_field(Reason reason = Reason::kColumnLength) {
     const absl::Status status = check_form(batch_);
     if (status.ok()) return "";
@@ -35,8 +35,8 @@ class UpdateFormTest : public ::testing::Test {
     return refusal->field;
   }
 
-  // Lets `column` have each length from 0 to 3 * width + 1 and returns those that are accepted, in entries; expects the
-  // others to be refused as `field`.
+  // Tries each length of `column` from 0 to 3 * width + 1 and returns the accepted ones, in entries; expects the others
+  // to be refused with `field`.
   template <class T>
   std::vector<size_t> accepted(absl::Span<const T>& column, size_t width, const std::string& field) {
     const absl::Span<const T> before = column;

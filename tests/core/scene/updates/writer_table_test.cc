@@ -16,7 +16,7 @@ UpdateAck ack_with(uint64_t revision, size_t errors) {
   return ack;
 }
 
-TEST(WriterTableTest, WhatIsNewIsWhatIsAdmittedWithoutAnAnswer) {
+TEST(WriterTableTest, IsNewAgreesWithAdmit) {
   WriterTable table;
   table.record(5, 1, ack_with(1, 0));
   for (uint64_t writer : {0, 5, 6}) {
@@ -27,7 +27,7 @@ TEST(WriterTableTest, WhatIsNewIsWhatIsAdmittedWithoutAnAnswer) {
   }
 }
 
-TEST(WriterTableTest, ATableThatIsPutBackForgetsTheSameWritersInTheSameOrder) {
+TEST(WriterTableTest, ARestoredTableEvictsTheSameWritersInTheSameOrder) {
   Random random(1);
   WriterTable table;
   for (uint64_t writer = 1; writer <= limits::kMaxWriters; ++writer)
@@ -42,7 +42,7 @@ TEST(WriterTableTest, ATableThatIsPutBackForgetsTheSameWritersInTheSameOrder) {
   }
 }
 
-TEST(WriterTableTest, WhatCannotHaveBeenThereIsNotPutBack) {
+TEST(WriterTableTest, InvalidEntriesAreNotRestored) {
   WriterTable table;
   EXPECT_TRUE(table.restore({5, 1, 1, {}}));
   EXPECT_FALSE(table.restore({5, 2, 2, {}}));
