@@ -1,4 +1,4 @@
-// `locus config show`: the options that locusd would run with here, read by the daemon's own parser.
+// `locus config show`: the effective daemon configuration, read by the daemon's own parser.
 #include <memory>
 #include <string>
 #include <vector>
