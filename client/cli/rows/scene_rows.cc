@@ -14,7 +14,7 @@ void read(const Repeated& column, int row, std::array<typename Repeated::value_t
   for (size_t i = 0; i < kCount; ++i) (*to)[i] = column.Get(row * static_cast<int>(kCount) + static_cast<int>(i));
 }
 
-// A dump writes every column in full.
+// Returns whether every shared column has an entry per id, as in every dump.
 template <class Run, class Positions>
 bool has_shared_columns(const Run& run, const Positions& positions) {
   const int rows = run.ids_size();
