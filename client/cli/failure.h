@@ -34,8 +34,8 @@ absl::Status with_place(const absl::Status& status, absl::string_view place);
 ExitCode exit_code_of(const absl::Status& status);
 
 // Writes a line "error: ..." and, if there is a hint, a line "hint: ...". With json and ndjson, writes one object on
-// one line instead: {"error": {"code", "message", "reason", "field", "index", "limit", "hint"}}. Entries without a value
-// are omitted.
+// one line instead: {"error": {"code", "message", "reason", "field", "index", "limit", "hint"}}. Entries without a
+// value are omitted.
 void write_failure(std::ostream& err, Format format, const absl::Status& status);
 
 // Returns OK if no item of the batch was refused. Otherwise returns an error with the number of refused items and the

@@ -47,7 +47,7 @@ struct RunOptions {
   bool dry_run = false;
 };
 
-// One byte more than allowed tells that there is more.
+// Reads a script. Stops once more than kMaxScriptBytes are read, so that the caller can refuse a longer one.
 absl::StatusOr<std::string> read_all(std::istream& in, const std::string& name) {
   std::string text;
   std::vector<char> part(size_t{1} << 16);

@@ -37,7 +37,7 @@ std::string shape_name(ThingKind kind);
 
 // Calls `take` with each thing of a message of a dump, objects before instances, until it fails. DATA_LOSS if a column
 // does not have one entry per id.
-absl::Status for_each_thing(const v1::DumpSceneResponse& piece,
+absl::Status for_each_thing(const v1::DumpSceneResponse& message,
                             const std::function<absl::Status(const SceneThing&)>& take);
 
 // Choice of the things that a command reads.

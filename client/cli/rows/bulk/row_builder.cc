@@ -30,7 +30,7 @@ std::string quoted_excerpt(absl::string_view text) {
 }
 
 template <class T, class... How>
-std::optional<T> read_whole(absl::string_view text, How... how) {
+std::optional<T> parse_exactly(absl::string_view text, How... how) {
   T value{};
   const char* const end = text.data() + text.size();
   const std::from_chars_result result = std::from_chars(text.data(), end, value, how...);
@@ -40,12 +40,12 @@ std::optional<T> read_whole(absl::string_view text, How... how) {
 
 std::optional<double> read_number(absl::string_view text) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  return read_whole<double>(text);
+  return parse_exactly<double>(text);
 }
 
 std::optional<uint64_t> read_integer(absl::string_view text) {
-  if (absl::ConsumePrefix(&text, "0x") || absl::ConsumePrefix(&text, "0X")) return read_whole<uint64_t>(text, 16);
-  return read_whole<uint64_t>(text, 10);
+  if (absl::ConsumePrefix(&text, "0x") || absl::ConsumePrefix(&text, "0X")) return parse_exactly<uint64_t>(text, 16);
+  return parse_exactly<uint64_t>(text, 10);
 }
 
 // Returns why `value` is not allowed for the kind; empty if it is allowed.
