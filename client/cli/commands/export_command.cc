@@ -32,8 +32,8 @@ absl::Status check(const ExportOptions& options) {
   return check(options.view);
 }
 
-// Returns the translation to the origin, from the scene's current bounds. The dump may have another revision, so the
-// exported things are only approximately centred.
+// Returns the recentre translation for the scene's current bounds. The dump may have another revision; its things are
+// then only approximately centred.
 absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.scene));
   if (!scene.has_min() || !scene.has_max()) return std::array<double, 3>{};
