@@ -40,7 +40,7 @@ absl::Status BulkAnswers::write(const v1::QueryResult& result, const SentRows& s
     if (!written.ok()) return written;
   }
   context_.out().flush();
-  if (!context_.out()) return absl::UnknownError("the output takes no more");
+  if (!context_.out()) return absl::UnknownError("cannot write the output");
   rows_ += sent.rows();
   return absl::OkStatus();
 }

@@ -120,7 +120,7 @@ class BulkUpdateRun {
     for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent);
     context_.out().flush();
     show_rows(context_, "rows applied", applied_);
-    return context_.out() ? absl::OkStatus() : absl::UnknownError("the output takes no more");
+    return context_.out() ? absl::OkStatus() : absl::UnknownError("cannot write the output");
   }
 
   void count(const v1::UpdateAck& ack) {

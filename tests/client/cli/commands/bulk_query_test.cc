@@ -249,7 +249,7 @@ TEST_F(BulkQueryTest, AnOutputThatCannotBeWrittenEndsTheRun) {
   std::ostringstream err;
   EXPECT_EQ(run_into({"-o", "csv", "query", "ball", "world", "--from-ndjson", rows.path(), "--radius", "9"}, out, err),
             ExitCode::kFailed);
-  EXPECT_THAT(err.str(), HasSubstr("the output takes no more"));
+  EXPECT_THAT(err.str(), HasSubstr("cannot write the output"));
 }
 
 TEST_F(BulkQueryTest, OptionsThatExcludeEachOtherAreUsageErrors) {
