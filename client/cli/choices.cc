@@ -10,7 +10,7 @@
 namespace locus::cli {
 namespace {
 
-// A validator's name is never printed, and the parser gives it back: that is where the words are kept.
+// Prefix of a validator's name, which stores the words: CLI11 never prints the name and returns it on request.
 constexpr char kName[] = "choices:";
 
 }  // namespace
@@ -30,7 +30,7 @@ CLI::Validator choices(const std::vector<std::string>& words) { return translate
 std::vector<std::string> choices_of(CLI::Option& option) {
   for (int i = 0;; ++i) {
     const CLI::Validator* validator = nullptr;
-    try {  // the parser tells the end of its list so, and no other way
+    try {  // an exception is CLI11's only sign for the end of the list
       validator = option.get_validator(i);
     } catch (const CLI::OptionNotFound&) {
       return {};

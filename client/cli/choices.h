@@ -1,5 +1,5 @@
-// Options that take one word of a few. Used in place of the parser's own checks, whose lists cannot be read back: what
-// completes words, writes manual pages or explains a mistake asks choices_of() for the words.
+// Options whose value is one of a few words. Used instead of CLI11's own checks, whose word lists cannot be read back:
+// shell completion, manual pages and error messages get the words from choices_of().
 #ifndef LOCUS_CLIENT_CLI_CHOICES_H_
 #define LOCUS_CLIENT_CLI_CHOICES_H_
 
@@ -12,14 +12,14 @@
 
 namespace locus::cli {
 
-// For Option::check(): only these words pass. The refusal names them all.
+// Returns a validator for Option::check() that accepts only these words. Its error names them all.
 CLI::Validator choices(const std::vector<std::string>& words);
 
-// For Option::transform() of an option that keeps an enum: each word with what it stands for.
+// Words and their enum values, for Option::transform() of an option that stores an enum.
 template <class Enum>
 using NamedValues = std::vector<std::pair<std::string, Enum>>;
 
-// The word in place `i` of `words` is turned into the text in place `i` of `texts`.
+// Returns a validator for Option::transform() that replaces `words[i]` by `texts[i]` and refuses other words.
 CLI::Validator translated_choices(const std::vector<std::string>& words, const std::vector<std::string>& texts);
 
 template <class Enum>
@@ -33,7 +33,7 @@ CLI::Validator choices(const NamedValues<Enum>& values) {
   return translated_choices(words, texts);
 }
 
-// The words that choices() was given for this option, in that order; none for an option that takes anything.
+// Returns the words that choices() got for this option, in that order; empty if the option takes any value.
 std::vector<std::string> choices_of(CLI::Option& option);
 
 }  // namespace locus::cli

@@ -41,7 +41,7 @@ OptionWords words_of(CLI::Option& option) {
   return words;
 }
 
-// An option group is a nameless command whose options belong to the command that holds it.
+// Appends the options of `app` and of its option groups. CLI11 keeps a group as a subcommand without a name.
 void add_options(CLI::App& app, CommandWords& words) {
   for (CLI::Option* option : app.get_options()) {
     const bool help_of_group = app.get_name().empty() && option == app.get_help_ptr();

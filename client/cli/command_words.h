@@ -1,5 +1,5 @@
-// The parser's commands and options as plain data, for what is written from them: completions and manual pages. One
-// walk over the parser, so that nothing can say anything else than the program does. Plain data; throws nothing.
+// The parser's commands and options as plain data, from which shell completions and manual pages are written. They are
+// read from the parser itself, so that these texts always agree with the program. Plain data; throws nothing.
 #ifndef LOCUS_CLIENT_CLI_COMMAND_WORDS_H_
 #define LOCUS_CLIENT_CLI_COMMAND_WORDS_H_
 
@@ -10,16 +10,16 @@
 
 namespace locus::cli {
 
-// What stands for an option's value, as far as a shell can help with it.
+// Kind of an option's value, as far as a shell can complete it.
 enum class ValueKind { kAnything, kChoice, kListOfChoices, kFile, kScene, kAddress };
 
 struct OptionWords {
   std::vector<std::string> names = {};  // "-o", "--output"; a positional has none
   std::string value = {};               // "FORMAT", a positional's own name; empty for a flag
   ValueKind kind = ValueKind::kAnything;
-  std::vector<std::string> choices = {};  // of the two kinds of choice
+  std::vector<std::string> choices = {};  // allowed words of kChoice and kListOfChoices
   std::string description = {};
-  std::string default_text = {};  // empty where the description tells it, or there is none
+  std::string default_text = {};  // empty if there is none, or the description states it
   bool required = false;
   bool repeatable = false;
 };
@@ -27,17 +27,18 @@ struct OptionWords {
 struct CommandWords {
   std::string path = {};  // "locus query ray"
   std::string description = {};
-  std::string footer = {};  // what help shows last: notes and examples
+  std::string footer = {};  // last part of the help: notes and examples
   std::vector<OptionWords> options = {};
   std::vector<OptionWords> positionals = {};
   std::vector<CommandWords> commands = {};
 };
 
-// Everything below `app`, but not what is hidden (of the empty group). Options keep the order in which help shows them.
-// A file is known by a value called FILE, OUT, DIRECTORY, BACKUP or DATA_DIR, a scene by SCENE, the server by ADDRESS.
+// Returns all commands and options of `app` except hidden ones (those in the group ""). Options keep the order in which
+// the help shows them. The name of the value selects its kind: FILE, OUT, DIRECTORY, BACKUP and DATA_DIR are files,
+// SCENE is a scene, ADDRESS is a server.
 CommandWords words_of(CLI::App& app);
 
-// The option called `name` among those of the command, or nothing.
+// Returns the command's option called `name` (with its dashes); null if it has none.
 const OptionWords* find_option(const CommandWords& command, const std::string& name);
 
 }  // namespace locus::cli

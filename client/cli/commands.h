@@ -1,5 +1,5 @@
-// One function a command: it adds the command's options, help and examples to `parent`, and runs it through `context`
-// once the line is parsed. `context` outlives the parser.
+// The commands, one function each: it adds the command's options, help and examples to `parent`, and a callback that
+// runs the command through `context` once the line is parsed. `context` must outlive the parser.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_H_
 
@@ -32,8 +32,8 @@ void add_health_command(CLI::App& parent, Context& context);
 void add_version_command(CLI::App& parent, Context& context);
 void add_completion_command(CLI::App& parent, Context& context);
 
-// Runs `run(options, context)`, which returns an absl::Status, when `command` was chosen; does nothing where lines are
-// only checked.
+// Runs `run(options, context)`, which returns an absl::Status, if `command` was chosen. Does nothing if lines are only
+// checked (Lines::kScriptCheck).
 template <class Options, class Run>
 void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {
@@ -41,8 +41,8 @@ void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Contex
   });
 }
 
-// The same for a command that touches nothing before it connects: where lines are only checked it runs up to there,
-// which finds options that do not go together.
+// Like run_when_chosen(), for a command without side effects before Context::connect(). If lines are only checked, the
+// command runs up to connect(), which fails, so that options that exclude each other are reported.
 template <class Options, class Run>
 void run_or_check_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {

@@ -1,5 +1,5 @@
-// What every command shares: where to write, how, and the connection, opened when first needed and kept. Commands reach
-// nothing global, so that one process can run many lines. Not thread-safe.
+// State shared by all commands: output streams, global options, and the connection, which is opened on first use and
+// kept. Commands use no globals, so that one process can run many lines. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_CONTEXT_H_
 #define LOCUS_CLIENT_CLI_CONTEXT_H_
 
@@ -18,18 +18,18 @@
 
 namespace locus::cli {
 
-// The options before every command.
+// Options that every command accepts.
 struct GlobalOptions {
   std::string address = client::kDefaultAddress;
   std::optional<double> timeout_seconds;  // none = the library's defaults, which give uploads more time
   Format format = Format::kTable;
 };
 
-// Whether lines that overwrite themselves make sense on `err`.
+// Choice whether to write progress lines, which overwrite themselves, to `err`.
 enum class Progress { kSilent, kLive };
 
-// What the lines are that run through a context. A script has one connection, chosen before it; while it is checked,
-// commands are parsed but nothing is sent.
+// Source of the lines that run through a context. A script has one connection, chosen before it starts. While a script
+// is checked, its commands are parsed and nothing is sent.
 enum class Lines { kProgram, kScript, kScriptCheck };
 
 class Context {
@@ -42,25 +42,26 @@ class Context {
   std::ostream& err() { return err_; }
   Progress progress() const { return progress_; }
 
-  // Connects to options().address the first time. UNAVAILABLE in words for the command line; a usage error while a
-  // batch is open, since nothing else is sent meanwhile; CANCELLED where lines are only checked.
+  // Returns the connection to options().address, and connects on the first call. Errors: UNAVAILABLE, with a message
+  // for people, if no server answers; a usage error while a batch is open, since no other request may be sent then;
+  // CANCELLED if lines are only checked.
   absl::StatusOr<client::Client*> connect();
 
   // Writes to the output in the chosen format.
   void write(const Report& report);
 
-  // From here on the last report written is kept as well, for whoever works with its values.
+  // Makes write() keep a copy of each report for take_report(), for scripts that use its values.
   void keep_reports() { keeps_reports_ = true; }
   bool keeps_reports() const { return keeps_reports_; }
-  // The last report written since the last call; null if there was none.
+  // Returns the last report written since the previous call, once; null if there was none.
   std::shared_ptr<const Report> take_report() { return std::move(kept_); }
 
-  // The scene of lines that name none; empty = every line must.
+  // Returns the scene of lines that name none. Empty: every line must name one.
   const std::string& default_scene() const { return default_scene_; }
   void use_scene(std::string scene) { default_scene_ = std::move(scene); }
 
-  // The latest revision of a scene that a change made through this context was acknowledged under. Queries that ask for
-  // no other view ask for at least this one, so that many lines in one process see their own writes.
+  // Returns the revision of the last acknowledged change to `scene` made through this context; none before the first.
+  // Queries without a view of their own ask for at least this revision, so that they see the changes of earlier lines.
   std::optional<client::Revision> own(const std::string& scene) const;
   void remember_own(const std::string& scene, client::Revision revision) { own_[scene] = revision; }
   void forget_own(const std::string& scene) { own_.erase(scene); }
@@ -68,10 +69,10 @@ class Context {
   Lines lines() const { return lines_; }
   void set_lines(Lines lines) { lines_ = lines; }
 
-  // The batch that `begin` opened: update commands add to it instead of sending their own.
+  // Returns the batch that `begin` opened, if any: update commands add to it instead of sending their own batch.
   std::optional<PendingBatch>& pending_batch() { return pending_batch_; }
 
-  // The outcome of the command that ran.
+  // Sets the outcome of the command that ran.
   void finish(absl::Status outcome) { outcome_ = std::move(outcome); }
   const absl::Status& outcome() const { return outcome_; }
 

@@ -1,8 +1,8 @@
 // Rows as csv (RFC 4180, with a line feed at the end of a line): for the report stream. Functions without state.
 //
-// One rule says which columns a row has: a key that names a vector is split (`normal.x,normal.y,normal.z`, `uv.u,uv.v`,
-// `rotation.x` .. `rotation.w`), every other key is one column. It goes by the key alone, so that a header does not
-// depend on what was found. Other lists and objects are one cell of JSON.
+// The keys of a row decide its columns: a key that names a vector is split (`normal.x,normal.y,normal.z`, `uv.u,uv.v`,
+// `rotation.x` .. `rotation.w`), any other key is one column. Values do not matter, so that the header is the same for
+// every result. Other lists and objects are one cell of JSON.
 #ifndef LOCUS_CLIENT_CLI_CSV_TEXT_H_
 #define LOCUS_CLIENT_CLI_CSV_TEXT_H_
 
@@ -13,11 +13,11 @@
 
 namespace locus::cli {
 
-// The header's line, without its end.
+// Returns the header line, without a line feed.
 std::string csv_header(const std::vector<std::string>& keys);
 
-// One row's line, without its end. Null and absent values are empty cells; a text is quoted where it holds a comma, a
-// quote, a line break or blanks at its ends, and where it is empty, since that is not null.
+// Returns the line of one row, without a line feed. Null and absent values are empty cells. A text is quoted if it has
+// a comma, a quote, a line break or a blank at either end, or if it is empty, which distinguishes it from null.
 std::string csv_line(const Json& row, const std::vector<std::string>& keys);
 
 }  // namespace locus::cli

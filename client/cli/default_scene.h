@@ -1,5 +1,5 @@
-// The scene that a line means when it names none: chosen by `use` in a script, or by LOCUS_SCENE. For commands with a
-// SCENE and for run_line. Functions without state.
+// The default scene, used by lines that name none: set by `use` in a script, or by the environment's LOCUS_SCENE. For
+// commands with an argument SCENE, and for run_line(). Functions without state.
 #ifndef LOCUS_CLIENT_CLI_DEFAULT_SCENE_H_
 #define LOCUS_CLIENT_CLI_DEFAULT_SCENE_H_
 
@@ -11,10 +11,11 @@
 
 namespace locus::cli {
 
-// The required positional SCENE. It is the command's first positional, and the only one that a default stands in for.
+// Adds the required positional SCENE. It must be the command's first positional, and is the only one that may be
+// omitted if there is a default scene.
 CLI::Option& add_scene_argument(CLI::App& command, std::string& scene);
 
-// `arguments` with `scene` put where the SCENE of the command they name stands; nothing if that command has none.
+// Returns `arguments` with `scene` inserted as the SCENE of the command they name; none if that command takes no SCENE.
 std::optional<std::vector<std::string>> with_scene(const CLI::App& app, const std::vector<std::string>& arguments,
                                                    const std::string& scene);
 

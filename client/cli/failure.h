@@ -1,4 +1,4 @@
-// What the command line does about failures: an exit code for scripts, and words that say what to do next. Functions
+// Errors on the command line: exit codes for scripts, error lines, and hints that say what to do next. Functions
 // without state.
 #ifndef LOCUS_CLIENT_CLI_FAILURE_H_
 #define LOCUS_CLIENT_CLI_FAILURE_H_
@@ -15,30 +15,31 @@ namespace locus::cli {
 
 enum class ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kUnreachable = 3, kDenied = 4, kNotFound = 5 };
 
-// A mistake in how the command was written, found after parsing; exits with kUsage.
+// Returns the error of a wrongly written command that the parser accepted; it exits with kUsage.
 absl::Status usage_error(absl::string_view message);
 
-// Marks a failure that was written already: it still decides the exit code.
+// Marks an error as already printed: run_line() does not print it again, but it still decides the exit code.
 absl::Status told(absl::Status status);
 bool is_told(const absl::Status& status);
 
-// One word for a failure: USAGE, the server's reason without "REASON_", or the name of the status code where the server
-// gave none.
+// Returns the name of an error: USAGE, the server's reason without "REASON_", or the status code if the server gave no
+// reason.
 std::string failure_name(const absl::Status& status);
-// Whether any failure has this name.
+// Returns whether failure_name() can return `name`.
 bool is_failure_name(const std::string& name);
 
-// The same failure with `place: ` before its message.
+// Returns `status` with `place: ` before its message; code and payloads stay.
 absl::Status with_place(const absl::Status& status, absl::string_view place);
 
 ExitCode exit_code_of(const absl::Status& status);
 
-// One line "error: ..." and one line "hint: ..." where there is one; with json and ndjson instead one object on one
-// line: {"error": {"code", "message", "reason", "field", "index", "hint"}}, absent parts left out.
+// Writes a line "error: ..." and, if there is a hint, a line "hint: ...". With json and ndjson, writes one object on
+// one line instead: {"error": {"code", "message", "reason", "field", "index", "limit", "hint"}}. Entries without a
+// value are omitted.
 void write_failure(std::ostream& err, Format format, const absl::Status& status);
 
-// OK if the ack refused nothing. Otherwise says how many items were refused and why the first was: NOT_FOUND if all
-// listed were unknown ids, else FAILED_PRECONDITION.
+// Returns OK if no item of the batch was refused. Otherwise returns an error with the number of refused items and the
+// reason of the first: NOT_FOUND if all listed items have unknown ids, else FAILED_PRECONDITION.
 absl::Status refused_items(const v1::UpdateAck& ack);
 
 }  // namespace locus::cli

@@ -12,8 +12,8 @@
 
 namespace {
 
-// Messages of megabytes come and go. By default glibc gives their memory back to the kernel each time, which halves
-// throughput.
+// Keeps freed memory in the process. Messages have megabytes, and by default glibc returns their memory to the kernel
+// each time, which halves throughput.
 void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, 512 << 20);

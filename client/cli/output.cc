@@ -15,7 +15,7 @@
 namespace locus::cli {
 namespace {
 
-// In the order in which they first appear.
+// Returns the keys of all rows, in the order in which they first appear.
 std::vector<std::string> keys_of_all(const std::vector<Json>& rows) {
   std::vector<std::string> keys;
   std::set<std::string> seen;

@@ -1,9 +1,9 @@
-// The one place where the command line writes answers: a report is a head (facts about the whole answer) and rows, and
-// prints as an aligned table for people, as one JSON document, as one JSON object a line, or as csv. Plain data and
-// functions without state. Rows that come in one after another go through client/cli/report_stream.h.
+// Reports, the only form in which commands write answers. A report has a head (facts about the whole answer) and rows,
+// and is printed as an aligned table, as one JSON document, as one JSON object per line, or as csv. Plain data and
+// functions without state. Rows that arrive one after another are written through client/cli/report_stream.h.
 //
 // In JSON, ids, groups, tags and epochs are strings, since they use all 64 bits; revisions, ticks and counts are
-// numbers; what is not there (a miss, infinity) is null.
+// numbers; a miss and infinity are null.
 #ifndef LOCUS_CLIENT_CLI_OUTPUT_H_
 #define LOCUS_CLIENT_CLI_OUTPUT_H_
 
@@ -17,34 +17,36 @@
 
 namespace locus::cli {
 
-// Keeps keys in the order of writing.
+// JSON value whose objects keep the order in which keys were added.
 using Json = nlohmann::ordered_json;
 
 enum class Format { kTable, kJson, kNdjson, kCsv };
 
 struct Report {
   Json head = Json::object();
-  std::string rows_name;  // the key of the rows in a JSON document; empty = the head is all there is
+  std::string rows_name;  // key of the rows in a JSON document; empty = a report without rows
   std::vector<Json> rows;
-  std::string no_rows = "nothing";  // what a table says instead of rows
-  // The columns of a table and of csv. Empty = those of the first row, in csv those of all rows; name them where there
-  // may be no row, so that csv has its header all the same.
+  std::string no_rows = "nothing";  // text of a table without rows
+  // Columns of a table and of csv. Empty: the keys of the first row, in csv the keys of all rows. Set it if there may
+  // be no rows, so that csv still has its header.
   std::vector<std::string> keys = {};
 };
 
-// Table: a line a row under a header of the keys of the first row, then the head on one line; without rows_name, a line
-// an entry of the head. JSON: {head..., rows_name: [rows]}. NDJSON: a line a row; without rows_name the head. CSV: a
-// header and a line a row, without the head; without rows_name a header and one line of the head.
+// Writes a report in `format`.
+//   table:  a header, one line per row, then the head on one line; without rows_name, one line per entry of the head
+//   json:   {head..., rows_name: [rows]}
+//   ndjson: one line per row, without the head; without rows_name, the head on one line
+//   csv:    a header and one line per row, without the head; without rows_name, a header and one line with the head
 void write_report(std::ostream& out, Format format, const Report& report);
 
-// One line of JSON. What is not UTF-8 is replaced: a server's text may hold anything.
+// Returns JSON on one line. Bytes that are not UTF-8 are replaced, since a server's text may have any bytes.
 std::string json_line(const Json& value);
-// A value as people read it: yes and no, "-" for null, lists with commas.
+// Returns the text of a table cell: yes or no for booleans, "-" for null, commas between the entries of a list.
 std::string table_cell(const Json& value);
 
-// 64-bit names as strings.
+// Returns an id, group, tag or epoch as a string.
 Json id_json(uint64_t id);
-// The shortest decimal that reads back as the same float; null where it is not finite.
+// Returns the shortest decimal that parses to the same float; null if `value` is not finite.
 Json float_json(float value);
 Json floats_json(absl::Span<const float> values);
 Json doubles_json(absl::Span<const double> values);

@@ -1,8 +1,8 @@
-// Changes of several lines that become one update batch and so one revision. For `begin` ... `commit` of scripts and
-// the commands between them. Not thread-safe.
+// Update batch that collects the changes of several lines, so that they become one revision. For `begin` ... `commit`
+// in scripts and the commands between them. Not thread-safe.
 //
-// A batch removes first, then inserts, then moves. Lines are taken only where that gives what running them one after
-// another would: about one object they come in that order. So a batch means what its lines say.
+// Invariant: the batch has the same effect as its lines run one by one. The server applies removes, then inserts, then
+// moves, then relabels, so the lines about one object must come in that order; others are refused.
 #ifndef LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 #define LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 
@@ -22,11 +22,11 @@ class PendingBatch {
     if (tick) batch_.set_tick(*tick);
   }
 
-  // Adds what a line changes. A usage error, and nothing is added, for another scene than before, a tick of its own, a
-  // second opinion on upsert, float positions in a frame, or a change that the batch would make in another order.
+  // Adds the changes of a line. Returns a usage error, and adds nothing, if the line names another scene or a tick,
+  // differs in upsert, has float positions in a frame, or has a change that the server would apply in another order.
   absl::Status add(const std::string& scene, const v1::UpdateBatch& line);
 
-  // Empty if nothing was added.
+  // Returns the scene of the lines; empty before the first add().
   const std::string& scene() const { return scene_; }
   const v1::UpdateBatch& batch() const { return batch_; }
 
@@ -40,7 +40,7 @@ class PendingBatch {
 
   std::string scene_;
   v1::UpdateBatch batch_;
-  std::map<uint64_t, Step> last_step_;  // of each id named so far
+  std::map<uint64_t, Step> last_step_;  // last step of each id named so far
 };
 
 }  // namespace locus::cli

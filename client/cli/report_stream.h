@@ -1,8 +1,7 @@
-// A report as it is written while its rows are still coming in: facts known before the rows, rows, facts known after
-// them, in any of the formats. For answers too long to hold; write_report() writes whole reports through it. Not
-// thread-safe.
+// Writer of a report whose rows arrive one after another: facts known before the rows, the rows, and facts known after
+// them, in any format. For answers too large to hold in memory; write_report() uses it, too. Not thread-safe.
 //
-// Invariant: begin() once, then any number of add(), then end() once.
+// Call order: begin() once, then add() for each row, then end() once.
 #ifndef LOCUS_CLIENT_CLI_REPORT_STREAM_H_
 #define LOCUS_CLIENT_CLI_REPORT_STREAM_H_
 
@@ -17,10 +16,11 @@
 namespace locus::cli {
 
 struct ReportShape {
-  std::string rows_name;            // the key of the rows in a JSON document
-  std::vector<std::string> keys;    // the columns of a table and of csv; empty = those of the first row
-  std::string no_rows = "nothing";  // what a table says instead of rows
-  // Rows of a table that are held back to find the columns' widths; a longer cell of a later row stands out of line.
+  std::string rows_name;            // key of the rows in a JSON document
+  std::vector<std::string> keys;    // columns of a table and of csv; empty = the keys of the first row
+  std::string no_rows = "nothing";  // text of a table without rows
+  // Number of rows that a table holds back to find the widths of its columns. Longer cells of later rows break the
+  // alignment.
   size_t width_rows = std::numeric_limits<size_t>::max();
 };
 
@@ -29,10 +29,11 @@ class ReportStream {
   // Borrows `out`, which must outlive the stream.
   ReportStream(std::ostream& out, Format format, ReportShape shape);
 
-  // Json writes the facts here, a table at the end; csv and ndjson have no place for them.
+  // Begins the report with `head`, facts known before the rows. json writes them at once, a table below its rows; csv
+  // and ndjson omit them.
   void begin(const Json& head);
   void add(const Json& row);
-  // Facts that are known only now.
+  // Ends the report with `tail`, facts known only after the last row.
   void end(const Json& tail = Json::object());
 
  private:
@@ -45,7 +46,7 @@ class ReportStream {
   ReportShape shape_;
   Json head_ = Json::object();
   size_t rows_ = 0;
-  std::vector<std::vector<std::string>> held_;  // lines of a table, until width_rows are there
+  std::vector<std::vector<std::string>> held_;  // lines of a table, up to width_rows rows
   std::vector<size_t> widths_;
 };
 

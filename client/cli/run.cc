@@ -34,17 +34,17 @@ LOCUS_SCENE names the scene of commands that are given none.
 `locus COMMAND --help` shows a command's options and examples. `source <(locus completion bash)` lets the shell complete
 lines of locus; zsh and fish have theirs.)";
 
-// What the parser has to say instead of running a command: help, which is code 0, or what is wrong with the line.
+// Result of a line whose command did not run: a help text (code 0) or an error of the parser.
 struct Refusal {
   int code = 0;
   std::string out;
   std::string err;
-  std::string message;           // what is wrong, without advice
-  bool lacks_something = false;  // a required option or argument
+  std::string message;           // parser's message, without advice
+  bool lacks_something = false;  // a required option or argument is missing
   bool wrong_value = false;
 };
 
-// The parser takes its arguments from the back, and reports by exceptions: this is where they end.
+// Parses and runs one line. CLI11 expects its arguments in reverse order and throws its errors, which end here.
 std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::string>& arguments) {
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
@@ -64,7 +64,8 @@ std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::strin
   return std::nullopt;
 }
 
-// Nothing is run before a line has all it needs, so a line that lacks something may be tried again with the scene.
+// Parses and runs a line. If a required argument is missing, retries with the default scene: CLI11 checks required
+// arguments before it runs a command, so the first attempt ran nothing.
 std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app;
   build_cli(app, context);
@@ -77,7 +78,7 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
   return parse_and_run(second, *longer);
 }
 
-// A script's connection is chosen once, before `run`.
+// Refuses --address and --timeout in a script, whose connection is chosen once, before `run`.
 void restrict_to_script(CLI::App& app) {
   for (const char* name : {"--address", "--timeout"}) {
     app.get_option(name)->envname("")->check([name](const std::string&) {
@@ -86,7 +87,7 @@ void restrict_to_script(CLI::App& app) {
   }
 }
 
-// The parser does not name what it found in the place of a command.
+// Returns the parser's message. If no command was found, appends the line, since the parser does not quote it.
 std::string in_words(const Refusal& refusal, const std::vector<std::string>& arguments) {
   if (refusal.message != CLI::RequiredError::Subcommand(1).what()) return refusal.message;
   constexpr size_t kShownBytes = 60;
@@ -162,7 +163,8 @@ absl::Status run_script_line(const std::vector<std::string>& arguments, Context&
   context.finish(absl::OkStatus());
   const std::optional<Refusal> refusal = run_with_default_scene(arguments, context);
   context.options() = before;
-  // While lines are checked, what is taken for an unknown value need not suit, nor go with the others.
+  // While lines are only checked, a placeholder of an unknown value may be invalid, or may conflict with other options:
+  // ignore errors of such lines.
   const bool guessed = context.lines() == Lines::kScriptCheck && has_unknown(arguments);
   if (!refusal) return guessed ? absl::OkStatus() : context.outcome();
   if (refusal->code != 0) {

@@ -1,4 +1,4 @@
-// The command line as a function: builds the parser and runs one line of arguments. For main and for tests.
+// The command line as functions: build the parser, run one line of arguments. For main(), scripts and tests.
 #ifndef LOCUS_CLIENT_CLI_RUN_H_
 #define LOCUS_CLIENT_CLI_RUN_H_
 
@@ -11,15 +11,15 @@
 
 namespace locus::cli {
 
-// Adds every command and global option to `app`, to run through `context`, which outlives it.
+// Adds every command and global option to `app`. The commands run through `context`, which must outlive `app`.
 void build_cli(CLI::App& app, Context& context);
 
-// Parses `arguments` (without the program's name), runs the command and writes its answer, or what went wrong, to the
-// context's streams. Help and --version count as success.
+// Parses `arguments` (without the program's name), runs the command and writes its answer or its error to the context's
+// streams. Help and --version count as success.
 ExitCode run_line(const std::vector<std::string>& arguments, Context& context);
 
-// The same for a line of a script: answers are written, what went wrong is returned, a wrong line as a usage error. Its
-// global options hold for that line alone. Where lines are only checked, nothing is run or written.
+// Runs a line of a script: writes the answer and returns the error instead of writing it; a line that does not parse is
+// a usage error. Global options apply to this line only. If lines are only checked, nothing is run or written.
 absl::Status run_script_line(const std::vector<std::string>& arguments, Context& context);
 
 }  // namespace locus::cli

@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-// Most options take a number; what else one takes, its words or its type's name tells.
+// Returns a value that `option` accepts: its first word, else a vector if its type's name says so, else a number.
 std::string suitable_value(CLI::Option& option) {
   const std::vector<std::string> words = choices_of(option);
   if (!words.empty()) return words.front();

@@ -86,7 +86,7 @@ BAD_EXAMPLES = {
         core("core/geometry/vec3.h", '"core/index/spatial_index.h"'),
         core("core/mesh/mesh.h", '"core/scene/scene.h"'),
         core("core/index/spatial_index.h", '"core/index/list/list_index.h"'),
-        core("core/scene/scene.h", '"core/query/run/run_batch.h"'),
+        core("core/scene/scene.h", '"tests/support/run_batch.h"'),
         server("server/scheduling/pool.h", '"server/services/query_service.h"'),
         server("server/config/server_config.h", '"core/scene/scene.h"'),
         {"client/lib/client.h": header("client/lib/client.h", "locus::client", '"core/geometry/vec3.h"')},

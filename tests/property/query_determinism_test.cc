@@ -12,16 +12,16 @@
 namespace locus::test {
 namespace {
 
-BatchResult answer(const SceneSnapshot& snapshot, const std::vector<OwnedBlock>& blocks, const RunOptions& options) {
-  auto result = run_batch(snapshot, batch_of(blocks), options);
+BatchResult answer(const SceneSnapshot& snapshot, const std::vector<OwnedBlock>& blocks, const RunOptions& options,
+                   const ParallelFor& parallel_for = {}) {
+  auto result = run_batch(snapshot, batch_of(blocks), options, parallel_for);
   LOCUS_CHECK(result.ok());
   return *std::move(result);
 }
 
-// Returns options that run the calls in random order, distributed over threads.
-RunOptions scrambled(size_t threads, uint64_t seed) {
-  RunOptions options;
-  options.parallel_for = [threads, seed](size_t count, const std::function<void(size_t)>& run) {
+// Returns a function that runs the calls in random order, distributed over threads.
+ParallelFor scrambled(size_t threads, uint64_t seed) {
+  return [threads, seed](size_t count, const std::function<void(size_t)>& run) {
     Random random(seed);
     std::vector<size_t> order(count);
     std::iota(order.begin(), order.end(), size_t{0});
@@ -33,7 +33,6 @@ RunOptions scrambled(size_t threads, uint64_t seed) {
       });
     for (std::thread& thread : pool) thread.join();
   };
-  return options;
 }
 
 // Returns the blocks with every query repeated `times` times, so that they are several chunks long.
@@ -77,7 +76,7 @@ TEST(QueryDeterminismTest, ThreadsChangeNoByte) {
     const SnapshotPtr snapshot = snapshot_of(scene.world);
     const BatchResult alone = answer(*snapshot, blocks, {});
     for (const size_t threads : {1, 2, 4})
-      ASSERT_EQ(difference(answer(*snapshot, blocks, scrambled(threads, seed)), alone), "")
+      ASSERT_EQ(difference(answer(*snapshot, blocks, {}, scrambled(threads, seed)), alone), "")
           << threads << " threads, " << scene.world.name << ", seed " << seed;
   }
 }
@@ -90,7 +89,7 @@ TEST(QueryDeterminismTest, AFullReplyIsTruncatedAtTheSameRowForAnyNumberOfThread
     QueryBatch batch = batch_of(blocks);
     batch.max_reply_bytes = static_cast<uint32_t>(fixed_reply_bytes(batch) + 20'000);
     const auto alone = run_batch(*snapshot, batch, {});
-    const auto shared = run_batch(*snapshot, batch, scrambled(4, seed));
+    const auto shared = run_batch(*snapshot, batch, {}, scrambled(4, seed));
     ASSERT_TRUE(alone.ok() && shared.ok());
     ASSERT_EQ(difference(*shared, *alone), "") << scene.world.name << ", seed " << seed;
   }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/check.h"
-#include "core/query/run/run_batch.h"
+#include "tests/support/run_batch.h"
 
 namespace locus::test {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/query/kinds/placed_triangle.h"
-#include "core/query/run/run_batch.h"
+#include "tests/support/run_batch.h"
 
 namespace locus::test {
 

@@ -273,13 +273,13 @@ class RewindLockstep {
     const SnapshotPtr snapshot = scene_.latest();
     BatchResult expected;
     for (const OwnedBlock& block : blocks) expected.blocks.push_back(expected_answer(*snapshot, block));
-    RunOptions brute_force, two_threads;
+    RunOptions brute_force;
     brute_force.brute_force = true;
-    two_threads.parallel_for = on_threads(2);
-    for (const RunOptions& options : {RunOptions(), brute_force, two_threads}) {
+    const std::pair<RunOptions, ParallelFor> ways[] = {{{}, {}}, {brute_force, {}}, {{}, on_threads(2)}};
+    for (const auto& [options, parallel_for] : ways) {
       for (const std::string& set : instruction_sets()) {
         LOCUS_CHECK(use_instruction_set(set).ok());
-        const absl::StatusOr<BatchResult> got = run_batch(*snapshot, batch, options);
+        const absl::StatusOr<BatchResult> got = run_batch(*snapshot, batch, options, parallel_for);
         LOCUS_CHECK(use_instruction_set("").ok());
         if (!got.ok()) return got.status().ToString();
         if (std::string what = difference(*got, expected); !what.empty()) return set + ": " + what;

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/query/run/run_batch.h"
 #include "tests/support/owned_block.h"
 #include "tests/support/random.h"
+#include "tests/support/run_batch.h"
 #include "tests/support/scene_schedule.h"
 
 namespace locus::test {

@@ -1,4 +1,4 @@
-// BvhOptions::parallel_for and RunOptions::parallel_for on a given number of threads, which start and end with each
+// BvhOptions::parallel_for and run_batch() on a given number of threads, which start and end with each
 // call.
 #ifndef LOCUS_TESTS_SUPPORT_THREADS_H_
 #define LOCUS_TESTS_SUPPORT_THREADS_H_

@@ -23,8 +23,8 @@ absl::Status BackupWriter::begin_file(const std::string& path) {
 }
 
 absl::Status BackupWriter::add(absl::string_view bytes) {
-  came_ += bytes.size();
-  if (progress_) progress_(came_, announced_.bytes);
+  received_ += bytes.size();
+  if (progress_) progress_(received_, announced_.bytes);
   return directory_.write(bytes);
 }
 

@@ -1,4 +1,4 @@
-// Writes a server's backup to a directory, with its SHA256SUMS. For `locus backup`. Not thread-safe.
+// Writer of a server's backup to a directory, with its file SHA256SUMS. For `locus backup`. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_BACKUP_WRITER_H_
 #define LOCUS_CLIENT_CLI_BACKUP_BACKUP_WRITER_H_
 
@@ -15,12 +15,12 @@
 
 namespace locus::cli {
 
-// Called now and then with the bytes done so far and the bytes in all.
+// Callback for progress, with the bytes done so far and the total.
 using BackupProgress = std::function<void(uint64_t done, uint64_t total)>;
 
 class BackupWriter final : public client::BackupSink {
  public:
-  // Borrows the directory, which was not made yet.
+  // Borrows the directory. Precondition: PartialDirectory::make() was not called.
   BackupWriter(PartialDirectory& directory, BackupProgress progress);
 
   absl::Status begin(const client::BackupSize& announced) override;
@@ -28,14 +28,14 @@ class BackupWriter final : public client::BackupSink {
   absl::Status add(absl::string_view bytes) override;
   absl::Status end_file(const client::BackupFile& file) override;
 
-  // Once everything came: adds SHA256SUMS and gives the directory its name.
+  // Adds SHA256SUMS and renames the directory to its target. Call it after the last file.
   absl::Status finish();
 
  private:
   PartialDirectory& directory_;
   const BackupProgress progress_;
   client::BackupSize announced_;
-  uint64_t came_ = 0;
+  uint64_t received_ = 0;
   std::vector<Checksum> checksums_;
 };
 

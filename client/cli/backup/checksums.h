@@ -21,11 +21,11 @@ struct Checksum {
   bool operator==(const Checksum&) const = default;
 };
 
-// A line a file: its hash in lower case, two spaces, its path.
+// Returns one line per file: its hash in lower case, two spaces, its path.
 std::string checksum_text(const std::vector<Checksum>& checksums);
 
-// Nothing but what checksum_text() writes, so that no change of a byte goes unnoticed. DATA_LOSS naming the line at
-// fault; so are paths that lead elsewhere or come twice.
+// Parses exactly the format of checksum_text(), so that every changed byte is noticed. DATA_LOSS naming the line for
+// any other text, for a path that leads out of the backup and for a repeated path.
 absl::StatusOr<std::vector<Checksum>> parse_checksums(absl::string_view text);
 
 }  // namespace locus::cli

@@ -1,4 +1,4 @@
-// What commands that read and write files of backups say when the system refuses something. A function without state.
+// Errors of file operations, for commands that read and write backups. A function without state.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_FILE_ERROR_H_
 #define LOCUS_CLIENT_CLI_BACKUP_FILE_ERROR_H_
 
@@ -9,9 +9,9 @@
 
 namespace locus::cli {
 
-// "cannot DOING PATH: ...", with what to do where that is known. `error` is an errno: NOT_FOUND where something is not
-// there, RESOURCE_EXHAUSTED for a full disk, else FAILED_PRECONDITION: a file that may not be read is not the server's
-// denial.
+// Returns the error "cannot DOING PATH: ...", with advice for common causes. `error` is an errno: NOT_FOUND for ENOENT,
+// RESOURCE_EXHAUSTED for a full disk, else FAILED_PRECONDITION. Missing file permissions are not PERMISSION_DENIED,
+// which is reserved for denials by the server.
 absl::Status file_error(absl::string_view doing, const std::string& path, int error);
 
 }  // namespace locus::cli

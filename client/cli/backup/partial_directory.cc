@@ -19,11 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Only for whoever runs this: scenes may be secret.
+// Access for the owner only, since scenes may be secret.
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kFileMode = 0600;
 
-// Without a slash at its end, so that a name can be added to.
+// Returns the absolute path without a trailing slash, so that a suffix can be appended.
 std::string absolute(const std::string& path) {
   std::error_code why;
   std::string text = fs::absolute(path, why).lexically_normal().string();
@@ -129,7 +129,7 @@ absl::Status PartialDirectory::keep() {
     RETURN_IF_ERROR(sync_folder(absl::StrCat(partial_, "/", folder)));
   }
   RETURN_IF_ERROR(sync_folder(partial_));
-  // Takes the place of an empty directory, and of nothing else.
+  // rename() replaces an empty directory and fails if anything else exists at the target.
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) return file_error("make", target_, errno);
   made_ = false;
   return sync_folder(fs::path(target_).parent_path().string());

@@ -1,8 +1,8 @@
-// A directory that comes into being whole or not at all: made and filled as TARGET.partial, and renamed to TARGET once
-// everything in it is on the disk. For backups and for what is restored from them. Not thread-safe.
+// Directory that appears complete or not at all: it is created and filled as TARGET.partial, and renamed to TARGET when
+// all its files are synced to disk. For backups and restored data directories. Not thread-safe.
 //
-// Invariant: nothing stands under the target's name before keep() returned OK. What is not kept is removed with the
-// object; a process that is killed leaves TARGET.partial behind.
+// Invariant: TARGET does not change before keep(). The destructor removes TARGET.partial unless keep() renamed it; a
+// process that is killed leaves it behind.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_PARTIAL_DIRECTORY_H_
 #define LOCUS_CLIENT_CLI_BACKUP_PARTIAL_DIRECTORY_H_
 
@@ -15,33 +15,34 @@
 
 namespace locus::cli {
 
-// What may stand under the target's name.
+// Choice of what may exist at the target: nothing, or nothing but an empty directory.
 enum class TargetRule { kNothing, kNothingOrEmpty };
 
 class PartialDirectory {
  public:
-  // Touches nothing yet.
+  // Stores the paths; does not access the file system.
   PartialDirectory(const std::string& target, TargetRule rule);
   ~PartialDirectory();
   PartialDirectory(const PartialDirectory&) = delete;
   PartialDirectory& operator=(const PartialDirectory&) = delete;
 
-  // Both absolute.
+  // Return absolute paths.
   const std::string& target() const { return target_; }
   const std::string& partial() const { return partial_; }
 
-  // FAILED_PRECONDITION where the rule is broken or TARGET.partial is there.
+  // Returns FAILED_PRECONDITION if the target breaks the rule or TARGET.partial exists.
   absl::Status check() const;
-  // Checks, and makes TARGET.partial for its owner alone. RESOURCE_EXHAUSTED where its disk has no room for `bytes`.
+  // Calls check() and creates TARGET.partial, accessible to its owner only. RESOURCE_EXHAUSTED if the disk has less
+  // than `bytes` free bytes.
   absl::Status make(uint64_t bytes);
 
-  // One file after another: a new file at `path`, which is relative, fit (client/lib/backup.h) and new; its folders are
-  // made. On the disk after close_file().
+  // Creates the file `path` and its folders, and opens it for write(). Only one file is open at a time. `path` must be
+  // relative, valid (BackupPaths in client/lib/backup.h) and new. The file is synced to disk by close_file().
   absl::Status open_file(const std::string& path);
   absl::Status write(absl::string_view bytes);
   absl::Status close_file();
 
-  // Gives the directory its name. Before this, every file is closed.
+  // Syncs the folders and renames the directory to the target. Precondition: no file is open.
   absl::Status keep();
 
  private:
@@ -51,8 +52,8 @@ class PartialDirectory {
   const std::string partial_;
   const TargetRule rule_;
   bool made_ = false;
-  std::set<std::string> folders_;  // that were made, relative
-  int file_ = -1;                  // the open one
+  std::set<std::string> folders_;  // created folders, relative paths
+  int file_ = -1;                  // descriptor of the open file; -1 = none
   std::string file_path_;
 };
 

@@ -1,4 +1,4 @@
-// The line that says how far a backup is while it comes or is read, where lines that overwrite themselves make sense.
+// Progress line of a backup or a restore, written if the context's progress is live.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
 #define LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
 
@@ -11,12 +11,12 @@
 
 namespace locus::cli {
 
-// Borrows the context, which outlives it and what it hands out.
+// Writer of the progress line. Borrows the context, which must outlive it; it must outlive the result of progress().
 class ProgressLine {
  public:
   ProgressLine(std::string doing, Context& context) : doing_(std::move(doing)), context_(context) {}
 
-  // Empty where nobody looks.
+  // Returns the callback that updates the line; empty if progress is not live.
   BackupProgress progress() const {
     if (context_.progress() != Progress::kLive) return {};
     return [this](uint64_t done, uint64_t total) {

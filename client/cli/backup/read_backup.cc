@@ -25,10 +25,10 @@ namespace fs = std::filesystem;
 
 constexpr size_t kReadBytes = size_t{1} << 20;
 constexpr size_t kNamedProblems = 5;
-// A line of each file that a backup may have.
+// Maximum size of SHA256SUMS: one line for each file that a backup may have.
 constexpr uint64_t kMaxChecksumBytes = client::kMaxBackupFiles * (client::kMaxBackupPathLength + 67);
 
-// What is wrong with a backup.
+// Damage found in a backup: the first few files by name, and a count.
 class Problems {
  public:
   void add(absl::string_view path, absl::string_view what) {
@@ -48,7 +48,7 @@ class Problems {
   size_t count_ = 0;
 };
 
-// Hands over a file's bytes until its end, or until `take` fails.
+// Reads a file and passes its bytes to `take`, until the end or until `take` fails.
 absl::Status read_file(const std::string& path, absl::FunctionRef<absl::Status(absl::string_view)> take) {
   const int file = open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
   if (file < 0) return file_error("read", path, errno);
@@ -84,7 +84,7 @@ absl::StatusOr<std::vector<Checksum>> read_checksums(const std::string& backup) 
       absl::StrCat("the backup ", backup, " is damaged: ", checksums.status().message(), "; take another backup"));
 }
 
-// Sizes of all files below `backup` by path, SHA256SUMS apart.
+// Returns the sizes of all files below `backup` except SHA256SUMS, by relative path.
 absl::StatusOr<std::map<std::string, uint64_t>> list_files(const std::string& backup, Problems& problems) {
   std::map<std::string, uint64_t> sizes;
   std::error_code why;
@@ -108,13 +108,13 @@ absl::StatusOr<std::map<std::string, uint64_t>> list_files(const std::string& ba
   return sizes;
 }
 
-// What there is to read.
+// Files of a backup to read, and their total size.
 struct Contents {
   std::vector<Checksum> files;
   uint64_t bytes = 0;
 };
 
-// The files that are listed and there. Every other file is a problem.
+// Returns the files that are listed and exist. Adds every other file, listed or existing, to `problems`.
 absl::StatusOr<Contents> find_files(const std::string& backup, Problems& problems) {
   ASSIGN_OR_RETURN(const std::vector<Checksum> checksums, read_checksums(backup));
   ASSIGN_OR_RETURN(auto sizes, list_files(backup, problems));

@@ -1,5 +1,4 @@
-// Reads a backup and proves it by its SHA256SUMS, and copies it where a copy is wanted. For `locus restore`. Functions
-// without state.
+// Verification of a backup by its SHA256SUMS, with an optional copy. For `locus restore`. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_READ_BACKUP_H_
 #define LOCUS_CLIENT_CLI_BACKUP_READ_BACKUP_H_
 
@@ -12,9 +11,9 @@
 
 namespace locus::cli {
 
-// Reads every file of the directory `backup`, once; with `copy`, which was not made yet, writes it there as well, all
-// but SHA256SUMS, and leaves it to the caller to keep. DATA_LOSS naming the first few files that are missing, have
-// other bytes, or are there without being listed; a copy ends at the first of them. NOT_FOUND where there is no backup.
+// Reads every file of the directory `backup` once and verifies its hash. With `copy`, on which make() was not called,
+// writes all files except SHA256SUMS to it; the caller then calls keep(). DATA_LOSS naming the first few files that are
+// missing, changed or not listed; with `copy`, reading ends at the first of them. NOT_FOUND if there is no backup.
 absl::StatusOr<client::BackupSize> read_backup(const std::string& backup, PartialDirectory* copy,
                                                const BackupProgress& progress);
 

@@ -10,8 +10,8 @@
 namespace locus::cli {
 namespace {
 
-constexpr size_t kWidthRows = 1000;          // of a table
-constexpr uint64_t kListedTruncated = 1000;  // all are counted
+constexpr size_t kWidthRows = 1000;          // rows of a table that decide the widths of its columns
+constexpr uint64_t kListedTruncated = 1000;  // maximum of indices listed; all are counted
 
 absl::Status no_fit() { return absl::DataLossError("the server's answer does not fit the question"); }
 
@@ -40,7 +40,7 @@ absl::Status BulkAnswers::write(const v1::QueryResult& result, const SentRows& s
     if (!written.ok()) return written;
   }
   context_.out().flush();
-  if (!context_.out()) return absl::UnknownError("the output takes no more");
+  if (!context_.out()) return absl::UnknownError("cannot write the output");
   rows_ += sent.rows();
   return absl::OkStatus();
 }
@@ -70,7 +70,7 @@ void BulkAnswers::note(const v1::QueryResult& result) {
     report_.begin(head);
     first_revision_ = result.revision();
   }
-  // With `follow` an answer may overtake a newer one.
+  // With `follow`, answers may arrive out of the order of their revisions: keep the newest.
   if (!revision_ || result.revision() > revision_->revision) tick_ = result.tick();
   if (!revision_ || result.revision() > revision_->revision) revision_ = {result.epoch(), result.revision()};
   if (!result.has_work()) return;

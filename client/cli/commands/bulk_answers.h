@@ -1,4 +1,4 @@
-// Writes the answers to bulk queries as they come in, as one report. For bulk_query.cc. Not thread-safe.
+// Writer of the answers to bulk queries, as one report, while they arrive. For bulk_query.cc. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_ANSWERS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_ANSWERS_H_
 
@@ -20,19 +20,20 @@ struct BulkQuery;
 
 class BulkAnswers {
  public:
-  // Borrows all. With `follow` answers may be of several revisions; the facts of the report then tell first and last.
+  // Borrows `query` and `context`. With `follow` answers may have different revisions; the report then shows the first
+  // and the newest.
   BulkAnswers(const BulkQuery& query, bool follow, Context& context);
 
-  // Appends the answer to `sent`, whose blocks have these frames. DATA_LOSS for an answer that does not fit the
-  // question, UNKNOWN when the output takes no more.
+  // Appends the answer to `sent`, whose blocks have these frames. DATA_LOSS if the answer does not match the query,
+  // UNKNOWN if the output cannot be written.
   absl::Status write(const v1::QueryResult& result, const SentRows& sent, const std::vector<client::Double3>& frames);
 
-  // Completes the report, if anything was answered.
+  // Completes the report; does nothing if there was no answer.
   void end();
 
-  // Of the answer written last.
+  // Returns the newest revision among the answers; none before the first answer.
   std::optional<client::Revision> revision() const { return revision_; }
-  // Rows of the input that are answered.
+  // Returns the number of answered rows of the input.
   uint64_t rows() const { return rows_; }
 
  private:
@@ -50,7 +51,7 @@ class BulkAnswers {
   uint64_t rows_ = 0;
   uint64_t truncated_ = 0;
   size_t clamped_ = 0;
-  Json truncated_rows_ = Json::array();  // the first of them
+  Json truncated_rows_ = Json::array();  // indices of the first truncated queries
   v1::Work work_;
   bool has_work_ = false;
 };

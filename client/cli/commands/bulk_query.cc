@@ -43,14 +43,15 @@ class BulkQueryRun {
       : query_(query), options_(options), bulk_(bulk), context_(context), answers_(query, bulk.follow, context) {}
 
   absl::Status run() {
-    // An input is there when the line runs, perhaps not before, and a pipe can be read only once.
+    // While a script is checked, do not open the input: an earlier line may create it, and a pipe can be read only
+    // once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, query_.schema));
     ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
     reader_ = reader.get();
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     absl::Status status = ask_all();
-    // What was sent before a wrong row is answered all the same; after a refusal nothing more is waited for.
+    // After a wrong row, still wait for the answers to earlier batches; after an error of the server, do not.
     while (!refused_ && !in_flight_.empty()) status.Update(write_front());
     answers_.end();
     hide_rows(context_);
@@ -63,7 +64,7 @@ class BulkQueryRun {
   struct InFlight {
     SentRows sent;
     std::future<absl::StatusOr<v1::QueryResult>> answer;
-    std::vector<client::Double3> frames;  // one a block
+    std::vector<client::Double3> frames;  // one per block
   };
 
   absl::Status ask_all() {
@@ -72,7 +73,7 @@ class BulkQueryRun {
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
       ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
-      // An input without rows asks an empty batch: it finds out whether the scene is there, and its revision.
+      // For an input without rows, send an empty batch to check that the scene exists and to get its revision.
       if (batch.rows() > 0 || (end == BatchEnd::kEnd && !asked)) {
         asked = true;
         RETURN_IF_ERROR(send(batch));
@@ -82,7 +83,7 @@ class BulkQueryRun {
     }
   }
 
-  // In as many messages as their blocks need.
+  // Sends the batch in as many messages as its blocks need.
   absl::Status send(const RowBatch& batch) {
     size_t begin = 0;
     do {
@@ -110,7 +111,7 @@ class BulkQueryRun {
     }
   }
 
-  // Returns the first row that did not fit.
+  // Adds the rows from `begin` on as blocks, up to kMaxBlocks. Returns the first row that was not added.
   size_t add_blocks(const RowBatch& batch, size_t begin, InFlight& message, client::QueryBuilder& builder) const {
     message.sent.first_row = batch.first_row + begin;
     const size_t first = begin;
@@ -129,7 +130,7 @@ class BulkQueryRun {
     return begin;
   }
 
-  // Those that are there; all, where nothing is left to be read for now.
+  // Writes the answers that are ready. If the input has no more data for now, waits for all answers.
   absl::Status write_answers(BatchEnd end) {
     while (!in_flight_.empty()) {
       if (end == BatchEnd::kFull &&

@@ -36,7 +36,8 @@ class BulkUpdateRun {
       : update_(update), scene_(scene), bulk_(bulk), context_(context) {}
 
   absl::Status run() {
-    // An input is there when the line runs, perhaps not before, and a pipe can be read only once.
+    // While a script is checked, do not open the input: an earlier line may create it, and a pipe can be read only
+    // once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, update_.schema));
     const absl::StatusOr<client::Client*> client = context_.connect();
@@ -46,8 +47,8 @@ class BulkUpdateRun {
     options.max_in_flight = static_cast<int>(kBulkWindow);
     stream_ = (*client)->update_stream(scene_, options);
     absl::Status status = send_all();
-    // Whatever went wrong, each batch that was sent has an outcome, and the report counts it.
-    while (!silent_ && !in_flight_.empty()) status.Update(take_front());
+    // Also after an error, wait for the acks of all batches in flight, since the report counts them.
+    while (!timed_out_ && !in_flight_.empty()) status.Update(take_front());
     write_totals();
     if (!status.ok()) return in_words(status, absl::StrCat(status.message(), "; ", what_was_done()));
     status = stream_->close();
@@ -65,7 +66,7 @@ class BulkUpdateRun {
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
       ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
-      // An input without rows sends an empty batch: it finds out whether the scene is there, and its revision.
+      // For an input without rows, send an empty batch to check that the scene exists and to get its revision.
       if (batch.rows() > 0 || (end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty())) {
         RETURN_IF_ERROR(send(batch));
       }
@@ -108,7 +109,7 @@ class BulkUpdateRun {
     in_flight_.pop_front();
     const double seconds = context_.options().timeout_seconds.value_or(kBulkAnswerSeconds);
     if (front.ack.wait_for(std::chrono::duration<double>(seconds)) != std::future_status::ready) {
-      silent_ = true;
+      timed_out_ = true;
       return absl::DeadlineExceededError(
           absl::StrCat(reader_->name(), ":", front.sent.line_range(), ": no answer within ", seconds, " s"));
     }
@@ -119,7 +120,7 @@ class BulkUpdateRun {
     for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent);
     context_.out().flush();
     show_rows(context_, "rows applied", applied_);
-    return context_.out() ? absl::OkStatus() : absl::UnknownError("the output takes no more");
+    return context_.out() ? absl::OkStatus() : absl::UnknownError("cannot write the output");
   }
 
   void count(const v1::UpdateAck& ack) {
@@ -171,7 +172,7 @@ class BulkUpdateRun {
   RowReader* reader_ = nullptr;
   std::unique_ptr<client::UpdateStream> stream_;
   std::deque<InFlight> in_flight_;
-  bool silent_ = false;  // nothing more is waited for
+  bool timed_out_ = false;  // an ack did not arrive in time: do not wait for others
   std::optional<ReportStream> errors_;
   std::string first_refused_;
   bool all_unknown_ = true;

@@ -13,7 +13,8 @@ struct CompletionOptions {
   Shell shell = Shell::kBash;
 };
 
-// Walks a parser of its own: the one that runs this command belongs to the caller.
+// Writes a completion script. It is made from a second parser, since the one that runs this command belongs to the
+// caller.
 absl::Status completion(const CompletionOptions& options, Context& context) {
   std::ostringstream nowhere;
   Context unused(nowhere, nowhere, Progress::kSilent);

@@ -1,4 +1,5 @@
-// `locus demo`: a level, ten thousand moving objects, clients that ask meanwhile, and every kind of answer checked.
+// `locus demo`: a level and ten thousand moving objects, with clients that query them, and a check of every kind of
+// answer.
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -35,7 +36,7 @@ struct DemoOptions {
   std::string compare;
 };
 
-// The table of the demo and whether all of it is as promised.
+// Table of the demo's results, with the count of wrong answers.
 class DemoTable {
  public:
   void add(const std::string& what, Json rest) {
@@ -57,7 +58,7 @@ class DemoTable {
     wrong_ += wrong;
     all_wrong_ += wrong;
   }
-  // A row that is nothing but a check.
+  // Adds a row of a check without a load.
   void add_check(const std::string& what, uint64_t checked, uint64_t wrong) {
     all_wrong_ += wrong;
     add(what, {{"rate_per_s", nullptr},
@@ -134,7 +135,7 @@ absl::Status check_leaks(const client::Client& client, const DemoOptions& option
   return absl::OkStatus();
 }
 
-// Four kinds in one batch, large enough to be split.
+// Returns a batch of all four kinds of query, large enough that the server splits it into chunks.
 v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
   DemoRandom random(seed);
   v1::QueryBatch mixed;
@@ -142,7 +143,7 @@ v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
   return mixed;
 }
 
-// The same scene on a second server, at the same tick, must answer with the same bytes.
+// Builds the same scene on a second server and compares: at the same tick, both must answer with the same bytes.
 absl::Status check_other(const client::Client& client, const DemoOptions& options, const ImportedLevel& level,
                          const DemoWorld& world, uint64_t tick, DemoTable& table) {
   ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> other, client::Client::connect(options.compare));

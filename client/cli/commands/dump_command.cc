@@ -14,14 +14,14 @@ namespace locus::cli {
 namespace {
 
 constexpr char kRowsName[] = "things";
-constexpr size_t kWidthRows = 1000;  // rows of a table that decide how wide its columns are
+constexpr size_t kWidthRows = 1000;  // rows of a table that decide the widths of its columns
 
 struct DumpOptions {
   std::string scene;
   ViewOptions view;
 };
 
-// Whatever a line in a script may want to look at is held; else rows go out as they come in.
+// Dumps a scene. Rows are written as they arrive, except in a script that keeps reports: there they are collected.
 absl::Status dump(const DumpOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.view));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
@@ -35,12 +35,12 @@ absl::Status dump(const DumpOptions& options, Context& context) {
       context.out(), context.options().format,
       {.rows_name = kRowsName, .keys = thing_keys(things), .no_rows = kNoRows, .width_rows = kWidthRows});
   bool begun = false;
-  const auto take = [&](const v1::DumpSceneResponse& piece) {
-    const Json head = {{"scene", options.scene}, {"epoch", id_json(piece.epoch())}, {"revision", piece.revision()}};
+  const auto take = [&](const v1::DumpSceneResponse& message) {
+    const Json head = {{"scene", options.scene}, {"epoch", id_json(message.epoch())}, {"revision", message.revision()}};
     if (!begun && !context.keeps_reports()) stream.begin(head);
     begun = true;
     kept.head = head;
-    return for_each_thing(piece, [&](const SceneThing& thing) {
+    return for_each_thing(message, [&](const SceneThing& thing) {
       if (!is_among(things, thing.kind)) return absl::OkStatus();
       if (context.keeps_reports()) {
         kept.rows.push_back(thing_row(thing, things));

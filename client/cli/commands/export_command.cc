@@ -32,7 +32,8 @@ absl::Status check(const ExportOptions& options) {
   return check(options.view);
 }
 
-// From the scene as it is now. The dump may be of another revision, so this is a choice of where to stand, no promise.
+// Returns the recentre translation for the scene's current bounds. The dump may have another revision; its things are
+// then only approximately centred.
 absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.scene));
   if (!scene.has_min() || !scene.has_max()) return std::array<double, 3>{};
@@ -40,14 +41,14 @@ absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options
                      {scene.max().x(), scene.max().y(), scene.max().z()});
 }
 
-// Nodes for everything that is wanted. What the answer says about the scene.
+// Adds a node to `file` for each thing to export. Returns the head of the report: file, scene, epoch and revision.
 absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file, client::Client& client,
                                 Context& context) {
   Json head = {{"file", options.out}, {"scene", options.scene}};
-  const auto take = [&](const v1::DumpSceneResponse& piece) {
-    head["epoch"] = id_json(piece.epoch());
-    head["revision"] = piece.revision();
-    absl::Status taken = for_each_thing(piece, [&](const SceneThing& thing) {
+  const auto take = [&](const v1::DumpSceneResponse& message) {
+    head["epoch"] = id_json(message.epoch());
+    head["revision"] = message.revision();
+    absl::Status taken = for_each_thing(message, [&](const SceneThing& thing) {
       return is_among(things_of(options.view), thing.kind) ? file.add(thing) : absl::OkStatus();
     });
     if (context.progress() == Progress::kLive)

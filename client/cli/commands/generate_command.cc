@@ -15,7 +15,7 @@
 namespace locus::cli {
 namespace {
 
-// A kind of level that can be made up.
+// Kind of level that can be generated.
 struct Kind {
   std::string name;
   std::string description;

@@ -31,7 +31,7 @@ const std::vector<v1::Column>& columns() {
   return columns;
 }
 
-// One block of ids and one of groups, as far as they are asked for.
+// Returns a batch with a block of ids and a block of groups, each only if requested.
 v1::QueryBatch batch_of(const GetOptions& options, const Context& context) {
   client::QueryBuilder builder;
   see_own(options.scene, context, builder);
@@ -47,7 +47,7 @@ v1::QueryBatch batch_of(const GetOptions& options, const Context& context) {
   return builder.build();
 }
 
-// The ids asked for that the dense first block does not have.
+// Returns the requested ids that the first block (one row per id) does not have.
 std::vector<uint64_t> missing_ids(const GetOptions& options, const v1::QueryResult& result) {
   std::vector<uint64_t> missing;
   if (options.ids.empty()) return missing;

@@ -34,7 +34,7 @@ struct InsertOptions {
   bool upsert = false;
 };
 
-// Which measures a shape has; the parser knows them only as optional.
+// Returns a usage error unless the measures match the shape; to the parser all of them are optional.
 absl::Status check_measures(const InsertOptions& options) {
   struct Measure {
     const char* name;
@@ -77,7 +77,7 @@ v1::UpdateBatch batch_of(const InsertOptions& options) {
   return builder.build();
 }
 
-// Fields of bulk rows.
+// Indices of the fields of bulk rows.
 enum InsertField : size_t { kId, kAt, kRadius, kHalf, kAxis, kRotation, kLayers, kGroup, kTag, kShape };
 
 const std::vector<std::string>& shapes() {
@@ -133,7 +133,7 @@ absl::Status check_row(const InsertOptions& options, const RowBatch& batch, size
   return absl::OkStatus();
 }
 
-// Rows of one shape, as one Insert.
+// Adds rows of one shape as one Insert.
 void add_rows(const InsertOptions& options, const RowBatch& batch, RowSpan rows, client::UpdateBuilder& builder) {
   const std::vector<RowColumn>& columns = batch.columns;
   const std::vector<uint64_t> ids = id_column(columns[kId], rows, 0, {});

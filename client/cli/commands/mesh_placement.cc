@@ -9,7 +9,8 @@
 namespace locus::cli {
 namespace {
 
-// The last message is followed by the server's work, which takes the longest: the line stays until the answer is there.
+// Returns the callback that updates the progress line. The line stays after the last message, since the server then
+// builds the tree, which takes longest.
 client::UploadProgress progress_line(const std::string& name, Context& context) {
   if (context.progress() == Progress::kSilent) return {};
   return [&context, name](uint64_t sent, uint64_t total) {

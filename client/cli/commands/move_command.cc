@@ -29,22 +29,23 @@ client::MoveKind kind_of(const MoveOptions& options) {
   return options.teleport ? client::MoveKind::kTeleport : client::MoveKind::kContinuous;
 }
 
-// Fields of bulk rows.
+// Indices of the fields of bulk rows.
 enum MoveField : size_t { kId, kTo, kRotation };
 
-// A list of moves has a rotation for each or for none, so that a new one begins where that changes.
+// Returns the update for these rows. Rows with and without a rotation go to different Moves, since one Move has
+// rotations for all of its objects or for none.
 v1::UpdateBatch batch_of_rows(const MoveOptions& options, const RowBatch& batch) {
   client::UpdateBuilder builder;
   if (options.tick) builder.tick(*options.tick);
-  const std::vector<uint8_t>& turned = batch.columns[kRotation].given;
+  const std::vector<uint8_t>& has_rotation = batch.columns[kRotation].given;
   for (size_t begin = 0, end = 0; begin < batch.rows(); begin = end) {
     end = begin + 1;
-    while (end < batch.rows() && turned[end] == turned[begin]) ++end;
+    while (end < batch.rows() && has_rotation[end] == has_rotation[begin]) ++end;
     const RowSpan rows = {begin, end};
     const std::vector<uint64_t> ids = id_column(batch.columns[kId], rows, 0, {});
     const std::vector<double> positions = positions_of(batch.columns[kTo], rows);
     std::vector<float> rotations = floats_of(options.rotations);
-    if (turned[begin] != 0) rotations = float_column(batch.columns[kRotation], rows, {0, 0, 0, 1}, {});
+    if (has_rotation[begin] != 0) rotations = float_column(batch.columns[kRotation], rows, {0, 0, 0, 1}, {});
     builder.moves({.ids = ids, .positions_f64 = positions, .rotations = rotations}, kind_of(options));
   }
   return builder.build();

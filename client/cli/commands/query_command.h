@@ -1,4 +1,4 @@
-// The kinds of query, each in a file of its own. Internal to the command line: commands.h is the door.
+// Subcommands of `locus query`, one file per kind of query. Internal to commands/; other code uses commands.h.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_QUERY_COMMAND_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_QUERY_COMMAND_H_
 
@@ -17,10 +17,10 @@ void add_query_ball(CLI::App& parent, Context& context);
 void add_query_box(CLI::App& parent, Context& context);
 void add_query_nearest(CLI::App& parent, Context& context);
 
-// Asks a batch of one block and gives its answer. DATA_LOSS if the server answers another number of blocks.
+// Asks a batch of one block and returns the result. DATA_LOSS if the result has another number of blocks.
 absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::QueryBuilder& builder, Context& context);
 
-// Asks and writes rows by `layout` under the name `rows_name`.
+// Asks a batch of one block and writes its rows, in `layout`, under the key `rows_name`.
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context);
 

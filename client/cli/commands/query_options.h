@@ -1,4 +1,4 @@
-// The options that every kind of query has, and where its positions go. For the query commands.
+// Options that every kind of query has, and the frame of its positions. For the query commands.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_QUERY_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_QUERY_OPTIONS_H_
 
@@ -33,22 +33,22 @@ struct QueryOptions {
   bool explain = false;
 };
 
-// SCENE and the shared options. `columns` are the names `--columns` knows besides the shared ones.
+// Adds SCENE and the shared options.
 void add_query_options(CLI::App& command, QueryOptions& options);
 
-// --detail of ball, box and nearest.
+// Adds --detail, for ball, box and nearest.
 void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
 
-// Usage error for options that exclude each other.
+// Returns a usage error for options that exclude each other.
 absl::Status check(const QueryOptions& options);
 
-// Makes the batch see what was acknowledged to this context on the scene, if anything was.
+// Makes the batch ask for at least the last revision of `scene` acknowledged to this context, if any.
 void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder);
 
-// View and budget. Without a view of its own the batch sees what was acknowledged to this context.
+// Sets the batch's view, work budget and explain flag. Without --at-least and --exactly, the view is that of see_own().
 void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder);
 
-// Everything of a block but its kind and columns.
+// Sets the shared options of a block: all except its kind and columns.
 template <class Block>
 void apply_to_block(const QueryOptions& options, Block& block) {
   block.source(options.source)
@@ -61,8 +61,8 @@ void apply_to_block(const QueryOptions& options, Block& block) {
   apply_to_block(options.past, block);
 }
 
-// Positions as a query sends them: floats relative to a frame. The frame is the origin where every coordinate is a
-// float, else the first position, so that positions far out or in decimals lose nothing that matters.
+// Positions of a query as floats relative to a frame. The frame is the origin if every coordinate is exactly a float,
+// else the first position, so that coordinates that are large or not exact in float keep their precision.
 struct FramedPositions {
   client::Double3 frame;
   std::vector<float> offsets;

@@ -29,7 +29,7 @@ struct BoxOptions {
   v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
 };
 
-// The columns to ask for and show: ids always, triangles where they are the rows.
+// Returns the columns to request and show: always ids, and triangles if each row is a triangle.
 std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail detail) {
   std::vector<v1::Column> columns = {v1::COLUMN_ID};
   if (detail == v1::STATIC_DETAIL_TRIANGLES || detail == v1::STATIC_DETAIL_TRIANGLES_SORTED) {
@@ -39,7 +39,7 @@ std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail
   return columns;
 }
 
-// Fields of bulk rows.
+// Indices of the fields of bulk rows.
 enum BallField : size_t { kBallAt, kRadius, kBallFilter };
 enum BoxField : size_t { kBoxAt, kHalf, kRotation, kBoxFilter };
 
@@ -133,7 +133,7 @@ absl::Status query_box(const BoxOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
-// What only overlaps have.
+// Adds the options of overlap queries: --detail, --after-id, and those of all queries.
 template <class Options>
 void add_overlap_options(CLI::App& command, Options& options) {
   add_detail_option(command, options.detail);

@@ -21,9 +21,9 @@
 namespace locus::cli {
 namespace {
 
-constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // of 28 bytes each, 52 with their work
+constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // 28 bytes per ray, 52 with its work
 constexpr ImageSize kDefaultSize = {960, 540};
-constexpr ImageSize kDefaultHeatSize = {480, 270};  // a ray costs several times more when its work is reported
+constexpr ImageSize kDefaultHeatSize = {480, 270};  // reporting its work makes a ray several times dearer
 
 enum class Show { kShaded, kDepth, kNormals, kIds };
 enum class Heat { kNone, kWork, kNodes, kCells, kTests };
@@ -41,7 +41,7 @@ struct RenderOptions {
   CastOptions cast;
 };
 
-// How many rays a pixel has in each direction.
+// Returns the number of rays per pixel and axis.
 uint32_t rays_a_side(const RenderOptions& options) { return options.samples == Samples::kFour ? 2 : 1; }
 
 ImageSize picture_size(const RenderOptions& options) {
@@ -52,7 +52,7 @@ ImageSize picture_size(const RenderOptions& options) {
 absl::StatusOr<ImageSize> ray_image_size(const RenderOptions& options) {
   const ImageSize size = picture_size(options);
   const uint64_t rays_a_pixel = uint64_t{rays_a_side(options)} * rays_a_side(options);
-  // Sides of 32 bits: neither product overflows once the first is known to be small.
+  // No overflow: both sides have 32 bits, and the second product is computed only if the first is small.
   if (size.pixels() > kMaxRenderRays || size.pixels() * rays_a_pixel > kMaxRenderRays) {
     return usage_error(absl::StrCat("--size ", size.width, "x", size.height, " with --samples ", rays_a_pixel,
                                     " takes more rays than a picture may have (", kMaxRenderRays,
@@ -67,7 +67,7 @@ absl::Status check_line(const RenderOptions& options) {
   return check_png_path(options.out);
 }
 
-// Bounds of what the picture is of. Sets the revision that all of it is taken at.
+// Returns the bounds of the thing or scene to show. Sets the revision at which all rays are asked.
 absl::StatusOr<Aabbd> find_target(RenderOptions& options, const client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.cast.scene));
   options.cast.revision = {scene.epoch(), scene.revision()};
@@ -95,7 +95,7 @@ std::vector<double> heat_of(const RayImage& image, Heat heat) {
   return values;
 }
 
-// Paints what was asked for, and reports what its colours stand for.
+// Paints the requested picture. Adds the values that its colours stand for to `head`.
 Picture paint(const RenderOptions& options, const RayImage& image, const Camera& camera, Json& head) {
   if (options.heat != Heat::kNone) {
     const std::vector<double> values = heat_of(image, options.heat);
@@ -145,7 +145,7 @@ Json head_of(const RenderOptions& options, const Camera& camera, const CastResul
   return head;
 }
 
-// One line that overwrites itself, a few times a second.
+// Returns the callback that updates the progress line, at most every 100 ms.
 CastProgress progress_line(const RenderOptions& options, uint64_t rays, Context& context) {
   if (context.progress() == Progress::kSilent) return {};
   return [&context, rays, out = options.out, last = absl::InfinitePast()](uint64_t done) mutable {

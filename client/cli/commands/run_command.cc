@@ -47,7 +47,7 @@ struct RunOptions {
   bool dry_run = false;
 };
 
-// One byte more than allowed tells that there is more.
+// Reads a script. Stops once more than kMaxScriptBytes are read, so that the caller can refuse a longer one.
 absl::StatusOr<std::string> read_all(std::istream& in, const std::string& name) {
   std::string text;
   std::vector<char> part(size_t{1} << 16);
@@ -134,7 +134,7 @@ void add_run_command(CLI::App& parent, Context& context) {
   command.add_option("--set", options->settings, "A variable for the script; repeat for more")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  command.add_flag("--keep-going", options->keep_going, "Go on after lines that fail; they are told and counted");
+  command.add_flag("--keep-going", options->keep_going, "Continue after lines that fail; print and count their errors");
   command.add_flag("--dry-run", options->dry_run, "Only check every line; needs no server");
   run_when_chosen(command, options, context, run);
 }

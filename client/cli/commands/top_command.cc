@@ -1,4 +1,4 @@
-// `locus top`: what a server does, from its metrics, as a table that renews itself.
+// `locus top`: rates and latencies of a server, computed from its metrics, as a table that is updated in place.
 #include <signal.h>
 #include <unistd.h>
 
@@ -20,7 +20,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kTimeout{5000};
-// Cursor to the upper left corner, and everything away.
+// Escape sequence: cursor to the upper left corner, then clear the screen.
 constexpr const char* kClearScreen = "\x1b[H\x1b[2J";
 
 struct TopOptions {
@@ -41,19 +41,20 @@ absl::StatusOr<Scraped> scrape(const TopOptions& options) {
   return Scraped{steady_clock::now(), std::move(samples)};
 }
 
-// Ctrl-C and the like end the table, not the program in the middle of a line: while this lives they wait to be asked.
-class Patience {
+// Guard that blocks SIGINT, SIGTERM and SIGHUP during its lifetime, so that they end the loop in wait() and do not kill
+// the program in the middle of a line.
+class EndSignals {
  public:
-  Patience() {
+  EndSignals() {
     sigemptyset(&ending_);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ending_, signal);
     pthread_sigmask(SIG_BLOCK, &ending_, &before_);
   }
-  ~Patience() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  Patience(const Patience&) = delete;
-  Patience& operator=(const Patience&) = delete;
+  ~EndSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  EndSignals(const EndSignals&) = delete;
+  EndSignals& operator=(const EndSignals&) = delete;
 
-  // False once somebody wants it to end.
+  // Waits `seconds`. Returns false as soon as one of the signals arrives.
   bool wait(double seconds) const {
     const timespec time = {static_cast<time_t>(seconds), static_cast<long>((seconds - std::floor(seconds)) * 1e9)};
     return sigtimedwait(&ending_, nullptr, &time) < 0;
@@ -96,10 +97,10 @@ void write(Context& context, const TopFigures& figures) {
 absl::Status top(const TopOptions& options, Context& context) {
   if (options.json) context.options().format = Format::kJson;
   const bool live = !options.once && isatty(STDOUT_FILENO) == 1 && context.options().format == Format::kTable;
-  const Patience patience;
+  const EndSignals end_signals;
   absl::StatusOr<Scraped> before = scrape(options);
   if (!before.ok()) return before.status();
-  while (patience.wait(options.interval)) {
+  while (end_signals.wait(options.interval)) {
     absl::StatusOr<Scraped> now = scrape(options);
     if (!now.ok()) return now.status();
     if (live) context.out() << kClearScreen;

@@ -1,5 +1,5 @@
-// What of a scene a command reads, and at which revision. For commands that read whole scenes. Plain data and functions
-// without state.
+// Options that select the kinds of things to read from a scene, and the revision. For commands that read all of a
+// scene. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_VIEW_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_VIEW_OPTIONS_H_
 
@@ -23,16 +23,17 @@ struct ViewOptions {
   Number64 epoch;
 };
 
-// --objects, --instances, --at-least, --exactly, --epoch.
+// Adds --objects, --instances, --at-least, --exactly, --epoch.
 void add_view_options(CLI::App& command, ViewOptions& options);
 
-// Both flags mean everything, as none does.
+// Returns the things to read: all of them if both flags or none are given.
 Things things_of(const ViewOptions& options);
 
-// Usage error for options that exclude each other.
+// Returns a usage error for options that exclude each other.
 absl::Status check(const ViewOptions& options);
 
-// A request for everything in a scene; without options the revision is at least that of the context's own last change.
+// Returns a request for everything in a scene. Without --at-least and --exactly, the revision is at least that of the
+// last change acknowledged to the context.
 v1::DumpSceneRequest dump_request(const std::string& scene, const ViewOptions& options, const Context& context);
 
 }  // namespace locus::cli

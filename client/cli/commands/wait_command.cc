@@ -43,7 +43,7 @@ Report report_of(const v1::Scene& scene) {
   return report;
 }
 
-// Asks again and again, less often as time goes on: instances take from milliseconds to minutes to build.
+// Polls the scene, at growing intervals, since instances take from milliseconds to minutes to build.
 absl::Status wait(const WaitOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const absl::Time end = absl::Now() + absl::Seconds(options.seconds);

@@ -14,9 +14,9 @@ std::istream& operator>>(std::istream& in, AsOf& time) {
   std::string text;
   in >> text;
   const size_t plus = text.find('+');
-  const bool whole = plus == std::string::npos;
+  const bool no_fraction = plus == std::string::npos;
   if (!absl::SimpleAtoi(text.substr(0, plus), &time.tick) ||
-      (!whole && !absl::SimpleAtof(text.substr(plus + 1), &time.fraction)))
+      (!no_fraction && !absl::SimpleAtof(text.substr(plus + 1), &time.fraction)))
     in.setstate(std::ios::failbit);
   return in;
 }

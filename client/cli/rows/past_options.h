@@ -1,4 +1,4 @@
-// Options of questions about the past: when to ask, and what to do about times that are not kept. For the query and get
+// Options of queries about the past: the time, and the treatment of times outside the history. For the query and get
 // commands. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_ROWS_PAST_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_ROWS_PAST_OPTIONS_H_
@@ -14,7 +14,7 @@
 
 namespace locus::cli {
 
-// "12" or "12+0.5": a tick, and how far from there to the next. Reading sets failbit on anything else.
+// Time given as "12" or "12+0.5": a tick and a fraction of the way to the next. Reading sets failbit on other texts.
 struct AsOf {
   uint64_t tick = 0;
   float fraction = 0;
@@ -27,11 +27,11 @@ struct PastOptions {
   v1::OutsideHistory outside = v1::OUTSIDE_HISTORY_UNSPECIFIED;
 };
 
-// --as-of and --outside.
+// Adds --as-of and --outside.
 void add_past_options(CLI::App& command, PastOptions& options);
 
 std::vector<uint64_t> ticks_of(const std::vector<AsOf>& times);
-// None where all are 0.
+// Returns the fractions of the times; empty if all are 0.
 std::vector<float> fractions_of(const std::vector<AsOf>& times);
 
 template <class Block>
@@ -39,7 +39,7 @@ void apply_to_block(const PastOptions& options, Block& block) {
   block.as_of(ticks_of(options.as_of), fractions_of(options.as_of)).outside_history(options.outside);
 }
 
-// The times that were asked in fact, as --as-of takes them, by query.
+// Returns the effective time of each query, in the form of --as-of.
 Json resolved_json(const v1::BlockResult& block);
 
 }  // namespace locus::cli

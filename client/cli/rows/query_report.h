@@ -13,24 +13,24 @@
 namespace locus::cli {
 
 struct RowLayout {
-  std::string query = {};                // what a query is called: "ray", "ball"; empty = rows do not name their query
-  std::vector<v1::Column> columns = {};  // what was asked for, in the order to show
-  client::Double3 frame = {};            // of the block: points are shown absolute
-  uint64_t first_query = 0;              // the number of the block's first query
-  bool dense = false;                    // one row a query, with a `hit` that may be false
+  std::string query = {};                // key of the query index: "ray", "ball"; empty = rows have none
+  std::vector<v1::Column> columns = {};  // requested columns, in the order of the output
+  client::Double3 frame = {};            // frame of the block; it is added to points
+  uint64_t first_query = 0;              // index of the block's first query
+  bool dense = false;                    // one row per query, with `hit` false for a miss
 };
 
-// Rows of one block, in the keys t, id, triangle, uv, normal, point, group, tag, layers, position, rotation. The row of
-// a miss has null in all of them.
+// Returns the rows of one block, with the keys t, id, triangle, uv, normal, point, group, tag, layers, position,
+// rotation. In the row of a miss all of them are null.
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout);
 
-// The keys of such rows, in their order.
+// Returns the keys of such rows, in their order.
 std::vector<std::string> row_keys(const RowLayout& layout);
 
 Json work_json(const v1::Work& work);
 
-// Epoch, revision and tick, the queries that were cut, the times of the past that were asked and which of them were
-// clamped, and the work if it was reported.
+// Returns the head of a report: epoch, revision and tick, the truncated queries, the effective times of queries about
+// the past and which of them were clamped, and the work if it was reported.
 Json result_head(const v1::QueryResult& result);
 
 }  // namespace locus::cli

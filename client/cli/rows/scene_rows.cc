@@ -14,7 +14,7 @@ void read(const Repeated& column, int row, std::array<typename Repeated::value_t
   for (size_t i = 0; i < kCount; ++i) (*to)[i] = column.Get(row * static_cast<int>(kCount) + static_cast<int>(i));
 }
 
-// A dump writes every column in full.
+// Returns whether every shared column has an entry per id, as in every dump.
 template <class Run, class Positions>
 bool has_shared_columns(const Run& run, const Positions& positions) {
   const int rows = run.ids_size();
@@ -83,9 +83,9 @@ std::string shape_name(ThingKind kind) {
   return "";
 }
 
-absl::Status for_each_thing(const v1::DumpSceneResponse& piece,
+absl::Status for_each_thing(const v1::DumpSceneResponse& message,
                             const std::function<absl::Status(const SceneThing&)>& take) {
-  for (const v1::Insert& run : piece.objects()) {
+  for (const v1::Insert& run : message.objects()) {
     if (!has_shared_columns(run, run.positions_f64()) || !has_shape_columns(run)) return damaged();
     for (int row = 0; row < run.ids_size(); ++row) {
       SceneThing thing = shared_part(run, run.positions_f64(), row);
@@ -93,7 +93,7 @@ absl::Status for_each_thing(const v1::DumpSceneResponse& piece,
       RETURN_IF_ERROR(take(thing));
     }
   }
-  for (const v1::Placement& run : piece.instances()) {
+  for (const v1::Placement& run : message.instances()) {
     if (!has_shared_columns(run, run.translations()) || run.scales_size() != run.ids_size()) return damaged();
     for (int row = 0; row < run.ids_size(); ++row) {
       SceneThing thing = shared_part(run, run.translations(), row);

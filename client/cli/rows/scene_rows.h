@@ -1,5 +1,5 @@
-// The things of a scene as they come in a dump, one by one, and as rows. For the dump and export commands. Plain data
-// and functions without state.
+// The things (objects and instances) of a dumped scene, one by one, and as rows. For the dump and export commands.
+// Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
 
@@ -17,7 +17,7 @@ namespace locus::cli {
 
 enum class ThingKind { kPoint, kBall, kBox, kCapsule, kInstance };
 
-// An object or an instance.
+// Object or instance of a scene.
 struct SceneThing {
   ThingKind kind = ThingKind::kPoint;
   uint64_t id = 0;
@@ -32,24 +32,24 @@ struct SceneThing {
   uint64_t tag = 0;
 };
 
-// "point", "ball", "box", "capsule"; an instance has no shape.
+// Returns "point", "ball", "box" or "capsule"; empty for an instance.
 std::string shape_name(ThingKind kind);
 
-// Calls `take` with each thing of a piece, objects before instances, until it fails. DATA_LOSS for a run whose columns
-// are not as long as a dump's are.
-absl::Status for_each_thing(const v1::DumpSceneResponse& piece,
+// Calls `take` with each thing of a message of a dump, objects before instances, until it fails. DATA_LOSS if a column
+// does not have one entry per id.
+absl::Status for_each_thing(const v1::DumpSceneResponse& message,
                             const std::function<absl::Status(const SceneThing&)>& take);
 
-// Which things of a scene a command is about.
+// Choice of the things that a command reads.
 enum class Things { kAll, kObjects, kInstances };
 bool is_among(Things things, ThingKind kind);
 
-// The keys of rows, in order. They are the names of the insert command's options as far as that has them, so that rows
-// of objects can be inserted: id, shape or mesh, at, rotation, scale, radius, half, axis, layers, group, tag; where
-// rows are of both, before all others kind: "object" or "instance".
+// Returns the keys of rows, in order: id, shape or mesh, at, rotation, scale, radius, half, axis, layers, group, tag.
+// They have the names of the insert command's options where it has them, so that rows of objects can be inserted. Rows
+// of both kinds of things begin with kind: "object" or "instance".
 const std::vector<std::string>& thing_keys(Things things);
 
-// A row with the keys that the thing has.
+// Returns the row of a thing, without the keys that its kind does not have.
 Json thing_row(const SceneThing& thing, Things things);
 
 }  // namespace locus::cli

@@ -20,7 +20,7 @@ size_t max_chunk_queries(const QueryBlock& block) {
   return lookup != nullptr && !lookup->groups.empty() ? limits::kMaxQueries : kChunkQueries;
 }
 
-void copy_rows(const BlockResult& from, size_t first, size_t rows, const RowSpans& to) {
+void copy_rows(const CollectedRows& from, size_t first, size_t rows, const RowSpans& to) {
   for_each_column_array([&](const auto& array) {
     if (array.get(to) == nullptr) return;
     std::copy_n(array.get(from).data() + first * array.width, rows * array.width, array.get(to));

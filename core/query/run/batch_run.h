@@ -35,9 +35,6 @@
 namespace locus {
 
 struct RunOptions {
-  // Calls its second argument for each index below the first, on any threads, and returns when all calls have returned.
-  // Used by run_batch() only. [one call on this thread]
-  std::function<void(size_t, const std::function<void(size_t)>&)> parallel_for;
   // Polled every limits::kTestsBetweenChecks primitive tests, from any thread; a status that is not OK ends the batch
   // with that status. [never ends]
   std::function<absl::Status()> stop;
@@ -99,7 +96,7 @@ class BatchRun {
     size_t block;
     size_t begin, end;
     bool done = false;
-    BlockResult rows = {};  // rows of counted blocks, and truncated queries of any block
+    CollectedRows rows = {};  // rows of counted blocks, and truncated queries of any block
     Work work = {};
   };
   using Chunks = std::list<Chunk>;

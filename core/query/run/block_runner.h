@@ -13,7 +13,7 @@
 #include "core/query/kinds/overlap_query.h"
 #include "core/query/kinds/query_task.h"
 #include "core/query/kinds/ray_query.h"
-#include "core/query/run/batch_result.h"
+#include "core/query/run/collected_rows.h"
 
 namespace locus {
 
@@ -37,7 +37,7 @@ class BlockRunner {
   size_t run(size_t begin, size_t end);
 
   // Returns the collected counts and rows (counted blocks) and the truncated queries as indices into the block.
-  BlockResult take_rows() { return std::move(result_); }
+  CollectedRows take_rows() { return std::move(result_); }
 
  private:
   // Checks the class invariants after the answers to queries [begin, reached).
@@ -75,7 +75,7 @@ class BlockRunner {
   // Result of a lookup of all groups, at the time of query groups_query_.
   absl::flat_hash_map<Group, OverlapAnswer> groups_;
   std::optional<size_t> groups_query_;
-  BlockResult result_;
+  CollectedRows result_;
 };
 
 }  // namespace locus

@@ -18,10 +18,10 @@ absl::Span<const float> part(const std::vector<float>& numbers, size_t begin, si
 }
 
 size_t ids_found(const SceneSnapshot& snapshot, const QueryBatch& batch) {
-  const absl::StatusOr<BatchResult> result = run_batch(snapshot, batch, {});
+  const absl::StatusOr<test::BatchResult> result = test::run_batch(snapshot, batch, {});
   LOCUS_CHECK_EQ(result.status(), absl::OkStatus());
   size_t found = 0;
-  for (const BlockResult& block : result->blocks) found += block.ids.size();
+  for (const test::BlockResult& block : result->blocks) found += block.ids.size();
   return found;
 }
 

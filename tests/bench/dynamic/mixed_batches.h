@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "core/query/run/run_batch.h"
 #include "tests/bench/dynamic/world.h"
+#include "tests/support/run_batch.h"
 
 namespace locus::bench::dynamic {
 

@@ -6,7 +6,7 @@
 #include "core/geometry/point_shape.h"
 #include "core/index/hash_grid/region_walk.h"
 #include "core/index/regions.h"
-#include "core/query/run/run_batch.h"
+#include "tests/support/run_batch.h"
 
 namespace locus::bench::dynamic {
 namespace {
@@ -100,7 +100,7 @@ class Batches : public Contender {
     columns.origins = numbers_of(origins_.front(), rays.size());
     columns.directions = numbers_of(directions_.front(), rays.size());
     columns.t_max = absl::MakeConstSpan(&kRayLength, 1);
-    const BlockResult result = run(columns, {Column::kId, Column::kT});
+    const test::BlockResult result = run(columns, {Column::kId, Column::kT});
     for (size_t i = 0; i < rays.size(); ++i) {
       answers.counts.push_back(result.ids[i] != kNoId ? 1 : 0);
       if (result.ids[i] == kNoId) continue;
@@ -112,14 +112,14 @@ class Batches : public Contender {
     NearestColumns columns;
     columns.points = numbers_of(centers.front(), centers.size());
     columns.count = kNearestCount;
-    const BlockResult result = run(columns, {Column::kId, Column::kT});
+    const test::BlockResult result = run(columns, {Column::kId, Column::kT});
     append(result, answers);
     answers.distances.insert(answers.distances.end(), result.t.begin(), result.t.end());
   }
 
  private:
   template <class Columns>
-  BlockResult run(const Columns& columns, ColumnSet wanted) const {
+  test::BlockResult run(const Columns& columns, ColumnSet wanted) const {
     QueryBatch batch;
     batch.max_reply_bytes = limits::kMaxReplyBytes;
     QueryBlock& block = batch.blocks.emplace_back();
@@ -132,7 +132,7 @@ class Batches : public Contender {
     }
     const absl::Status checked = check_batch(batch);
     LOCUS_CHECK_EQ(checked, absl::OkStatus());
-    absl::StatusOr<BatchResult> result = run_batch(*ours_.latest(), batch, {});
+    absl::StatusOr<test::BatchResult> result = test::run_batch(*ours_.latest(), batch, {});
     LOCUS_CHECK_EQ(result.status(), absl::OkStatus());
     return std::move(result->blocks.front());
   }
@@ -140,7 +140,7 @@ class Batches : public Contender {
   void ask(const Columns& columns, Answers& answers) const {
     append(run(columns, {Column::kId}), answers);
   }
-  static void append(const BlockResult& result, Answers& answers) {
+  static void append(const test::BlockResult& result, Answers& answers) {
     answers.ids.insert(answers.ids.end(), result.ids.begin(), result.ids.end());
     answers.counts.insert(answers.counts.end(), result.counts.begin(), result.counts.end());
   }

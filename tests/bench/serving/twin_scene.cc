@@ -141,16 +141,17 @@ UpdateBatch columns_of(const v1::UpdateBatch& batch) {
   return columns;
 }
 
-BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& batch) {
+test::BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& batch) {
   LOCUS_CHECK(check_batch(batch).ok());
-  absl::StatusOr<BatchResult> answer = run_batch(snapshot, batch, {});
+  absl::StatusOr<test::BatchResult> answer = test::run_batch(snapshot, batch, {});
   LOCUS_CHECK(answer.ok());
   return *std::move(answer);
 }
 
-uint64_t hash_of(const BatchResult& result) {
+uint64_t hash_of(const test::BatchResult& result) {
   AnswerHash hash;
-  for (const BlockResult& block : result.blocks) hash.add(block.t, block.uvs, block.ids, block.triangles, block.counts);
+  for (const test::BlockResult& block : result.blocks)
+    hash.add(block.t, block.uvs, block.ids, block.triangles, block.counts);
   return hash.value();
 }
 

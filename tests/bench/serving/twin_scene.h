@@ -9,12 +9,12 @@
 #include "absl/status/status.h"
 #include "absl/types/span.h"
 #include "core/query/query_batch.h"
-#include "core/query/run/run_batch.h"
 #include "core/scene/scene.h"
 #include "locus/v1/query_service.pb.h"
 #include "locus/v1/update_service.pb.h"
 #include "tests/bench/serving/daemon.h"
 #include "tests/bench/static/bench_mesh.h"
+#include "tests/support/run_batch.h"
 
 namespace locus::bench::serving {
 
@@ -44,10 +44,10 @@ UpdateBatch columns_of(const v1::UpdateBatch& batch);
 
 // What the server does with a batch that it has parsed: every value is checked, then the batch answered, by this thread
 // alone.
-BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& batch);
+test::BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& batch);
 
 // Equal for equal answers, wherever they come from.
-uint64_t hash_of(const BatchResult& result);
+uint64_t hash_of(const test::BatchResult& result);
 uint64_t hash_of(const v1::QueryResult& result);
 
 // How many rows there are: hits of rays, results of balls.

@@ -1,5 +1,5 @@
-// Bulk input against a real locusd: one daemon a test, command lines run in this process, and a pipe that a test writes
-// to while a command reads from it.
+// Fixture for bulk input against a real locusd: one daemon per test, command lines run in this process, and a pipe that
+// a test writes to while a command reads from it.
 #ifndef LOCUS_TESTS_CLIENT_CLI_BULK_FIXTURE_H_
 #define LOCUS_TESTS_CLIENT_CLI_BULK_FIXTURE_H_
 
@@ -47,7 +47,7 @@ class BulkTest : public ::testing::Test {
     const ExitCode code = run_into(line, out, err);
     return {code, out.str(), err.str()};
   }
-  // The answer of a line that must succeed.
+  // Returns the output of a line that must succeed.
   std::string out_of(const std::vector<std::string>& line) const {
     const BulkOutcome outcome = run(line);
     EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
@@ -64,7 +64,7 @@ class BulkTest : public ::testing::Test {
   std::string address_;
 };
 
-// A named pipe with a writer.
+// Named pipe with a writer.
 class NamedPipe {
  public:
   NamedPipe() : path_(TestFile::path_of("pipe")) { EXPECT_EQ(mkfifo(path_.c_str(), 0600), 0); }
@@ -73,7 +73,7 @@ class NamedPipe {
   NamedPipe& operator=(const NamedPipe&) = delete;
 
   const std::string& path() const { return path_; }
-  // Waits for the reader the first time.
+  // Writes to the pipe. The first call waits for a reader.
   void write(const std::string& bytes) {
     if (!file_.is_open()) file_.open(path_);
     file_ << bytes << std::flush;
@@ -85,10 +85,10 @@ class NamedPipe {
   std::ofstream file_;
 };
 
-// Collects what another thread writes, and waits for it.
+// Stream buffer that collects the output of another thread and can wait for a text.
 class SharedText : public std::streambuf {
  public:
-  // Whether `part` came within a minute.
+  // Returns whether `part` was written within a minute.
   bool wait_for(const std::string& part) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::minutes(1), [&] { return text_.find(part) != std::string::npos; });

@@ -16,7 +16,7 @@ using ::testing::IsEmpty;
 
 enum class Colour { kRed = 4, kBlue = 7 };
 
-TEST(ChoicesTest, AWordBecomesTheValueItStandsFor) {
+TEST(ChoicesTest, AWordIsConvertedToItsEnumValue) {
   CLI::App app;
   Colour colour = Colour::kRed;
   app.add_option("--colour", colour)
@@ -25,7 +25,7 @@ TEST(ChoicesTest, AWordBecomesTheValueItStandsFor) {
   EXPECT_EQ(colour, Colour::kBlue);
 }
 
-TEST(ChoicesTest, AnotherWordIsRefusedWithTheWordsThatAreNot) {
+TEST(ChoicesTest, AnUnknownWordIsRefusedWithTheListOfAllowedWords) {
   CLI::App app;
   std::string shape;
   app.add_option("--shape", shape)->check(choices({"point", "ball"}));
@@ -37,14 +37,14 @@ TEST(ChoicesTest, AnotherWordIsRefusedWithTheWordsThatAreNot) {
   }
 }
 
-TEST(ChoicesTest, TheNumberBehindAWordIsNoWord) {
+TEST(ChoicesTest, TheNumberOfAnEnumValueIsRefused) {
   CLI::App app;
   Colour colour = Colour::kRed;
   app.add_option("--colour", colour)->transform(choices(NamedValues<Colour>{{"red", Colour::kRed}}));
   EXPECT_THROW(app.parse("--colour 4"), CLI::ValidationError);
 }
 
-TEST(ChoicesTest, TheWordsCanBeReadBackInTheirOrderAndAmongOtherChecks) {
+TEST(ChoicesTest, ChoicesOfReturnsTheWordsInOrderAlsoBesideOtherChecks) {
   CLI::App app;
   std::string shape;
   CLI::Option& option = *app.add_option("--shape", shape);
@@ -53,13 +53,13 @@ TEST(ChoicesTest, TheWordsCanBeReadBackInTheirOrderAndAmongOtherChecks) {
   EXPECT_THAT(choices_of(option), ElementsAre("point", "ball"));
 }
 
-// Every option of every command below `app`.
+// Appends all options of `app` and of all its subcommands.
 void collect_options(CLI::App& app, std::vector<CLI::Option*>& options) {
   for (CLI::Option* option : app.get_options()) options.push_back(option);
   for (CLI::App* command : app.get_subcommands({})) collect_options(*command, options);
 }
 
-TEST(ChoicesTest, NoOptionOfLocusHidesItsWordsInAnotherCheck) {
+TEST(ChoicesTest, NoOptionOfLocusUsesTheParsersOwnCheckForWords) {
   std::ostringstream ignored;
   Context context(ignored, ignored, Progress::kSilent);
   CLI::App app;

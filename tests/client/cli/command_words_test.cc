@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// A parser with one of everything.
+// Fixture with a parser that has one option of each kind.
 class CommandWordsTest : public ::testing::Test {
  protected:
   CommandWordsTest() {
@@ -39,7 +39,7 @@ class CommandWordsTest : public ::testing::Test {
   CLI::App app_;
 };
 
-TEST_F(CommandWordsTest, ACommandCarriesItsPathDescriptionAndFooter) {
+TEST_F(CommandWordsTest, ACommandHasItsPathDescriptionAndFooter) {
   const CommandWords words = words_of(app_);
   EXPECT_EQ(words.path, "tool");
   ASSERT_THAT(words.commands, SizeIs(1)) << "what is hidden stays hidden";
@@ -48,7 +48,7 @@ TEST_F(CommandWordsTest, ACommandCarriesItsPathDescriptionAndFooter) {
   EXPECT_EQ(words.commands[0].footer, "Examples:\n  tool draw");
 }
 
-TEST_F(CommandWordsTest, OptionsKeepTheirOrderAndThoseOfAGroupJoinThem) {
+TEST_F(CommandWordsTest, OptionsKeepTheirOrderAndIncludeThoseOfOptionGroups) {
   std::vector<std::string> names;
   const CommandWords draw = words_of(app_).commands[0];
   for (const OptionWords& option : draw.options) names.push_back(option.names.back());
@@ -71,7 +71,7 @@ TEST(CommandWordsOfLocusTest, DirectoriesOfBackupsAreCompletedAsPaths) {
   EXPECT_EQ(paths, 3u);
 }
 
-TEST_F(CommandWordsTest, AnOptionSaysWhatItTakes) {
+TEST_F(CommandWordsTest, AnOptionHasItsNamesValueKindAndDefault) {
   const CommandWords draw = words_of(app_).commands[0];
   const OptionWords& out = *find_option(draw, "-o");
   EXPECT_THAT(out.names, ElementsAre("-o", "--out"));
@@ -85,7 +85,7 @@ TEST_F(CommandWordsTest, AnOptionSaysWhatItTakes) {
   EXPECT_EQ(find_option(draw, "--secret"), nullptr);
 }
 
-TEST_F(CommandWordsTest, APositionalIsKnownByItsName) {
+TEST_F(CommandWordsTest, APositionalHasItsNameAsValueAndNoOptionNames) {
   const CommandWords draw = words_of(app_).commands[0];
   ASSERT_THAT(draw.positionals, SizeIs(1));
   EXPECT_THAT(draw.positionals[0].names, IsEmpty());

@@ -29,7 +29,7 @@ class ContextTest : public ::testing::Test {
   Context context_{out_, err_, Progress::kSilent};
 };
 
-TEST_F(ContextTest, AQueryAsksForWhatThisProcessWasAcknowledged) {
+TEST_F(ContextTest, AQueryAsksForAtLeastTheLastAcknowledgedRevision) {
   query();
   EXPECT_FALSE(server_.queries.last_batch.has_view());
   ASSERT_EQ(run_here({"remove", "arena", "--id", "7"}), ExitCode::kOk);
@@ -40,19 +40,19 @@ TEST_F(ContextTest, AQueryAsksForWhatThisProcessWasAcknowledged) {
   EXPECT_EQ(server_.queries.last_batch.view().at_least(), 1u);
 }
 
-TEST_F(ContextTest, AViewOfTheLinesOwnWins) {
+TEST_F(ContextTest, AViewGivenOnTheLineOverridesTheAcknowledgedRevision) {
   ASSERT_EQ(run_here({"remove", "arena", "--id", "7"}), ExitCode::kOk);
   query({"--exactly", "5"});
   EXPECT_EQ(server_.queries.last_batch.view().exactly(), 5u);
 }
 
-TEST_F(ContextTest, AnAckOfAnotherSceneMeansNothing) {
+TEST_F(ContextTest, AnAckOfAnotherSceneDoesNotChangeTheView) {
   ASSERT_EQ(run_here({"remove", "hall", "--id", "7"}), ExitCode::kOk);
   query();
   EXPECT_FALSE(server_.queries.last_batch.has_view());
 }
 
-TEST_F(ContextTest, ADeletedSceneIsForgotten) {
+TEST_F(ContextTest, DeletingASceneForgetsItsAcknowledgedRevision) {
   ASSERT_EQ(run_here({"scene", "create", "arena"}), ExitCode::kOk);
   query();
   EXPECT_EQ(server_.queries.last_batch.view().epoch(), uint64_t{1} << 63);
@@ -61,7 +61,7 @@ TEST_F(ContextTest, ADeletedSceneIsForgotten) {
   EXPECT_FALSE(server_.queries.last_batch.has_view());
 }
 
-TEST_F(ContextTest, ReportsAreKeptOnlyWhenAskedFor) {
+TEST_F(ContextTest, ReportsAreKeptOnlyAfterKeepReports) {
   run_here({"scene", "create", "arena"});
   EXPECT_EQ(context_.take_report(), nullptr);
   context_.keep_reports();
@@ -72,7 +72,7 @@ TEST_F(ContextTest, ReportsAreKeptOnlyWhenAskedFor) {
   EXPECT_EQ(context_.take_report(), nullptr) << "it was taken";
 }
 
-TEST_F(ContextTest, ALineIsNotBlamedForTheOneBefore) {
+TEST_F(ContextTest, AFailedLineDoesNotChangeTheExitCodeOfTheNext) {
   EXPECT_EQ(run_here({"scene", "describe", "nowhere"}), ExitCode::kNotFound);
   EXPECT_EQ(run_here({"--help"}), ExitCode::kOk);
   EXPECT_EQ(run_here({"limits"}), ExitCode::kOk);

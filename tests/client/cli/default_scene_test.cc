@@ -21,7 +21,7 @@ std::optional<std::vector<std::string>> completed(const std::vector<std::string>
   return with_scene(app, arguments, "arena");
 }
 
-TEST(DefaultSceneTest, TheSceneGoesRightBehindTheCommand) {
+TEST(DefaultSceneTest, TheSceneIsInsertedDirectlyAfterTheCommand) {
   EXPECT_THAT(completed({"get", "--id", "7"}), Optional(ElementsAre("get", "arena", "--id", "7")));
   EXPECT_THAT(completed({"query", "ray", "--from", "0,0,0"}),
               Optional(ElementsAre("query", "ray", "arena", "--from", "0,0,0")));
@@ -29,12 +29,12 @@ TEST(DefaultSceneTest, TheSceneGoesRightBehindTheCommand) {
               Optional(ElementsAre("insert", "arena", "ball", "--id", "7")));
 }
 
-TEST(DefaultSceneTest, AValueOfAnOptionIsNotTakenForTheCommand) {
+TEST(DefaultSceneTest, AnOptionsValueIsNotMistakenForACommand) {
   EXPECT_THAT(completed({"-a", "get", "--output=json", "-o", "query", "get"}),
               Optional(ElementsAre("-a", "get", "--output=json", "-o", "query", "get", "arena")));
 }
 
-TEST(DefaultSceneTest, CommandsWithoutSceneTakeNone) {
+TEST(DefaultSceneTest, CommandsWithoutSceneGetNone) {
   EXPECT_EQ(completed({"limits"}), std::nullopt);
   EXPECT_EQ(completed({"scene", "create"}), std::nullopt);
   EXPECT_EQ(completed({"scene", "delete"}), std::nullopt) << "deleting takes a name, always";
@@ -55,7 +55,7 @@ class DefaultSceneRunTest : public ::testing::Test {
   Context context_{out_, err_, Progress::kSilent};
 };
 
-TEST_F(DefaultSceneRunTest, ALineWithoutSceneMeansTheDefault) {
+TEST_F(DefaultSceneRunTest, ALineWithoutSceneUsesTheDefault) {
   context_.use_scene("arena");
   EXPECT_EQ(run_here({"query", "ball", "--at", "0,0,0", "--radius", "1"}), ExitCode::kFailed)
       << "the fake server answers no blocks";
@@ -70,13 +70,13 @@ TEST_F(DefaultSceneRunTest, ALineWithASceneKeepsIt) {
   EXPECT_THAT(server_.updates.scenes, ElementsAre("hall"));
 }
 
-TEST_F(DefaultSceneRunTest, WhatElseIsMissingIsStillNamed) {
+TEST_F(DefaultSceneRunTest, AnotherMissingOptionIsStillReported) {
   context_.use_scene("arena");
   EXPECT_EQ(run_here({"insert", "ball", "--id", "7"}), ExitCode::kUsage);
   EXPECT_THAT(err_.str(), HasSubstr("give --id and --at, or rows"));
 }
 
-TEST_F(DefaultSceneRunTest, ImportAndGeneratePlaceInTheDefault) {
+TEST_F(DefaultSceneRunTest, ImportAndGenerateUseTheDefaultScene) {
   context_.use_scene("arena");
   EXPECT_EQ(run_here({"generate", "city", "--triangles", "100", "--create"}), ExitCode::kOk) << err_.str();
   EXPECT_EQ(server_.scenes.last_change.scene(), "arena");

@@ -1,4 +1,4 @@
-// The program itself as scripts see it: exit codes and streams of a child process.
+// Tests of the program as a child process: exit codes and streams, as scripts use them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -32,21 +32,21 @@ Exit run_program(const std::string& environment, const std::string& arguments) {
   return exit;
 }
 
-TEST(ExitCodeTest, HelpIsSuccess) {
+TEST(ExitCodeTest, HelpExitsZero) {
   const Exit exit = run_program("", "--help");
   EXPECT_EQ(exit.code, 0);
   EXPECT_THAT(exit.text, HasSubstr("Examples:"));
 }
 
-TEST(ExitCodeTest, AWrongLineIsTwo) { EXPECT_EQ(run_program("", "query sphere").code, 2); }
+TEST(ExitCodeTest, AWrongLineExitsTwo) { EXPECT_EQ(run_program("", "query sphere").code, 2); }
 
-TEST(ExitCodeTest, NobodyThereIsThree) {
+TEST(ExitCodeTest, AnUnreachableServerExitsThree) {
   const Exit exit = run_program("LOCUS_ADDRESS=unix:/nonexistent/locus.sock", "limits");
   EXPECT_EQ(exit.code, 3);
   EXPECT_THAT(exit.text, HasSubstr("nothing answers at unix:/nonexistent/locus.sock: start one with `locusd`"));
 }
 
-TEST(ExitCodeTest, DeniedIsFourNotFoundFiveFailedOneAndTheRestZero) {
+TEST(ExitCodeTest, DeniedExitsFourNotFoundFiveFailedOneAndSuccessZero) {
   FakeServer server;
   const std::string environment = "LOCUS_ADDRESS=" + server.address();
   EXPECT_EQ(run_program(environment, "health").code, 0);

@@ -34,14 +34,14 @@ TEST(FailureTest, EachKindOfFailureHasItsExitCode) {
   EXPECT_EQ(exit_code_of(absl::NotFoundError("")), ExitCode::kNotFound);
 }
 
-TEST(FailureTest, WordsSayWhatWentWrongAndWhatToDo) {
+TEST(FailureTest, TextHasAnErrorLineAndAHintLine) {
   std::ostringstream err;
   write_failure(err, Format::kTable, absl::DeadlineExceededError("too slow"));
   EXPECT_THAT(err.str(), HasSubstr("error: too slow\n"));
   EXPECT_THAT(err.str(), HasSubstr("hint: give it more time with --timeout"));
 }
 
-TEST(FailureTest, JsonCarriesTheStructuredRefusal) {
+TEST(FailureTest, JsonHasTheFieldsOfTheStructuredError) {
   std::ostringstream err;
   write_failure(err, Format::kJson, not_finite());
   const Json error = Json::parse(err.str())["error"];
@@ -53,7 +53,7 @@ TEST(FailureTest, JsonCarriesTheStructuredRefusal) {
 
 TEST(FailureTest, AnAckThatRefusedNothingIsSuccess) { EXPECT_TRUE(refused_items(v1::UpdateAck()).ok()); }
 
-TEST(FailureTest, OnlyUnknownIdsAreNotFoundOtherRefusalsAreFailures) {
+TEST(FailureTest, RefusedItemsAreNotFoundOnlyIfAllIdsAreUnknown) {
   v1::UpdateAck ack;
   ack.set_applied(1);
   ack.set_refused(1);
@@ -69,7 +69,7 @@ TEST(FailureTest, OnlyUnknownIdsAreNotFoundOtherRefusalsAreFailures) {
   EXPECT_TRUE(absl::IsFailedPrecondition(refused_items(ack)));
 }
 
-TEST(FailureTest, AFailureHasOneName) {
+TEST(FailureTest, FailureNameIsUsageTheReasonOrTheCode) {
   EXPECT_EQ(failure_name(not_finite()), "NOT_FINITE");
   EXPECT_EQ(failure_name(usage_error("x")), "USAGE");
   EXPECT_EQ(failure_name(absl::NotFoundError("x")), "NOT_FOUND") << "no reason, so the code";
@@ -77,14 +77,14 @@ TEST(FailureTest, AFailureHasOneName) {
   for (const char* name : {"", "OK", "UNSPECIFIED", "not_found", "17"}) EXPECT_FALSE(is_failure_name(name)) << name;
 }
 
-TEST(FailureTest, APlaceLeavesTheFailureWhatItIs) {
+TEST(FailureTest, WithPlaceKeepsNameAndExitCode) {
   const absl::Status placed = with_place(not_finite(), "x.locus:3");
   EXPECT_EQ(failure_name(placed), "NOT_FINITE");
   EXPECT_TRUE(absl::StartsWith(placed.message(), "x.locus:3: "));
   EXPECT_EQ(exit_code_of(with_place(usage_error("x"), "y")), ExitCode::kUsage);
 }
 
-TEST(FailureTest, WhatWasToldKeepsItsExitCode) {
+TEST(FailureTest, AnAlreadyPrintedErrorKeepsItsExitCode) {
   EXPECT_TRUE(is_told(told(absl::NotFoundError("x"))));
   EXPECT_FALSE(is_told(absl::NotFoundError("x")));
   EXPECT_EQ(exit_code_of(told(absl::NotFoundError("x"))), ExitCode::kNotFound);

@@ -39,7 +39,7 @@ TEST(OutputTest, JsonIsOneDocumentWithIdsAsStrings) {
   EXPECT_TRUE(document["hits"][1]["id"].is_null());
 }
 
-TEST(OutputTest, JsonKeepsARowOnALine) {
+TEST(OutputTest, JsonWritesEachRowOnOneLine) {
   Report report;
   report.head = {{"tick", 3}};
   report.rows_name = "hits";
@@ -48,13 +48,13 @@ TEST(OutputTest, JsonKeepsARowOnALine) {
             "{\n  \"tick\": 3,\n  \"hits\": [\n    {\"point\":[1,2]},\n    {\"point\":[3,4]}\n  ]\n}\n");
 }
 
-TEST(OutputTest, NdjsonIsALineARow) {
+TEST(OutputTest, NdjsonIsOneLinePerRow) {
   EXPECT_EQ(written(Format::kNdjson, two_rows()),
             "{\"ray\":0,\"hit\":true,\"id\":\"7\",\"point\":[0.5,1.0,-2.0]}\n"
             "{\"ray\":1,\"hit\":false,\"id\":null,\"point\":null}\n");
 }
 
-TEST(OutputTest, NoRowsSaySoInATableAndAreAnEmptyListInJson) {
+TEST(OutputTest, WithoutRowsATableHasATextAndJsonAnEmptyList) {
   Report report;
   report.rows_name = "scenes";
   report.no_rows = "no scenes";
@@ -70,7 +70,7 @@ TEST(OutputTest, AReportWithoutRowsIsItsHead) {
   EXPECT_EQ(written(Format::kNdjson, report), "{\"name\":\"arena\",\"min\":null}\n");
 }
 
-TEST(OutputTest, CsvIsAHeaderAndALineARowWithVectorsSplitAndNullEmpty) {
+TEST(OutputTest, CsvIsAHeaderAndOneLinePerRowWithVectorsSplitAndNullEmpty) {
   EXPECT_EQ(written(Format::kCsv, two_rows()),
             "ray,hit,id,point.x,point.y,point.z\n"
             "0,true,7,0.5,1.0,-2.0\n"
@@ -84,7 +84,7 @@ TEST(OutputTest, CsvHasTheKeysOfEveryRow) {
   EXPECT_EQ(written(Format::kCsv, report), "id,radius\n1,\n2,0.5\n");
 }
 
-TEST(OutputTest, CsvWithoutRowsIsTheHeaderOfTheNamedKeys) {
+TEST(OutputTest, CsvWithoutRowsIsTheHeaderOfTheGivenKeys) {
   Report report;
   report.rows_name = "found";
   report.keys = {"ball", "id"};
@@ -98,7 +98,7 @@ TEST(OutputTest, CsvOfAReportWithoutRowsIsOneHeaderAndOneLine) {
             "name,min.x,min.y,min.z,features\narena,,,,\"[\"\"rays\"\",\"\"balls\"\"]\"\n");
 }
 
-TEST(OutputTest, NamedKeysAreTheColumnsOfATableToo) {
+TEST(OutputTest, GivenKeysAreAlsoTheColumnsOfATable) {
   Report report;
   report.rows_name = "things";
   report.keys = {"id", "radius"};

@@ -21,7 +21,7 @@ v1::UpdateBatch removes(uint64_t id) { return UpdateBuilder().remove(id).build()
 
 class PendingBatchTest : public ::testing::Test {
  protected:
-  // "" where the line is taken.
+  // Adds a line and returns the message of its error; "" if it was added.
   std::string add(const v1::UpdateBatch& line, const std::string& scene = "arena") {
     const v1::UpdateBatch before = pending_.batch();
     const absl::Status added = pending_.add(scene, line);
@@ -48,13 +48,13 @@ TEST_F(PendingBatchTest, LinesBecomeOneBatchUnderOneTick) {
   EXPECT_THAT(batch.moves(0).ids(), ElementsAre(4));
 }
 
-TEST_F(PendingBatchTest, LinesAboutOtherObjectsComeInAnyOrder) {
+TEST_F(PendingBatchTest, LinesAboutDifferentObjectsMayComeInAnyOrder) {
   EXPECT_EQ(add(moves(1)), "");
   EXPECT_EQ(add(inserts(2)), "");
   EXPECT_EQ(add(removes(3)), "");
 }
 
-TEST_F(PendingBatchTest, AboutOneObjectTheOrderIsTheBatchs) {
+TEST_F(PendingBatchTest, LinesAboutOneObjectMustComeInTheOrderOfTheBatch) {
   EXPECT_EQ(add(removes(1)), "");
   EXPECT_EQ(add(inserts(1)), "") << "a new life";
   EXPECT_EQ(add(moves(1)), "");
@@ -64,12 +64,12 @@ TEST_F(PendingBatchTest, AboutOneObjectTheOrderIsTheBatchs) {
   EXPECT_THAT(add(removes(2)), HasSubstr("an earlier line of it already inserts 2"));
 }
 
-TEST_F(PendingBatchTest, ARelabelComesLast) {
+TEST_F(PendingBatchTest, ARelabelMustComeAfterMovesOfTheSameObject) {
   EXPECT_EQ(add(UpdateBuilder().relabel(1, {.tag = 7}).build()), "");
   EXPECT_THAT(add(moves(1)), HasSubstr("already changes 1"));
 }
 
-TEST_F(PendingBatchTest, RemovingAllOrAGroupComesFirst) {
+TEST_F(PendingBatchTest, RemovingAllOrAGroupMustComeFirst) {
   EXPECT_EQ(add(UpdateBuilder().clear().build()), "");
   EXPECT_EQ(add(UpdateBuilder().remove_group(3).build()), "");
   EXPECT_EQ(add(removes(1)), "");
@@ -79,12 +79,12 @@ TEST_F(PendingBatchTest, RemovingAllOrAGroupComesFirst) {
   EXPECT_THAT(add(UpdateBuilder().remove_group(5).build()), HasSubstr("put this line first"));
 }
 
-TEST_F(PendingBatchTest, ABatchIsForOneScene) {
+TEST_F(PendingBatchTest, ALineForAnotherSceneIsRefused) {
   EXPECT_EQ(add(inserts(1)), "");
   EXPECT_EQ(add(inserts(2), "hall"), "a batch is for one scene: this one is for arena, commit it before changing hall");
 }
 
-TEST_F(PendingBatchTest, ALineHasNoTickUpsertOrFrameOfItsOwn) {
+TEST_F(PendingBatchTest, ALineWithItsOwnTickUpsertOrFrameIsRefused) {
   EXPECT_THAT(add(UpdateBuilder().tick(6).move(1, kHere).build()), HasSubstr("begin --tick N"));
   EXPECT_EQ(add(inserts(1)), "");
   EXPECT_THAT(add(UpdateBuilder().upsert().insert_ball(2, kHere, 1).build()), HasSubstr("--upsert"));

@@ -9,7 +9,7 @@ namespace {
 
 Json row(int number, const std::string& text) { return {{"n", number}, {"text", text}}; }
 
-TEST(ReportStreamTest, RowsAreOutBeforeTheReportEnds) {
+TEST(ReportStreamTest, RowsAreWrittenBeforeTheReportEnds) {
   for (const Format format : {Format::kJson, Format::kNdjson, Format::kCsv}) {
     std::ostringstream out;
     ReportStream stream(out, format, {.rows_name = "rows", .keys = {"n", "text"}});
@@ -20,7 +20,7 @@ TEST(ReportStreamTest, RowsAreOutBeforeTheReportEnds) {
   }
 }
 
-TEST(ReportStreamTest, JsonPutsLateFactsBehindTheRows) {
+TEST(ReportStreamTest, JsonWritesLateFactsAfterTheRows) {
   std::ostringstream out;
   ReportStream stream(out, Format::kJson, {.rows_name = "rows", .keys = {}});
   stream.begin({{"tick", 1}});
@@ -41,7 +41,7 @@ TEST(ReportStreamTest, ATableShowsEarlyAndLateFactsAtItsEnd) {
   EXPECT_EQ(out.str(), "n  text\n1  a\ntick 1, cut 2\n");
 }
 
-TEST(ReportStreamTest, ATableHoldsBackNoMoreRowsThanAsked) {
+TEST(ReportStreamTest, ATableHoldsBackAtMostWidthRows) {
   std::ostringstream out;
   ReportStream stream(out, Format::kTable, {.rows_name = "rows", .keys = {}, .width_rows = 2});
   stream.begin(Json::object());
@@ -54,7 +54,7 @@ TEST(ReportStreamTest, ATableHoldsBackNoMoreRowsThanAsked) {
   stream.end();
 }
 
-TEST(ReportStreamTest, WithoutRowsEachFormatSaysSo) {
+TEST(ReportStreamTest, EachFormatHasAFormWithoutRows) {
   const auto empty = [](Format format) {
     std::ostringstream out;
     ReportStream stream(out, format, {.rows_name = "found", .keys = {"ball", "id"}});

@@ -49,7 +49,7 @@ class RunTest : public ::testing::Test {
   FakeServer server_;
 };
 
-TEST(HelpTest, EveryCommandExplainsItselfWithExamples) {
+TEST(HelpTest, EveryCommandHasHelpWithExamples) {
   const std::vector<std::vector<std::string>> commands = {{},
                                                           {"scene"},
                                                           {"scene", "create"},
@@ -130,7 +130,7 @@ TEST(UsageTest, VersionNeedsNoServer) {
   EXPECT_THAT(run({"--version"}).out, HasSubstr(LOCUS_VERSION));
 }
 
-TEST(UsageTest, WhereNothingAnswersTheErrorSaysHowToStartOne) {
+TEST(UsageTest, WithoutAServerTheErrorSaysHowToStartOne) {
   const Outcome outcome = run({"-a", "unix:/nonexistent/locus.sock", "health"});
   EXPECT_EQ(outcome.code, ExitCode::kUnreachable);
   EXPECT_EQ(outcome.err,
@@ -173,7 +173,7 @@ TEST_F(RunTest, InsertSendsColumnsInDoubleWithLabels) {
   EXPECT_TRUE(batch.upsert());
 }
 
-TEST_F(RunTest, EveryShapeIsSentAsItself) {
+TEST_F(RunTest, EveryShapeIsSentInItsOwnColumns) {
   ASSERT_EQ(run_here({"insert", "arena", "point", "--id", "1", "--at", "0,0,0"}).code, ExitCode::kOk);
   EXPECT_TRUE(server_.updates.last_batch.inserts(0).has_point());
   ASSERT_EQ(run_here({"insert", "arena", "box", "--id", "1", "--at", "0,0,0", "--half", "1,2,3"}).code, ExitCode::kOk);
@@ -242,7 +242,7 @@ TEST_F(RunTest, FirstHitsShowHitsAndMisses) {
   EXPECT_EQ(server_.queries.scene, "arena");
 }
 
-TEST_F(RunTest, AnyIsAYesOrNoForEachRay) {
+TEST_F(RunTest, ModeAnyWritesYesOrNoForEachRay) {
   server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
     result.add_blocks()->set_hits(std::string("\1\0", 2));
     return grpc::Status::OK;
@@ -253,7 +253,7 @@ TEST_F(RunTest, AnyIsAYesOrNoForEachRay) {
   EXPECT_THAT(server_.queries.last_batch.blocks(0).columns(), IsEmpty());
 }
 
-TEST_F(RunTest, OverlapsAreRowsByQueryAndCutsAreListed) {
+TEST_F(RunTest, OverlapsAreRowsByQueryAndTruncatedQueriesAreListed) {
   server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
     v1::BlockResult& block = *result.add_blocks();
     for (const uint32_t count : {2, 0}) block.add_counts(count);
@@ -296,7 +296,7 @@ TEST_F(RunTest, NearestAreRowsByDistanceWithTheirPoints) {
   EXPECT_THAT(block.columns(), ElementsAre(v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_TRIANGLE, v1::COLUMN_POINT));
 }
 
-TEST_F(RunTest, TimesOfThePastAreAskedByQueryAndShownAsTheyWereResolved) {
+TEST_F(RunTest, AsOfIsSentPerQueryAndTheEffectiveTimesAreShown) {
   server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
     v1::BlockResult& block = *result.add_blocks();
     for (int i = 0; i < 2; ++i) block.add_counts(0);
@@ -315,7 +315,7 @@ TEST_F(RunTest, TimesOfThePastAreAskedByQueryAndShownAsTheyWereResolved) {
   EXPECT_EQ(block.outside_history(), v1::OUTSIDE_HISTORY_CLAMP);
 }
 
-TEST_F(RunTest, PositionsThatAreNoFloatsTravelInAFrame) {
+TEST_F(RunTest, PositionsThatAreNotFloatsAreSentInAFrame) {
   server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
     v1::BlockResult& block = *result.add_blocks();
     block.add_counts(0);
@@ -327,13 +327,13 @@ TEST_F(RunTest, PositionsThatAreNoFloatsTravelInAFrame) {
   EXPECT_THAT(block.balls().centers(), ElementsAre(0, 0, 0, 1, 0, 0));
 }
 
-TEST_F(RunTest, APositionThatIsNotFiniteIsNotHiddenInTheFrame) {
+TEST_F(RunTest, APositionThatIsNotFiniteIsNotMovedIntoTheFrame) {
   run_here({"query", "ball", "arena", "--at", "nan,0,0", "--radius", "1"});
   EXPECT_EQ(server_.queries.last_batch.blocks(0).frame().x(), 0);
   EXPECT_TRUE(std::isnan(server_.queries.last_batch.blocks(0).balls().centers(0)));
 }
 
-TEST_F(RunTest, GetShowsWhatIsThereAndNamesWhatIsNot) {
+TEST_F(RunTest, GetShowsTheFoundIdsAndNamesTheMissingOnes) {
   server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
     v1::BlockResult& block = *result.add_blocks();
     for (const uint64_t id : {7, 0}) block.add_ids(id);
@@ -408,13 +408,13 @@ TEST_F(RunTest, EveryCommandAnswersInCsv) {
   EXPECT_EQ(csv({"scene", "delete", "arena"}), "deleted\narena\n");
 }
 
-TEST_F(RunTest, ErrorsBesideCsvAreWords) {
+TEST_F(RunTest, ErrorsOfCsvOutputAreTextLines) {
   const Outcome outcome = run_here({"-o", "csv", "scene", "describe", "nowhere"});
   EXPECT_THAT(outcome.err, ::testing::StartsWith("error: "));
   EXPECT_EQ(outcome.out, "");
 }
 
-TEST_F(RunTest, AFileThatIsNotThereIsNotFound) {
+TEST_F(RunTest, AMissingFileIsNotFound) {
   EXPECT_EQ(run_here({"import", "/nonexistent/level.obj", "--scene", "arena"}).code, ExitCode::kNotFound);
 }
 

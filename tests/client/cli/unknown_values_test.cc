@@ -27,7 +27,7 @@ class UnknownValuesTest : public ::testing::Test {
   Context context_{out_, out_, Progress::kSilent};
 };
 
-TEST_F(UnknownValuesTest, AnyOptionTakesAnUnknownValue) {
+TEST_F(UnknownValuesTest, AnyOptionAcceptsAnUnknownValue) {
   for (const std::vector<std::string>& line : std::vector<std::vector<std::string>>{
            {"query", "ray", kMark, "--from", kMark, "--dir", kMark, "--mode", kMark, "--max-t", kMark, "--mask", kMark},
            {"query", "ray", "a", "--from=" + kMark, "--dir=0,0,1", "--columns", kMark, "-o", kMark},
@@ -38,19 +38,19 @@ TEST_F(UnknownValuesTest, AnyOptionTakesAnUnknownValue) {
   }
 }
 
-TEST_F(UnknownValuesTest, OtherMistakesAreFoundAllTheSame) {
+TEST_F(UnknownValuesTest, OtherMistakesAreStillReported) {
   EXPECT_THAT(std::string(check({"insert", "a", "--id", kMark}).message()), HasSubstr("SHAPE is required"));
   EXPECT_EQ(exit_code_of(check({"query", "ray", "a", "--from", kMark, "--dir", kMark, "--nope"})), ExitCode::kUsage);
   EXPECT_EQ(exit_code_of(check({"query", kMark})), ExitCode::kUsage) << "a command is never unknown";
 }
 
-TEST_F(UnknownValuesTest, ACheckedLineDoesNothing) {
+TEST_F(UnknownValuesTest, ACheckedLineWritesNothing) {
   EXPECT_EQ(check({"version"}), absl::OkStatus());
   EXPECT_EQ(check({"--help"}), absl::OkStatus());
   EXPECT_THAT(out_.str(), IsEmpty());
 }
 
-TEST_F(UnknownValuesTest, TheMarkIsSeenAnywhere) {
+TEST_F(UnknownValuesTest, HasUnknownFindsTheMarkInAnyArgument) {
   EXPECT_TRUE(has_unknown({"a", "b" + kMark + "c"}));
   EXPECT_FALSE(has_unknown({"a", ""}));
 }

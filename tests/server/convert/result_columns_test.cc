@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/query/run/batch_result.h"
+#include "tests/support/run_batch.h"
 
 namespace locus::server {
 namespace {
@@ -49,14 +49,14 @@ void fill(AnswerSink& sink) {
 }
 
 TEST(ResultColumnsTest, EachColumnIsWrittenToItsProtocolField) {
-  BatchResult through_core;
+  test::BatchResult through_core;
   through_core.blocks.resize(2);
-  BatchResultSink core_sink(through_core);
+  test::BatchResultSink core_sink(through_core);
   fill(core_sink);
   v1::QueryResult result;
   ResultColumns sink(result, 2);
   fill(sink);
-  const BlockResult& expected = through_core.blocks[1];
+  const test::BlockResult& expected = through_core.blocks[1];
   const v1::BlockResult& block = result.blocks(1);
   EXPECT_THAT(block.counts(), ElementsAreArray(expected.counts));
   EXPECT_THAT(block.truncated(), ElementsAreArray(expected.truncated));

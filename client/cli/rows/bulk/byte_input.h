@@ -1,4 +1,4 @@
-// A file, a pipe or the standard input, read piece by piece: for inputs that are too long to hold or never end. Not
+// A file, a pipe or standard input, read in chunks: for inputs that are too large for memory or never end. Not
 // thread-safe.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
@@ -14,8 +14,8 @@ namespace locus::cli {
 
 class ByteInput {
  public:
-  // "-" is the standard input, which stays open; its name in messages is "stdin". NOT_FOUND for a path that is not
-  // there, INVALID_ARGUMENT for one that cannot be read. Opening a named pipe waits for its writer.
+  // Opens `path`. "-" is standard input, which stays open and is called "stdin" in messages. NOT_FOUND if the path does
+  // not exist, INVALID_ARGUMENT if it cannot be read. Opening a named pipe waits for its writer.
   static absl::StatusOr<ByteInput> open(const std::string& path);
   ~ByteInput();
   ByteInput(ByteInput&& other) noexcept;
@@ -23,10 +23,10 @@ class ByteInput {
   ByteInput(const ByteInput&) = delete;
   ByteInput& operator=(const ByteInput&) = delete;
 
-  // Waits for some bytes and reads at most buffer.size() of them; 0 at the end. UNKNOWN if reading fails.
+  // Waits for data, reads at most buffer.size() bytes and returns their count, 0 at the end. UNKNOWN if reading fails.
   absl::StatusOr<size_t> read(absl::Span<char> buffer);
 
-  // Whether read() would return at once, or will within `wait`. True at the end too.
+  // Returns whether read() has data within `wait`. True at the end and after an error, too.
   bool ready_within(std::chrono::milliseconds wait) const;
 
   const std::string& name() const { return name_; }

@@ -9,7 +9,8 @@
 namespace locus::cli {
 namespace {
 
-// Reads a quoted field from behind its opening quote; leaves `rest` behind the closing one. False if none closes it.
+// Reads a quoted field, with `rest` just after its opening quote, and moves `rest` just after the closing one. Returns
+// false if there is no closing quote.
 bool take_quoted(absl::string_view& rest, std::string& field) {
   field.clear();
   while (true) {
@@ -35,15 +36,15 @@ absl::Status split_csv_record(absl::string_view record, std::vector<std::string>
   absl::string_view rest = record;
   while (true) {
     std::string field;
-    const size_t number = fields.size() + 1;
+    const size_t field_number = fields.size() + 1;
     if (!rest.empty() && rest.front() == '"') {
       rest.remove_prefix(1);
-      if (!take_quoted(rest, field)) return stray_quote(number);
-      if (!rest.empty() && rest.front() != ',') return stray_quote(number);
+      if (!take_quoted(rest, field)) return stray_quote(field_number);
+      if (!rest.empty() && rest.front() != ',') return stray_quote(field_number);
     } else {
       const size_t end = std::min(rest.find(','), rest.size());
       const absl::string_view text = absl::StripAsciiWhitespace(rest.substr(0, end));
-      if (text.find('"') != absl::string_view::npos) return stray_quote(number);
+      if (text.find('"') != absl::string_view::npos) return stray_quote(field_number);
       field.assign(text.data(), text.size());
       rest.remove_prefix(end);
     }

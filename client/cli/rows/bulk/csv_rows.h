@@ -19,17 +19,17 @@ class CsvRows {
   explicit CsvRows(const RowSchema& schema) : schema_(schema) {}
 
   bool has_header() const { return !slots_.empty(); }
-  // INVALID_ARGUMENT for a column that is unknown, there twice, missing, or given by an option as well.
+  // Reads the header. INVALID_ARGUMENT for a column that is unknown, repeated or missing, or also given by an option.
   absl::Status read_header(absl::string_view record);
-  // Appends one row; an empty cell is a value that is not given. INVALID_ARGUMENT for anything else than one good value
-  // a column.
+  // Appends one row; an empty cell means that the value is not given. INVALID_ARGUMENT for a wrong number of fields or
+  // a wrong value.
   absl::Status read_row(absl::string_view record, uint64_t line, RowBuilder& builder, RowBatch& batch);
 
  private:
   absl::Status check_complete() const;
 
   const RowSchema& schema_;
-  std::vector<Slot> slots_;  // one a column
+  std::vector<Slot> slots_;  // field of each column
   std::vector<std::string> fields_;
 };
 

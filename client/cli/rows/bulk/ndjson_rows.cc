@@ -10,7 +10,7 @@
 namespace locus::cli {
 namespace {
 
-// What the parser calls for each piece. Returning false ends the parse with `status_` set.
+// SAX handler: the parser calls it for each token. A call that returns false ends the parse with `status_` set.
 class RowHandler final : public nlohmann::json_sax<nlohmann::json> {
  public:
   RowHandler(const RowSchema& schema, RowBuilder& builder) : schema_(schema), builder_(builder) {}
@@ -71,7 +71,7 @@ class RowHandler final : public nlohmann::json_sax<nlohmann::json> {
   }
   bool parse_error(std::size_t position, const std::string& /*token*/,
                    const nlohmann::detail::exception& error) override {
-    // 406 is a number that no double holds; anything else is a matter of grammar.
+    // Error 406 is a number out of the range of double; all others are syntax errors.
     return refuse(error.id == 406 ? absl::StrCat(name(), ": the number at column ", position, " is beyond any double")
                                   : absl::StrCat("no JSON at column ", position));
   }
@@ -102,7 +102,7 @@ class RowHandler final : public nlohmann::json_sax<nlohmann::json> {
   const RowSchema& schema_;
   RowBuilder& builder_;
   absl::Status status_;
-  std::optional<Slot> slot_;  // of the key read last
+  std::optional<Slot> slot_;  // slot of the last key read
   bool started_ = false;
   bool in_list_ = false;
   size_t next_part_ = 0;

@@ -1,5 +1,5 @@
-// A row from one line of JSON. For the row reader; a function without state. Whole numbers are read as such, so that
-// ids keep all 64 bits; they may be strings too, as in the answers.
+// Reading of a row from one line of JSON. For the row reader; a function without state. Integers are not converted to
+// double, so that ids keep all 64 bits; ids may also be strings, as in answers.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_NDJSON_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_NDJSON_ROWS_H_
 
@@ -12,9 +12,9 @@
 
 namespace locus::cli {
 
-// Appends the row that the object `text` holds: {"from": [0, 1, 0], "dir.x": 1, "id": "7"}; null is a value that is not
-// given. INVALID_ARGUMENT for what is no such object, for unknown or repeated keys and for wrong values; the batch is
-// then as it was. Cost: one pass, and no tree is built, so that nesting costs nothing.
+// Parses `text`, one object such as {"from": [0, 1, 0], "dir.x": 1, "id": "7"}, and appends its row; null means that
+// the value is not given. INVALID_ARGUMENT for any other text, for unknown or repeated keys and for wrong values; the
+// batch is then unchanged. Cost: one pass without building a tree, so that deep nesting costs nothing.
 absl::Status read_ndjson_row(const RowSchema& schema, absl::string_view text, uint64_t line, RowBuilder& builder,
                              RowBatch& batch);
 

@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr size_t kPieceBytes = 65536;
+constexpr size_t kChunkBytes = 65536;
 constexpr absl::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 }  // namespace
@@ -39,8 +39,8 @@ absl::StatusOr<Arrival> RecordInput::next(Record& record, std::optional<Clock::t
   return Arrival::kRecord;
 }
 
-// Whether [begin_, scanned_) is a whole record with its line end. A quote within quotes is written twice, so that
-// telling inside from outside needs no more than counting.
+// Scans for the end of a record. Returns whether [begin_, scanned_) is a complete record with its line end. A quote
+// within quotes is written twice, so the parity of the quotes decides whether a position is inside quotes.
 bool RecordInput::find_end() {
   while (scanned_ < buffer_.size()) {
     const char c = buffer_[scanned_++];
@@ -57,7 +57,7 @@ absl::StatusOr<bool> RecordInput::read_more() {
   scanned_ -= begin_;
   begin_ = 0;
   const size_t had = buffer_.size();
-  buffer_.resize(had + kPieceBytes);
+  buffer_.resize(had + kChunkBytes);
   const absl::StatusOr<size_t> count = input_.read(absl::MakeSpan(buffer_).subspan(had));
   buffer_.resize(had + (count.ok() ? *count : 0));
   if (!count.ok()) return count.status();

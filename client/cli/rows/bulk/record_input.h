@@ -1,5 +1,5 @@
-// Cuts an input into records: lines, or csv records, which may hold line breaks in quotes. For the row readers. Holds
-// one piece of the input and at most one record at a time. Not thread-safe.
+// Splits an input into records: lines, or csv records, which may have line breaks in quotes. For the row readers. Keeps
+// one chunk of the input and at most one record in memory. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_RECORD_INPUT_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_RECORD_INPUT_H_
 
@@ -20,8 +20,8 @@ inline constexpr size_t kMaxRecordBytes = 65536;
 enum class RecordForm { kLine, kCsv };
 
 struct Record {
-  absl::string_view text;  // without its line end and without a byte order mark; valid until the next call
-  uint64_t line = 0;       // where it begins, from 1
+  absl::string_view text;  // without line end and byte order mark; valid until the next call
+  uint64_t line = 0;       // line of the input where it begins, from 1
 };
 
 enum class Arrival { kRecord, kPause, kEnd };
@@ -32,13 +32,13 @@ class RecordInput {
 
   RecordInput(ByteInput input, RecordForm form) : input_(std::move(input)), form_(form) {}
 
-  // The next record. With `pause_at`, kPause if nothing comes until then and nothing is there any more. Errors are
-  // INVALID_ARGUMENT without the input's name (a record over kMaxRecordBytes, a quote that is not closed), or what
-  // reading said; line() is where they belong.
+  // Reads the next record. With `pause_at`, returns kPause if the input has no data by then. Errors: INVALID_ARGUMENT
+  // for a record over kMaxRecordBytes or a quote that is not closed, without the input's name, or the error of read().
+  // line() is the line of the error.
   absl::StatusOr<Arrival> next(Record& record, std::optional<Clock::time_point> pause_at);
 
   const std::string& name() const { return input_.name(); }
-  // Of the record that is to come, or that failed.
+  // Returns the line where the record of the last call of next() begins, also if the call failed.
   uint64_t line() const { return line_; }
 
  private:
@@ -49,8 +49,8 @@ class RecordInput {
   ByteInput input_;
   const RecordForm form_;
   std::string buffer_;
-  size_t begin_ = 0;    // of the record to come
-  size_t scanned_ = 0;  // what find_end() has seen
+  size_t begin_ = 0;    // start of the next record in buffer_
+  size_t scanned_ = 0;  // end of the bytes that find_end() has scanned
   bool in_quotes_ = false;
   bool ended_ = false;
   uint64_t line_ = 1;

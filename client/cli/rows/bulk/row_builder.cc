@@ -23,14 +23,14 @@ bool holds_integer(FieldKind kind) {
   return kind == FieldKind::kId || kind == FieldKind::kBits || kind == FieldKind::kWord;
 }
 
-// As much of what was found as a message can bear.
-std::string shown(absl::string_view text) {
+// Truncates `text` for an error message and quotes it.
+std::string quoted_excerpt(absl::string_view text) {
   if (text.size() <= kShownBytes) return absl::StrCat("'", absl::CEscape(text), "'");
   return absl::StrCat("'", absl::CEscape(text.substr(0, kShownBytes)), "...'");
 }
 
 template <class T, class... How>
-std::optional<T> read_whole(absl::string_view text, How... how) {
+std::optional<T> parse_exactly(absl::string_view text, How... how) {
   T value{};
   const char* const end = text.data() + text.size();
   const std::from_chars_result result = std::from_chars(text.data(), end, value, how...);
@@ -40,15 +40,15 @@ std::optional<T> read_whole(absl::string_view text, How... how) {
 
 std::optional<double> read_number(absl::string_view text) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  return read_whole<double>(text);
+  return parse_exactly<double>(text);
 }
 
 std::optional<uint64_t> read_integer(absl::string_view text) {
-  if (absl::ConsumePrefix(&text, "0x") || absl::ConsumePrefix(&text, "0X")) return read_whole<uint64_t>(text, 16);
-  return read_whole<uint64_t>(text, 10);
+  if (absl::ConsumePrefix(&text, "0x") || absl::ConsumePrefix(&text, "0X")) return parse_exactly<uint64_t>(text, 16);
+  return parse_exactly<uint64_t>(text, 10);
 }
 
-// Why `value` will not do; empty if it will.
+// Returns why `value` is not allowed for the kind; empty if it is allowed.
 std::string fault_of(FieldKind kind, double value) {
   if (kind == FieldKind::kDistance) {
     return value >= 0 ? "" : absl::StrCat(value, " is not 0 or more");  // also for NaN
@@ -93,15 +93,15 @@ absl::Status RowBuilder::put_text(const Slot& slot, absl::string_view text) {
   if (field.kind == FieldKind::kWord) {
     const auto word = std::find(field.words.begin(), field.words.end(), text);
     if (word != field.words.end()) return store(slot, 0, static_cast<uint64_t>(word - field.words.begin()));
-    return wrong(slot, absl::StrCat(shown(text), " is none of ", absl::StrJoin(field.words, ", ")));
+    return wrong(slot, absl::StrCat(quoted_excerpt(text), " is none of ", absl::StrJoin(field.words, ", ")));
   }
   if (holds_integer(field.kind)) {
     const std::optional<uint64_t> integer = read_integer(text);
     if (integer) return put_integer(slot, *integer);
-    return wrong(slot, absl::StrCat(shown(text), " is no whole number from 0 to 18446744073709551615"));
+    return wrong(slot, absl::StrCat(quoted_excerpt(text), " is no whole number from 0 to 18446744073709551615"));
   }
   const std::optional<double> number = read_number(text);
-  return number ? put_number(slot, *number) : wrong(slot, absl::StrCat(shown(text), " is no number"));
+  return number ? put_number(slot, *number) : wrong(slot, absl::StrCat(quoted_excerpt(text), " is no number"));
 }
 
 absl::Status RowBuilder::put_number(const Slot& slot, double value) {

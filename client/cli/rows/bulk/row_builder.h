@@ -1,7 +1,7 @@
-// Puts one row after another into a batch, value by value, and checks each: the door through which untrusted numbers
-// come in. For the csv and ndjson readers. Not thread-safe.
+// Builder that appends rows to a batch, value by value, and validates every value of the untrusted input. For the csv
+// and ndjson readers. Not thread-safe.
 //
-// Invariant: a row reaches the batch whole and checked, or not at all.
+// Invariant: the batch has only complete, valid rows; a row with an error leaves it unchanged.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_BUILDER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_BUILDER_H_
 
@@ -20,23 +20,24 @@ class RowBuilder {
   // Borrows the schema.
   explicit RowBuilder(const RowSchema& schema);
 
-  // An empty batch with the schema's columns.
+  // Returns an empty batch with the schema's columns.
   RowBatch empty_batch(uint64_t first_row) const;
 
+  // Begins a row without values.
   void start();
-  // One value, as text or as JSON has it. `slot` names a part where the field has parts. Errors are INVALID_ARGUMENT
-  // and say the column and what was found: "dir.y: 'abc' is no number".
+  // Sets one value of the row, from text or from a number in JSON. `slot` must name a part if the field has parts.
+  // Errors are INVALID_ARGUMENT with the column and the value: "dir.y: 'abc' is no number".
   absl::Status put_text(const Slot& slot, absl::string_view text);
   absl::Status put_number(const Slot& slot, double value);
   absl::Status put_integer(const Slot& slot, uint64_t value);
-  // Appends the row; refused if a required field or a part of a vector is missing.
+  // Appends the row. INVALID_ARGUMENT if a required field or a part of a vector is missing.
   absl::Status finish(uint64_t line, RowBatch& batch);
 
  private:
   struct Value {
     std::array<double, 4> numbers{};
     uint64_t integer = 0;
-    uint32_t parts_given = 0;  // a bit each
+    uint32_t parts_given = 0;  // bit i: part i has a value
   };
 
   absl::Status wrong(const Slot& slot, absl::string_view what) const;

@@ -1,5 +1,5 @@
-// Reads a csv or ndjson input batch by batch. For the commands that take rows; the only door to this room's readers.
-// Not thread-safe. Holds no more than one batch and one piece of the input.
+// Reader of a csv or ndjson input, batch by batch. For the commands that accept rows; the only entry to this folder's
+// readers. Not thread-safe. Keeps at most one batch and one chunk of the input in memory.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 
@@ -19,16 +19,16 @@ namespace locus::cli {
 
 enum class RowFormat { kCsv, kNdjson };
 
-// How long rows that are there wait for more to share a batch with, once the input has nothing ready.
+// Time after the first row of a batch from which on the batch ends as soon as the input has no data ready.
 inline constexpr std::chrono::milliseconds kRowPause{50};
 
 enum class BatchEnd {
-  kFull,   // as many rows as asked for
-  kPause,  // the input has nothing more to give now
-  kEnd,    // the input is over
+  kFull,   // the batch has max_rows rows
+  kPause,  // the input has no data ready
+  kEnd,    // the input has ended
 };
 
-// What a reader does while it has no row yet.
+// Behaviour of a reader before the first row of a batch: wait for it, or return kPause after kRowPause.
 enum class Patience { kWait, kPause };
 
 class RowReader {
@@ -37,8 +37,8 @@ class RowReader {
   RowReader(const RowReader&) = delete;
   RowReader& operator=(const RowReader&) = delete;
 
-  // Reads the next rows, at most `max_rows`, into `batch`. With Patience::kPause a batch may end without a row, as it
-  // may at the end. Errors are "FILE:LINE: what is wrong"; the batch is then of no use, and the reader is spent.
+  // Reads the next rows, at most `max_rows`, into `batch`. A batch may be empty at the end of the input and with
+  // Patience::kPause. The message of an error is "FILE:LINE: REASON"; do not use the batch or the reader after it.
   absl::StatusOr<BatchEnd> next(size_t max_rows, Patience patience, RowBatch& batch);
 
   const RowSchema& schema() const { return schema_; }
@@ -53,7 +53,7 @@ class RowReader {
   RecordInput input_;
   RowBuilder builder_;
   CsvRows csv_;
-  uint64_t rows_ = 0;  // of all batches
+  uint64_t rows_ = 0;  // rows of all batches so far
 };
 
 }  // namespace locus::cli

@@ -16,12 +16,13 @@ bool is_named(const Field& field, const std::string& name) {
 }  // namespace
 
 std::optional<Slot> find_slot(const RowSchema& schema, absl::string_view name) {
-  const std::string whole = absl::StrReplaceAll(name, {{"-", "_"}});
-  const size_t dot = whole.size() > 2 && whole[whole.size() - 2] == '.' ? whole.size() - 2 : std::string::npos;
+  const std::string normalized = absl::StrReplaceAll(name, {{"-", "_"}});
+  const size_t dot =
+      normalized.size() > 2 && normalized[normalized.size() - 2] == '.' ? normalized.size() - 2 : std::string::npos;
   for (size_t i = 0; i < schema.size(); ++i) {
-    if (is_named(schema[i], whole)) return Slot{i};
-    if (dot == std::string::npos || !is_named(schema[i], whole.substr(0, dot))) continue;
-    const size_t part = schema[i].parts.find(whole.back());
+    if (is_named(schema[i], normalized)) return Slot{i};
+    if (dot == std::string::npos || !is_named(schema[i], normalized.substr(0, dot))) continue;
+    const size_t part = schema[i].parts.find(normalized.back());
     if (part != std::string::npos) return Slot{i, part};
   }
   return std::nullopt;

@@ -1,8 +1,8 @@
-// What columns a bulk input may have, and one batch of its rows in columns. For the row readers and the commands that
-// read rows. Plain data, and one lookup.
+// Schema of a bulk input: the columns that it may have; and a batch of its rows, stored in columns. For the row readers
+// and the commands that read rows. Plain data, and one lookup.
 //
-// Names are those of the commands' options without the dashes, `-` written as `_` or left: from, dir, max_t. The parts
-// of a vector are from.x, from.y, from.z in csv, and in ndjson either that or "from": [x, y, z].
+// Columns have the names of the commands' options without the leading dashes, with `_` or `-` inside: from, dir, max_t.
+// The parts of a vector are from.x, from.y, from.z in csv; ndjson also allows "from": [x, y, z].
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_SCHEMA_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_SCHEMA_H_
 
@@ -18,12 +18,12 @@
 namespace locus::cli {
 
 enum class FieldKind {
-  kCoordinate,  // |x| <= 1e9, kept in double
-  kFloat,       // finite as a float
-  kDistance,    // 0 or more, infinity too
-  kId,          // 64 bits
-  kBits,        // 32 bits
-  kWord,        // one of Field::words; kept as its place among them
+  kCoordinate,  // |x| <= 1e9, stored as double
+  kFloat,       // within the finite range of float
+  kDistance,    // 0 or more, infinity included
+  kId,          // unsigned, 64 bits
+  kBits,        // unsigned, 32 bits
+  kWord,        // one of Field::words, stored as its index there
 };
 
 struct Field {
@@ -32,7 +32,7 @@ struct Field {
   std::string parts = {};  // "xyz" or "xyzw" for a vector, empty for one value
   std::vector<std::string> aliases = {};
   bool required = false;
-  std::string option = {};  // the option that gives the value for all rows; then the input must not have the column
+  std::string option = {};  // option that sets the value for all rows; then the input must not have the column
   std::vector<std::string> words = {};
 
   size_t size() const { return parts.empty() ? 1 : parts.size(); }
@@ -40,23 +40,23 @@ struct Field {
 
 using RowSchema = std::vector<Field>;
 
-// A field, and a part of it; a vector's name alone stands for all of its parts.
+// Index of a field, and of a part of it. Without a part, the name of a vector stands for all of its parts.
 struct Slot {
   size_t field = 0;
   std::optional<size_t> part = std::nullopt;
 };
 
-// Nothing for a name the schema does not know.
+// Returns the slot that `name` names; none if the schema has no such field or part.
 std::optional<Slot> find_slot(const RowSchema& schema, absl::string_view name);
 
-// "from.x" for a part, "from" for a whole field.
+// Returns the name of a slot: "from.x" for a part, "from" for all of the field.
 std::string slot_name(const RowSchema& schema, const Slot& slot);
 
-// All names of columns in csv, for messages: "from.x, from.y, ...".
+// Returns the names of all columns in csv, for messages: "from.x, from.y, ...".
 std::string known_columns(const RowSchema& schema);
 
-// One field of all rows of a batch. Either `numbers` (size() a row) or `integers` is filled, by kind; a row that does
-// not give the field has zeros there and 0 in `given`.
+// Values of one field for all rows of a batch. Either `numbers` (Field::size() entries per row) or `integers` is
+// filled, depending on the kind. A row without the field has zeros there and 0 in `given`.
 struct RowColumn {
   std::vector<double> numbers;
   std::vector<uint64_t> integers;
@@ -67,9 +67,9 @@ struct RowColumn {
 };
 
 struct RowBatch {
-  std::vector<RowColumn> columns;  // one a field of the schema
-  std::vector<uint64_t> lines;     // where each row begins in the input, from 1
-  uint64_t first_row = 0;          // how many rows of the input came before
+  std::vector<RowColumn> columns;  // one per field of the schema
+  std::vector<uint64_t> lines;     // line of the input where each row begins, from 1
+  uint64_t first_row = 0;          // number of rows of the input before this batch
 
   size_t rows() const { return lines.size(); }
 };

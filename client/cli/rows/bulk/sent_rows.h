@@ -1,5 +1,5 @@
-// Which lines of an input a sent batch holds, so that what a server says about one of its items can be said about a
-// line. For the commands that send rows. Plain data and one lookup.
+// Lines of the input that a sent batch was made from, so that an error of the server about an item can name its line.
+// For the commands that send rows. Plain data and one lookup.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 
@@ -14,17 +14,17 @@
 namespace locus::cli {
 
 struct SentRows {
-  uint64_t first_row = 0;           // of the input
-  std::vector<uint64_t> lines;      // one a row
-  std::vector<size_t> list_starts;  // where each of the batch's lists (blocks, inserts, moves) begins among the rows
+  uint64_t first_row = 0;           // index in the input of the first row
+  std::vector<uint64_t> lines;      // line of each row
+  std::vector<size_t> list_starts;  // first row of each of the batch's lists (blocks, inserts, moves)
 
   size_t rows() const { return lines.size(); }
 
-  // The line of entry `index` of the list that `field` names ("moves[3].ids", "blocks[0].rays.directions",
-  // "remove_ids"); nothing where that is no row.
+  // Returns the line of entry `index` of the list that `field` names ("moves[3].ids", "blocks[0].rays.directions",
+  // "remove_ids"); none if that is not a row.
   std::optional<uint64_t> line_of(absl::string_view field, size_t index) const;
 
-  // "17" or "17-8208"; empty without rows.
+  // Returns the first and last line as "17" or "17-8208"; empty without rows.
   std::string line_range() const;
 };
 

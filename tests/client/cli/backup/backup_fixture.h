@@ -1,4 +1,4 @@
-// For tests of backup and restore: a server with a planned backup, a folder, and lines of the command line.
+// Fixture for tests of backup and restore: a server with a planned backup, a temporary folder, and command lines.
 #ifndef LOCUS_TESTS_CLIENT_CLI_BACKUP_BACKUP_FIXTURE_H_
 #define LOCUS_TESTS_CLIENT_CLI_BACKUP_BACKUP_FIXTURE_H_
 
@@ -26,7 +26,7 @@ struct Outcome {
   std::string err;
 };
 
-// Bytes by path of all files below `directory`.
+// Returns the bytes of all files below `directory`, by relative path.
 inline Files files_of(const std::string& directory) {
   Files files;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(directory)) {

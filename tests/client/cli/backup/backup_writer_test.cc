@@ -12,7 +12,7 @@ using testing::Outcome;
 
 using BackupCommandTest = testing::BackupFixture;
 
-TEST_F(BackupCommandTest, FilesComeWithAListThatCoreutilsProves) {
+TEST_F(BackupCommandTest, TheBackupHasChecksumsThatCoreutilsVerifies) {
   const Json report = json_of({"backup", backup_});
   EXPECT_EQ(report.dump(), Json({{"directory", backup_}, {"files", 3}, {"bytes", 14}}).dump());
   testing::Files files = files_of(backup_);
@@ -25,13 +25,13 @@ TEST_F(BackupCommandTest, FilesComeWithAListThatCoreutilsProves) {
   EXPECT_EQ(files, planned_);
 }
 
-TEST_F(BackupCommandTest, ProgressIsShownWhereSomebodyLooks) {
+TEST_F(BackupCommandTest, ProgressIsWrittenOnlyIfLive) {
   const Outcome outcome = run({"backup", backup_}, Progress::kLive);
   EXPECT_THAT(outcome.err, HasSubstr("backing up: 0 of 0 MiB"));
   EXPECT_THAT(run({"backup", folder_.file("quiet")}).err, IsEmpty());
 }
 
-TEST_F(BackupCommandTest, ABackupThatBreaksOffLeavesNothing) {
+TEST_F(BackupCommandTest, AnInterruptedOrDamagedBackupLeavesNoFiles) {
   server_.servers.backup_end = {grpc::StatusCode::UNAVAILABLE, "planned"};
   EXPECT_EQ(run({"backup", backup_}).code, ExitCode::kUnreachable);
   server_.servers.backup_end = {};
@@ -44,7 +44,7 @@ TEST_F(BackupCommandTest, ABackupThatBreaksOffLeavesNothing) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-TEST_F(BackupCommandTest, ADirectoryThatIsThereIsNotTouched) {
+TEST_F(BackupCommandTest, AnExistingDirectoryIsRefused) {
   std::filesystem::create_directory(backup_);
   const Outcome outcome = run({"backup", backup_});
   EXPECT_EQ(outcome.code, ExitCode::kFailed);
@@ -52,7 +52,7 @@ TEST_F(BackupCommandTest, ADirectoryThatIsThereIsNotTouched) {
   EXPECT_TRUE(std::filesystem::is_empty(backup_));
 }
 
-TEST_F(BackupCommandTest, AServerThatKeepsNothingIsToldByItsOwnWords) {
+TEST_F(BackupCommandTest, AServerWithoutStorageIsReportedWithItsOwnMessage) {
   v1::Error error;
   error.set_reason(v1::REASON_NOT_SERVED);
   server_.servers.backup_pieces.clear();
@@ -64,13 +64,13 @@ TEST_F(BackupCommandTest, AServerThatKeepsNothingIsToldByItsOwnWords) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-TEST_F(BackupCommandTest, AFileInThePlaceOfTheListIsRefused) {
+TEST_F(BackupCommandTest, AFileNamedSha256SumsFromTheServerIsRefused) {
   server_.servers.plan_backup({{"SHA256SUMS", "mine"}});
   EXPECT_THAT(run({"backup", backup_}).err, HasSubstr("which a backup has for itself"));
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-TEST_F(BackupCommandTest, AServerThatLiesAboutPathsWritesNowhereElse) {
+TEST_F(BackupCommandTest, APathOutsideTheBackupIsRefused) {
   server_.servers.plan_backup({{"../escaped", "bytes"}});
   const Outcome outcome = run({"backup", backup_});
   EXPECT_EQ(outcome.code, ExitCode::kFailed);

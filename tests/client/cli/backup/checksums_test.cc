@@ -23,11 +23,11 @@ std::string refusal_of(const std::string& text) {
   return std::string(status.message());
 }
 
-TEST(ChecksumsTest, ALineIsWhatCoreutilsWrites) {
+TEST(ChecksumsTest, ALineHasTheFormatOfCoreutils) {
   EXPECT_EQ(checksum_text({checksum_of("tables/a b", "abc")}), std::string(kHex) + "  tables/a b\n");
 }
 
-TEST(ChecksumsTest, WhatIsWrittenReadsBackTheSame) {
+TEST(ChecksumsTest, WrittenChecksumsParseToTheSame) {
   const std::vector<Checksum> checksums = {checksum_of("CURRENT", "abc"), checksum_of("tables/1", "")};
   const absl::StatusOr<std::vector<Checksum>> again = parse_checksums(checksum_text(checksums));
   ASSERT_TRUE(again.ok()) << again.status();
@@ -40,7 +40,7 @@ TEST(ChecksumsTest, NoFilesAreNoLines) {
   EXPECT_THAT(*none, SizeIs(0));
 }
 
-TEST(ChecksumsTest, ALineOfAnotherFormIsNamedByItsNumber) {
+TEST(ChecksumsTest, AMalformedLineIsReportedWithItsNumber) {
   const std::string good = std::string(kHex) + "  a\n";
   const std::string hex = kHex;
   for (const std::string& bad :
@@ -50,7 +50,7 @@ TEST(ChecksumsTest, ALineOfAnotherFormIsNamedByItsNumber) {
   EXPECT_THAT(refusal_of(good + hex + "  b"), HasSubstr("line 2 of SHA256SUMS is damaged: it does not end"));
 }
 
-TEST(ChecksumsTest, PathsThatLeadElsewhereOrComeTwiceAreDamage) {
+TEST(ChecksumsTest, RepeatedPathsAndPathsOutsideTheBackupAreDataLoss) {
   const std::string hex = kHex;
   EXPECT_THAT(refusal_of(hex + "  ../x\n"), HasSubstr("leads out of its directory"));
   EXPECT_THAT(refusal_of(hex + "  /x\n"), HasSubstr("leads out of its directory"));

@@ -36,7 +36,7 @@ class PartialDirectoryTest : public ::testing::Test {
   const std::string target_ = folder_.file("target");
 };
 
-TEST_F(PartialDirectoryTest, TheTargetAppearsWholeWhenItIsKept) {
+TEST_F(PartialDirectoryTest, TheTargetAppearsCompleteOnKeep) {
   PartialDirectory directory(target_, TargetRule::kNothing);
   ASSERT_TRUE(directory.make(3).ok());
   ASSERT_TRUE(write_file(directory, "a/b/one", "1").ok());
@@ -50,7 +50,7 @@ TEST_F(PartialDirectoryTest, TheTargetAppearsWholeWhenItIsKept) {
   EXPECT_FALSE(exists(directory.partial()));
 }
 
-TEST_F(PartialDirectoryTest, WhatIsNotKeptIsGoneWithTheObject) {
+TEST_F(PartialDirectoryTest, TheDestructorRemovesADirectoryThatWasNotKept) {
   {
     PartialDirectory directory(target_, TargetRule::kNothing);
     ASSERT_TRUE(directory.make(0).ok());
@@ -62,7 +62,7 @@ TEST_F(PartialDirectoryTest, WhatIsNotKeptIsGoneWithTheObject) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-TEST_F(PartialDirectoryTest, OnlyItsOwnerMayReadIt) {
+TEST_F(PartialDirectoryTest, OnlyTheOwnerHasAccess) {
   PartialDirectory directory(target_, TargetRule::kNothing);
   ASSERT_TRUE(directory.make(0).ok());
   ASSERT_TRUE(write_file(directory, "a/one", "1").ok());
@@ -74,7 +74,7 @@ TEST_F(PartialDirectoryTest, OnlyItsOwnerMayReadIt) {
   }
 }
 
-TEST_F(PartialDirectoryTest, ATargetThatIsThereIsNotTouched) {
+TEST_F(PartialDirectoryTest, AnExistingTargetIsRefusedUnlessTheRuleAllowsEmpty) {
   std::filesystem::create_directory(target_);
   const PartialDirectory strict(target_, TargetRule::kNothing);
   EXPECT_THAT(std::string(strict.check().message()), HasSubstr("is there already"));
@@ -87,13 +87,13 @@ TEST_F(PartialDirectoryTest, ATargetThatIsThereIsNotTouched) {
   EXPECT_FALSE(exists(made.partial()));
 }
 
-TEST_F(PartialDirectoryTest, AFileInThePlaceOfTheTargetIsNotTouched) {
+TEST_F(PartialDirectoryTest, AFileAtTheTargetIsRefused) {
   std::ofstream(target_) << "precious";
   const PartialDirectory directory(target_, TargetRule::kNothingOrEmpty);
   EXPECT_TRUE(absl::IsFailedPrecondition(directory.check()));
 }
 
-TEST_F(PartialDirectoryTest, ATargetThatFillsUpMeanwhileIsNotOverwritten) {
+TEST_F(PartialDirectoryTest, ATargetFilledAfterMakeIsNotOverwritten) {
   PartialDirectory directory(target_, TargetRule::kNothing);
   ASSERT_TRUE(directory.make(0).ok());
   std::filesystem::create_directory(target_);
@@ -111,7 +111,7 @@ TEST_F(PartialDirectoryTest, AnEmptyTargetIsReplaced) {
   EXPECT_EQ(text_of(target_ + "/one"), "1");
 }
 
-TEST_F(PartialDirectoryTest, WhatAnInterruptedRunLeftIsNamedAndKept) {
+TEST_F(PartialDirectoryTest, APartialDirectoryOfAnotherRunIsReportedAndKept) {
   std::filesystem::create_directory(target_ + ".partial");
   {
     PartialDirectory directory(target_, TargetRule::kNothing);
@@ -122,13 +122,13 @@ TEST_F(PartialDirectoryTest, WhatAnInterruptedRunLeftIsNamedAndKept) {
   EXPECT_TRUE(exists(target_ + ".partial")) << "it may be another run's";
 }
 
-TEST_F(PartialDirectoryTest, MoreThanTheDiskHasRoomForIsRefusedAtOnce) {
+TEST_F(PartialDirectoryTest, MoreBytesThanTheDiskHasFreeAreRefusedAtOnce) {
   PartialDirectory directory(target_, TargetRule::kNothing);
   const absl::Status made = directory.make(std::numeric_limits<uint64_t>::max());
   EXPECT_TRUE(absl::IsResourceExhausted(made)) << made;
 }
 
-TEST_F(PartialDirectoryTest, AFolderThatIsNotThereIsNamed) {
+TEST_F(PartialDirectoryTest, AMissingParentFolderIsReported) {
   PartialDirectory directory(folder_.file("missing/target"), TargetRule::kNothing);
   const absl::Status made = directory.make(0);
   EXPECT_TRUE(absl::IsNotFound(made)) << made;

@@ -10,7 +10,7 @@ using ::testing::HasSubstr;
 using testing::Outcome;
 using ::testing::StartsWith;
 
-// A backup of the planned files, and no server.
+// Fixture with a backup of the planned files. No server is used.
 class RestoreCommandTest : public testing::BackupFixture {
  protected:
   void SetUp() override {
@@ -22,7 +22,7 @@ class RestoreCommandTest : public testing::BackupFixture {
     std::ofstream(backup_ + "/" + path, std::ios::binary | std::ios::trunc) << bytes;
   }
 
-  // Neither proves whole nor is restored.
+  // Expects that both --verify-only and a restore refuse the backup with a message that contains `how`.
   void expect_damaged(const std::string& how) {
     for (const std::vector<std::string>& line :
          std::vector<std::vector<std::string>>{{"restore", backup_, "--verify-only"}, {"restore", backup_, data_}}) {
@@ -38,19 +38,19 @@ class RestoreCommandTest : public testing::BackupFixture {
   const std::string data_ = folder_.file("data");
 };
 
-TEST_F(RestoreCommandTest, TheDataDirectoryHasTheFilesOfTheServerAndNothingElse) {
+TEST_F(RestoreCommandTest, TheDataDirectoryHasExactlyTheFilesOfTheServer) {
   const Json report = json_of({"restore", backup_, data_});
   EXPECT_EQ(report.dump(), Json({{"data_dir", data_}, {"files", 3}, {"bytes", 14}}).dump());
   EXPECT_EQ(files_of(data_), planned_);
 }
 
-TEST_F(RestoreCommandTest, ItSaysWhatToDoNext) {
+TEST_F(RestoreCommandTest, TheNextCommandsAreSuggested) {
   const Outcome outcome = run({"restore", backup_ + "/", data_ + "/"});
   EXPECT_EQ(outcome.code, ExitCode::kOk);
   EXPECT_THAT(outcome.err, StartsWith("next: `locusd check " + data_ + "`, then `locusd --data-dir " + data_ + "`"));
 }
 
-TEST_F(RestoreCommandTest, AWholeBackupIsProvenWithoutWritingAnything) {
+TEST_F(RestoreCommandTest, VerifyOnlyAcceptsAnIntactBackupAndWritesNothing) {
   EXPECT_EQ(json_of({"restore", "--verify-only", backup_})["whole"], true);
   EXPECT_FALSE(std::filesystem::exists(data_));
 }
@@ -81,22 +81,22 @@ TEST_F(RestoreCommandTest, EveryTruncationOfEveryFileIsFound) {
   }
 }
 
-TEST_F(RestoreCommandTest, ADamagedFileIsNamed) {
+TEST_F(RestoreCommandTest, ADamagedFileIsReported) {
   write("tables/000007.sst", "other");
   expect_damaged("tables/000007.sst has other bytes than SHA256SUMS says");
 }
 
-TEST_F(RestoreCommandTest, AFileThatIsMissingIsNamed) {
+TEST_F(RestoreCommandTest, AMissingFileIsReported) {
   std::filesystem::remove(backup_ + "/CURRENT");
   expect_damaged("CURRENT is missing");
 }
 
-TEST_F(RestoreCommandTest, AFileThatIsNotListedIsNamed) {
+TEST_F(RestoreCommandTest, AnUnlistedFileIsReported) {
   write("tables/more", "");
   expect_damaged("tables/more is not listed in SHA256SUMS");
 }
 
-TEST_F(RestoreCommandTest, ALinkIsNoFileOfABackup) {
+TEST_F(RestoreCommandTest, ASymbolicLinkIsReported) {
   std::filesystem::rename(backup_ + "/CURRENT", folder_.file("elsewhere"));
   std::filesystem::create_symlink(folder_.file("elsewhere"), backup_ + "/CURRENT");
   expect_damaged("CURRENT is no regular file");
@@ -108,7 +108,7 @@ TEST_F(RestoreCommandTest, VerifyingNamesTheFirstFewAndCountsTheRest) {
   EXPECT_THAT(outcome.err, HasSubstr("extra4 is not listed in SHA256SUMS and 4 more; take another backup"));
 }
 
-TEST_F(RestoreCommandTest, ADataDirectoryThatIsNotEmptyIsNotTouched) {
+TEST_F(RestoreCommandTest, ANonEmptyDataDirectoryIsRefusedAndUnchanged) {
   std::filesystem::create_directory(data_);
   std::ofstream(data_ + "/CURRENT") << "precious";
   const Outcome outcome = run({"restore", backup_, data_});
@@ -123,7 +123,7 @@ TEST_F(RestoreCommandTest, AnEmptyDataDirectoryIsFilled) {
   EXPECT_EQ(files_of(data_), planned_);
 }
 
-TEST_F(RestoreCommandTest, WhatIsNoBackupIsNotFound) {
+TEST_F(RestoreCommandTest, ADirectoryWithoutChecksumsIsNotFound) {
   for (const std::string& path : {folder_.file("nowhere"), folder_.path()}) {
     const Outcome outcome = run({"restore", path, data_});
     EXPECT_EQ(outcome.code, ExitCode::kNotFound) << outcome.err;
@@ -131,7 +131,7 @@ TEST_F(RestoreCommandTest, WhatIsNoBackupIsNotFound) {
   }
 }
 
-TEST_F(RestoreCommandTest, ItMustBeSaidWhetherToRestoreOrToVerify) {
+TEST_F(RestoreCommandTest, EitherATargetOrVerifyOnlyIsRequired) {
   EXPECT_EQ(run({"restore", backup_}).code, ExitCode::kUsage);
   EXPECT_EQ(run({"restore", backup_, data_, "--verify-only"}).code, ExitCode::kUsage);
   EXPECT_EQ(run({"restore"}).code, ExitCode::kUsage);

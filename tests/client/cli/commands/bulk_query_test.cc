@@ -27,7 +27,7 @@ constexpr char kRayHeader[] = "from.x,from.y,from.z,dir.x,dir.y,dir.z\n";
 
 class BulkQueryTest : public BulkTest {
  protected:
-  // A block of balls around the origin, in one insert.
+  // Inserts a block of balls around the origin, in one batch.
   void insert_balls() {
     std::string rows = "id,at.x,at.y,at.z\n";
     for (int i = 0; i < 1000; ++i)
@@ -37,7 +37,8 @@ class BulkQueryTest : public BulkTest {
   }
 };
 
-// Eighths are floats, so that the options' frame and the rows' frame are both the origin.
+// Returns random rays whose coordinates are multiples of 1/8, hence exact floats: with options and with rows, the frame
+// is the origin.
 std::vector<std::array<double, 6>> random_rays(int count) {
   test::Random random(17);
   std::vector<std::array<double, 6>> rays;
@@ -48,7 +49,7 @@ std::vector<std::array<double, 6>> random_rays(int count) {
   return rays;
 }
 
-TEST_F(BulkQueryTest, AHundredThousandRaysThroughAPipeAreAnsweredAsThoseOfOptions) {
+TEST_F(BulkQueryTest, AHundredThousandRaysFromAPipeGetTheSameAnswersAsFromOptions) {
   insert_balls();
   constexpr int kRays = 100000;
   constexpr int kChunk = 1000;
@@ -105,7 +106,7 @@ TEST_F(BulkQueryTest, AnswersDoNotDependOnWhereBatchesEnd) {
   EXPECT_EQ(answers("7"), whole);
 }
 
-TEST_F(BulkQueryTest, EveryKindAndModeTakesRows) {
+TEST_F(BulkQueryTest, EveryKindAndModeAcceptsRows) {
   insert_balls();
   const TestFile rays("{\"from\":[0,0,-9],\"dir\":[0,0,1]}\n{\"from\":[2,2,-9],\"dir\":[0,0,1]}\n", "rays.ndjson");
   EXPECT_EQ(out_of({"-o", "csv", "query", "ray", "world", "--from-ndjson", rays.path(), "--mode", "any"}),
@@ -124,14 +125,14 @@ TEST_F(BulkQueryTest, EveryKindAndModeTakesRows) {
             "query,t,id,triangle\n0,0.0,2,\n2,0.0,3,\n");
 }
 
-TEST_F(BulkQueryTest, AJsonAnswerIsOneDocumentLikeThatOfOptions) {
+TEST_F(BulkQueryTest, AJsonAnswerIsTheSameDocumentAsFromOptions) {
   insert_balls();
   const TestFile rows("{\"at\":[0,0,0]}\n{\"at\":[4,0,0]}\n", "at.ndjson");
   const Json bulk = json_of({"query", "ball", "world", "--from-ndjson", rows.path(), "--radius", "1", "--batch", "1"});
   EXPECT_EQ(bulk, json_of({"query", "ball", "world", "--at", "0,0,0", "--at", "4,0,0", "--radius", "1"}));
 }
 
-TEST_F(BulkQueryTest, AnswersComeBeforeTheInputEndsAndAtTheRevisionOfTheFirst) {
+TEST_F(BulkQueryTest, AnswersAreWrittenBeforeTheInputEndsAndAtTheRevisionOfTheFirst) {
   NamedPipe pipe;
   SharedText text;
   std::thread command([&] {
@@ -174,7 +175,7 @@ TEST_F(BulkQueryTest, WithFollowLaterRowsSeeNewerRevisions) {
   EXPECT_EQ(answer["revision"], 2);
 }
 
-TEST_F(BulkQueryTest, ARevisionThatIsNoLongerKeptEndsTheRunAndSaysWhatWasAnswered) {
+TEST_F(BulkQueryTest, ADroppedRevisionEndsTheRunWithTheCountOfAnsweredRows) {
   NamedPipe pipe;
   SharedText text;
   std::ostringstream err;
@@ -199,7 +200,7 @@ TEST_F(BulkQueryTest, ARevisionThatIsNoLongerKeptEndsTheRunAndSaysWhatWasAnswere
                     HasSubstr("; 1 rows before it were answered")));
 }
 
-TEST_F(BulkQueryTest, AWrongRowEndsTheRunBehindTheAnswersBeforeItsBatch) {
+TEST_F(BulkQueryTest, AWrongRowEndsTheRunAfterTheAnswersOfEarlierBatches) {
   const TestFile file(absl::StrCat(kRayHeader, "0,0,0,0,0,1\n1,0,0,0,0,1\n2,0,0,0,0,1\n3,0,0,0,abc,1\n"));
   const BulkOutcome outcome =
       run({"-o", "csv", "query", "ray", "world", "--from-csv", file.path(), "--batch", "2", "--mode", "any"});
@@ -225,7 +226,7 @@ TEST_F(BulkQueryTest, AnInputWithoutRowsIsAnsweredEmpty) {
   EXPECT_EQ(run({"query", "ray", "nowhere", "--from-ndjson", empty.path()}).code, ExitCode::kNotFound);
 }
 
-TEST_F(BulkQueryTest, WhatIsCutIsCountedAndTheFirstNamed) {
+TEST_F(BulkQueryTest, TruncatedQueriesAreCountedAndTheFirstIsNamed) {
   insert_balls();
   const TestFile rows("{\"at\":[99,0,0]}\n{\"at\":[0,0,0]}\n", "at.ndjson");
   const std::vector<std::string> line = {"query", "ball",          "world", "--from-ndjson", rows.path(), "--radius",
@@ -240,7 +241,7 @@ TEST_F(BulkQueryTest, WhatIsCutIsCountedAndTheFirstNamed) {
       "warning: 1 rows found more than was reported, the first is ball 1: raise --max-results or lower --batch\n");
 }
 
-TEST_F(BulkQueryTest, AnOutputThatTakesNoMoreEndsTheRun) {
+TEST_F(BulkQueryTest, AnOutputThatCannotBeWrittenEndsTheRun) {
   class Closed : public std::streambuf {};
   const TestFile rows("{\"at\":[0,0,0]}\n", "at.ndjson");
   Closed closed;
@@ -248,10 +249,10 @@ TEST_F(BulkQueryTest, AnOutputThatTakesNoMoreEndsTheRun) {
   std::ostringstream err;
   EXPECT_EQ(run_into({"-o", "csv", "query", "ball", "world", "--from-ndjson", rows.path(), "--radius", "9"}, out, err),
             ExitCode::kFailed);
-  EXPECT_THAT(err.str(), HasSubstr("the output takes no more"));
+  EXPECT_THAT(err.str(), HasSubstr("cannot write the output"));
 }
 
-TEST_F(BulkQueryTest, OptionsThatDoNotGoTogetherAreUsageErrors) {
+TEST_F(BulkQueryTest, OptionsThatExcludeEachOtherAreUsageErrors) {
   const TestFile file(kRayHeader);
   const std::string& path = file.path();
   for (const std::vector<std::string>& line : std::vector<std::vector<std::string>>{
@@ -271,14 +272,14 @@ TEST_F(BulkQueryTest, OptionsThatDoNotGoTogetherAreUsageErrors) {
   }
 }
 
-TEST_F(BulkQueryTest, AColumnBesideItsOptionAndAFileThatIsNotThereAreNamed) {
+TEST_F(BulkQueryTest, AColumnBesideItsOptionAndAMissingFileAreReported) {
   const TestFile file(kRayHeader);
   EXPECT_THAT(run({"query", "ray", "world", "--from-csv", file.path(), "--dir", "0,0,1"}).err,
               HasSubstr(file.path() + ":1: column dir is there and --dir is given: leave one of them out"));
   EXPECT_EQ(run({"query", "ray", "world", "--from-csv", "/nonexistent/rays.csv"}).code, ExitCode::kNotFound);
 }
 
-TEST(FrameOfTest, FloatsAndWhatIsNearTheOriginHaveTheOriginAsFrame) {
+TEST(FrameOfTest, FloatsAndPositionsNearTheOriginHaveTheOriginAsFrame) {
   EXPECT_EQ(frame_of(1e8, 0, 0).x, 0);
   EXPECT_EQ(frame_of(8000.1, -8000.1, 0).x, 0);
   EXPECT_EQ(frame_of(1000000.1, 0, 0).x, 999424);

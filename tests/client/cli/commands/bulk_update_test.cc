@@ -54,7 +54,7 @@ TEST_F(BulkUpdateTest, AHundredThousandObjectsAreInsertedMovedAndRemoved) {
   EXPECT_EQ(json_of({"scene", "describe", "world"})["objects"], 0);
 }
 
-TEST_F(BulkUpdateTest, MovesOfAPipeThatPausesAreAppliedAtOnce) {
+TEST_F(BulkUpdateTest, MovesFromAPipeAreAppliedAsSoonAsItPauses) {
   out_of({"insert", "world", "point", "--id", "18446744073709551615", "--at", "0,0,0"});
   NamedPipe pipe;
   std::ostringstream out;
@@ -87,7 +87,7 @@ TEST_F(BulkUpdateTest, RefusedItemsAreListedByLine) {
   EXPECT_EQ(json_of({"scene", "describe", "world"})["revision"], 2);
 }
 
-TEST_F(BulkUpdateTest, AWrongRowChangesNothingOfItsBatchAndWhatWasAppliedIsSaid) {
+TEST_F(BulkUpdateTest, AWrongRowStopsItsBatchAndTheAppliedRowsAreCounted) {
   const TestFile file("{\"id\":1,\"at\":[0,0,0]}\n{\"id\":2,\"at\":[0,0,0]}\n{\"id\":3,\"at\":[0,0,0]}\n{\"id\":4}\n",
                       "rows.ndjson");
   const BulkOutcome outcome = run({"insert", "world", "point", "--from-ndjson", file.path(), "--batch", "2"});
@@ -120,7 +120,7 @@ TEST_F(BulkUpdateTest, MixedShapesKeepTheirMeasuresAndLabels) {
   EXPECT_EQ(touched("30,6.25,0"), "{\"ball\":0,\"id\":\"4\",\"group\":\"0\",\"tag\":\"0\",\"layers\":1}\n");
 }
 
-TEST_F(BulkUpdateTest, MeasuresThatDoNotFitTheShapeAreNamedByLine) {
+TEST_F(BulkUpdateTest, WrongMeasuresOfAShapeAreReportedWithTheirLine) {
   const auto refusal = [&](const std::string& shape, const std::string& rows) {
     const TestFile file(rows);
     const BulkOutcome outcome = run({"insert", "world", shape, "--from-csv", file.path()});
@@ -137,7 +137,7 @@ TEST_F(BulkUpdateTest, MeasuresThatDoNotFitTheShapeAreNamedByLine) {
               HasSubstr(":2: shape: 'cone' is none of point, ball"));
 }
 
-TEST_F(BulkUpdateTest, ARefusedBatchIsNamedByItsLines) {
+TEST_F(BulkUpdateTest, ARefusedBatchIsReportedWithItsLines) {
   const TestFile file("id,at.x,at.y,at.z\n1,0,0,0\n2,0,0,0\n");
   const BulkOutcome outcome = run({"insert", "nowhere", "point", "--from-csv", file.path()});
   EXPECT_EQ(outcome.code, ExitCode::kNotFound);
@@ -151,7 +151,7 @@ TEST_F(BulkUpdateTest, AnInputWithoutRowsReportsTheRevision) {
   EXPECT_EQ(answer["revision"], 0);
 }
 
-TEST_F(BulkUpdateTest, OptionsThatDoNotGoTogetherAreUsageErrors) {
+TEST_F(BulkUpdateTest, OptionsThatExcludeEachOtherAreUsageErrors) {
   const TestFile file("id,to.x,to.y,to.z\n");
   const std::string& path = file.path();
   for (const std::vector<std::string>& line : std::vector<std::vector<std::string>>{

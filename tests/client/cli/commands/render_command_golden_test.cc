@@ -1,5 +1,6 @@
-// Pictures of made-up scenes through a real server, against the hashes in tests/golden/renders.txt: what rays hit is
-// the same on every machine, with any number of threads. On a mismatch the picture is kept in the build tree.
+// Pictures of generated scenes by a real server, compared with the hashes in tests/golden/renders.txt: the hits of the
+// rays are the same on every machine and with any number of threads. If they differ, the picture is kept in the build
+// tree.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr client::Rotation kTilted = {0.18257419f, 0.36514837f, 0.54772256f, 0.73029674f};  // (1, 2, 3, 4), made unit
+constexpr client::Rotation kTilted = {0.18257419f, 0.36514837f, 0.54772256f, 0.73029674f};  // (1, 2, 3, 4), normalised
 constexpr client::Rotation kAboutZ = {0, 0, 0.38268343f, 0.92387953f};                      // an eighth of a turn
 
 struct GoldenPicture {
@@ -41,7 +42,7 @@ const std::vector<GoldenPicture>& golden_pictures() {
   return pictures;
 }
 
-// Balls, boxes and capsules, 60 each, over a square around `middle`.
+// Returns 60 balls, 60 boxes and 60 capsules spread over a square around `middle`.
 client::UpdateBuilder made_objects(const client::Double3& middle, uint64_t seed) {
   client::UpdateBuilder updates;
   SplitMix64 random(seed);
@@ -71,7 +72,7 @@ void make_scene(RenderServer& server, const std::string& name) {
   server.apply(name, objects);
 }
 
-// Of one picture: depths, then ids.
+// Hashes of one picture's depths and ids.
 struct Hashes {
   std::string depth;
   std::string ids;
@@ -111,7 +112,7 @@ std::optional<Hashes> take(RenderServer& server, const GoldenPicture& picture, c
 
 class GoldenRenderTest : public ::testing::TestWithParam<uint32_t> {};
 
-TEST_P(GoldenRenderTest, PicturesHitWhatTheyAlwaysHit) {
+TEST_P(GoldenRenderTest, PicturesMatchTheirGoldenHashes) {
   const std::map<std::string, Hashes> golden = golden_hashes();
   RenderServer server(GetParam());
   for (const char* scene : {"city", "tilted", "far", "objects"}) make_scene(server, scene);
@@ -132,7 +133,7 @@ TEST_P(GoldenRenderTest, PicturesHitWhatTheyAlwaysHit) {
 INSTANTIATE_TEST_SUITE_P(Threads, GoldenRenderTest, ::testing::Values(1u, 2u),
                          [](const auto& threads) { return std::to_string(threads.param); });
 
-TEST(GoldenRenderSensitivityTest, OneObjectMovedByATenThousandthShows) {
+TEST(GoldenRenderSensitivityTest, MovingOneObjectByATenThousandthChangesTheDepthHash) {
   const GoldenPicture picture = {"city-moved", "city", {"--eye", "-20,-70,12", "--look-at", "10,0,6", "--fov", "60"}};
   const std::string path = picture_path(picture.name, 2);
   RenderServer server;

@@ -12,7 +12,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Two balls on a city's ground.
+// Fixture with two balls on the ground of a city.
 class RenderCommandTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -79,13 +79,13 @@ TEST_F(RenderCommandTest, EveryChannelShowsTheSameHits) {
   }
 }
 
-TEST_F(RenderCommandTest, FourSamplesAPixelAreFourTimesTheRays) {
+TEST_F(RenderCommandTest, FourSamplesPerPixelCastFourTimesTheRays) {
   const Json json = report({"--samples", "4"});
   EXPECT_EQ(json["rays"], 4 * 32 * 24);
   EXPECT_EQ(json["width"], 32);
 }
 
-TEST_F(RenderCommandTest, OneThingFillsMoreOfThePictureThanInThatOfTheScene) {
+TEST_F(RenderCommandTest, APictureOfOneThingIsCloserThanThatOfTheScene) {
   EXPECT_LT(report({"--at", "7"})["nearest"], report({})["nearest"]);
 }
 
@@ -94,24 +94,24 @@ TEST_F(RenderCommandTest, LivePicturesNameTheFirstAndTheLastRevision) {
   EXPECT_EQ(json["first_revision"], json["revision"]);
 }
 
-TEST_F(RenderCommandTest, ProgressGoesToATerminalOnly) {
+TEST_F(RenderCommandTest, ProgressIsWrittenOnlyIfLive) {
   EXPECT_THAT(render({}).err, IsEmpty());
   EXPECT_THAT(render({}, Progress::kLive).err, HasSubstr(" % of 768 rays"));
 }
 
-TEST_F(RenderCommandTest, AnEmptySceneIsExplained) {
+TEST_F(RenderCommandTest, AnEmptySceneIsRefused) {
   const Outcome outcome = server_.run({"render", "empty", path_});
   EXPECT_EQ(outcome.code, ExitCode::kFailed);
   EXPECT_THAT(outcome.err, HasSubstr("scene empty is empty, there is nothing to see"));
 }
 
-TEST_F(RenderCommandTest, WhatIsNotThereIsNotFound) {
+TEST_F(RenderCommandTest, MissingScenesAndHiddenOrMissingThingsAreNotFound) {
   EXPECT_EQ(server_.run({"render", "nowhere", path_}).code, ExitCode::kNotFound);
   expect_refused({"--at", "99"}, ExitCode::kNotFound, "scene arena has no object or instance 99");
   expect_refused({"--at", "9"}, ExitCode::kNotFound, "it is hidden (layers 0)");
 }
 
-TEST_F(RenderCommandTest, AFileThatCannotBeIsRefusedBeforeAnythingIsAsked) {
+TEST_F(RenderCommandTest, AnImpossibleOutputPathIsRefusedBeforeAnyRequest) {
   const Outcome folder = server_.run({"render", "nowhere", "/nonexistent/x.png"});
   EXPECT_EQ(folder.code, ExitCode::kFailed);
   EXPECT_THAT(folder.err, HasSubstr("there is no folder /nonexistent"));

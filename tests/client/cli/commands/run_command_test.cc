@@ -1,4 +1,4 @@
-// Scripts against the real locusd: the committed examples, broken copies of them, and what the program says at the end.
+// Scripts against a real locusd: the committed examples, and copies of them with mistakes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ class RunCommandTest : public ::testing::Test {
     const ExitCode code = run_line(arguments, context);
     return {code, out.str(), err.str()};
   }
-  // A file of the test's own, gone after it.
+  // Writes a script to a file that is removed after the test, and returns its path.
   std::string file_with(const std::string& text) {
     std::ofstream(file_) << text;
     return file_;
@@ -85,7 +85,7 @@ TEST_F(RunCommandTest, EveryExamplePassesTwice) {
   }
 }
 
-TEST_F(RunCommandTest, EveryExampleIsCheckedWithoutServer) {
+TEST_F(RunCommandTest, EveryExamplePassesTheCheckWithoutServer) {
   for (const std::string& example : examples()) {
     const Outcome outcome = run({"run", example, "--dry-run"}, "unix:/nonexistent/locus.sock");
     EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
@@ -123,14 +123,14 @@ TEST_F(RunCommandTest, WrongSettingsAndFilesAreRefused) {
   EXPECT_EQ(run({"run", file_with("end")}).code, ExitCode::kUsage);
 }
 
-TEST_F(RunCommandTest, AMistakeInTheLastLineStopsTheFirst) {
+TEST_F(RunCommandTest, AMistakeInTheLastLinePreventsTheFirstFromRunning) {
   const Outcome outcome = run({"run", file_with("echo never\nquery ray arena\n")});
   EXPECT_EQ(outcome.code, ExitCode::kUsage);
   EXPECT_THAT(outcome.out, IsEmpty());
   EXPECT_THAT(outcome.err, HasSubstr(".locus:2: give --from and --dir"));
 }
 
-TEST_F(RunCommandTest, WhatABatchMeansIsWhatItsLinesMean) {
+TEST_F(RunCommandTest, ABatchHasTheEffectOfItsLines) {
   const Outcome outcome = run({"run", file_with(R"(
 scene create order --if-absent
 use order

@@ -28,13 +28,13 @@ class WaitCommandTest : public ::testing::Test {
   Context context_{out_, err_, Progress::kSilent};
 };
 
-TEST_F(WaitCommandTest, ASceneWithNothingToComeIsReadyAtOnce) {
+TEST_F(WaitCommandTest, ASceneWithoutPendingChangesIsReadyAtOnce) {
   scene().set_revision(4);
   EXPECT_EQ(wait({}), ExitCode::kOk) << err_.str();
   EXPECT_EQ(Json::parse(out_.str())["revision"], 4);
 }
 
-TEST_F(WaitCommandTest, ChangesToComeAreWaitedForAndAFailedOneIsTold) {
+TEST_F(WaitCommandTest, PendingChangesAreAwaitedAndABuildErrorIsReported) {
   scene().set_pending_changes(1);
   std::thread builder([this] {
     v1::Scene ready;
@@ -48,24 +48,24 @@ TEST_F(WaitCommandTest, ChangesToComeAreWaitedForAndAFailedOneIsTold) {
   EXPECT_EQ(Json::parse(out_.str())["last_build_error"], "too deep");
 }
 
-TEST_F(WaitCommandTest, TimeIsBoundedAndTheRefusalSaysWhatIsMissing) {
+TEST_F(WaitCommandTest, ATimeoutReportsTheRevisionAndThePendingChanges) {
   scene().set_pending_changes(2);
   EXPECT_EQ(wait({"--for", "0"}), ExitCode::kFailed);
   EXPECT_THAT(err_.str(), HasSubstr("after 0 s scene arena is at revision 0 with 2 changes of instances to come"));
 }
 
-TEST_F(WaitCommandTest, ARevisionIsWaitedFor) {
+TEST_F(WaitCommandTest, ARevisionIsAwaited) {
   scene().set_revision(4);
   EXPECT_EQ(wait({"--revision", "4"}), ExitCode::kOk);
   EXPECT_EQ(wait({"--revision", "5", "--for", "0"}), ExitCode::kFailed);
 }
 
-TEST_F(WaitCommandTest, ASceneThatIsNotThereIsNotFound) {
+TEST_F(WaitCommandTest, AMissingSceneIsNotFound) {
   server_.scenes.scenes.clear();
   EXPECT_EQ(wait({}), ExitCode::kNotFound);
 }
 
-TEST_F(WaitCommandTest, WaitingForEverIsAMistake) { EXPECT_EQ(wait({"--for", "1e9"}), ExitCode::kUsage); }
+TEST_F(WaitCommandTest, TooLongAWaitIsAUsageError) { EXPECT_EQ(wait({"--for", "1e9"}), ExitCode::kUsage); }
 
 }  // namespace
 }  // namespace locus::cli

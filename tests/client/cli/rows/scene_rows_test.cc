@@ -6,7 +6,7 @@
 namespace locus::cli {
 namespace {
 
-// What both kinds of runs have, for one thing.
+// Adds one thing to the columns that runs of objects and of instances share.
 template <class Run>
 void fill_shared(Run& run, uint64_t id) {
   run.add_ids(id);
@@ -16,34 +16,34 @@ void fill_shared(Run& run, uint64_t id) {
   run.add_tags(0);
 }
 
-// A ball, a box, a capsule, a point and an instance.
+// Returns a message of a dump with a ball, a box, a capsule, a point and an instance.
 v1::DumpSceneResponse one_of_each() {
-  v1::DumpSceneResponse piece;
+  v1::DumpSceneResponse message;
   for (uint64_t id = 1; id <= 4; ++id) {
-    v1::Insert& run = *piece.add_objects();
+    v1::Insert& run = *message.add_objects();
     fill_shared(run, id);
     for (const double part : {0.1, 2.0, 3.0}) run.add_positions_f64(part);
   }
-  piece.mutable_objects(0)->mutable_ball()->add_radii(0.5f);
-  piece.mutable_objects(2)->mutable_capsule()->add_radii(0.25f);
+  message.mutable_objects(0)->mutable_ball()->add_radii(0.5f);
+  message.mutable_objects(2)->mutable_capsule()->add_radii(0.25f);
   for (const float part : {1.f, 2.f, 3.f}) {
-    piece.mutable_objects(1)->mutable_box()->add_half_extents(part);
-    piece.mutable_objects(2)->mutable_capsule()->add_half_axes(part);
+    message.mutable_objects(1)->mutable_box()->add_half_extents(part);
+    message.mutable_objects(2)->mutable_capsule()->add_half_axes(part);
   }
-  piece.mutable_objects(3)->mutable_point();
-  v1::Placement& place = *piece.add_instances();
+  message.mutable_objects(3)->mutable_point();
+  v1::Placement& place = *message.add_instances();
   place.set_mesh("crate");
   fill_shared(place, 5);
   for (const double part : {4.0, 5.0, 6.0}) place.add_translations(part);
   place.add_scales(2);
-  return piece;
+  return message;
 }
 
-absl::Status read(const v1::DumpSceneResponse& piece) {
-  return for_each_thing(piece, [](const SceneThing&) { return absl::OkStatus(); });
+absl::Status read(const v1::DumpSceneResponse& message) {
+  return for_each_thing(message, [](const SceneThing&) { return absl::OkStatus(); });
 }
 
-TEST(SceneRowsTest, ThingsComeInOrderWithWhatTheyHave) {
+TEST(SceneRowsTest, ThingsComeInOrderWithTheirValues) {
   std::vector<SceneThing> things;
   ASSERT_TRUE(for_each_thing(one_of_each(), [&](const SceneThing& thing) {
                 things.push_back(thing);
@@ -63,7 +63,7 @@ TEST(SceneRowsTest, ThingsComeInOrderWithWhatTheyHave) {
   EXPECT_EQ(things[4].scale, 2);
 }
 
-TEST(SceneRowsTest, ReadingEndsWithTheFirstFailure) {
+TEST(SceneRowsTest, ReadingEndsAtTheFirstError) {
   int taken = 0;
   EXPECT_EQ(
       for_each_thing(one_of_each(),
@@ -72,10 +72,10 @@ TEST(SceneRowsTest, ReadingEndsWithTheFirstFailure) {
   EXPECT_EQ(taken, 2);
 }
 
-TEST(SceneRowsTest, ColumnsOfAnotherLengthAreDataLoss) {
-  const v1::DumpSceneResponse whole = one_of_each();
-  ASSERT_TRUE(read(whole).ok());
-  std::vector<v1::DumpSceneResponse> damaged(9, whole);
+TEST(SceneRowsTest, ColumnsOfWrongLengthAreDataLoss) {
+  const v1::DumpSceneResponse intact = one_of_each();
+  ASSERT_TRUE(read(intact).ok());
+  std::vector<v1::DumpSceneResponse> damaged(9, intact);
   damaged[0].mutable_objects(0)->add_positions_f64(0);
   damaged[1].mutable_objects(0)->clear_rotations();
   damaged[2].mutable_objects(0)->add_layers(0);
@@ -85,10 +85,10 @@ TEST(SceneRowsTest, ColumnsOfAnotherLengthAreDataLoss) {
   damaged[6].mutable_objects(3)->clear_point();
   damaged[7].mutable_instances(0)->clear_scales();
   damaged[8].mutable_instances(0)->clear_tags();
-  for (const v1::DumpSceneResponse& piece : damaged) EXPECT_TRUE(absl::IsDataLoss(read(piece)));
+  for (const v1::DumpSceneResponse& message : damaged) EXPECT_TRUE(absl::IsDataLoss(read(message)));
 }
 
-TEST(SceneRowsTest, RowsHaveOnlyKeysOfTheirKinds) {
+TEST(SceneRowsTest, RowsHaveOnlyTheKeysOfThingKeysInTheirOrder) {
   for (const Things things : {Things::kAll, Things::kObjects, Things::kInstances}) {
     const std::vector<std::string>& keys = thing_keys(things);
     ASSERT_TRUE(for_each_thing(one_of_each(), [&](const SceneThing& thing) {

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 
 #include "core/query/columns.h"
-#include "core/query/run/run_batch.h"
 #include "tests/support/owned_block.h"
+#include "tests/support/run_batch.h"
 #include "tests/support/scene_fixture.h"
 
 namespace locus::test {

@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "core/query/columns.h"
-#include "core/query/run/run_batch.h"
 #include "tests/support/generated_meshes.h"
+#include "tests/support/run_batch.h"
 #include "tests/support/small_world.h"
 
 namespace locus::test {

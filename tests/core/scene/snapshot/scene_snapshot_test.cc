@@ -5,7 +5,7 @@
 #include <atomic>
 #include <thread>
 
-#include "core/query/run/run_batch.h"
+#include "tests/support/run_batch.h"
 #include "tests/support/scene_fixture.h"
 #include "tests/support/test_scale.h"
 

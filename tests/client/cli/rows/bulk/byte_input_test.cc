@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(ByteInputTest, AFileIsReadToItsEndAndThenGivesNothing) {
+TEST(ByteInputTest, AFileIsReadToItsEndAndThenReadReturnsZero) {
   const TestFile file("abc");
   absl::StatusOr<ByteInput> input = ByteInput::open(file.path());
   ASSERT_TRUE(input.ok());
@@ -24,7 +24,7 @@ TEST(ByteInputTest, AFileIsReadToItsEndAndThenGivesNothing) {
   EXPECT_EQ(*input->read(absl::MakeSpan(buffer)), 0u);
 }
 
-TEST(ByteInputTest, AFileThatIsNotThereIsNotFound) {
+TEST(ByteInputTest, AMissingFileIsNotFound) {
   const absl::StatusOr<ByteInput> input = ByteInput::open("/nonexistent/rows.csv");
   EXPECT_TRUE(absl::IsNotFound(input.status()));
   EXPECT_THAT(std::string(input.status().message()), HasSubstr("no file /nonexistent/rows.csv: check the path"));
@@ -36,7 +36,7 @@ TEST(ByteInputTest, AFolderIsRefused) {
   EXPECT_THAT(std::string(input.status().message()), HasSubstr("/ is a folder: give a file"));
 }
 
-TEST(ByteInputTest, TheStandardInputHasANameForMessages) { EXPECT_EQ(ByteInput::open("-")->name(), "stdin"); }
+TEST(ByteInputTest, StandardInputIsNamedStdin) { EXPECT_EQ(ByteInput::open("-")->name(), "stdin"); }
 
 }  // namespace
 }  // namespace locus::cli

@@ -16,22 +16,22 @@ std::vector<std::string> fields_of(absl::string_view record) {
   return fields;
 }
 
-TEST(CsvRecordTest, CommasDivideFields) { EXPECT_THAT(fields_of("1,2,3"), ElementsAre("1", "2", "3")); }
+TEST(CsvRecordTest, CommasSeparateFields) { EXPECT_THAT(fields_of("1,2,3"), ElementsAre("1", "2", "3")); }
 
-TEST(CsvRecordTest, NothingIsOneEmptyField) { EXPECT_THAT(fields_of(""), ElementsAre("")); }
+TEST(CsvRecordTest, AnEmptyRecordIsOneEmptyField) { EXPECT_THAT(fields_of(""), ElementsAre("")); }
 
-TEST(CsvRecordTest, ACommaAtTheEndOpensAnEmptyField) { EXPECT_THAT(fields_of(",a,"), ElementsAre("", "a", "")); }
+TEST(CsvRecordTest, ACommaAtTheEndIsFollowedByAnEmptyField) { EXPECT_THAT(fields_of(",a,"), ElementsAre("", "a", "")); }
 
-TEST(CsvRecordTest, QuotesHoldCommasQuotesAndLineBreaks) {
+TEST(CsvRecordTest, QuotedFieldsMayHaveCommasQuotesAndLineBreaks) {
   EXPECT_THAT(fields_of("\"a,b\",\"say \"\"hi\"\"\",\"two\r\nlines\",\"\""),
               ElementsAre("a,b", "say \"hi\"", "two\r\nlines", ""));
 }
 
-TEST(CsvRecordTest, BlanksAroundAPlainFieldGoAndThoseInQuotesStay) {
+TEST(CsvRecordTest, BlanksAroundAnUnquotedFieldAreDroppedAndThoseInQuotesKept) {
   EXPECT_THAT(fields_of(" 1 ,\t2,\" 3 \""), ElementsAre("1", "2", " 3 "));
 }
 
-TEST(CsvRecordTest, AQuoteInTheMiddleNamesItsField) {
+TEST(CsvRecordTest, AQuoteInTheMiddleOfAFieldIsRefused) {
   for (const char* record : {"1,a\"b", "1,\"a\"b", "1,\"a", "1,\"a\"\"", "1, \"a\""}) {
     std::vector<std::string> fields;
     EXPECT_THAT(std::string(split_csv_record(record, fields).message()), HasSubstr("field 2: a quote in the middle"))

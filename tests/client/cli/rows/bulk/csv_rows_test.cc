@@ -35,7 +35,7 @@ std::string row_refusal(absl::string_view row) {
   return std::string(status.message());
 }
 
-TEST(CsvRowsTest, ColumnsComeInAnyOrderAndOptionalOnesMayBeEmptyOrAbsent) {
+TEST(CsvRowsTest, ColumnsMayComeInAnyOrderAndOptionalOnesMayBeEmptyOrAbsent) {
   CsvRows rows(schema());
   ASSERT_TRUE(rows.read_header(" max-t ,\"from.z\",from.x,from.y").ok());
   RowBuilder builder(schema());
@@ -47,7 +47,7 @@ TEST(CsvRowsTest, ColumnsComeInAnyOrderAndOptionalOnesMayBeEmptyOrAbsent) {
   EXPECT_THAT(batch.columns[2].given, ElementsAre(0, 0));
 }
 
-TEST(CsvRowsTest, AHeaderWithAnUnknownColumnNamesItAndThoseKnown) {
+TEST(CsvRowsTest, AnUnknownColumnIsRefusedWithTheKnownOnes) {
   EXPECT_EQ(header_refusal("from.x,from.y,from.z,color"),
             "unknown column 'color'; a header line names columns out of: from.x, from.y, from.z, max_t, mask");
   EXPECT_THAT(header_refusal("from,max_t"), StartsWith("unknown column 'from'")) << "a vector has three columns";
@@ -56,18 +56,18 @@ TEST(CsvRowsTest, AHeaderWithAnUnknownColumnNamesItAndThoseKnown) {
   EXPECT_THAT(header_refusal("from.x,,from.y,from.z"), StartsWith("unknown column ''"));
 }
 
-TEST(CsvRowsTest, AHeaderWithoutANeededColumnNamesIt) {
+TEST(CsvRowsTest, AMissingRequiredColumnIsReported) {
   EXPECT_THAT(header_refusal("from.x,from.z"), StartsWith("no column from.y; "));
   EXPECT_THAT(header_refusal("max_t"), StartsWith("no column from.x; "));
 }
 
-TEST(CsvRowsTest, AColumnThereTwiceOrGivenByAnOptionIsRefused) {
+TEST(CsvRowsTest, ARepeatedColumnOrOneGivenByAnOptionIsRefused) {
   EXPECT_EQ(header_refusal("from.x,from.y,from.z,max_t,max-t"), "column max_t is there twice");
   EXPECT_EQ(header_refusal("from.x,from.y,from.z,mask"),
             "column mask is there and --mask is given: leave one of them out");
 }
 
-TEST(CsvRowsTest, RowsOfAnotherLengthOrWithWrongCellsAreRefused) {
+TEST(CsvRowsTest, RowsOfWrongLengthOrWithWrongCellsAreRefused) {
   EXPECT_EQ(row_refusal("1,2,3"), "has 3 fields, the header names 4");
   EXPECT_EQ(row_refusal("1,2,3,4,5"), "has 5 fields, the header names 4");
   EXPECT_EQ(row_refusal("1,abc,3,4"), "from.y: 'abc' is no number");

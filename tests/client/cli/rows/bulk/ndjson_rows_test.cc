@@ -34,7 +34,7 @@ std::string refusal(absl::string_view text) {
   return std::string(status.message());
 }
 
-TEST(NdjsonRowsTest, VectorsAreListsOrParts) {
+TEST(NdjsonRowsTest, VectorsMayBeListsOrParts) {
   RowBatch batch;
   ASSERT_TRUE(read(R"({"from": [1, 2.5, -3e2], "max-t": 7})", batch).ok());
   ASSERT_TRUE(read(R"(  {"from.x": 1, "from.z": 3, "from.y": 2}  )", batch).ok());
@@ -50,20 +50,20 @@ TEST(NdjsonRowsTest, IdsAreExactAsNumbersAndAsStrings) {
   EXPECT_THAT(batch.columns[2].integers, ElementsAre(9007199254740993ull, ~0ull, ~0ull));
 }
 
-TEST(NdjsonRowsTest, NullIsNotGiven) {
+TEST(NdjsonRowsTest, NullMeansThatTheValueIsNotGiven) {
   RowBatch batch;
   ASSERT_TRUE(read(R"({"from":[0,0,0],"id":null,"max_t":null})", batch).ok());
   EXPECT_THAT(batch.columns[2].given, ElementsAre(0));
   EXPECT_EQ(refusal(R"({"from":null})"), "from: is missing");
 }
 
-TEST(NdjsonRowsTest, IdsThatAreNoWholeNumbersAreRefused) {
+TEST(NdjsonRowsTest, IdsThatAreNotIntegersAreRefused) {
   for (const char* id : {"7.0", "-1", "18446744073709551616", "1e3", "\"7.0\"", "\"\"", "true", "[7]", "{}"}) {
     EXPECT_THAT(refusal(std::string(R"({"from":[0,0,0],"id":)") + id + "}"), HasSubstr("id: ")) << id;
   }
 }
 
-TEST(NdjsonRowsTest, BrokenJsonIsNamedByItsColumn) {
+TEST(NdjsonRowsTest, InvalidJsonIsReportedWithItsColumn) {
   EXPECT_EQ(refusal(R"({"from":[0,0,0])"), "no JSON at column 16");
   for (const char* text : {"{", "{\"from\":[0,0,0]}}", "{\"from\":[0,0,0],}", "{'from':1}", "{\"from\":[0,0,NaN]}",
                            "{\"from\":[0 0 0]}", "\"", "{\"from\":[01,0,0]}", "{\"\xff\":1}", "\x00"}) {
@@ -72,13 +72,13 @@ TEST(NdjsonRowsTest, BrokenJsonIsNamedByItsColumn) {
   EXPECT_THAT(refusal(R"({"from":[1e999,0,0]})"), HasSubstr("from: the number at column 14 is beyond any double"));
 }
 
-TEST(NdjsonRowsTest, WhatIsNoObjectIsRefused) {
+TEST(NdjsonRowsTest, ValuesOtherThanAnObjectAreRefused) {
   EXPECT_EQ(refusal("[1,2,3]"), "a list, not an object in braces");
   EXPECT_EQ(refusal("null"), "null, not an object in braces");
   for (const char* text : {"7", "-7", "7.5", "\"x\"", "true"}) EXPECT_FALSE(refusal(text).empty()) << text;
 }
 
-TEST(NdjsonRowsTest, ValuesOfAnotherFormAreRefusedByName) {
+TEST(NdjsonRowsTest, ValuesOfTheWrongTypeAreRefusedWithTheirKey) {
   EXPECT_EQ(refusal(R"({"from":[1,2]})"), "from: has 2 numbers, not 3");
   EXPECT_EQ(refusal(R"({"from":[1,2,3,4]})"), "from: has more than 3 numbers");
   EXPECT_EQ(refusal(R"({"from":[1,[2],3]})"), "from: a list is no value here");

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Pair;
 
-using Records = std::vector<std::pair<std::string, uint64_t>>;  // text and line
+using Records = std::vector<std::pair<std::string, uint64_t>>;  // text and line of each record
 
 struct Outcome {
   Records records;
@@ -48,9 +48,9 @@ TEST(RecordInputTest, LinesEndWithOrWithoutCarriageReturnAndTheLastNeedsNoEnd) {
               ElementsAre(Pair("a", 1), Pair("b", 2), Pair("", 3), Pair("c", 4)));
 }
 
-TEST(RecordInputTest, NothingHoldsNoRecord) { EXPECT_THAT(read("", RecordForm::kCsv).records, IsEmpty()); }
+TEST(RecordInputTest, AnEmptyInputHasNoRecord) { EXPECT_THAT(read("", RecordForm::kCsv).records, IsEmpty()); }
 
-TEST(RecordInputTest, AByteOrderMarkIsDroppedAtTheBeginningOnly) {
+TEST(RecordInputTest, AByteOrderMarkIsDroppedOnlyAtTheBeginning) {
   EXPECT_THAT(read("\xEF\xBB\xBFx\n\xEF\xBB\xBFy\n", RecordForm::kLine).records,
               ElementsAre(Pair("x", 1), Pair("\xEF\xBB\xBFy", 2)));
 }
@@ -62,7 +62,7 @@ TEST(RecordInputTest, LineBreaksInQuotesBelongToACsvRecordAndCountAsLines) {
       << "lines of JSON know no such thing";
 }
 
-TEST(RecordInputTest, RecordsAcrossPiecesAreWhole) {
+TEST(RecordInputTest, RecordsAcrossChunksAreComplete) {
   std::string bytes;
   for (int i = 0; i < 20000; ++i)
     bytes += std::to_string(i) + ",\"" + std::string(static_cast<size_t>(i % 37), 'x') + "\"\n";
@@ -74,14 +74,14 @@ TEST(RecordInputTest, RecordsAcrossPiecesAreWhole) {
   }
 }
 
-TEST(RecordInputTest, ALineOfTheLimitPassesAndOneByteMoreDoesNot) {
+TEST(RecordInputTest, ALineAsLongAsTheLimitIsAcceptedAndOneByteMoreIsRefused) {
   EXPECT_EQ(read(std::string(kMaxRecordBytes, 'x') + "\r\n", RecordForm::kLine).records.size(), 1u);
   const Outcome longer = read("a\n" + std::string(kMaxRecordBytes + 3, 'x') + "\n", RecordForm::kLine);
   EXPECT_THAT(std::string(longer.status.message()), HasSubstr("the line is longer than 65536 bytes"));
   EXPECT_EQ(longer.line, 2u);
 }
 
-TEST(RecordInputTest, AQuoteThatIsNotClosedIsNamedAtItsLine) {
+TEST(RecordInputTest, AnUnclosedQuoteIsReportedWithItsLine) {
   const Outcome at_end = read("a\n\"b\nc\n", RecordForm::kCsv);
   EXPECT_THAT(std::string(at_end.status.message()), HasSubstr("a quote is opened and not closed"));
   EXPECT_EQ(at_end.line, 2u);
@@ -89,7 +89,7 @@ TEST(RecordInputTest, AQuoteThatIsNotClosedIsNamedAtItsLine) {
   EXPECT_THAT(std::string(far.status.message()), HasSubstr("not closed within 65536 bytes"));
 }
 
-TEST(RecordInputTest, AnInputThatHasNothingReadyPausesAndGoesOnWithTheSameRecord) {
+TEST(RecordInputTest, AnInputWithoutDataPausesAndContinuesWithTheSameRecord) {
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe(ends.data()), 0);
   absl::StatusOr<ByteInput> input = ByteInput::open("/proc/self/fd/" + std::to_string(ends[0]));

@@ -30,7 +30,7 @@ std::string refusal(size_t field, absl::string_view text) {
   return std::string(builder.put_text(slot, text).message());
 }
 
-TEST(RowBuilderTest, TextBecomesNumbersOfEachKind) {
+TEST(RowBuilderTest, TextIsConvertedToTheKindOfItsField) {
   RowBuilder builder(schema());
   RowBatch batch = builder.empty_batch(0);
   builder.start();
@@ -50,14 +50,14 @@ TEST(RowBuilderTest, TextBecomesNumbersOfEachKind) {
   EXPECT_THAT(batch.lines, ElementsAre(9));
 }
 
-TEST(RowBuilderTest, WhatIsNoNumberIsNamedWithItsColumn) {
+TEST(RowBuilderTest, TextThatIsNotANumberIsReportedWithItsColumn) {
   EXPECT_EQ(refusal(0, "abc"), "at.y: 'abc' is no number");
   for (const char* text : {"1,5", "1 2", "0x10", "1e", "--1", "+-1", "+", "1.2.3", "١", "1e400", "1e-400"}) {
     EXPECT_NE(refusal(kRadius, text).find("is no number"), std::string::npos) << text;
   }
 }
 
-TEST(RowBuilderTest, BytesThatCannotBeShownAreEscapedAndLongOnesCut) {
+TEST(RowBuilderTest, MessagesEscapeUnprintableBytesAndTruncateLongText) {
   EXPECT_EQ(refusal(kRadius, absl::string_view("1\0\n", 3)), "radius: '1\\000\\n' is no number");
   EXPECT_EQ(refusal(kRadius, std::string(1000, 'x')), "radius: '" + std::string(40, 'x') + "...' is no number");
 }
@@ -73,7 +73,7 @@ TEST(RowBuilderTest, NumbersOutOfRangeAreRefusedByKind) {
   EXPECT_EQ(refusal(kShape, "cone"), "shape: 'cone' is none of ball, box");
 }
 
-TEST(RowBuilderTest, IdsAreWholeAndExact) {
+TEST(RowBuilderTest, IdsMustBeExactIntegers) {
   for (const char* text : {"-1", "1.0", "1e3", "18446744073709551616", "0x", "0x1G", ""}) {
     EXPECT_NE(refusal(kId, text).find("is no whole number from 0 to 18446744073709551615"), std::string::npos) << text;
   }
@@ -82,7 +82,7 @@ TEST(RowBuilderTest, IdsAreWholeAndExact) {
   EXPECT_FALSE(builder.put_number({kId}, 7.0).ok()) << "a float may have lost digits";
 }
 
-TEST(RowBuilderTest, ARowThatIsNotWholeDoesNotReachTheBatch) {
+TEST(RowBuilderTest, AnIncompleteRowIsNotAppended) {
   RowBuilder builder(schema());
   RowBatch batch = builder.empty_batch(0);
   builder.start();
@@ -94,7 +94,7 @@ TEST(RowBuilderTest, ARowThatIsNotWholeDoesNotReachTheBatch) {
   EXPECT_TRUE(batch.columns[0].numbers.empty());
 }
 
-TEST(RowBuilderTest, WhatARowDoesNotGiveIsMarked) {
+TEST(RowBuilderTest, MissingValuesAreMarkedAsNotGiven) {
   RowBuilder builder(schema());
   RowBatch batch = builder.empty_batch(0);
   for (const bool with_radius : {true, false}) {

@@ -23,7 +23,7 @@ RowReader reader_of(const std::string& path, RowFormat format = RowFormat::kCsv)
   return RowReader(*std::move(input), format, schema());
 }
 
-TEST(RowReaderTest, RowsComeInBatchesWithTheirLinesAndNumbers) {
+TEST(RowReaderTest, BatchesHaveTheLinesAndIndicesOfTheirRows) {
   const TestFile file("\xEF\xBB\xBFto.x,to.y,to.z\r\n1,2,3\r\n\r\n4,5,6\r\n7,8,\"9\n\"\r\n");
   RowReader reader = reader_of(file.path());
   RowBatch batch;
@@ -35,7 +35,7 @@ TEST(RowReaderTest, RowsComeInBatchesWithTheirLinesAndNumbers) {
   EXPECT_EQ(batch.first_row, 2u);
 }
 
-TEST(RowReaderTest, TheLastBatchIsShort) {
+TEST(RowReaderTest, TheLastBatchMayBeShorter) {
   const TestFile file("to.x,to.y,to.z\n1,2,3\n4,5,6");
   RowReader reader = reader_of(file.path());
   RowBatch batch;
@@ -62,14 +62,14 @@ TEST(RowReaderTest, AnEmptyNdjsonHasNoRows) {
   EXPECT_EQ(*reader.next(10, Patience::kWait, batch), BatchEnd::kEnd);
 }
 
-TEST(RowReaderTest, AWrongLineOfJsonIsNamed) {
+TEST(RowReaderTest, AWrongLineOfJsonIsReportedWithFileAndLine) {
   const TestFile file("{\"to\":[1,2,3]}\n\n{\"to\":[1,2]}\n", "rows.ndjson");
   RowReader reader = reader_of(file.path(), RowFormat::kNdjson);
   RowBatch batch;
   EXPECT_EQ(reader.next(10, Patience::kWait, batch).status().message(), file.path() + ":3: to: has 2 numbers, not 3");
 }
 
-TEST(RowReaderTest, AnInputThatIsSilentEndsABatchEarlyAndGoesOnLater) {
+TEST(RowReaderTest, AnInputWithoutDataEndsABatchEarlyAndContinuesLater) {
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe(ends.data()), 0);
   RowReader reader = reader_of("/proc/self/fd/" + std::to_string(ends[0]), RowFormat::kNdjson);

@@ -11,19 +11,19 @@ RowSchema schema() {
           {.name = "id", .kind = FieldKind::kId}};
 }
 
-TEST(RowSchemaTest, AVectorIsFoundWholeAndByPart) {
+TEST(RowSchemaTest, AVectorIsFoundByItsNameAndByPart) {
   EXPECT_EQ(find_slot(schema(), "at")->part, std::nullopt);
   EXPECT_EQ(find_slot(schema(), "at.z")->part, 2u);
   EXPECT_EQ(find_slot(schema(), "position.y")->part, 1u);
   EXPECT_EQ(find_slot(schema(), "position.y")->field, 0u);
 }
 
-TEST(RowSchemaTest, DashesAndUnderscoresAreTheSame) {
+TEST(RowSchemaTest, DashesAndUnderscoresAreEquivalent) {
   EXPECT_EQ(find_slot(schema(), "max-t")->field, 1u);
   EXPECT_EQ(find_slot(schema(), "max_t")->field, 1u);
 }
 
-TEST(RowSchemaTest, WhatIsNotThereIsNotFound) {
+TEST(RowSchemaTest, UnknownNamesAreNotFound) {
   for (const char* name : {"", ".", ".x", "at.", "at.w", "at.xy", "id.x", "AT", "at ", "ids", "at.x.y"}) {
     EXPECT_FALSE(find_slot(schema(), name).has_value()) << name;
   }

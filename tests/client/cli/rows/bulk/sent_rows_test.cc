@@ -13,7 +13,7 @@ TEST(SentRowsTest, AnItemIsFoundByItsListAndIndex) {
   EXPECT_EQ(kSent.line_of("remove_ids", 1), 6u);
 }
 
-TEST(SentRowsTest, WhatIsNoRowIsNotFound) {
+TEST(SentRowsTest, FieldsAndIndicesWithoutARowAreNotFound) {
   EXPECT_FALSE(kSent.line_of("moves[0].ids", 3).has_value()) << "beyond its list";
   EXPECT_FALSE(kSent.line_of("moves[1].ids", 1).has_value()) << "beyond the last list";
   EXPECT_FALSE(kSent.line_of("moves[2].ids", 0).has_value());
@@ -22,7 +22,7 @@ TEST(SentRowsTest, WhatIsNoRowIsNotFound) {
   EXPECT_FALSE(SentRows{}.line_of("remove_ids", 0).has_value());
 }
 
-TEST(SentRowsTest, TheRangeIsOneLineOrTwo) {
+TEST(SentRowsTest, TheLineRangeIsOneLineOrTwo) {
   EXPECT_EQ(kSent.line_range(), "5-9");
   EXPECT_EQ((SentRows{.lines = {7}, .list_starts = {0}}).line_range(), "7");
   EXPECT_EQ(SentRows{}.line_range(), "");

@@ -1,4 +1,4 @@
-// Files with given bytes, for tests of bulk input.
+// Temporary files with given bytes, for tests of bulk input.
 #ifndef LOCUS_TESTS_CLIENT_CLI_ROWS_BULK_TEST_INPUT_H_
 #define LOCUS_TESTS_CLIENT_CLI_ROWS_BULK_TEST_INPUT_H_
 
@@ -11,7 +11,7 @@
 
 namespace locus::cli {
 
-// A file of the running test, gone with it.
+// File of the running test, removed by the destructor.
 class TestFile {
  public:
   explicit TestFile(const std::string& bytes, const std::string& name = "rows.csv") : path_(path_of(name)) {

@@ -7,8 +7,8 @@
 #include <deque>
 #include <thread>
 
-#include "core/query/run/run_batch.h"
 #include "core/scene/scene.h"
+#include "tests/support/run_batch.h"
 #include "tests/support/small_world.h"
 #include "tests/support/test_scale.h"
 

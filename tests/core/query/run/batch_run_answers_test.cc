@@ -1,11 +1,10 @@
-#include "core/query/run/run_batch.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "core/query/columns.h"
+#include "tests/support/run_batch.h"
 #include "tests/support/small_world.h"
 
 namespace locus::test {

@@ -1,0 +1,35 @@
+// Rows that one chunk of a batch collects until those before it are written: columns in vectors, and which queries were
+// truncated. Plain data.
+#ifndef LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_
+#define LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_
+
+#include <vector>
+
+#include "core/query/columns.h"
+
+namespace locus {
+
+template <class T>
+using ColumnVector = std::vector<T>;
+
+// Rows of some queries of one block, concatenated in query order; columns that were not requested stay empty.
+struct CollectedRows : ColumnArrays<ColumnVector> {
+  std::vector<uint32_t> counts;     // rows per query; empty for dense results, which have one row each
+  std::vector<uint32_t> truncated;  // indices of truncated queries, ascending
+};
+
+// Appends `rows` uninitialized rows to each column of `columns`; the pointers stay valid until the next call.
+inline RowSpans add_rows(CollectedRows& collected, ColumnSet columns, size_t rows) {
+  RowSpans spans;
+  for_each_column_array([&](const auto& array) {
+    if (!columns.has(array.column)) return;
+    auto& values = array.get(collected);
+    values.resize(values.size() + array.width * rows);
+    array.get(spans) = values.data() + (values.size() - array.width * rows);
+  });
+  return spans;
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_

@@ -1,0 +1,104 @@
+// Answers a batch synchronously, into columns that the result owns. The server uses BatchRun with the columns of its
+// reply. Threads: any number of calls may run at once on one snapshot.
+#ifndef LOCUS_TESTS_SUPPORT_RUN_BATCH_H_
+#define LOCUS_TESTS_SUPPORT_RUN_BATCH_H_
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/index/work.h"
+#include "core/query/run/answer_sink.h"
+#include "core/query/run/batch_run.h"
+#include "core/query/run/collected_rows.h"
+#include "tests/support/threads.h"
+
+namespace locus::test {
+
+// Rows of one block, as BlockResult of the protocol has them.
+struct BlockResult : CollectedRows {
+  std::string hits;  // ANY: one byte per query, 0 or 1
+  // Blocks with as_of_ticks: the effective time of each query, and the indices, ascending, of queries that asked for a
+  // time outside the history and got the nearest kept time.
+  std::vector<uint64_t> resolved_ticks;
+  std::vector<float> resolved_fractions;
+  std::vector<uint32_t> clamped;
+  // Cost, which may differ between equal results: work depends on the index structures.
+  Work work;
+  uint64_t nanoseconds = 0;  // by RunOptions::work_clock, all threads together
+};
+
+struct BatchResult {
+  std::vector<BlockResult> blocks;
+  Work work;
+  uint64_t nanoseconds = 0;
+};
+
+// Appends `entries` entries and returns the first of them.
+template <class Values>
+auto* grow(Values& values, size_t entries) {
+  values.resize(values.size() + entries);
+  return values.data() + (values.size() - entries);
+}
+
+// Sink that appends to a BatchResult.
+class BatchResultSink final : public AnswerSink {
+ public:
+  // `result` is borrowed; its `blocks` already have the number of blocks of the batch.
+  explicit BatchResultSink(BatchResult& result) : result_(result) {}
+
+  RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) override {
+    return locus::add_rows(result_.blocks.at(block), columns, rows);
+  }
+  char* add_hits(size_t block, size_t queries) override { return grow(result_.blocks.at(block).hits, queries); }
+  uint32_t* add_counts(size_t block, size_t queries) override { return grow(result_.blocks.at(block).counts, queries); }
+  uint32_t* add_truncated(size_t block, size_t queries) override {
+    return grow(result_.blocks.at(block).truncated, queries);
+  }
+  TimeSpans add_times(size_t block, size_t queries) override {
+    BlockResult& result = result_.blocks.at(block);
+    return {grow(result.resolved_ticks, queries), grow(result.resolved_fractions, queries)};
+  }
+  uint32_t* add_clamped(size_t block, size_t queries) override {
+    return grow(result_.blocks.at(block).clamped, queries);
+  }
+
+ private:
+  BatchResult& result_;
+};
+
+// Answers `batch`, which has passed check_batch(), at `snapshot`, by calls of BatchRun::work() that `parallel_for`
+// distributes over threads. [one call on this thread] Returns OUT_OF_RANGE for a time outside the history unless its
+// block clamps, or the status of RunOptions::stop.
+inline absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
+                                             const RunOptions& options, const ParallelFor& parallel_for = {}) {
+  BatchResult result;
+  result.blocks.resize(batch.blocks.size());
+  BatchResultSink sink(result);
+  const absl::StatusOr<std::unique_ptr<BatchRun>> run = BatchRun::prepare(snapshot, batch, options, sink);
+  if (!run.ok()) return run.status();
+  const auto work = [&run](size_t) {
+    while ((*run)->work(std::numeric_limits<uint64_t>::max()) == Progress::kMore) {
+    }
+  };
+  // A thread that finds no chunk to start may leave: the threads still working continue until the batch is done.
+  if (parallel_for)
+    parallel_for(BatchRun::kMaxChunks, work);
+  else
+    work(0);
+  if (const absl::Status status = (*run)->status(); !status.ok()) return status;
+  for (size_t b = 0; b < result.blocks.size(); ++b) {
+    result.blocks[b].work = (*run)->cost(b).work;
+    result.blocks[b].nanoseconds = (*run)->cost(b).nanoseconds;
+  }
+  result.work = (*run)->cost().work;
+  result.nanoseconds = (*run)->cost().nanoseconds;
+  return result;
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_RUN_BATCH_H_
