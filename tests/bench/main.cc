@@ -21,7 +21,7 @@
 namespace locus::bench {
 namespace {
 
-// Every suite is one line here and one folder beside this file.
+// Returns all suites. Each has one line here and one folder beside this file.
 std::vector<Suite> suites() {
   return {
       {"static", "rays, balls, boxes, builds and memory of one level, beside Embree and others", run_static_suite},
@@ -99,7 +99,8 @@ int run(const Options& options) {
   return exit_status(report);
 }
 
-// As the daemon does, for whatever is measured: what is freed is used again, and not given back to the kernel.
+// Tunes malloc like the daemon, for all measurements: freed memory is used again instead of being returned to the
+// kernel.
 void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, 512 << 20);

@@ -30,8 +30,8 @@ inline Shape random_shape(Random& random, ShapeKind kind, double position_size) 
   return shape;
 }
 
-// Draws an unrotated shape whose numbers are whole and at most `reach`. A capsule's half axis keeps one
-// coordinate; the others are 0.
+// Draws an unrotated shape. Its position is whole and at most `reach` on each axis; its size and radius are small whole
+// numbers.
 inline Shape lattice_shape(Random& random, ShapeKind kind, int reach) {
   Shape shape;
   shape.kind = kind;

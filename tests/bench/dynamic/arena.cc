@@ -11,12 +11,12 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr size_t kBatchesApart = 997;     // between what two readers start with
-constexpr size_t kBatchesToACount = 500;  // a reader counts all objects once in so many, outside its latencies
+constexpr size_t kBatchesApart = 997;     // distance between the first batches of two readers
+constexpr size_t kBatchesToACount = 500;  // batches between a reader's counts of all objects, outside its latencies
 
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-// How often the kernel took the core away from this thread: what other programs do, not we.
+// Returns how often the kernel preempted this thread, because of other programs.
 int64_t times_taken_away() {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);

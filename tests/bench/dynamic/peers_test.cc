@@ -6,16 +6,17 @@
 #include "tests/bench/dynamic/agreement.h"
 #include "tests/bench/dynamic/world_run.h"
 
-// Every contender, ours among them, against all objects one by one.
+// Compares every contender, including locus, with a test of all objects one by one.
 namespace locus::bench::dynamic {
 namespace {
 
 using ::testing::IsEmpty;
 
 constexpr uint32_t kCount = 3000;
-constexpr float kCrowded = 300;  // a side at which most queries find something
+constexpr float kCrowded = 300;  // side of a world in which most queries find something
 
-// One id that nobody has in every answer: whoever is right differs from it, so that all objects are asked.
+// Returns answers with an id that no object has, so that every right answer differs and the comparison tests all
+// objects.
 Answers wrong_answers(size_t queries) {
   Answers answers;
   answers.ids.assign(queries, 1);
@@ -24,7 +25,7 @@ Answers wrong_answers(size_t queries) {
   return answers;
 }
 
-// Of what ties, peers may find any: so they are compared with us, and we with the truth.
+// Among ties, peers may return any object, so the comparison is with locus, which is compared with brute force.
 void expect_right_nearest(Contender& contender, const World& world) {
   if (!contender.does(Task::kNearest)) return;
   const Queries queries = queries_of(world, 20);

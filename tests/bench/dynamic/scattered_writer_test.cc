@@ -9,7 +9,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// Remembers where objects are.
+// A contender that only stores the positions of objects.
 class Memory : public Contender {
  public:
   Memory() : Contender("memory") {}

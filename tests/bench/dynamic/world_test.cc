@@ -5,7 +5,7 @@
 
 #include <set>
 
-// The expected numbers come from another program of the same definition.
+// Another program of the same definition computed the expected values.
 namespace locus::bench::dynamic {
 namespace {
 

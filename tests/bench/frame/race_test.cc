@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-double now = 0;  // what the clock of these tests shows
+double now = 0;  // time of the clock of these tests
 
 double read_clock() { return now; }
 

@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* kName = "mesh/2M";
 
-// Its triangles in storage order: that trees from outlines answer right is for the tests to say.
+// Returns a hash of the triangles in storage order. Other tests verify the answers of trees restored from a topology.
 uint64_t hash_of(const StaticMesh& mesh) {
   ResultsHash hash;
   mesh.tree().for_each([&hash](const Triangle& triangle) { hash.add(triangle.number); });
@@ -37,7 +37,7 @@ class MeshCase {
     };
   }
 
-  // Uploads it, and opens the directory again.
+  // Uploads the mesh and opens the directory again.
   absl::Status prepare(const std::string& name) {
     const absl::StatusOr<BenchMesh> level = load_mesh(name);
     if (!level.ok()) return level.status();
@@ -51,7 +51,7 @@ class MeshCase {
     return open();
   }
 
-  // From what the directory holds; before a build it loses the outline, as one of an earlier version is none.
+  // Removes the stored topology before a build, as in the directory of an earlier version, which has none.
   void forget_outline() {
     outline_ = log_->read_outline({1}).value_or("");
     log_->keep_outline({1}, "");
@@ -67,7 +67,7 @@ class MeshCase {
   }
 
   const absl::Status& status() const { return status_; }
-  // Of the last one.
+  // Returns the mesh of the last restore or build.
   const MeshPtr& mesh() const { return mesh_; }
   size_t outline_bytes() const { return outline_.size(); }
 
