@@ -1,4 +1,4 @@
-"""Small trees that break one rule each, and one that keeps them all. None stands for a file taken away."""
+"""Small example trees: each breaks one rule, and one keeps all rules. None stands for a removed file."""
 
 HEADER = """// Three numbers: a position or a direction in world units, for all rooms. Plain data, so threads share it freely.
 #ifndef {guard}

@@ -51,7 +51,7 @@ class MeshCase {
     return open();
   }
 
-  // Removes the stored topology before a build, as in the directory of an earlier version, which has none.
+  // Removes the stored topology, so that recovery builds the tree, as in a directory of an earlier version.
   void forget_outline() {
     outline_ = log_->read_outline({1}).value_or("");
     log_->keep_outline({1}, "");

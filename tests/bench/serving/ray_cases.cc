@@ -8,10 +8,10 @@
 namespace locus::bench::serving {
 namespace {
 
-constexpr size_t kThreads = 2;  // the two cores: streams of the client, threads in process
+constexpr size_t kThreads = 2;  // for two cores: streams of the client, threads in process
 
-// What a batch size costs beside its queries: a message, in nanoseconds a query, and the share of the limit that has to
-// be reached. `window` messages under way on each stream are what fits the second cache.
+// Size of a batch, its cost beside the queries (a message, in nanoseconds per query), and the required share of the
+// possible rate. `window` messages in flight on each stream fit into the second-level cache.
 struct Size {
   size_t rays;
   size_t window;
@@ -20,7 +20,8 @@ struct Size {
 };
 constexpr Size kSizes[] = {{1024, 4, 45, 0.95}, {8192, 2, 20, 0.92}};
 
-// The names are what a ray costs in process, about: neighbours of a picture, and rays from anywhere to anywhere.
+// Workloads, named by the approximate cost of a ray in process: neighbouring rays of a picture, and rays between random
+// points.
 struct Work {
   const char* name;
   double nanoseconds;
@@ -93,7 +94,7 @@ class RayCases {
       run_.disagree(absl::StrCat(name, ": ", differ, " of ", ours.size(), " batches have other answers over gRPC"));
   }
 
-  // `cost`: nanoseconds that a ray takes one core in process.
+  // Notes whether the ratio reaches the bar. `cost`: nanoseconds of one core for a ray in process.
   void judge_overhead(const Work& work, const Size& size, double cost) const {
     constexpr double kNameHolds = 0.2;
     judge(run_.report, size.share * cost / (cost + size.overhead),

@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// Answers right, but for the first of each batch that hits.
+// A peer whose answers are right, except for the first hit of each batch.
 class Liar : public Peer {
  public:
   explicit Liar(const BenchMesh& mesh, std::string fault = "") : Peer("liar"), right_(mesh), fault_(std::move(fault)) {}
@@ -57,7 +57,7 @@ class AgreementTest : public testing::Test {
     options_.quick = true;
     options_.rounds = 1;
   }
-  // All cases of rays, balls and boxes that the filter wants.
+  // Runs all cases of rays, balls and boxes that the filter selects.
   Report report_of(Peer& ours, std::unique_ptr<Peer> peer, const std::string& filter) {
     options_.filter = *CaseFilter::create(filter);
     Peers peers;

@@ -77,7 +77,7 @@ absl::StatusOr<BenchMesh> generated(const Kind& kind, const std::vector<std::str
   return bench_mesh(name, {kind.generate(triangles, seed)});
 }
 
-// The last part of a path, without its ending.
+// Returns the last part of a path, without its extension.
 std::string stem(const std::string& path) {
   const std::string file = path.substr(path.find_last_of('/') + 1);
   return file.substr(0, file.find_last_of('.'));

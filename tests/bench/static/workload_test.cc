@@ -4,7 +4,7 @@
 
 #include "tests/bench/static/two_sheets.h"
 
-// The expected numbers come from another program of the same definition.
+// Another program of the same definition computed the expected values.
 namespace locus::bench {
 namespace {
 
