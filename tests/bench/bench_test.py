@@ -1,4 +1,4 @@
-"""locus-bench as it is run: python3 bench_test.py PROGRAM PEER... with the peers that it was configured with."""
+"""Tests of the program locus-bench: python3 bench_test.py PROGRAM PEER... with the peers of its configuration."""
 
 import json
 import math
@@ -24,7 +24,7 @@ CASES = {"ray/incoherent/first": RAYS, "ray/incoherent/any": ANY, "ray/short/fir
          "ball/2": BALLS, "ball/10": BALLS, "box/0.5": BOXES, "box/2": BOXES, "box/10": BOXES,
          "build": {"embree": {"embree_medium"}}, "memory": {"embree": {"embree_medium"}}}
 
-# The suite dynamic; what stands under "ours" needs no package.
+# The suite dynamic; cases below "ours" need no package.
 DYNAMIC_PEERS = {"bullet": {"bullet"}, "boost": {"boost_rtree"}, "nanoflann": {"nanoflann"},
                  "ours": {"flat_hash_map", "sorted_rebuild"}}
 ONE_SIZE_ONLY = {"boost_rtree", "nanoflann", "flat_hash_map"}
@@ -149,7 +149,7 @@ class BenchTest(unittest.TestCase):
 
 
 class SuiteRun:
-    """One quick run of SUITE, whose cells are those of expected()."""
+    """Makes one quick run of SUITE, which must have the cells of expected()."""
 
     @classmethod
     def setUpClass(cls):

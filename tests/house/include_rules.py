@@ -6,8 +6,8 @@ from source_tree import includes, quoted_includes
 
 INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid")
 
-# Folders that the sources of a folder may include in addition to their own. A name without a final "/*" means that folder
-# alone, with it also the folders below it. "proto" stands for the code generated from the protocol.
+# Folders that the sources of a folder may include in addition to their own. A name without a final "/*" means only that
+# folder, with it also the folders below it. "proto" stands for the code generated from the protocol.
 ALLOWED = {
     "core/base": [],
     "core/geometry": ["core/base"],
@@ -190,7 +190,7 @@ def includes_start_at_the_root(tree):
 
 
 def cycles(graph):
-    """Returns the sets of nodes that reach each other, by Tarjan's strongly connected components (1972), without recursion."""
+    """Returns sets of nodes that reach each other. Source: Tarjan, strongly connected components, 1972; not recursive."""
     number, low, on_stack, stack, found = {}, {}, set(), [], []
     for root in sorted(graph):
         work = [] if root in number else [(root, iter(sorted(graph[root])))]

@@ -1,4 +1,4 @@
-"""Rules of Python files: every file has a docstring; the product's are also documented, typed and have short functions."""
+"""Rules of Python files: every file has a docstring; the product's are also documented and typed."""
 import ast
 
 MAX_FUNCTION_LINES = 80
@@ -8,7 +8,7 @@ TESTS = "tests/client/python/"
 
 
 def python_files(tree, below=""):
-    """Yields (path, text) of each Python file."""
+    """Returns (path, text) of each Python file."""
     return [(path, text) for path, text in sorted(tree.files.items()) if path.endswith(".py") and path.startswith(below)]
 
 
