@@ -121,7 +121,7 @@ class BenchTest(unittest.TestCase):
         for value in first.values():
             self.assertRegex(value, "^[0-9a-f]{16}$")
 
-    def test_missing_peers_are_said(self):
+    def test_missing_peers_are_reported(self):
         said = self.answers[0].stdout.count("a peer is missing")
         self.assertEqual(said, 4 - len(PEERS & {"embree", "bullet", "boost", "cgal"}))
 
@@ -137,7 +137,7 @@ class BenchTest(unittest.TestCase):
             self.assertEqual(answer.returncode, 2, arguments)
             self.assertNotEqual(answer.stderr, "", arguments)
 
-    def test_a_mesh_that_is_not_there_is_status_1_and_named(self):
+    def test_a_missing_mesh_is_status_1_and_named(self):
         answer = run("static", "--quick", "--mesh", "/no/such/level.obj")
         self.assertEqual(answer.returncode, 1)
         self.assertIn("/no/such/level.obj", answer.stderr)
@@ -183,7 +183,7 @@ class DynamicTest(SuiteRun, unittest.TestCase):
     def expected(self):
         return expected_dynamic_cells()
 
-    def test_missing_peers_are_said(self):
+    def test_missing_peers_are_reported(self):
         said = self.answer.stdout.count("a peer is missing")
         self.assertEqual(said, 3 - len(PEERS & {"bullet", "boost", "nanoflann"}))
 
@@ -194,10 +194,10 @@ class ServingTest(SuiteRun, unittest.TestCase):
     def expected(self):
         return SERVING | (REDIS if HAS_REDIS else set())
 
-    def test_a_missing_redis_is_said(self):
+    def test_a_missing_redis_is_reported(self):
         self.assertEqual("a peer is missing: redis" in self.answer.stdout, not HAS_REDIS)
 
-    def test_what_has_to_be_shown_is_said_beside_what_was_found(self):
+    def test_the_required_ratio_is_noted_beside_the_measured_one(self):
         self.assertRegex(self.answer.stdout, r"note: rays/90ns/1024 beside in_process: .* to be shown .*c/\(c\+45\)")
 
 
@@ -207,7 +207,7 @@ class LogTest(SuiteRun, unittest.TestCase):
     def expected(self):
         return LOG
 
-    def test_what_has_to_be_shown_is_said_beside_what_was_found(self):
+    def test_the_required_ratio_is_noted_beside_the_measured_one(self):
         self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* to be shown 0\.800")
 
 

@@ -36,7 +36,7 @@ TEST(CheckValuesTest, OtherSumsAreDisagreements) {
                                                 HasSubstr("sum of distances is 1160.0000")));
 }
 
-TEST(CheckValuesTest, WhatIsNearestIsSummedUpToItsCentres) {
+TEST(CheckValuesTest, NearestSumsUseDistancesToCentres) {
   const World world(Kind::kUniform, 10'000);
   const Queries queries = queries_of(world);
   Answers answers;
@@ -55,7 +55,7 @@ TEST(CheckValuesTest, WorldsWithoutKnownValuesPass) {
   EXPECT_THAT(report.disagreements, IsEmpty());
 }
 
-TEST(CheckValuesTest, LargeWorldsAreAskedAfterFewerTicks) {
+TEST(CheckValuesTest, LargeWorldsRunFewerTicksBeforeQueries) {
   EXPECT_EQ(ticks_before_queries(10'000), 20u);
   EXPECT_EQ(ticks_before_queries(100'000), 20u);
   EXPECT_EQ(ticks_before_queries(1'000'000), 3u);

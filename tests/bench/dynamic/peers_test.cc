@@ -58,7 +58,7 @@ void expect_right(Contender& contender, const World& world) {
   expect_right_nearest(contender, world);
 }
 
-TEST(PeersTest, FindWhatWasLoaded) {
+TEST(PeersTest, LoadedObjectsAreFound) {
   const World world(Kind::kUniform, kCount, kCrowded);
   for (const Maker& maker : makers_for(world)) {
     const std::unique_ptr<Contender> contender = maker.make();
@@ -67,7 +67,7 @@ TEST(PeersTest, FindWhatWasLoaded) {
   }
 }
 
-TEST(PeersTest, FindEverythingWhereItMoved) {
+TEST(PeersTest, MovedObjectsAreFoundAtTheirNewPositions) {
   World world(Kind::kBorder, kCount, kCrowded);
   std::vector<std::unique_ptr<Contender>> contenders;
   for (const Maker& maker : makers_for(world)) {
@@ -81,7 +81,7 @@ TEST(PeersTest, FindEverythingWhereItMoved) {
   for (const auto& contender : contenders) expect_right(*contender, world);
 }
 
-TEST(PeersTest, FindNothingThatWasRemovedAndAllThatCameBack) {
+TEST(PeersTest, RemovedObjectsAreNotFoundAndReinsertedOnesAre) {
   const World world(Kind::kUniform, kCount, kCrowded);
   const Objects all = world.objects();
   const Objects some = {all.ids.subspan(100, 500), all.positions.subspan(300, 1500), all.radii.subspan(100, 500)};
@@ -101,7 +101,7 @@ TEST(PeersTest, FindNothingThatWasRemovedAndAllThatCameBack) {
   }
 }
 
-TEST(PeersTest, WhoTakesOneSizeOnlyIsLeftOutOfOtherWorlds) {
+TEST(PeersTest, PeersOfOneSizeAreLeftOutOfWorldsWithSeveral) {
   const auto names = [](Kind kind) {
     std::vector<std::string> result;
     for (const Maker& maker : makers_for(World(kind, 10))) result.push_back(maker.name);
@@ -112,7 +112,7 @@ TEST(PeersTest, WhoTakesOneSizeOnlyIsLeftOutOfOtherWorlds) {
   EXPECT_EQ(names(Kind::kGiant).front(), "locus");
 }
 
-TEST(PeersTest, WhoTakesAllSizesFindsTheGiant) {
+TEST(PeersTest, PeersOfAllSizesFindTheGiant) {
   const World world(Kind::kGiant, kCount, kCrowded);
   for (const Maker& maker : makers_for(world)) {
     const std::unique_ptr<Contender> contender = maker.make();
@@ -121,7 +121,7 @@ TEST(PeersTest, WhoTakesAllSizesFindsTheGiant) {
   }
 }
 
-TEST(PeersTest, AWholeBatchAnswersAsTheIndexDoes) {
+TEST(PeersTest, ABatchHasTheAnswersOfTheIndex) {
   const World world(Kind::kMixed, kCount, kCrowded);
   Ours ours;
   ours.load(world.objects());

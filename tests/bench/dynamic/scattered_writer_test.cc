@@ -21,7 +21,7 @@ class Memory : public Contender {
   std::map<uint64_t, Vec3f> places;
 };
 
-TEST(ScatteredWriterTest, MovesEveryObjectOnceATickOnAndThenBack) {
+TEST(ScatteredWriterTest, MovesEveryObjectToTheNextTickAndThenBack) {
   World world(Kind::kUniform, 1000);
   const World before = world;
   ScatteredWriter writer(world);

@@ -26,7 +26,7 @@ TEST(BulkCallerTest, IsAnswered) {
   EXPECT_TRUE(caller.status().ok()) << caller.status();
 }
 
-TEST(ChurnTest, AllGuestsComeAreAnsweredAndGo) {
+TEST(ChurnTest, AllGuestsAreAnsweredAndLeave) {
   const auto server = LocalServer::start("locus-echo");
   ASSERT_TRUE(server.ok()) << server.status();
   const v1::StreamQueriesRequest message = one_ray();
@@ -35,7 +35,7 @@ TEST(ChurnTest, AllGuestsComeAreAnsweredAndGo) {
   EXPECT_TRUE(guests.status().ok()) << guests.status();
 }
 
-TEST(ChurnTest, GuestsWhoAreNotAnsweredAreAnError) {
+TEST(ChurnTest, UnansweredGuestsAreAnError) {
   const auto server = LocalServer::start("locus-echo");
   ASSERT_TRUE(server.ok()) << server.status();
   v1::StreamQueriesRequest message = one_ray();

@@ -74,7 +74,7 @@ class AgreementTest : public testing::Test {
   Ours right_{mesh_};
 };
 
-TEST_F(AgreementTest, EqualAnswersAgreeWithoutAWord) {
+TEST_F(AgreementTest, EqualAnswersAgreeWithoutANote) {
   const Report report = report_of(right_, std::make_unique<Ours>(mesh_), "");
   EXPECT_THAT(report.cells, SizeIs(12));
   EXPECT_THAT(report.notes, IsEmpty());
@@ -94,7 +94,7 @@ TEST_F(AgreementTest, AWrongAnyHitOfOursMakesTheExitStatusOne) {
   EXPECT_EQ(exit_status(report_of(ours, std::make_unique<Ours>(mesh_), "ray/incoherent/any")), 1);
 }
 
-TEST_F(AgreementTest, ATriangleThatWeLeaveOutMakesTheExitStatusOne) {
+TEST_F(AgreementTest, AMissingTriangleOfOursMakesTheExitStatusOne) {
   for (const char* filter : {"ray/incoherent/all", "ball/10", "box/10"}) {
     Liar ours(mesh_);
     const Report report = report_of(ours, std::make_unique<Ours>(mesh_), filter);
@@ -156,7 +156,7 @@ TEST_F(AgreementTest, ATriangleGivenTwiceIsADisagreement) {
   EXPECT_THAT(report.disagreements[0], HasSubstr("we gave a triangle twice"));
 }
 
-TEST_F(AgreementTest, SlowPeersAreAskedSixteenOfEach128) {
+TEST_F(AgreementTest, SlowPeersGetSixteenOfEach128Queries) {
   class Slow : public Ours {
    public:
     using Ours::Ours;
