@@ -17,7 +17,7 @@ constexpr size_t kBatchesToACount = 500;  // batches between a reader's counts o
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
 // Returns how often the kernel preempted this thread, because of other programs.
-int64_t times_taken_away() {
+int64_t preemptions() {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);
   return usage.ru_nivcsw;
@@ -51,12 +51,12 @@ void Arena::write(const Window& window, Seen& seen) {
 
 void Arena::read(size_t first_batch, Seen& seen) const {
   for (size_t i = 0; !stop_; ++i) {
-    const int64_t taken_away = times_taken_away();
+    const int64_t preempted_before = preemptions();
     const double start = wall_seconds();
     const SnapshotPtr snapshot = ours_.latest();
     batches_.ask(*snapshot, first_batch + i);
     const double seconds = wall_seconds() - start;
-    if (times_taken_away() == taken_away)
+    if (preemptions() == preempted_before)
       seen.latencies.push_back(seconds);
     else
       ++seen.interrupted;

@@ -150,9 +150,9 @@ absl::Status measure_commits(const LogRun& run, const Size& size) {
   Report cells;
   add_cells(contestants, times, cell_of(name, kMetric, hash), cells);
   for (Cell& cell : cells.cells) {
-    const bool judged = cell.peer_name == "append";
+    const bool has_bar = cell.peer_name == "append";
     run.report.add(std::move(cell));
-    if (judged) judge(run.report, size.bar);
+    if (has_bar) note_bar(run.report, size.bar);
   }
   run.report.notes.push_back(
       absl::StrFormat("%s: %.0f commits a second of %d bytes", name, 1e9 / median(times[0]), records.front().size()));
@@ -199,7 +199,7 @@ absl::Status measure_writers(const LogRun& run, const Size& size) {
   }
   add_cells(contestants, times, cell_of(name, kMetric, hash), run.report);
   constexpr double kBar = 2;
-  if (size.moves == 256) judge(run.report, kBar);
+  if (size.moves == 256) note_bar(run.report, kBar);
   return absl::OkStatus();
 }
 

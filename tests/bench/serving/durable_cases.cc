@@ -80,7 +80,7 @@ class DurableCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(kMovesName, "ns/move", hash_of_number(compare(kMovesName))), run_.report);
     constexpr double kBar = 0.5;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     const double micros = 1e-3 * static_cast<double>(kMovesAMessage);
     run_.note(absl::StrFormat("%s: %.0f us a message durable, %.0f with memory acks", kMovesName,
                               micros * median(times[0]), micros * median(times[1])));
@@ -120,7 +120,7 @@ class DurableCases {
     add_cells(contestants, times, cell_of(kQueriesName, "ns/ball", hash_of_number(server.hashes().front())),
               run_.report);
     constexpr double kBar = 0.9;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     for (const absl::Status& failure : failures) status.Update(failure);
     status.Update(server.status());
     return status;
@@ -190,7 +190,7 @@ class RestartCase {
       bar.push_back(1);
     }
     add_cell(run_, cell_of(kRestartName, "s", hash_of_number(hash)), "bar", seconds, bar, Better::kLess);
-    judge(run_.report, 1);
+    note_bar(run_.report, 1);
     return absl::OkStatus();
   }
 
@@ -222,9 +222,9 @@ class RestartCase {
   }
 
   // Writes a tick, or its first records.
-  absl::Status move(const Daemon& daemon, size_t most, uint64_t& written) {
+  absl::Status move(const Daemon& daemon, size_t max_records, uint64_t& written) {
     std::vector<v1::StreamUpdatesRequest> messages = move_messages(world_, "arena", kMovesARecord, 1);
-    messages.resize(std::min(messages.size(), most));
+    messages.resize(std::min(messages.size(), max_records));
     written += messages.size();
     UpdateLoad load(daemon, messages, kWindow, UpdateLoad::Expect::kApplied);
     load.run(1);

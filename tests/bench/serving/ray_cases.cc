@@ -59,7 +59,7 @@ class RayCases {
                                                  {"in_process", [&](size_t) { process.run(1); }, count, {}}};
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/ray", hash_of_all(here)), run_.report);
-    judge_overhead(work, size, kThreads * median(times[1]));
+    note_overhead_bar(work, size, kThreads * median(times[1]));
     return server.status();
   }
 
@@ -78,7 +78,7 @@ class RayCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/ray", hash_of_all(hashes)), run_.report);
     constexpr double kBar = 0.9;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     absl::Status status = one.status();
     status.Update(two.status());
     return status;
@@ -95,10 +95,10 @@ class RayCases {
   }
 
   // Notes whether the ratio reaches the bar. `cost`: nanoseconds of one core for a ray in process.
-  void judge_overhead(const Work& work, const Size& size, double cost) const {
+  void note_overhead_bar(const Work& work, const Size& size, double cost) const {
     constexpr double kNameHolds = 0.2;
-    judge(run_.report, size.share * cost / (cost + size.overhead),
-          absl::StrFormat(" = %.2f c/(c+%.0f) at c = %.0f ns in process", size.share, size.overhead, cost));
+    note_bar(run_.report, size.share * cost / (cost + size.overhead),
+             absl::StrFormat(" = %.2f c/(c+%.0f) at c = %.0f ns in process", size.share, size.overhead, cost));
     if (!run_.options.quick && std::abs(cost / work.nanoseconds - 1) > kNameHolds)
       run_.note(absl::StrFormat("%s: on this machine now %.0f ns", work.name, cost));
   }

@@ -92,7 +92,7 @@ void compare_any(const std::string& case_name, const BenchMesh& mesh, const Peer
   compare_rays(case_name, mesh, peer, Task::kAny, asked, ours, theirs, report);
 }
 
-void judge(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report) {
+void report_tally(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report) {
   if (tally.queries == 0) return;
   const std::string sentence = absl::StrCat(case_name, ": ", peer.name(), " differs from us in ", tally.ids, " ids of ",
                                             tally.queries, " queries; the first: ", tally.first_difference);

@@ -46,7 +46,7 @@ void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vect
                  RegionTally& tally, Report& report);
 
 // Reports the tally after the last query.
-void judge(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report);
+void report_tally(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report);
 
 template <class Overlaps>
 void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vector<uint32_t> theirs, Overlaps overlaps,

@@ -130,7 +130,7 @@ class RegionRace {
       if (set_of(ids_of(*entry.peer, entry.asked.queries[i])) != ours)
         settle(entry, entry.asked.queries[i], entry.asked.places[i], tally);
     }
-    judge(name_, *entry.peer, case_.task, tally, run_.report);
+    report_tally(name_, *entry.peer, case_.task, tally, run_.report);
   }
 
   void settle(const Entry<Query>& entry, const Query& query, size_t place, RegionTally& tally) {
