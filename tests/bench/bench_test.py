@@ -198,7 +198,7 @@ class ServingTest(SuiteRun, unittest.TestCase):
         self.assertEqual("a peer is missing: redis" in self.answer.stdout, not HAS_REDIS)
 
     def test_the_required_ratio_is_noted_beside_the_measured_one(self):
-        self.assertRegex(self.answer.stdout, r"note: rays/90ns/1024 beside in_process: .* to be shown .*c/\(c\+45\)")
+        self.assertRegex(self.answer.stdout, r"note: rays/90ns/1024 beside in_process: .* required .*c/\(c\+45\)")
 
 
 class LogTest(SuiteRun, unittest.TestCase):
@@ -208,7 +208,7 @@ class LogTest(SuiteRun, unittest.TestCase):
         return LOG
 
     def test_the_required_ratio_is_noted_beside_the_measured_one(self):
-        self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* to be shown 0\.800")
+        self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* required 0\.800")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ namespace locus::bench {
 // Notes whether the cell just added reaches `bar`; `how` explains the bar.
 inline void note_bar(Report& report, double bar, const std::string& how = "") {
   const Cell& cell = report.cells.back();
-  report.notes.push_back(absl::StrFormat("%s beside %s: %.3f, to be shown %.3f%s: %s", cell.case_name, cell.peer_name,
+  report.notes.push_back(absl::StrFormat("%s beside %s: %.3f, required %.3f%s: %s", cell.case_name, cell.peer_name,
                                          cell.ratio, bar, how, cell.ratio >= bar ? "shown" : "MISSED"));
 }
 

@@ -121,7 +121,7 @@ class CrowdCases {
       run_.note(absl::StrCat(name, ": nothing was refused"));
     } else {
       const double p99 = percentile(crowd.refusals, 0.99);
-      run_.note(absl::StrFormat("%s: %d calls refused, p50 %.2f ms, p99 %.2f ms, to be shown 5: %s", name,
+      run_.note(absl::StrFormat("%s: %d calls refused, p50 %.2f ms, p99 %.2f ms, required 5: %s", name,
                                 crowd.refusals.size(), 1e3 * median(crowd.refusals), 1e3 * p99,
                                 p99 < kMaxSeconds ? "shown" : "MISSED"));
       run_.note(absl::StrFormat(

@@ -117,7 +117,7 @@ class EchoCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/move", hash_of_number(messages.size())), run_.report);
     const double rate = 1e3 / median(times[0]);
-    run_.note(absl::StrFormat("%s: %.1f M moves/s parsed and acked, to be shown %.0f: %s", name, rate, moves.bar,
+    run_.note(absl::StrFormat("%s: %.1f M moves/s parsed and acked, required %.0f: %s", name, rate, moves.bar,
                               rate >= moves.bar ? "shown" : "MISSED"));
     note_time(name, time, plain_time);
     absl::Status status = server.status();

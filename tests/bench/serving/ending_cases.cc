@@ -140,7 +140,7 @@ class EndingCases {
     const double most = *std::max_element(after.begin(), after.end());
     run_.note(absl::StrFormat(
         "%s: the server computes for another %.2f ms (p50), %.2f (p99), %.2f (most) of a job of "
-        "%.0f, to be shown 5: %s",
+        "%.0f, required 5: %s",
         name, percentile(after, 0.5), percentile(after, 0.99), most, whole_ms_, worst < kMaxMs ? "shown" : "MISSED"));
   }
 

@@ -69,7 +69,7 @@ absl::StatusOr<BenchMesh> generated(const Kind& kind, const std::vector<std::str
   const bool read = words.size() <= 3 && absl::SimpleAtoi(words[1], &triangles) && triangles > 0 &&
                     triangles <= kind.max_triangles && (words.size() < 3 || absl::SimpleAtoi(words[2], &seed));
   if (!read) {
-    return absl::InvalidArgumentError(absl::StrCat("a made-up mesh is ", kind.name, ":TRIANGLES or ", kind.name,
+    return absl::InvalidArgumentError(absl::StrCat("a generated mesh is ", kind.name, ":TRIANGLES or ", kind.name,
                                                    ":TRIANGLES:SEED, TRIANGLES from 1 to ", kind.max_triangles));
   }
   std::string name = absl::StrCat(kind.name, "-", rounded_count(triangles));
