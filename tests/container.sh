@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Builds the image of deploy/Dockerfile and shows what a container of it does, without a registry or a Docker daemon: the
-# base comes from this machine's Debian sources, buildah builds, podman runs. Checks the compose file and the systemd
-# unit too. Everything lies under build/container and is used again by the next run. Needs root.
+# Builds the image of deploy/Dockerfile and tests a container of it, without a registry or a Docker daemon: the base
+# comes from this machine's Debian sources, buildah builds, podman runs. Checks the compose file and the systemd
+# unit too. All files are in build/container; the next run uses them again. Needs root.
 #
 #   ./tests/container.sh            ends with: N passed, M failed, K skipped
-#   ./tests/container.sh --fresh    first removes what earlier runs built
+#   ./tests/container.sh --fresh    first removes the files of earlier runs
 #
 # Writes one line a check, passed, failed or skipped and its name, to build/container/results.txt, and `ended` last.
 # shellcheck disable=SC2016,SC2317  # $(ORIGIN) is for apt-get; functions are called through check
@@ -46,7 +46,7 @@ finish() {
 
 report() { echo "$1 $2" | tee -a "$results"; }
 
-# check NAME COMMAND...: passes when the command does. What it prints goes to the log, and is shown if it fails.
+# check NAME COMMAND...: passes when the command does. Its output goes to the log, and is shown if it fails.
 check() {
   local name=$1 outcome=failed
   shift
@@ -58,7 +58,7 @@ check() {
 
 skip() { report skipped "$1"; echo "    SKIP: $2"; }
 
-# Without this the checks that follow make no sense.
+# The later checks depend on this one.
 need() {
   local before
   before=$(grep -c ^failed "$results")
@@ -66,8 +66,8 @@ need() {
   [ "$(grep -c ^failed "$results")" = "$before" ] || finish
 }
 
-# Storage and settings of our own. runc rather than crun, and limits no higher than a process without CAP_SYS_RESOURCE
-# may set: containers run inside containers this way.
+# Separate storage and settings. runc instead of crun, and limits that a process without CAP_SYS_RESOURCE may set, so
+# that this works inside a container.
 set_up_podman() {
   local driver=overlay
   [ "$(stat -f -c %T "$store")" = overlayfs ] && driver=vfs
@@ -87,13 +87,13 @@ driver = "$driver"
 graphroot = "$store/storage"
 runroot = "$work/run"
 TEXT
-  # The images of earlier runs stay; what podman remembers beside them names folders that are gone.
+  # Keeps the images of earlier runs, and removes podman's other state, which names folders that do not exist any more.
   rm -rf "$store/storage/libpod"
   export CONTAINERS_CONF=$work/containers.conf CONTAINERS_STORAGE_CONF=$work/storage.conf
   podman info
 }
 
-# A minimal Debian from the sources that apt on this machine knows.
+# Builds a minimal Debian from the package sources of this machine's apt.
 make_base() {
   if buildah inspect "$base" > /dev/null 2>&1; then echo "there already"; return 0; fi
   mkdir -p "$work/base"
@@ -109,9 +109,9 @@ build_image() {
     --ignorefile deploy/Dockerfile.dockerignore --tag "$image" .
 }
 
-# Starts a container with the given options and waits until it answers; sets `id`. Hardened as compose.yaml has it.
+# Starts a container with the given options and waits until it answers; sets `id`. Hardened as in compose.yaml.
 start() {
-  # conmon notes where it stands when the kernel ends a container for want of memory.
+  # conmon writes a file to its working directory if the kernel kills a container that is out of memory.
   id=$(cd "$work" && podman run --detach --read-only --cap-drop all --security-opt no-new-privileges --env LOCUS_INSECURE=1 \
     --publish 127.0.0.1::7575 "$@" "$image") || return
   containers+=("$id")
@@ -123,9 +123,9 @@ start() {
   return 1
 }
 
-# In the container itself.
+# Runs a command in the container itself.
 inside() { podman exec --interactive "$id" "$@"; }
-# A client of its own: another container, through the port that is published on this machine's loopback.
+# Runs a command in a second container, as a client through the port that is published on this machine's loopback.
 client() {
   podman run --rm --interactive --network host --env LOCUS_ADDRESS="$(podman port "$id" 7575/tcp)" --entrypoint locus "$image" "$@"
 }
@@ -161,7 +161,7 @@ has_no_capability() { [ "$(inside sed -n 's/^Cap[A-Z][a-z]*:\t//p;s/^NoNewPrivs:
 is_healthy() { podman healthcheck run "$id"; }
 started_with() { podman logs "$id" 2>&1 | grep " serving " | grep -w -- "$1"; }
 lists_its_memory() { client -o ndjson limits | grep '"memory_bytes"' | grep -w 201326592; }
-# A mesh whose tree would not fit: refused, and nothing is lost.
+# Uploads a mesh whose tree exceeds the memory: it is refused, and no data is lost.
 refuses_what_does_not_fit() {
   local output code
   client scene create full || return
@@ -192,12 +192,12 @@ compose_starts() {
 unit_is_correct() {
   local output
   sed 's#/usr/local/bin/locusd#/bin/true#' deploy/locusd.service > "$work/locusd.service"
-  # It ends well whatever it complains about.
+  # Its exit status is 0 even if it prints warnings.
   output=$(systemd-analyze verify --man=no "$work/locusd.service" 2>&1) || return
   printf '%s' "$output"
   [ -z "$output" ]
 }
-# Exposure in tenths: 0 is none, 100 all.
+# Maximum exposure in tenths: 0 is none, 100 is complete.
 unit_is_hardened() { systemd-analyze security --offline=true --threshold=15 deploy/locusd.service; }
 
 check_image() {

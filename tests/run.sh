@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs what the tests need, builds, runs every suite and ends with one line: N passed, M failed, K skipped.
+# Installs the packages that the tests need, builds, runs the suites and ends with: N passed, M failed, K skipped.
 #
-#   ./tests/run.sh                  everything once, in a release build
+#   ./tests/run.sh                  a release build and its tests
 #   ./tests/run.sh --sanitizers     also the benchmarks' own tests, ThreadSanitizer, and AddressSanitizer with UBSan
 #   ./tests/run.sh --only asan      one suite: release, tsan or asan
 #   ./tests/run.sh --long           also the sanitizers, the tests labelled long, clang-tidy and the container
@@ -56,7 +56,7 @@ finish() {
   exit
 }
 
-# Adds the lines on standard input to the sums: `passed`, `skipped` or `failed` and a name each.
+# Counts the lines on standard input: `passed`, `skipped` or `failed` and a name each.
 count_lines() {
   local suite=$1 kind name
   while read -r kind name; do
@@ -68,12 +68,12 @@ count_lines() {
   done
 }
 
-# Adds the results that ctest wrote to the sums.
+# Counts the results in ctest's file.
 count_results() {
   count_lines "$1" < <(/usr/bin/python3 tests/house/read_results.py "build/$1/results.xml" || echo "failed no readable results")
 }
 
-# The image and a container of it. Counted only if the script came to its end.
+# Runs container.sh and counts its results. A script that ends early is a failure.
 run_container() {
   say "container"
   ./tests/container.sh || true
@@ -81,7 +81,7 @@ run_container() {
   count_lines container < build/container/results.txt
 }
 
-# GCC 12's ThreadSanitizer stops where the kernel randomises addresses over more bits than it knows of.
+# ThreadSanitizer of GCC 12 fails if the kernel randomises more address bits than it supports.
 steady_addresses=()
 if setarch "$(uname -m)" -R true 2> /dev/null; then steady_addresses=(setarch "$(uname -m)" -R); fi
 
@@ -89,12 +89,12 @@ run_suite() {
   local suite=$1 wrapper=() labels=(-LE long)
   if [ "$suite" = tsan ]; then wrapper=(${steady_addresses[@]+"${steady_addresses[@]}"}); fi
   local options=(-DLOCUS_TESTS=ON -DLOCUS_PYTHON=ON)
-  # clang-tidy checks each file by itself.
+  # clang-tidy checks each file separately.
   if [ "$long" = yes ]; then options+=(-DLOCUS_UNITY=OFF); fi
   if [ "$suite" = release ]; then options+=(-DLOCUS_BENCH=$([ "$bench" = yes ] && echo ON || echo OFF)); fi
   if [ "$suite" = release ] && [ "$long" = yes ]; then labels=(); fi
-  # The command line costs AddressSanitizer half an hour of compiling: its readers of files are judged always, all of it
-  # in the long run.
+  # Compiling the whole command line with AddressSanitizer takes half an hour, so only the long run does; its file
+  # importers are always tested.
   if [ "$suite" = asan ] && [ "$long" = yes ]; then options+=(-DLOCUS_CLI=ON); fi
   say "$suite: configure"
   cmake --preset "$suite" "${options[@]}" || { fail "$suite: configure"; return; }
@@ -104,7 +104,7 @@ run_suite() {
   rm -f "build/$suite/results.xml"
   ${wrapper[@]+"${wrapper[@]}"} ctest --preset "$suite" ${labels[@]+"${labels[@]}"} --parallel "$jobs" --no-tests=error \
     --test-output-size-passed 65536 --output-junit "$PWD/build/$suite/results.xml" || echo "run.sh: ctest of $suite exited with $?"
-  # What the proofs found, in a line each.
+  # Prints the result of each proof.
   grep -h '^proof: ' "build/$suite/Testing/Temporary/LastTest.log" || true
   count_results "$suite"
 }

@@ -1,4 +1,4 @@
-"""locus-bench as it is run: python3 bench_test.py PROGRAM PEER... with the peers that it was configured with."""
+"""Tests of the program locus-bench: python3 bench_test.py PROGRAM PEER... with the peers of its configuration."""
 
 import json
 import math
@@ -24,7 +24,7 @@ CASES = {"ray/incoherent/first": RAYS, "ray/incoherent/any": ANY, "ray/short/fir
          "ball/2": BALLS, "ball/10": BALLS, "box/0.5": BOXES, "box/2": BOXES, "box/10": BOXES,
          "build": {"embree": {"embree_medium"}}, "memory": {"embree": {"embree_medium"}}}
 
-# The suite dynamic; what stands under "ours" needs no package.
+# The suite dynamic; cases below "ours" need no package.
 DYNAMIC_PEERS = {"bullet": {"bullet"}, "boost": {"boost_rtree"}, "nanoflann": {"nanoflann"},
                  "ours": {"flat_hash_map", "sorted_rebuild"}}
 ONE_SIZE_ONLY = {"boost_rtree", "nanoflann", "flat_hash_map"}
@@ -121,7 +121,7 @@ class BenchTest(unittest.TestCase):
         for value in first.values():
             self.assertRegex(value, "^[0-9a-f]{16}$")
 
-    def test_missing_peers_are_said(self):
+    def test_missing_peers_are_reported(self):
         said = self.answers[0].stdout.count("a peer is missing")
         self.assertEqual(said, 4 - len(PEERS & {"embree", "bullet", "boost", "cgal"}))
 
@@ -137,7 +137,7 @@ class BenchTest(unittest.TestCase):
             self.assertEqual(answer.returncode, 2, arguments)
             self.assertNotEqual(answer.stderr, "", arguments)
 
-    def test_a_mesh_that_is_not_there_is_status_1_and_named(self):
+    def test_a_missing_mesh_is_status_1_and_named(self):
         answer = run("static", "--quick", "--mesh", "/no/such/level.obj")
         self.assertEqual(answer.returncode, 1)
         self.assertIn("/no/such/level.obj", answer.stderr)
@@ -149,7 +149,7 @@ class BenchTest(unittest.TestCase):
 
 
 class SuiteRun:
-    """One quick run of SUITE, whose cells are those of expected()."""
+    """Makes one quick run of SUITE, which must have the cells of expected()."""
 
     @classmethod
     def setUpClass(cls):
@@ -183,7 +183,7 @@ class DynamicTest(SuiteRun, unittest.TestCase):
     def expected(self):
         return expected_dynamic_cells()
 
-    def test_missing_peers_are_said(self):
+    def test_missing_peers_are_reported(self):
         said = self.answer.stdout.count("a peer is missing")
         self.assertEqual(said, 3 - len(PEERS & {"bullet", "boost", "nanoflann"}))
 
@@ -194,11 +194,11 @@ class ServingTest(SuiteRun, unittest.TestCase):
     def expected(self):
         return SERVING | (REDIS if HAS_REDIS else set())
 
-    def test_a_missing_redis_is_said(self):
+    def test_a_missing_redis_is_reported(self):
         self.assertEqual("a peer is missing: redis" in self.answer.stdout, not HAS_REDIS)
 
-    def test_what_has_to_be_shown_is_said_beside_what_was_found(self):
-        self.assertRegex(self.answer.stdout, r"note: rays/90ns/1024 beside in_process: .* to be shown .*c/\(c\+45\)")
+    def test_the_required_ratio_is_noted_beside_the_measured_one(self):
+        self.assertRegex(self.answer.stdout, r"note: rays/90ns/1024 beside in_process: .* required .*c/\(c\+45\)")
 
 
 class LogTest(SuiteRun, unittest.TestCase):
@@ -207,8 +207,8 @@ class LogTest(SuiteRun, unittest.TestCase):
     def expected(self):
         return LOG
 
-    def test_what_has_to_be_shown_is_said_beside_what_was_found(self):
-        self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* to be shown 0\.800")
+    def test_the_required_ratio_is_noted_beside_the_measured_one(self):
+        self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* required 0\.800")
 
 
 if __name__ == "__main__":

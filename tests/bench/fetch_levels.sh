@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# Fetches the levels that locus-bench knows from Debian's packages into build/levels: downloaded and unpacked, never
-# installed. Safe to run again.
+# Fetches the levels for locus-bench from Debian's packages into build/levels. Packages are downloaded and unpacked, but
+# not installed. Safe to run again.
 #
 #   ./tests/bench/fetch_levels.sh
 #
-# Exits 1 if one of them cannot be had; locus-bench does without it and says so.
+# Exits 1 if one of them is not available; locus-bench then runs without it and adds a note.
 set -uo pipefail
 cd "$(dirname "$0")/../.." || exit
 levels=build/levels
 mkdir -p "$levels"
 
-# fetch PACKAGE FILE: the file of that name in the package.
+# fetch PACKAGE FILE: fetches the file of that name from the package.
 fetch() {
   local package=$1 file=$2 folder
   if [ -f "$levels/$file" ]; then return 0; fi

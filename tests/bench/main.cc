@@ -21,15 +21,16 @@
 namespace locus::bench {
 namespace {
 
-// Every suite is one line here and one folder beside this file.
+// Returns all suites. Each has one line here and one folder beside this file.
 std::vector<Suite> suites() {
   return {
-      {"static", "rays, balls, boxes, builds and memory of one level, beside Embree and others", run_static_suite},
-      {"dynamic", "moving objects: moves, queries, memory and readers beside a writer, beside Bullet and others",
+      {"static", "rays, balls, boxes, builds and memory of one level, compared with Embree and others",
+       run_static_suite},
+      {"dynamic", "moving objects: moves, queries, memory and readers during writes, compared with Bullet and others",
        dynamic::run_dynamic_suite},
-      {"serving", "a server and its client on the loopback, beside the same work in process, plain sockets and Redis",
+      {"serving", "a server and its client on the loopback, compared with work in process, plain sockets and Redis",
        serving::run_serving_suite},
-      {"log", "update batches on their way to the disk, beside appending them to a file", log::run_log_suite},
+      {"log", "update batches on their way to the disk, compared with appending to a file", log::run_log_suite},
   };
 }
 
@@ -43,8 +44,9 @@ constexpr char kExamples[] = R"(Examples:
   locus-bench serving --filter '^rays/' --rounds 9
   TMPDIR=/mnt/disk locus-bench log
 
-A MESH is a file that `locus import` reads (FILE, or FILE#ENTRY for a level in a .pk3), or a made-up one: KIND:TRIANGLES
-or KIND:TRIANGLES:SEED, where KIND is city, terrain or blob. Levels of Debian packages: tests/bench/fetch_levels.sh.
+A MESH is a file that `locus import` reads (FILE, or FILE#ENTRY for a level in a .pk3), or a generated one:
+KIND:TRIANGLES or KIND:TRIANGLES:SEED, where KIND is city, terrain or blob. tests/bench/fetch_levels.sh downloads levels
+of Debian packages.
 Exit codes: 0 ok, 1 failed or results disagree, 2 usage.)";
 
 std::string described_suites() {
@@ -56,23 +58,23 @@ std::string described_suites() {
 void add_options(CLI::App& app, Options& options, std::string& filter) {
   std::vector<std::string> names;
   for (const Suite& suite : suites()) names.push_back(suite.name);
-  app.description("Benchmarks of locus beside its peers: ratios, with results that must agree.");
+  app.description("Benchmarks that compare locus with other libraries: ratios, with results that must agree.");
   app.footer(kExamples);
   app.add_option("SUITE", options.suite, described_suites())->required()->check(CLI::IsMember(names));
   app.add_option("--json", options.json, "Also write the cells to this file")->type_name("FILE");
-  app.add_flag("--quick", options.quick, "Every case in small, in under 20 s");
+  app.add_flag("--quick", options.quick, "Every case with a small workload, in under 20 s");
   app.add_option("--filter", filter, "Only cases whose names match")->type_name("REGEX");
-  app.add_option("--rounds", options.rounds, "Rounds that count, after one that does not [3]")
+  app.add_option("--rounds", options.rounds, "Measured rounds, after one warm-up round [3]")
       ->type_name("N")
       ->check(CLI::Range(kMinRounds, kMaxRounds));
-  app.add_option("--mesh", options.meshes, "In place of the suite's own; may be repeated")
+  app.add_option("--mesh", options.meshes, "A mesh instead of the suite's own; may be repeated")
       ->type_name("MESH")
       ->expected(1)
       ->take_all();
   app.add_option("--threads", options.threads, "Threads of the cases that use several [2]")
       ->type_name("N")
       ->check(CLI::Range(2, kMaxThreads));
-  app.add_option("--levels", options.levels, "Where fetched levels are kept [build/levels]")->type_name("FOLDER");
+  app.add_option("--levels", options.levels, "Folder of fetched levels [build/levels]")->type_name("FOLDER");
 }
 
 int fail(const absl::Status& status, int code) {
@@ -99,7 +101,8 @@ int run(const Options& options) {
   return exit_status(report);
 }
 
-// As the daemon does, for whatever is measured: what is freed is used again, and not given back to the kernel.
+// Tunes malloc like the daemon, for all measurements: freed memory is used again instead of being returned to the
+// kernel.
 void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, 512 << 20);

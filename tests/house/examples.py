@@ -1,4 +1,4 @@
-"""Small trees that break one rule each, and one that keeps them all. None stands for a file taken away."""
+"""Small example trees: each breaks one rule, and one keeps all rules. None stands for a removed file."""
 import language_rules
 
 HEADER = """// Three numbers: a position or a direction in world units, for all rooms. Plain data, so threads share it freely.
@@ -140,8 +140,9 @@ BAD_EXAMPLES = {
                          source('const char* path = "/ro' + 'ot/x";\n'), {"tests/run.sh": "/ho" + "me/me/x\n"}],
     "TestsMirrorTheSources": [{"tests/core/geometry/gone_test.cc": "namespace locus {}\n"},
                               {"tests/core/vec3_test.cc": "namespace locus {}\n"}],
-    "CommentsBeginWithAVerbOrANoun": [source("// Of the last batch.\nint refused();"), source("  // Whether it is there.\nbool a;"),
-                                      source("// The same, once more.\nint b;"), source("int c;\n// Where it stands.\nint d;")],
+    "CommentsBeginWithAVerbOrANoun": [
+        source("// Of the last batch.\nint refused();"), source("  // Whether it is there.\nbool a;"),
+        source("// The same, once more.\nint b;"), source("int c;\n// Where it stands.\nint d;")],
     "LimitsAreNamedMaxAndMin": [source("constexpr int kMo" + "st = 3;"), source("constexpr int kLe" + "astRows = 3;")],
     "WordsArePlain": [source("// Wakes who" + "ever waits.\nvoid wake();"), {"core/README.md": "Rules of the ho" + "use.\n"}],
     "HardRoomsHavePages": [{"core/GLOSSARY.md": None}, {"server/ARCHITECTURE.md": "x\n" * 61}, {"deploy/NOTES.md": "x\n" * 61}],

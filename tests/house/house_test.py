@@ -1,10 +1,10 @@
-"""The rules of the house, each a test of its own.
+"""The repository rules, each a test of its own.
 
     house_test.py --list                          names of the rules
     house_test.py --root . [--build DIR] [RULE]   checks the tree (one rule or all), 0 if every rule holds, 77 if skipped
-    house_test.py --sizes                         how long files and functions are
+    house_test.py --sizes                         lengths of files and functions
 
-Before a rule judges the tree it is run over examples that break it and examples that keep it (examples.py): a rule that
+Before a rule checks the tree, it runs on examples that break it and examples that keep it (examples.py): a rule that
 cannot fail is a defect and fails.
 """
 import argparse
@@ -27,7 +27,7 @@ TREE_RULES = {**include_rules.RULES, **shape_rules.RULES, **language_rules.RULES
 
 
 def failures_of_the_rule_itself(name, rule):
-    """What is wrong with a rule: an example that breaks it and passes, or the good example refused."""
+    """Returns defects of a rule: examples that break it but pass, or the good example refused."""
     problems = [f"the rule refuses a good example: {problem}" for problem in rule(Tree(GOOD_EXAMPLE))]
     examples = BAD_EXAMPLES.get(name, [])
     if not examples:
@@ -62,7 +62,7 @@ def check_format(options):
 
 
 def check_exceptions(options):
-    """No exception of the mirror may outlive its file."""
+    """Fails if a file listed as an exception of the mirror no longer exists."""
     problems = [] if shape_rules.stale_exceptions(Tree(GOOD_EXAMPLE)) else ["the rule does not see its bad example"]
     return problems + shape_rules.stale_exceptions(read_tree(options.root))
 
@@ -76,7 +76,7 @@ OTHER_RULES = {
 
 
 def run(name, options):
-    """Prints what the rule found; the exit status of that rule alone."""
+    """Prints the findings of one rule and returns its exit status."""
     try:
         check = OTHER_RULES.get(name)
         problems = check(options) if check else check_tree_rule(name, options)

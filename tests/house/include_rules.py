@@ -1,4 +1,4 @@
-"""Who may include whom: rooms, third-party headers and cycles."""
+"""Rules about includes: allowed directions between rooms, third-party headers and cycles."""
 import posixpath
 import re
 
@@ -6,14 +6,14 @@ from source_tree import includes, quoted_includes
 
 INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid")
 
-# A folder's sources may include their own folder and these. A name without a final "/*" means that folder alone, with it
-# the folders below it too. "proto" stands for what is generated from the protocol.
+# Folders that the sources of a folder may include in addition to their own. A name without a final "/*" means only that
+# folder, with it also the folders below it. "proto" stands for the code generated from the protocol.
 ALLOWED = {
     "core/base": [],
     "core/geometry": ["core/base"],
     "core/mesh": ["core/geometry", "core/base"],
     "core/index": ["core/geometry", "core/base"],
-    # From the bottom up: what is there, how it changes, what readers see, what is written to the log, and the scene.
+    # From the bottom up: stored content, its updates, snapshots and readers, the log, and the scene.
     "core/scene/objects": ["core/index/*", "core/geometry", "core/base"],
     "core/scene/statics": ["core/index/*", "core/mesh", "core/geometry", "core/base"],
     "core/scene/updates": ["core/scene/objects", "core/scene/statics", "core/index/*", "core/geometry", "core/base"],
@@ -39,7 +39,7 @@ ALLOWED = {
                    "proto"],
     "server/services": ["server/rpc", "server/host", "server/convert", "server/scheduling", "server/storage",
                         "server/security", "server/observability", "server/config", "core/*", "proto"],
-    "client/lib": ["proto", "core/base/status_macros.h"],  # that file alone, in sources: it is not installed
+    "client/lib": ["proto", "core/base/status_macros.h"],  # only this file, in sources: it is not installed
     "client/cli": ["client/lib", "core/base"],
     "client/cli/commands": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
     "client/cli/rows": ["client/cli", "client/cli/rows/bulk", "client/lib", "core/base"],
@@ -58,13 +58,13 @@ ALLOWED = {
     "client/cli/script": ["client/cli", "client/cli/rows", "core/base"],
     "deploy/manual": ["client/cli", "server/config"],
 }
-# The kernels are compiled for processors that the rest may not run on: only plain data of the tree goes in.
+# Kernels are compiled for instruction sets that a processor can lack, so they may include only plain data of the tree.
 ALLOWED["core/index/bvh/kernels"] = ["core/index/bvh", "core/base"]
 ALLOWED["core/index/hash_grid/kernels"] = ["core/base"]
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
 ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 
-# Third-party headers by the start of their names, and the folders (with those below) that may see them. Tests may see all.
+# Third-party headers by prefix, and the folders (with those below) that may include them. Tests may include all.
 THIRD_PARTY = {
     "grpc": ["server/rpc", "server/services", "server/convert", "server/observability", "client/lib"],
     "google/protobuf/": ["server/rpc", "server/services", "server/convert", "client/lib"],
@@ -90,16 +90,16 @@ THIRD_PARTY = {
 FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
 INTRINSICS = "immintrin.h"
 KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
-# How an array asks for large pages: advice that changes no value.
+# madvise() for large pages: it changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
 CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/reader_tracker)\.(h|cc)")
 
-# A folder and the folder that holds it, where both are one room that was divided for its size only.
+# Pairs of a folder and its parent that count as one room, divided only because of its size.
 ONE_ROOM = {"client/cli/levels/import/quake": "client/cli/levels/import"}
 
 
 def room_of_include(target):
-    """The folder that an include names, or None for Abseil and other libraries."""
+    """Returns the folder that an include names, or None for Abseil and other libraries."""
     if target.startswith("locus/v1/"):
         return "proto"
     top = target.split("/")[0]
@@ -189,7 +189,7 @@ def includes_start_at_the_root(tree):
 
 
 def cycles(graph):
-    """Sets of nodes that reach each other, by Tarjan's strongly connected components (1972), without recursion."""
+    """Returns sets of nodes that reach each other. Source: Tarjan, strongly connected components, 1972; not recursive."""
     number, low, on_stack, stack, found = {}, {}, set(), [], []
     for root in sorted(graph):
         work = [] if root in number else [(root, iter(sorted(graph[root])))]

@@ -1,4 +1,4 @@
-"""Rules of Python files: every file says what it is, and the product's are documented, typed and of short functions."""
+"""Rules of Python files: every file has a docstring; the product's are also documented and typed."""
 import ast
 
 MAX_FUNCTION_LINES = 80
@@ -8,12 +8,12 @@ TESTS = "tests/client/python/"
 
 
 def python_files(tree, below=""):
-    """(path, text) of each Python file."""
+    """Returns (path, text) of each Python file."""
     return [(path, text) for path, text in sorted(tree.files.items()) if path.endswith(".py") and path.startswith(below)]
 
 
 def parsed(path, text):
-    """The file's syntax tree, and a problem if it has none."""
+    """Returns the file's syntax tree, or a problem if it does not parse."""
     try:
         return ast.parse(text), []
     except SyntaxError as error:
@@ -24,7 +24,7 @@ FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def python_files_are_tidy(tree):
-    """They parse, open with a docstring, and have no endless lines and functions."""
+    """Checks that files parse, open with a docstring, and have no long lines or functions."""
     problems = []
     for path, text in python_files(tree):
         module, broken = parsed(path, text)
@@ -41,7 +41,7 @@ def python_files_are_tidy(tree):
 
 
 def public(body, prefix=""):
-    """Public classes, functions and methods of a module or class, with their full names."""
+    """Yields public classes, functions and methods of a module or class, with their full names."""
     for node in body:
         if isinstance(node, (ast.ClassDef, *FUNCTIONS)) and not node.name.startswith("_"):
             yield node, prefix + node.name
@@ -50,7 +50,7 @@ def public(body, prefix=""):
 
 
 def untyped(function):
-    """Arguments without a type, and `return` where that has none."""
+    """Returns the arguments without a type, and `return` if the result has none."""
     arguments = function.args
     named = arguments.posonlyargs + arguments.args + arguments.kwonlyargs
     extra = [argument for argument in (arguments.vararg, arguments.kwarg) if argument]
@@ -59,7 +59,7 @@ def untyped(function):
 
 
 def python_names_are_documented(tree):
-    """Public names of the package have docstrings; every function has type hints."""
+    """Checks that public names of the package have docstrings and that every function has type hints."""
     problems = []
     for path, text in python_files(tree, PRODUCT):
         module, _ = parsed(path, text)
@@ -71,7 +71,7 @@ def python_names_are_documented(tree):
 
 
 def python_tests_mirror_the_sources(tree):
-    """A test stands for the module of its name, at the same place."""
+    """Checks that each test has the path of a module, with its name."""
     return [f"{path}: there is no source of that name to test" for path, _ in python_files(tree, TESTS)
             if path.endswith("_test.py") and PRODUCT + path[len(TESTS):-len("_test.py")] + ".py" not in tree.files]
 

@@ -1,4 +1,4 @@
-"""The shape of files and folders: sizes, guards, comments, layout, names, and what may stand nowhere."""
+"""Rules about files and folders: sizes, guards, comments, layout, names, and forbidden text."""
 import posixpath
 import re
 import statistics
@@ -35,7 +35,7 @@ def percentile(values, share):
 
 
 def sizes(tree):
-    """One line a kind: how many there are, and how long they are."""
+    """Returns one line for each kind of file: their number and lengths."""
     lines = []
     for name, rooms in (("product", ("core", "server", "client")), ("tests", ("tests",))):
         paths = tree.code(*rooms)
@@ -88,7 +88,7 @@ def rooms_have_short_readmes(tree):
 
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".gif", ".webp", ".bmp", ".ico")
-PICTURES = {"deploy/quickstart.png": 300 * 1024}  # bytes at most; what a clone takes is small
+PICTURES = {"deploy/quickstart.png": 300 * 1024}  # maximum bytes, so that a clone stays small
 
 
 def pictures_are_few_and_small(tree):
@@ -98,7 +98,7 @@ def pictures_are_few_and_small(tree):
          if path in PICTURES and tree.size(path) > PICTURES[path]]
 
 
-# Written in pieces, so that this file does not hold what it forbids.
+# Split into parts, so that this file does not contain the forbidden words.
 UNFINISHED = re.compile(r"\b(" + "|".join(("TO" + "DO", "FIX" + "ME", "XX" + "X", "HA" + "CK")) + r")\b")
 MACHINE_PATH = re.compile(r"(?<![\w.}/-])/(?:" + "|".join(("wo" + "rk", "ro" + "ot", "ho" + "me", "Us" + "ers")) +
                           r")/|\.\./sha" + "red|/tmp/w" + "t\\b")
@@ -118,7 +118,7 @@ def no_path_of_a_machine(tree):
     return each_line(tree, MACHINE_PATH, "a path of one machine")
 
 
-# Tests whose subject is no file of ours. Each needs a reason.
+# Tests whose subject is no source file. Each needs a reason.
 MIRROR_EXCEPTIONS = {
     "tests/client/cli/exit_code_test.cc": "the program as a child process: exit codes and streams",
     "tests/core/geometry/shape_ray_test.cc": "ray tests of every shape, whose predicates stand in one file a pair",
@@ -128,7 +128,7 @@ MIRRORED = ("tests/core", "tests/server", "tests/client", "tests/deploy")
 
 
 def subjects(path):
-    """What a test may stand for: hash_grid_threads_test.cc tests hash_grid_threads, hash_grid or hash."""
+    """Returns possible subjects of a test: hash_grid_threads_test.cc tests hash_grid_threads, hash_grid or hash."""
     words = path[len("tests/"):-len("_test.cc")].split("_")
     return {"_".join(words[:count]) for count in range(1, len(words) + 1)}
 
@@ -158,7 +158,7 @@ def rooms_use_their_namespace(tree):
         opened = OUTER_NAMESPACE.findall(code)
         if not opened and posixpath.basename(path) not in ("main.cc", "status_macros.h"):
             problems.append(f"{path}: has nothing in namespace {expected}")
-        # A header of the core may open the inner namespaces locus::internal and the like, another room's never.
+        # Headers of core may open inner namespaces such as locus::internal; those of other rooms may not.
         for name in opened:
             inside = name == expected or name.startswith(expected + "::")
             nested = name != "locus" and "locus" not in name.split("::")[0] and expected in opened

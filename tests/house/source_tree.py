@@ -1,4 +1,4 @@
-"""The project's files as the house rules see them: a map from path to text, with the few things a rule asks of a C++ file.
+"""The project's files for the repository rules: a map from path to text, and helpers that parse C++ files.
 
 Rules take a Tree, so that each of them is also run over small examples that never were on a disk.
 """
@@ -11,18 +11,18 @@ SKIPPED_FOLDERS = {".git", "build", ".cache", "__pycache__", "node_modules"}
 
 
 class Tree:
-    """Files by path from the project's root, '/' between folders."""
+    """Files by their path from the project's root, with '/' between folders."""
 
     def __init__(self, files, sizes=None):
         self.files = dict(files)
         self.sizes = dict(sizes or {})
 
     def size(self, path):
-        """Bytes on the disk; of an example, its text's."""
+        """Returns the bytes on the disk; for an example, those of its text."""
         return self.sizes.get(path, len(self.files[path].encode()))
 
     def code(self, *rooms):
-        """Paths of headers and sources, all or those below one of the given folders."""
+        """Returns the paths of headers and sources: all, or those below one of the given folders."""
         return [path for path in sorted(self.files)
                 if path.endswith(CODE_ENDINGS) and (not rooms or path.startswith(tuple(room + "/" for room in rooms)))]
 
@@ -60,7 +60,7 @@ INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTIL
 
 
 def includes(text):
-    """(quoted, target) of each #include."""
+    """Returns (quoted, target) of each #include."""
     return [(mark == '"', target) for mark, target in INCLUDE.findall(without_comments(text))]
 
 
@@ -78,12 +78,12 @@ def blank(text):
 
 
 def without_comments(text):
-    """Comments turned into blanks; lines keep their numbers and literals stay."""
+    """Replaces comments by blanks; keeps line numbers and literals."""
     return COMMENT_OR_LITERAL.sub(lambda m: blank(m.group()) if m.group().startswith(("//", "/*")) else m.group(), text)
 
 
 def without_comments_and_literals(text):
-    """Also string and character literals turned into blanks: what is left has only braces that are braces."""
+    """Replaces also string and character literals by blanks, so that every remaining brace is code."""
     return COMMENT_OR_LITERAL.sub(lambda m: blank(m.group()), text)
 
 
@@ -93,7 +93,7 @@ ACCESS = re.compile(r"^(\s*(public|private|protected)\s*:)+")
 
 
 def after_template(declaration):
-    """The declaration without leading template<...>, whose `class` says nothing of what follows."""
+    """Returns the declaration without leading template<...>, whose `class` does not tell its kind."""
     declaration = ACCESS.sub("", declaration).strip()
     while re.match(r"template\s*<", declaration):
         position, depth = declaration.index("<"), 0
@@ -106,7 +106,7 @@ def after_template(declaration):
 
 
 def kind_of_brace(declaration):
-    """What the brace after this text opens outside of functions: 'scope', 'function' or 'value'."""
+    """Returns what a brace after this text opens outside of functions: 'scope', 'function' or 'value'."""
     text = after_template(declaration)
     if TYPE_OR_NAMESPACE.match(re.sub(r"alignas\s*\([^)]*\)|final\b", "", text)):
         return "scope"
@@ -118,7 +118,7 @@ def kind_of_brace(declaration):
 
 
 def functions(text):
-    """(first line, number of lines) of each function that has a body, lambdas counted with what holds them.
+    """Returns (first line, number of lines) of each function with a body; a lambda counts in its function.
 
     A reading of formatted code by its braces, not a parser: a brace that touches the word before it is a value, like the
     initialiser of a member.

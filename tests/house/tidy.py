@@ -1,7 +1,7 @@
 """Runs clang-tidy over the product's sources as a build folder compiles them: tidy.py BUILD [--jobs N] [--part PATH_PART].
 
-Prints a line a file and its findings; exits 1 if there is one. The sources with planted bugs are left out: they are the
-same files. First it checks a bad example, so that a configuration that finds nothing is not taken for clean sources.
+Prints a line for each file, and its findings; exits 1 if there is one. Leaves out the targets with planted bugs, which
+compile the same files. First checks a bad example, which reveals a configuration that finds nothing.
 """
 import argparse
 import concurrent.futures
@@ -18,7 +18,7 @@ FINDING = re.compile(r"(error|warning): ")
 
 
 def tidy(folder, path):
-    """What clang-tidy says of a file, none of it if the file is clean."""
+    """Returns the findings of clang-tidy in a file; empty if there are none."""
     answer = subprocess.run(["clang-tidy", "--quiet", "-p", folder, path], capture_output=True, text=True)
     if FINDING.search(answer.stdout) or answer.returncode != 0:
         return answer.stdout or answer.stderr or f"clang-tidy exited with {answer.returncode}"

@@ -1,4 +1,4 @@
-"""Rules that ask a tool: the formatter over the sources, the linker's symbol table over the built libraries."""
+"""Rules that run a tool: the formatter on the sources, nm on the built libraries."""
 import os
 import shutil
 import subprocess
@@ -9,11 +9,11 @@ FILES_A_CALL = 50
 
 
 class Skip(Exception):
-    """The tool or the build is not at hand."""
+    """Raised if the tool or the build is missing."""
 
 
 def symbols_of_other_worlds(lines):
-    """Undefined names that belong to gRPC or protobuf, from the output of nm --demangle --undefined-only."""
+    """Returns the undefined names of gRPC or protobuf, from the output of nm --demangle --undefined-only."""
     return sorted({line.split(" U ", 1)[1].strip() for line in lines
                    if " U " in line and ("grpc" in line.lower() or "google::protobuf" in line)})
 
@@ -33,8 +33,8 @@ def pure_libraries_refer_to_no_grpc(tree, build):
 
 
 def faults_of_a_kernel(lines):
-    """What an object compiled for one instruction set may not have: more than one exported symbol, or one that the linker
-    may merge with another object's, from the output of nm --demangle."""
+    """Returns the faults of an object compiled for one instruction set: more than one exported symbol, or one that the
+    linker may merge with another object's. Takes the output of nm --demangle."""
     exported = [line.split(" T ", 1)[1] for line in lines if " T " in line]
     merged = [line for line in lines if any(f" {kind} " in line for kind in "VvWwu")]
     problems = [] if len(exported) == 1 else [f"exports {len(exported)} symbols, not one: {', '.join(exported)}"]

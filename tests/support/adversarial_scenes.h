@@ -1,5 +1,5 @@
-// Families of scenes in which spatial indices are known to go wrong, and ordinary random ones. Each draws one scene
-// from a generator; the same state gives the same scene.
+// Families of scenes that are known to break spatial indexes, and ordinary random ones. Each function draws one scene
+// from a generator; equal generator states give equal scenes.
 #ifndef LOCUS_TESTS_SUPPORT_ADVERSARIAL_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_ADVERSARIAL_SCENES_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus::test {
 
-// One of the 26 directions along axes and diagonals.
+// Draws one of the 26 directions along axes and diagonals.
 inline Vec3d lattice_direction(Random& random) {
   Vec3d direction;
   while (direction == Vec3d{}) direction = random.whole_vector(1);
@@ -26,7 +26,7 @@ inline std::array<Vec3d, 26> lattice_directions() {
   return directions;
 }
 
-// A corner, the middle of an edge or of a face, or the centre.
+// Draws a corner, the middle of an edge or of a face, or the centre.
 inline Vec3d notable_point(const Placement& placement, Random& random) {
   const Vec3d sides = random.whole_vector(1);
   const Vec3d local = {sides.x * placement.half.x, sides.y * placement.half.y, sides.z * placement.half.z};
@@ -44,7 +44,8 @@ inline Obbd random_box(Vec3d center, double size, Random& random) {
   return box;
 }
 
-// `count` of each kind around the placements, sizes up to `size`: aimed at notable points or nowhere.
+// Adds `count` queries of each kind around the placements, with sizes up to `size`: aimed at notable points or at
+// random.
 inline void add_queries(SceneSketch& sketch, int count, double size, Random& random) {
   for (int i = 0; i < count; ++i) {
     const Vec3d target = notable_point(sketch, random);
@@ -69,8 +70,8 @@ inline SceneSketch random_scene(Random& random) {
   return sketch;
 }
 
-// Walls on the planes of a lattice, rays from its points and half points in all 26 directions, balls and boxes that
-// just touch. `step` is the lattice's; `corner` its origin.
+// Draws walls on the planes of a lattice, rays from its points and half points in all 26 directions, and balls and
+// boxes that just touch. `step` is the spacing of the lattice, `corner` its origin.
 inline SceneSketch lattice_scene(std::string family, double step, Vec3d corner, Random& random) {
   SceneSketch sketch{std::move(family), {}, {}, {}, {}};
   const auto point = [&](int parts) { return corner + random.whole_vector(2 * parts) * (step / parts); };
@@ -106,7 +107,7 @@ inline SceneSketch far_lattice(Random& random) {
   return lattice_scene("far lattice", random.chance(0.5) ? 1 : 64, {offset, -offset / 2, offset / 8}, random);
 }
 
-// Rays that graze: exactly at corners and edges, and along edges.
+// Draws rays that graze triangles: exactly at corners and edges, and along edges.
 inline SceneSketch edges_and_corners(Random& random) {
   SceneSketch sketch{"edges and corners", {}, {}, {}, {}};
   for (int i = 0; i < 24; ++i) {
@@ -128,7 +129,7 @@ inline SceneSketch edges_and_corners(Random& random) {
   return sketch;
 }
 
-// Rays that start exactly on surfaces, edges and corners, or inside solids.
+// Draws rays that start exactly on surfaces, edges and corners, or inside solids.
 inline SceneSketch on_and_inside_solids(Random& random) {
   SceneSketch sketch{"on and inside solids", {}, {}, {}, {}};
   for (int i = 0; i < 20; ++i) {
@@ -142,7 +143,7 @@ inline SceneSketch on_and_inside_solids(Random& random) {
   return sketch;
 }
 
-// The same few values many times over, with other ids.
+// Draws the same few values many times, with different ids.
 inline SceneSketch coincident(Random& random) {
   SceneSketch sketch{"coincident", {}, {}, {}, {}};
   for (uint64_t i = random.below(3) + 1; i > 0; --i) {
@@ -157,7 +158,7 @@ inline SceneSketch coincident(Random& random) {
   return sketch;
 }
 
-// Points, lines, and slivers a million times longer than wide.
+// Draws points, lines, and slivers a million times longer than wide.
 inline SceneSketch degenerate_and_slivers(Random& random) {
   SceneSketch sketch{"degenerate and slivers", {}, {}, {}, {}};
   for (int i = 0; i < 32; ++i) {
@@ -175,7 +176,7 @@ inline SceneSketch degenerate_and_slivers(Random& random) {
   return sketch;
 }
 
-// Things of a centimetre beside things of ten kilometres.
+// Draws values of a centimetre beside values of ten kilometres.
 inline SceneSketch tiny_beside_huge(Random& random) {
   SceneSketch sketch{"1 cm beside 10 km", {}, {}, {}, {}};
   for (int i = 0; i < 32; ++i) {
@@ -197,7 +198,7 @@ inline SceneSketch all_in_one_cell(Random& random) {
   return sketch;
 }
 
-// An ordinary scene far out, where neighbouring floats are far apart.
+// Draws an ordinary scene far from the origin, where neighbouring floats are far apart.
 inline SceneSketch far_out(Random& random) {
   SceneSketch sketch = random_scene(random);
   sketch.family = "far out";
@@ -219,7 +220,7 @@ inline SceneSketch long_and_short_directions(Random& random) {
   return sketch;
 }
 
-// Values at distances that double, so that any split leaves nearly all on one side.
+// Draws values at distances that double, so that any split leaves nearly all on one side.
 inline SceneSketch doubling_distances(Random& random) {
   SceneSketch sketch{"doubling distances", {}, {}, {}, {}};
   const Vec3d direction = random.chance(0.5) ? lattice_direction(random) : random.unit_vector();
@@ -241,7 +242,7 @@ inline constexpr SceneFamily kAdversarialFamilies[] = {
     degenerate_and_slivers, doubling_distances,   long_and_short_directions,
 };
 
-// Scene number `seed`: the families take turns.
+// Draws scene `seed`: the families alternate.
 inline SceneSketch adversarial_scene(uint64_t seed, Random& random) {
   return kAdversarialFamilies[seed % std::size(kAdversarialFamilies)](random);
 }

@@ -1,5 +1,5 @@
-// Overlap of boxes with segments, boxes and triangles by clipping in long double: a reference that knows nothing of
-// separating axes. All in the axes of one box around the origin.
+// Overlap of boxes with segments, boxes and triangles by clipping in long double: a reference that does not use
+// separating axes. Everything is in the axes of one box around the origin.
 #ifndef LOCUS_TESTS_SUPPORT_BOX_CLIP_H_
 #define LOCUS_TESTS_SUPPORT_BOX_CLIP_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus::test {
 
-// Whether the segment has a point in the box grown by `grown`, which may be negative.
+// Returns whether the segment has a point in the box grown by `grown`, which may be negative.
 inline bool clipped_segment_remains(Vec3r from, Vec3r to, Vec3r half, Real grown) {
   Real low = 0, high = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -27,7 +27,8 @@ inline bool clipped_segment_remains(Vec3r from, Vec3r to, Vec3r half, Real grown
   return low <= high;
 }
 
-// Sutherland and Hodgman, Reentrant Polygon Clipping, 1974: whether any of the polygon remains within the grown box.
+// Returns whether any part of the polygon lies within the grown box. Source: Sutherland and Hodgman, Reentrant Polygon
+// Clipping, 1974.
 inline bool clipped_polygon_remains(std::vector<Vec3r> polygon, Vec3r half, Real grown) {
   for (int side = 0; side < 6; ++side) {
     const int axis = side / 2;
@@ -47,7 +48,7 @@ inline bool clipped_polygon_remains(std::vector<Vec3r> polygon, Vec3r half, Real
   return true;
 }
 
-// A box as the reference sees it: its middle, its three turned half edges.
+// Oriented box of the reference: its centre and its three rotated half edges.
 struct RealBox {
   Vec3r center;
   std::array<Vec3r, 3> half_edges;
@@ -87,7 +88,7 @@ inline bool any_edge_meets(const RealBox& edges, const RealBox& solid, Real grow
   return false;
 }
 
-// Two boxes share a point iff an edge of one meets the other.
+// Returns whether two boxes share a point: they do if and only if an edge of one meets the other.
 inline bool boxes_share_a_point(const RealBox& a, const RealBox& b, Real grown) {
   return any_edge_meets(a, b, grown) || any_edge_meets(b, a, grown);
 }

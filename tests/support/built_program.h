@@ -1,5 +1,5 @@
-// The programs of this build, which stand beside the tests. No path is compiled in: a compiler's cache then serves
-// every checkout.
+// Paths of the programs of this build, which lie beside the tests. No path is compiled in, so that the compiler cache
+// serves every checkout.
 #ifndef LOCUS_TESTS_SUPPORT_BUILT_PROGRAM_H_
 #define LOCUS_TESTS_SUPPORT_BUILT_PROGRAM_H_
 

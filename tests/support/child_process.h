@@ -1,4 +1,4 @@
-// A program in a process of its own, ended with the test.
+// A program in a process of its own, which ends with the test.
 #ifndef LOCUS_TESTS_SUPPORT_CHILD_PROCESS_H_
 #define LOCUS_TESTS_SUPPORT_CHILD_PROCESS_H_
 
@@ -16,7 +16,7 @@ namespace locus::test {
 
 class ChildProcess {
  public:
-  // `log` takes what it writes to standard output and standard error.
+  // Starts the program. Its standard output and standard error go to the file `log`.
   ChildProcess(const std::string& program, std::vector<std::string> arguments, const std::string& log) {
     arguments.insert(arguments.begin(), program);
     std::vector<char*> argv;
@@ -37,7 +37,7 @@ class ChildProcess {
 
   void signal(int number) { kill(pid_, number); }
 
-  // Its exit code once it has ended; -1 if a signal ended it.
+  // Waits for the end of the process and returns its exit code; -1 if a signal ended it.
   int wait() {
     int status = 0;
     if (pid_ <= 0 || waitpid(pid_, &status, 0) != pid_) return -1;
@@ -46,7 +46,8 @@ class ChildProcess {
   }
 
  private:
-  // Between fork() and exec(): nothing here allocates or locks. A test that is killed takes its programs with it.
+  // Runs between fork() and exec(), so it neither allocates nor locks. The kernel ends the program if the test is
+  // killed.
   [[noreturn]] static void become(const std::vector<char*>& argv, const std::string& log) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);

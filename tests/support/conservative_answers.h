@@ -1,5 +1,5 @@
-// What is wrong with conservative answers: held against exact ones, which they must contain, and against bounds of
-// placed triangles in long double, which share no arithmetic with the product.
+// Verification of conservative answers: compared with exact ones, which they must contain, and with bounds of placed
+// triangles in long double, which share no arithmetic with the product.
 #ifndef LOCUS_TESTS_SUPPORT_CONSERVATIVE_ANSWERS_H_
 #define LOCUS_TESTS_SUPPORT_CONSERVATIVE_ANSWERS_H_
 
@@ -20,13 +20,13 @@ namespace internal {
 
 struct FoundRow {
   float t = 0;
-  Vec3f point;  // of what is nearest, relative to the frame
+  Vec3f point;  // of the nearest point, relative to the frame
 };
-using Found = std::map<std::pair<Id, uint32_t>, FoundRow>;  // by id and triangle
+using Found = std::map<std::pair<Id, uint32_t>, FoundRow>;  // key: id and triangle
 
 inline bool is_lookup(const OwnedBlock& block) { return std::holds_alternative<LookupColumns>(block.settings.kind); }
 
-// Returns everything found, triangle by triangle, whatever number of rows the block asks for.
+// Returns every found triangle, whatever number of rows the block asks for.
 inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock block, Precision precision) {
   block.settings.precision = precision;
   block.settings.max_results = limits::kMaxMaxResults;
@@ -89,7 +89,7 @@ class RealQuery {
     if (std::holds_alternative<BoxColumns>(block.settings.kind)) half_ = half_bounds(block, i);
   }
 
-  // Returns nothing where it does not meet the box, else the distance to it, or along the ray.
+  // Returns the distance to the box, or the t along the ray; nothing if the query does not meet the box.
   std::optional<Real> meets(const BoxReal& box) const {
     if (direction_) return entered(box);
     const Vec3r gap = max(max(box.min - at_, at_ - box.max), Vec3r{});
@@ -143,7 +143,7 @@ class RealQuery {
   std::optional<Real> radius_;
 };
 
-// Describes what is wrong with the answer of one query about one triangle; empty for nothing.
+// Describes the first error in the answer of one query about one triangle; empty if it is right.
 inline std::string triangle_fault(const RealQuery& query, const PlacedMesh& placed, uint32_t number, const Found& exact,
                                   const Found& conservative) {
   const std::pair<Id, uint32_t> key{placed.id, number};
@@ -164,7 +164,7 @@ inline std::string triangle_fault(const RealQuery& query, const PlacedMesh& plac
   return "";
 }
 
-// Describes a point that is not as far as its distance says; empty for none.
+// Describes a point that is not at the reported distance; empty if it is.
 inline std::string point_fault(const OwnedBlock& block, size_t i, const FoundRow& row) {
   const Vec3r from = {block.points[3 * i], block.points[3 * i + 1], block.points[3 * i + 2]};
   const Real away = length(to_real(row.point) - from);
@@ -203,16 +203,16 @@ std::string conservative_fault(const QueryScene& scene, const Fault& fault) {
 
 }  // namespace internal
 
-// Describes the first exact row that conservative ones lack, or have later; empty for none.
+// Describes the first exact row that the conservative rows lack, or have at a greater t; empty if there is none.
 inline std::string superset_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [](const OwnedBlock& /*block*/, size_t /*query*/, const internal::Found& exact,
                 const internal::Found& conservative) { return internal::lacking(exact, conservative); });
 }
 
-// Describes the first conservative row that the bounds of its triangle, grown by 2^-38 of the magnitudes, do not
-// explain, or that is not there though they are met; empty for none. For scenes of instances alone, and queries without
-// filters, limits and culling.
+// Describes the first conservative row whose triangle's bounds, grown by 2^-38 of the magnitudes, the query does not
+// meet, or the first missing row whose bounds it meets; empty if there is none. For scenes of instances only, and
+// queries without filters, limits and culling.
 inline std::string placed_bounds_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [&](const OwnedBlock& block, size_t i, const internal::Found& exact, const internal::Found& conservative) {

@@ -1,4 +1,4 @@
-// References for closed convex solids in long double, by search instead of by formulas: a solid is where a convex
+// References for closed convex solids in long double, by search instead of formulas: a solid is the set where a convex
 // function, its gauge, is at most zero. Gauges grow by at most the distance moved, so that `gauge <= e` contains all
 // points within e of the solid and `gauge <= -e` only points that stay inside when moved by e.
 #ifndef LOCUS_TESTS_SUPPORT_CONVEX_REFERENCE_H_
@@ -12,7 +12,7 @@
 
 namespace locus::test {
 
-// The place of the least value of a convex function of one variable, by golden section.
+// Returns the argument at which a convex function of one variable is smallest, by golden section.
 template <class Function>
 Real argmin(const Function& f, Real low, Real high) {
   constexpr Real kGolden = 0.61803398874989484820L;
@@ -36,7 +36,7 @@ Real argmin(const Function& f, Real low, Real high) {
   return 0.5L * (low + high);
 }
 
-// Where a monotone predicate turns from false at `no` to true at `yes`.
+// Returns the point where a monotone predicate changes from false at `no` to true at `yes`.
 template <class Predicate>
 Real turning_point(const Predicate& holds, Real no, Real yes) {
   for (int step = 0; step < 90; ++step) {
@@ -50,12 +50,12 @@ struct RealInterval {
   Real near, far;
 };
 
-// The solid of a shape, in axes around its centre: without the position no digits are lost to far places.
+// Solid of a shape, in axes around its centre: without the position no digits are lost far from the origin.
 class SolidReference {
  public:
   explicit SolidReference(const Shape& shape) : shape_(shape) {}
 
-  // `offset`: from the shape's position, in world axes.
+  // Returns the gauge at `offset` from the shape's position, in world axes.
   Real gauge(Vec3r offset) const {
     const Vec3r p = turned_back(shape_.rotation, offset);
     const Vec3r size = to_real(shape_.size);
@@ -77,7 +77,7 @@ class SolidReference {
     return 0;
   }
 
-  // Euclidean distance of a point to the solid of zero radius: the point, box or segment.
+  // Returns the Euclidean distance of a point to the solid of zero radius: the point, box or segment.
   Real distance_to_core(Vec3r offset) const {
     if (shape_.kind != ShapeKind::kBox) return gauge(offset) + core_radius();
     const Vec3r outside = abs(turned_back(shape_.rotation, offset)) - to_real(shape_.size);
@@ -87,7 +87,7 @@ class SolidReference {
     return shape_.kind == ShapeKind::kBall || shape_.kind == ShapeKind::kCapsule ? shape_.radius : 0;
   }
 
-  // Part of the line offset + s * unit, |s| <= reach, where gauge <= grown.
+  // Returns the part of the line offset + s * unit, |s| <= reach, where gauge <= grown.
   std::optional<RealInterval> chord(Vec3r offset, Vec3r unit, Real reach, Real grown) const {
     const auto along = [&](Real s) { return gauge(offset + unit * s); };
     const Real middle = argmin(along, -reach, reach);

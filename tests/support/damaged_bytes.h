@@ -1,4 +1,4 @@
-// Bytes as a disk may give them back: cut off, or with bits turned over.
+// Bytes as a faulty disk may return them: truncated, or with flipped bits.
 #ifndef LOCUS_TESTS_SUPPORT_DAMAGED_BYTES_H_
 #define LOCUS_TESTS_SUPPORT_DAMAGED_BYTES_H_
 
@@ -8,8 +8,8 @@
 
 namespace locus::test {
 
-// At least one bit or the length differs. Whole words now and then become numbers that are large or small, as lengths
-// would have to be to do harm.
+// Returns `bytes` with at least one bit or the length changed. Sometimes overwrites whole words with small or large
+// numbers, which are harmful as lengths.
 inline std::string damaged(const std::string& bytes, Random& random) {
   std::string result = bytes;
   if (random.chance(0.2)) {

@@ -1,5 +1,5 @@
-// Rays that meet a triangle at a sine of 2^-36 and less: what the proof of 100,000,000 rays with seed 4 found answered
-// wrong while double alone decided, each with the reference's answer. Plain data.
+// Rays that meet a triangle at a sine of at most 2^-36, each with the reference's answer. The proof of 100,000,000 rays
+// with seed 4 found them answered wrongly when double alone decided. Plain data.
 #ifndef LOCUS_TESTS_SUPPORT_EDGE_ON_CASES_H_
 #define LOCUS_TESTS_SUPPORT_EDGE_ON_CASES_H_
 
@@ -21,7 +21,7 @@ struct EdgeOnCase {
   double t;
 };
 
-inline constexpr double kNothing = -1;  // is hit
+inline constexpr double kNothing = -1;  // no hit
 
 inline const EdgeOnCase kEdgeOnCases[] = {
     {{{0x1.2p+4f, 0x1.e4p+6f, 0}, {0x1.6p+4f, 0x1.e4p+6f, 0x1.18p+5f}, {0x1.6p+4f, 0x1.e4p+6f, 0}},
@@ -124,7 +124,7 @@ inline const EdgeOnCase kEdgeOnCases[] = {
      0.4716796875},
 };
 
-// What is wrong with TriangleRay's answer to the first case that it does not know; empty for nothing.
+// Describes TriangleRay's answer to the first case that it gets wrong; empty if there is none.
 inline std::string edge_on_difference() {
   int number = 0;
   for (const EdgeOnCase& each : kEdgeOnCases) {

@@ -1,4 +1,4 @@
-// Whether two trees over a mesh's triangles lie in memory the same, byte for byte.
+// Comparison of two trees over a mesh's triangles in memory, byte for byte.
 #ifndef LOCUS_TESTS_SUPPORT_EQUAL_TREES_H_
 #define LOCUS_TESTS_SUPPORT_EQUAL_TREES_H_
 
@@ -19,7 +19,7 @@ bool equal_bytes(const T* a, const T* b, size_t count) {
 
 }  // namespace internal
 
-// Neither is empty.
+// Expects equal bytes. Neither tree may be empty.
 inline void expect_equal_bytes(const TriangleBvh& a, const TriangleBvh& b) {
   ASSERT_EQ(a.node_count(), b.node_count());
   ASSERT_EQ(a.block_count(), b.block_count());

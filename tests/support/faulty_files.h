@@ -1,7 +1,7 @@
-// The machine's file system with faults of a disk: it remembers what was synced, so that a test can see what a power
-// loss would have left, and it fails as it is told. Syncing itself is left out, which makes tests fast. What is on the
-// disk for sure: of a file the bytes before its last sync, of a folder the entries of its last sync; a removed or
-// replaced file is back where its folder was not synced since.
+// The machine's file system with injected disk faults: it tracks synced data, so that a test can get the state after a
+// power loss, and fails on request. It does not sync anything itself, which makes tests fast. A power loss preserves
+// for each file the bytes before its last sync, and for each folder the entries at its last sync; a removed or replaced
+// file is back if its folder was not synced since.
 //
 // Threads: any, as RocksDB uses it.
 #ifndef LOCUS_TESTS_SUPPORT_FAULTY_FILES_H_
@@ -41,28 +41,28 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
  public:
   using Status = rocksdb::IOStatus;
 
-  // Everything below `root`, which exists; `graveyard` is a folder for what was removed.
+  // Tracks everything below `root`, which exists; `graveyard` is a folder for removed files.
   FaultyFiles(std::string root, std::string graveyard)
       : FileSystemWrapper(rocksdb::FileSystem::Default()), root_(std::move(root)), graveyard_(std::move(graveyard)) {
     std::filesystem::create_directories(graveyard_);
   }
   const char* Name() const override { return "FaultyFiles"; }
 
-  // The power goes before the change of that number from now on, the first being 0: from then on nothing is changed.
+  // Simulates a power loss before change `change` from now on, counted from 0: no later change takes effect.
   void stop_before(uint64_t change) { changes_left_ = change; }
-  // The process goes on, or another begins, with all that was written, synced or not.
+  // Continues after a process restart without power loss: all written data is there, synced or not.
   void go_on() { changes_left_ = kForEver; }
   bool stopped() const { return changes_left_ == 0; }
   uint64_t changes() const { return changes_; }
-  // From now on so many syncs fail, or writes: of RocksDB's logs, since what else is written meanwhile would take some
-  // of them at random. For a negative number all, of any file.
+  // Makes the next `count` syncs or writes of RocksDB's log files fail; other files are excluded, since their
+  // concurrent writes would consume faults at random. A negative number fails all, for any file.
   void fail_syncs(int64_t count) { failing_syncs_ = count; }
   void fail_writes(int64_t count) { failing_writes_ = count; }
-  // Every write fails for want of room, and there is none.
+  // Makes every write fail for lack of space while `full`; the free space is then 0.
   void fill(bool full) { full_ = full; }
 
-  // What a power loss leaves, as files below `to`. Of what was not synced a random part from the start of each file's
-  // rest is there too if `torn`.
+  // Writes the files that a power loss leaves below `to`. If `torn`, each file also keeps a random part from the start
+  // of its unsynced bytes.
   void lose_power(const std::string& to, Random& random, bool torn) {
     const std::lock_guard lock(mutex_);
     std::filesystem::create_directories(to);
@@ -144,9 +144,9 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
   static constexpr uint64_t kForEver = ~uint64_t{0};
 
   struct File {
-    std::string place;                // where its bytes are now
-    uint64_t synced = 0;              // so many of its first bytes are on the disk ...
-    std::optional<std::string> held;  // ... or these, where some of them were written over since
+    std::string place;                // path of its bytes now
+    uint64_t synced = 0;              // number of its first bytes that are on the disk ...
+    std::optional<std::string> held;  // ... or these bytes, if some of them were overwritten since
   };
 
   class Written final : public rocksdb::FSWritableFileOwnerWrapper {
@@ -158,7 +158,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
                   rocksdb::IODebugContext* debug) override {
       Status status = files_.write(*state_);
       if (status.ok()) return FSWritableFileOwnerWrapper::Append(data, options, debug);
-      // As a disk does that becomes full: some of it is there.
+      // A disk that becomes full during a write keeps a part of it.
       if (!files_.stopped())
         FSWritableFileOwnerWrapper::Append({data.data(), data.size() / 2}, options, debug).PermitUncheckedError();
       return status;
@@ -178,7 +178,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
     Status Sync(const rocksdb::IOOptions&, rocksdb::IODebugContext*) override { return files_.sync(*state_); }
     Status Fsync(const rocksdb::IOOptions&, rocksdb::IODebugContext*) override { return files_.sync(*state_); }
     Status RangeSync(uint64_t, uint64_t, const rocksdb::IOOptions&, rocksdb::IODebugContext*) override {
-      return Status::OK();  // it promises nothing
+      return Status::OK();  // guarantees nothing
     }
     Status Allocate(uint64_t, uint64_t, const rocksdb::IOOptions&, rocksdb::IODebugContext*) override {
       return Status::OK();
@@ -278,7 +278,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
     }
     return file;
   }
-  // What was at `path` is there no more, but may be back after a power loss.
+  // Removes the file at `path` in such a way that it can be back after a power loss.
   void bury(const std::string& path) {
     const std::lock_guard lock(mutex_);
     const auto file = now_.find(path);

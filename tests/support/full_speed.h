@@ -22,10 +22,10 @@ struct FullSpeedResult {
   uint64_t revisions = 0;
   uint64_t looks = 0;
   uint64_t past_looks = 0;
-  std::string difference;  // the first that any reader saw
+  std::string difference;  // first difference that a reader found
 };
 
-// Until go_on(what was done so far) is false, or a reader sees a difference.
+// Runs until go_on(revisions so far) is false, or a reader finds a difference.
 template <class GoOn>
 FullSpeedResult run_at_full_speed(const FullSpeedOptions& options, const GoOn& go_on) {
   const SceneSchedule schedule(options.objects);

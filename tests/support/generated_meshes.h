@@ -15,8 +15,8 @@ inline void number_in_order(std::vector<Triangle>& triangles) {
   for (size_t i = 0; i < triangles.size(); ++i) triangles[i].number = static_cast<uint32_t>(i);
 }
 
-// Closed and seen from the origin everywhere: rays from there hit whatever their direction. Radius 1 give or take
-// `noise`; 4 * rings * (rings - 1) triangles, neighbours share the very same vertices.
+// Returns a closed mesh that is visible from the origin everywhere: every ray from there hits it. Radius 1 plus or
+// minus `noise`; 4 * rings * (rings - 1) triangles; neighbours have bitwise equal vertices.
 inline std::vector<Triangle> bumpy_sphere(int rings, double noise, uint64_t seed) {
   Random random(seed);
   const int sectors = 2 * rings;
@@ -48,7 +48,7 @@ inline std::vector<Triangle> bumpy_sphere(int rings, double noise, uint64_t seed
   return triangles;
 }
 
-// Houses of 12 triangles on a square lattice of `side` * `side` plots of 10 units, corners on half units.
+// Returns houses of 12 triangles on a square lattice of `side` * `side` plots of 10 units, with corners on half units.
 inline std::vector<Triangle> box_city(int side, uint64_t seed) {
   Random random(seed);
   std::vector<Triangle> triangles;

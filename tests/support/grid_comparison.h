@@ -25,7 +25,7 @@ inline HashGridOptions random_grid_options(Random& random) {
   return options;
 }
 
-// The same values filed in one batch at the given cell size, and one by one at another.
+// Compares with the list: the same values inserted in one batch at the given cell size, and one by one at another.
 inline std::string grid_difference(const ObjectScene& scene, Random& random) {
   const ObjectList list = make_list(scene.values);
   ObjectGrid bulk(random_grid_options(random));
@@ -37,7 +37,7 @@ inline std::string grid_difference(const ObjectScene& scene, Random& random) {
   return "";
 }
 
-// Balls of a scene, and such as just touch some of its values, asked as balls and not by their bounds.
+// Compares queries by balls, not by their bounds: the balls of a scene, and balls that just touch some of its values.
 inline std::string grid_ball_difference(const ObjectScene& scene, Random& random) {
   ObjectGrid grid(random_grid_options(random));
   grid.apply({}, scene.values);
@@ -74,7 +74,7 @@ inline std::string grid_ball_difference(const ObjectScene& scene, Random& random
   return "";
 }
 
-// Puts each object where another one is, so that it fits the queries of the scene, or a little beside.
+// Moves an object to the position of another one, so that it suits the queries of the scene, or slightly beside it.
 inline Object moved(const Object& object, const std::vector<Object>& objects, Random& random) {
   Object result = object;
   result.shape.position = random.pick(objects).shape.position;
@@ -83,8 +83,8 @@ inline Object moved(const Object& object, const std::vector<Object>& objects, Ra
   return result;
 }
 
-// Random batches of inserts, moves and removes with the list in lockstep; snapshots kept along the way must go on to
-// answer as the list did when they were taken.
+// Random batches of inserts, moves and removes, applied to a grid and the list in lockstep. Snapshots kept along the
+// way must still give the list's answers from the time when they were taken.
 class GridLockstep {
  public:
   GridLockstep(const ObjectScene& scene, Random& random)
@@ -153,15 +153,15 @@ class GridLockstep {
   ObjectList list_;
 };
 
-// A grid that lives through a dozen batches over a scene of one of all families.
+// Compares a grid after each of a dozen batches over a scene of any family.
 inline std::string moving_grid_difference(const ObjectScene& scene, Random& random) {
   ObjectScene shorter = scene;
   while (shorter.rays.size() > 12) shorter.rays.pop_back();
   return GridLockstep(shorter, random).run(12);
 }
 
-// The first scene of seeds 0 to count - 1 that draw(seed, random) makes on which compare(scene, random) is not empty,
-// and what it says; empty when there is none.
+// Returns the first difference that compare(scene, random) finds in the scenes draw(seed, random) of seeds 0 to count -
+// 1; empty if there is none.
 template <class Draw, class Compare>
 std::string search_grid_scenes(uint64_t count, const Draw& draw, const Compare& compare) {
   for (uint64_t seed = 0; seed < count; ++seed) {
@@ -173,7 +173,7 @@ std::string search_grid_scenes(uint64_t count, const Draw& draw, const Compare& 
   return "";
 }
 
-// Families of both kinds in turn.
+// Draws a scene of the families of both kinds alternately.
 inline SceneSketch any_adversarial_scene(uint64_t seed, Random& random) {
   return seed % 2 == 0 ? adversarial_scene(seed / 2, random) : grid_scene(seed / 2, random);
 }

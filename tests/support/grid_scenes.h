@@ -1,5 +1,5 @@
-// Families of scenes built to break grids in particular, beside those of adversarial_scenes.h: values that sit on cell
-// borders of every level, on both sides of zero, at the world's edge, or that outgrow all cells.
+// Families of scenes built to break grids, in addition to those of adversarial_scenes.h: values on cell borders of
+// every level, on both sides of zero, at the world's edge, or larger than all cells.
 #ifndef LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 
@@ -8,14 +8,14 @@
 
 namespace locus::test {
 
-// Rays from lattice planes in all 26 directions, from places in `sketch` and without end.
+// Adds rays from lattice planes in all 26 directions, from positions in `sketch` and without limit.
 inline void add_lattice_rays(SceneSketch& sketch, double step, Random& random) {
   for (const Vec3d direction : lattice_directions()) {
     sketch.rays.push_back({notable_point(sketch, random) - direction * (step * random.whole(0, 3)), direction});
   }
 }
 
-// One value, or a few, larger than the world of all others.
+// Draws one value, or a few, larger than the world of all others.
 inline SceneSketch giants_among_small(Random& random) {
   SceneSketch sketch{"giants among small ones", {}, {}, {}, {}};
   for (int i = 0; i < 40; ++i) {
@@ -27,7 +27,7 @@ inline SceneSketch giants_among_small(Random& random) {
   return sketch;
 }
 
-// Points, and shapes that are none but have no extent, exactly on borders of cells of several sizes.
+// Draws points, and shapes without extent, exactly on borders of cells of several sizes.
 inline SceneSketch points_on_borders(Random& random) {
   SceneSketch sketch{"points on borders", {}, {}, {}, {}};
   const double step = std::exp2(random.whole(-3, 6));
@@ -42,7 +42,8 @@ inline SceneSketch points_on_borders(Random& random) {
   return sketch;
 }
 
-// Diameters that are exactly the edge of a level's cell, or a rounding beyond, on the borders of that level.
+// Draws values whose diameter is exactly the edge of a level's cell, or greater by a rounding, on the borders of that
+// level.
 inline SceneSketch sizes_between_levels(Random& random) {
   SceneSketch sketch{"sizes between levels", {}, {}, {}, {}};
   for (int i = 0; i < 40; ++i) {
@@ -55,7 +56,7 @@ inline SceneSketch sizes_between_levels(Random& random) {
   return sketch;
 }
 
-// Less than a cell on both sides of zero, where indices that truncate would fall together.
+// Draws values less than a cell from zero on both sides, where indices that truncate would coincide.
 inline SceneSketch around_zero(Random& random) {
   SceneSketch sketch{"around zero", {}, {}, {}, {}};
   const double size = random.magnitude(-10, 3);
@@ -72,7 +73,7 @@ inline SceneSketch around_zero(Random& random) {
   return sketch;
 }
 
-// At the corners of the world, with rays across it.
+// Draws values at the corners of the world, with rays across it.
 inline SceneSketch world_edges(Random& random) {
   constexpr double kEdge = limits::kMaxCoordinate;
   SceneSketch sketch{"world edges", {}, {}, {}, {}};

@@ -15,7 +15,7 @@
 namespace locus::test {
 
 struct HttpAnswer {
-  long code = 0;  // 0 = none came
+  long code = 0;  // 0: no response
   std::string headers;
   std::string body;
 };
@@ -25,7 +25,7 @@ inline size_t append_to(char* data, size_t size, size_t count, void* text) {
   return size * count;
 }
 
-// `method` is GET, HEAD or any other, which is sent without a body.
+// Sends a request without a body. `method` is GET, HEAD or any other.
 inline HttpAnswer http_get(int port, const std::string& path, const std::string& method = "GET") {
   const std::unique_ptr<CURL, decltype(&curl_easy_cleanup)> curl(curl_easy_init(), curl_easy_cleanup);
   HttpAnswer answer;
@@ -58,7 +58,7 @@ class RawConnection {
   RawConnection(const RawConnection&) = delete;
   RawConnection& operator=(const RawConnection&) = delete;
 
-  // Everything until the other side closes.
+  // Reads until the peer closes the connection.
   std::string read_all() {
     std::string text;
     char buffer[4096];

@@ -1,6 +1,6 @@
-// The judge of spatial indices: puts every kind of question to an index and to an oracle and compares the answers bit
-// for bit in (t, id). Also holds an index to its contract: to hand over, exactly once, every value whose own interval
-// or bounds are wanted. One judge for unit tests, random tests and planted bugs.
+// Verifier of spatial indexes: asks an index and an oracle every kind of query and compares the answers bit for bit in
+// (t, id). Also checks the contract of an index: it passes every value whose interval or bounds qualify to the visitor
+// exactly once. Unit tests, random tests and tests of planted bugs share it.
 #ifndef LOCUS_TESTS_SUPPORT_INDEX_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_INDEX_JUDGE_H_
 
@@ -24,7 +24,7 @@ ListIndex<V> make_list(const std::vector<V>& values) {
   return list;
 }
 
-// Each function returns an empty string, or what differs first.
+// Each function returns the first difference, or an empty string.
 template <SpatialIndex Index>
 class IndexJudge {
  public:
@@ -33,7 +33,7 @@ class IndexJudge {
   using S = ScalarOf<Value>;
   using Hits = std::vector<RayHit<Value>>;
 
-  // Both are borrowed and hold the same values.
+  // Borrows both, which must hold the same values.
   IndexJudge(const Index& index, const ListIndex<Value>& oracle) : index_(index), oracle_(oracle) {}
 
   std::string difference(const TestScene<Value>& scene) const {
@@ -43,7 +43,7 @@ class IndexJudge {
     }
     for (size_t i = 0; i < scene.balls.size(); ++i) {
       if (std::string what = ball_difference(scene.balls[i]); !what.empty()) return label(scene, "ball", i) + what;
-      // Every other one moved by less than a float can tell.
+      // Moves every other centre by less than the resolution of float.
       const Vec3d center = to_double(scene.balls[i].center) * (i % 2 == 0 ? 1 : 1 + 0x1p-25);
       if (std::string what = point_difference(center); !what.empty()) return label(scene, "centre of ball", i) + what;
     }
@@ -53,8 +53,8 @@ class IndexJudge {
     return "";
   }
 
-  // First, any and all hits and the bounds on the way, up to each hit, just beyond it, halfway, and without end.
-  // `turn` varies which values the contract is checked for.
+  // Compares first, any and all hits and the bounds at limits up to each hit, just beyond it, halfway, and without
+  // limit. `turn` varies which values the contract is checked for.
   std::string ray_difference(const typename Traits::RayQuery& ray, size_t turn) const {
     constexpr S kInfinity = std::numeric_limits<S>::infinity();
     Hits hits;
@@ -76,7 +76,7 @@ class IndexJudge {
     return overlap_difference(exact, conservative);
   }
 
-  // The nearest one and most: without end, up to one of them, and just below that.
+  // Compares the nearest one and several nearest: without limit, up to the distance of one of them, and just below it.
   std::string point_difference(const Vec3d& point) const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     std::vector<ValueAt<Value>> all;
@@ -104,7 +104,7 @@ class IndexJudge {
   }
 
  private:
-  // Keeps the ids it is given; wants boxes up to a fixed limit.
+  // Collects the ids that it is given; accepts boxes up to a fixed limit.
   template <class Limit>
   class Recorder {
    public:
@@ -189,7 +189,7 @@ class IndexJudge {
     return list_difference(sorted_ids(got), sorted_ids(expected));
   }
 
-  // Values are wanted whose own interval starts at the limit, and no later.
+  // Returns a violation: the index must pass the values whose interval starts at or before the limit, and no others.
   std::string broken_ray_contract(const typename Traits::RayQuery& ray, size_t turn) const {
     const auto values = oracle_.values();
     for (size_t i = 0; i < std::min<size_t>(values.size(), 4); ++i) {
@@ -223,7 +223,7 @@ class IndexJudge {
     return "";
   }
 
-  // Values are wanted whose bounds are as far as the limit, and no farther.
+  // Returns a violation: the index must pass the values whose bounds are at most `limit` away, and no others.
   std::string broken_point_contract(const Vec3d& point, double limit) const {
     Recorder<double> recorder(limit);
     Work work;
@@ -259,7 +259,8 @@ class IndexJudge {
   const ListIndex<Value>& oracle_;
 };
 
-// What differs first between `index` and the list of the same values over all queries of `scene`; empty when nothing.
+// Returns the first difference between `index` and the list of the same values over all queries of `scene`; empty if
+// there is none.
 template <SpatialIndex Index>
 std::string first_difference(const Index& index, const TestScene<typename Index::Value>& scene) {
   const auto oracle = make_list(scene.values);

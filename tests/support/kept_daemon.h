@@ -1,4 +1,4 @@
-// A real locusd with a data directory, that may be stopped, killed and started again, with stubs to call it.
+// A real locusd with a data directory that can be stopped, killed and started again, with stubs to call it.
 #ifndef LOCUS_TESTS_SUPPORT_KEPT_DAEMON_H_
 #define LOCUS_TESTS_SUPPORT_KEPT_DAEMON_H_
 
@@ -19,31 +19,31 @@ namespace locus::test {
 
 class KeptDaemon {
  public:
-  // `options` beside those for its address and its directory.
+  // Adds `options` to those for its address and its directory.
   explicit KeptDaemon(std::vector<std::string> options = {}) : options_(std::move(options)) {}
   ~KeptDaemon() {
     process_.reset();
     std::filesystem::remove_all(directory());
   }
 
-  // From the next start on.
+  // Takes effect at the next start.
   void set_options(std::vector<std::string> options) { options_ = std::move(options); }
 
   std::string directory() const { return folder_.file("data"); }
   std::string log() const { return text_of(folder_.file("log")); }
 
-  // Until it serves.
+  // Starts the daemon and waits until it serves.
   void start() {
     launch();
     port_ = DaemonProcess::wait_for_port(folder_.file("port"));
     stubs_ = std::make_unique<Stubs>("127.0.0.1:" + std::to_string(port_));
   }
-  // Of one that does not come so far.
+  // Starts a daemon that is expected to exit before it serves, and returns its exit code.
   int exit_code_of_start() {
     launch();
     return process_->wait();
   }
-  // Its exit code.
+  // Stops the daemon and returns its exit code.
   int stop() {
     process_->signal(SIGTERM);
     return process_->wait();
@@ -53,9 +53,9 @@ class KeptDaemon {
     process_->wait();
   }
   Stubs& stubs() { return *stubs_; }
-  int port() const { return port_; }  // of the latest start
+  int port() const { return port_; }  // port of the latest start
 
-  // `locusd check` or `repair`: its exit code; what it printed is in printed().
+  // Runs `locusd check` or `repair` and returns its exit code; printed() has its output.
   int maintain(const std::string& task) const {
     DaemonProcess process({task, directory()}, folder_.file("second"));
     return process.wait();
@@ -102,7 +102,7 @@ inline v1::Scene get_scene(Stubs& stubs, const std::string& name) {
   return response.scene();
 }
 
-// Everything in the scene, as text to compare: a piece after the other.
+// Returns everything in the scene as text to compare, chunk after chunk.
 inline std::string dump_of(Stubs& stubs, const std::string& name) {
   grpc::ClientContext context;
   set_timeout(context);
@@ -117,7 +117,7 @@ inline std::string dump_of(Stubs& stubs, const std::string& name) {
   return text;
 }
 
-// Where each point is.
+// Positions of points.
 struct PlacedPoint {
   double x, y, z;
   friend bool operator==(const PlacedPoint&, const PlacedPoint&) = default;

@@ -1,5 +1,5 @@
-// Rays for the kernels and their judge: every answer of an instruction set's kernels against all triangles one by one,
-// bit for bit. For the tests of the kernels and for those that plant bugs in them.
+// Rays for the kernels, and their verification: every answer of an instruction set's kernels is compared with a test of
+// all triangles, bit for bit. For the tests of the kernels and for tests of planted bugs in them.
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 
@@ -29,7 +29,7 @@ struct KernelQuestion {
   Cull cull = Cull::kNone;
 };
 
-// Of all hits, the lowest first.
+// Rows of all hits, the lowest first.
 using KernelAnswer = std::vector<KernelRow>;
 
 inline void sort_rows(absl::Span<KernelRow> rows) {
@@ -59,13 +59,13 @@ inline KernelRay kernel_ray(const KernelQuestion& question) {
           true};
 }
 
-// A mesh and questions to it with their answers; each that has a hit is asked again with a limit at, just behind and
+// A mesh, and queries on it with their answers; each query that has a hit is repeated with a limit at, just behind and
 // just before the nearest. Immutable.
 class KernelTrial {
  public:
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions)
       : KernelTrial(std::move(name), triangles, questions, *TriangleBvh::build(triangles)) {}
-  // Asks `tree`, which is of those triangles.
+  // Queries `tree`, which must be built from those triangles.
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions,
               TriangleBvh tree)
       : name_(std::move(name)), tree_(std::move(tree)) {
@@ -82,7 +82,7 @@ class KernelTrial {
     }
   }
 
-  // What is answered wrong first, empty for nothing: asked all at once, and one by one.
+  // Returns the first wrong answer, empty if there is none; asks all queries at once, and one by one.
   std::string difference(const RayKernels& kernels) const {
     std::vector<KernelHit> first(rays_.size()), any(rays_.size());
     kernels.first(tree_.tree(), rays_.data(), first.data(), rays_.size());
@@ -100,7 +100,8 @@ class KernelTrial {
     return "";
   }
 
-  // Of the questions, asked one by one. Kernels may leave hard ones undecided, but not many.
+  // Returns the share of undecided answers to the queries, asked one by one. Kernels may leave hard ones undecided, but
+  // few.
   double undecided_share(const RayKernels& kernels) const {
     size_t undecided = 0;
     for (const KernelRay& ray : rays_) {
@@ -115,7 +116,7 @@ class KernelTrial {
   }
 
  private:
-  // What is wrong with the answer to question `i`; empty for nothing.
+  // Returns the error in the answer to query `i`; empty if it is right.
   std::string wrong_verdict(const KernelHit& hit, size_t i) const {
     if (hit.verdict == KernelVerdict::kUndecided) return "";
     if ((hit.verdict == KernelVerdict::kHit) == !answers_[i].empty()) return "";
@@ -133,7 +134,7 @@ class KernelTrial {
     return hit.number == expected.number ? "" : absl::StrCat("first: ", hit.number, " is hit, not ", expected.number);
   }
 
-  // The same of all hits, up to `most` a question.
+  // Likewise for all hits, up to `most` per query.
   std::string difference_of_all(const RayKernels& kernels, uint32_t most) const {
     std::vector<KernelHit> hits(rays_.size());
     std::vector<KernelRow> rows(rays_.size() * most), rows_alone(most);
@@ -162,7 +163,7 @@ class KernelTrial {
     return "";
   }
 
-  // `answer`: with the question's own limit or without.
+  // Adds a query. `answer` is computed with the query's own limit or without.
   void add(const KernelQuestion& question, KernelAnswer answer) {
     while (!answer.empty() && answer.back().t > question.limit) answer.pop_back();
     rays_.push_back(kernel_ray(question));

@@ -1,4 +1,4 @@
-// The families of rays that kernels are tried with: each is known to bring out one kind of mistake. Made from seeds.
+// Families of rays for testing kernels: each is known to reveal one kind of mistake. Made from seeds.
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
 
@@ -30,7 +30,7 @@ inline Vec3d place_within(const Triangle& triangle, Random& random) {
 
 }  // namespace internal
 
-// Half of them short, a third of them culling.
+// Draws queries: half of them short, a third of them culling.
 inline std::vector<KernelQuestion> random_questions(const std::vector<Triangle>& mesh, size_t count, uint64_t seed) {
   Random random(seed);
   const Aabbf bounds = internal::bounds_of_all(mesh);
@@ -63,7 +63,7 @@ inline std::vector<KernelTrial> ordinary_trials() {
   return trials;
 }
 
-// Here float knows little, and double decides.
+// Makes trials far from the origin, where float rounding is coarse and double decides.
 inline std::vector<KernelTrial> far_trials() {
   std::vector<KernelTrial> trials;
   for (const float distance : {1e3f, 1e5f, 1e7f})
@@ -74,8 +74,8 @@ inline std::vector<KernelTrial> far_trials() {
   return trials;
 }
 
-// Runs of rays that go nearly the same way, as cameras and sensors ask: from one place, at places close together, or
-// side by side along an axis. Limits and culls differ within a run.
+// Makes runs of rays in nearly equal directions, as cameras and sensors send them: from one position, from positions
+// close together, or side by side along an axis. Limits and culls differ within a run.
 inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mesh, uint64_t seed) {
   Random random(seed);
   const Aabbf bounds = internal::bounds_of_all(mesh);
@@ -101,8 +101,8 @@ inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mes
   return KernelTrial(std::move(name), mesh, questions);
 }
 
-// Runs of rays that go together along a triangle that they see nearly edge-on, which is left undecided, while others of
-// its block are hit.
+// Makes runs of rays that pass together along a triangle that they see nearly edge-on, which stays undecided, while
+// they hit others of its block.
 inline KernelTrial edge_on_beam_trial() {
   Random random(15);
   const std::vector<Triangle> city = box_city(6, 1);
@@ -135,7 +135,7 @@ inline std::vector<KernelTrial> beam_trials() {
   return trials;
 }
 
-// Along axes and diagonals from corners, edges and walls, where many triangles are edge-on or equally near.
+// Makes rays along axes and diagonals from corners, edges and walls, where many triangles are edge-on or equally near.
 inline KernelTrial lattice_trial() {
   Random random(4);
   std::vector<KernelQuestion> questions;
@@ -150,7 +150,8 @@ inline KernelTrial lattice_trial() {
   return KernelTrial("lattice", box_city(5, 1), questions);
 }
 
-// Only double can tell the components apart. From just off the surface, the axis chosen to project along shows in t.
+// Makes rays whose components differ in double only. From just off the surface, the axis chosen for projection shows in
+// t.
 inline KernelTrial near_diagonal_trial() {
   const std::vector<Triangle> sphere = bumpy_sphere(14, 0.1, 1);
   Random random(9);
@@ -191,7 +192,7 @@ inline KernelTrial surface_trial() {
   return KernelTrial("from the surface", sphere, questions);
 }
 
-// A tenth of the triangles has no area, a fifth of the rays lies in a triangle's plane.
+// Makes a mesh of which a tenth of the triangles has no area, and rays of which a fifth lies in a triangle's plane.
 inline KernelTrial sliver_trial() {
   Random random(7);
   std::vector<Triangle> slivers;
@@ -211,7 +212,7 @@ inline KernelTrial sliver_trial() {
   return KernelTrial("slivers", slivers, questions);
 }
 
-// Everything five times: of equal hits the lowest number wins.
+// Makes each triangle five times: of equal hits the lowest number wins.
 inline KernelTrial copies_trial() {
   std::vector<Triangle> copies;
   for (int copy = 0; copy < 5; ++copy)

@@ -1,7 +1,7 @@
-// A network that loses answers: a port that passes connections on to a gRPC server and cuts them where a test wants it,
-// after the server has done its work and before whoever asked hears of it.
+// A network that loses replies: a port that forwards connections to a gRPC server and cuts them on request, after the
+// server has done its work and before the client receives the reply.
 //
-// Threads: every member from any thread. Source of the frames: RFC 9113, HTTP/2, section 4.1.
+// Threads: every member from any thread. Source of the frame format: RFC 9113, HTTP/2, section 4.1.
 #ifndef LOCUS_TESTS_SUPPORT_LOSSY_RELAY_H_
 #define LOCUS_TESTS_SUPPORT_LOSSY_RELAY_H_
 
@@ -43,11 +43,11 @@ class LossyRelay {
   LossyRelay& operator=(const LossyRelay&) = delete;
 
   int port() const { return port_; }
-  // Where new connections go from now on.
+  // Sets the port to which new connections are forwarded from now on.
   void set_server(int port) { server_port_ = port; }
-  // Of the answers' frames from now on, each so-manieth is lost and its connection with it; 0 loses none.
+  // Makes every `frames`-th frame of the replies get lost, and its connection with it; 0 loses none.
   void lose_every(uint64_t frames) { lose_every_ = frames; }
-  // The next one alone.
+  // Makes only the next frame get lost.
   void lose_one() { lose_one_ = true; }
   uint64_t lost() const { return lost_; }
 
@@ -82,7 +82,7 @@ class LossyRelay {
   }
 
   void pump(int client, int server) {
-    std::string answers;  // the part of a frame that is here
+    std::string answers;  // received part of an incomplete frame
     char bytes[65536];
     while (!ended_) {
       pollfd both[] = {{client, POLLIN, 0}, {server, POLLIN, 0}};
@@ -100,7 +100,7 @@ class LossyRelay {
     }
   }
 
-  // False where one of them is lost.
+  // Forwards complete frames; returns false if one of them is to be lost.
   bool pass_frames(std::string& answers, int client) {
     while (answers.size() >= kFrameHead) {
       const auto byte = [&answers](size_t at) { return static_cast<uint8_t>(answers[at]); };
@@ -135,7 +135,7 @@ class LossyRelay {
   std::atomic<bool> lose_one_ = false, ended_ = false;
   int listener_ = -1;
   int port_ = 0;
-  std::vector<std::thread> connections_;  // of the acceptor, until it has ended
+  std::vector<std::thread> connections_;  // used by the acceptor until it has ended
   std::thread acceptor_;
 };
 

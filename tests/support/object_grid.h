@@ -1,5 +1,5 @@
-// Objects in a hash grid that can be written to and asked at once, like the other structures: for the tests that
-// compare structures. Every question goes to a set as readers get it.
+// Objects in a hash grid with the interface of the other indexes, for tests that compare indexes. Every query goes to
+// an ObjectSet, as readers get it.
 #ifndef LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
 #define LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
 
@@ -14,7 +14,7 @@ class ObjectGrid {
   ObjectGrid() : ObjectGrid(HashGridOptions()) {}
   explicit ObjectGrid(const HashGridOptions& options) : store_(options), set_(store_.snapshot()) {}
 
-  // Returns as ObjectStore::apply().
+  // Returns the result of ObjectStore::apply().
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
     const size_t replaced = store_.apply(removed, inserted);
     set_ = store_.snapshot();

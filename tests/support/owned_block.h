@@ -1,4 +1,4 @@
-// A block of queries that owns its columns, and what differs between two results. For tests of queries.
+// A block of queries that owns its columns, and comparison of two results. For tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_OWNED_BLOCK_H_
 #define LOCUS_TESTS_SUPPORT_OWNED_BLOCK_H_
 
@@ -12,7 +12,7 @@
 
 namespace locus::test {
 
-// `settings` holds everything but columns; its kind says which of the columns below are meant.
+// `settings` holds everything but columns; its kind determines which of the columns below are used.
 struct OwnedBlock {
   QueryBlock settings;
   std::vector<float> points;  // origins, centres or points
@@ -26,7 +26,7 @@ struct OwnedBlock {
   std::vector<uint64_t> as_of_ticks;
   std::vector<float> as_of_fractions;
 
-  // Borrows from this.
+  // Returns a block that borrows from this one.
   QueryBlock view() const {
     QueryBlock block = settings;
     block.masks = masks;
@@ -38,7 +38,7 @@ struct OwnedBlock {
     return block;
   }
 
-  // Queries begin to end (exclusive) alone. Columns with one entry for all stay as they are.
+  // Returns the queries begin to end (exclusive). Columns with one entry for all queries stay as they are.
   OwnedBlock part(size_t begin, size_t end) const {
     const size_t n = query_count(view());
     const auto width_of_sizes = std::holds_alternative<BallColumns>(settings.kind) ? size_t{1} : size_t{3};
@@ -87,7 +87,7 @@ struct OwnedBlock {
   }
 };
 
-// Borrows from `blocks`, which must therefore outlive it: a list that is not kept is refused.
+// Borrows from `blocks`, which must therefore outlive it: a temporary list is refused.
 QueryBatch batch_of(std::vector<OwnedBlock>&& blocks) = delete;
 inline QueryBatch batch_of(const std::vector<OwnedBlock>& blocks) {
   QueryBatch batch;
@@ -95,7 +95,7 @@ inline QueryBatch batch_of(const std::vector<OwnedBlock>& blocks) {
   return batch;
 }
 
-// `block` must be right.
+// Runs a block, which must be valid.
 inline BlockResult run_block(const SceneSnapshot& snapshot, const OwnedBlock& block, const RunOptions& options = {}) {
   QueryBatch batch;
   batch.blocks = {block.view()};
@@ -119,7 +119,8 @@ std::string column_difference(const char* name, const Column& got, const Column&
 }
 }  // namespace internal
 
-// The first column, and the first number in it, that differ in any bit; empty when none does. Work apart.
+// Returns the first column and the first index at which two results differ in any bit; empty if they are equal. Ignores
+// work.
 inline std::string difference(const BlockResult& got, const BlockResult& expected) {
   using internal::column_difference;
   for (std::string what :

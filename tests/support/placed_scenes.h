@@ -1,5 +1,5 @@
-// Random scenes in which the placing of meshes is what troubles: far from the world's origin, far from their own, or
-// turned into planes of the world. Queries are of all kinds that bounds of placed triangles can decide.
+// Random scenes in which the placement of meshes is the difficulty: far from the world's origin, far from their own, or
+// rotated into planes of the world. Queries are of all kinds that bounds of placed triangles can decide.
 #ifndef LOCUS_TESTS_SUPPORT_PLACED_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_PLACED_SCENES_H_
 
@@ -63,7 +63,7 @@ inline OwnedBlock far_block(const PlacedMesh& placed, QueryKind kind, Random& ra
 
 }  // namespace internal
 
-// Draws small meshes near to and far from the world's origin, turned and scaled, and queries around them without
+// Draws small meshes near to and far from the world's origin, rotated and scaled, and queries around them without
 // filters and limits. No objects.
 inline QueryScene far_scene(Random& random) {
   constexpr double kDistances[] = {0, 1e3, 1e6, 1e6, 9e8};
@@ -81,8 +81,8 @@ inline QueryScene far_scene(Random& random) {
   return scene;
 }
 
-// Draws a random scene and, in the same place, a mesh with vertices a million units from its own origin, brought back
-// by the translation: queries are rounded to the mesh's floats there, which the placed triangles know nothing of.
+// Draws a random scene and, at the same position, a mesh with vertices a million units from its own origin, moved back
+// by the translation. Queries are rounded there to the mesh's floats; placed triangles are not.
 inline QueryScene brought_back_scene(Random& random) {
   SceneSketch sketch = random_scene(random);
   for (int i = 0; i < 40; ++i) sketch.balls.push_back({random.vector(5), random.between(0, 1)});
@@ -106,7 +106,7 @@ inline QueryScene turned_floor_scene(Random& random) {
   floor.id = 1;
   floor.rotation = random.rotation();
   const Transform transform = make_transform({}, floor.rotation, 1);
-  std::vector<Triangle> triangles;  // level in the world, up to rounding
+  std::vector<Triangle> triangles;  // level in world axes, up to rounding
   const auto vertex = [&] {
     return to_float(transform.point_to_mesh({double(random.whole(-4, 4)), double(random.whole(-4, 4)), 1}));
   };
@@ -123,8 +123,8 @@ inline QueryScene turned_floor_scene(Random& random) {
   return scene;
 }
 
-// Draws balls and boxes that touch a wall of the world, or do not, by less than float tells: what is rounded to mesh
-// axes touches in other cases than what is placed in the world.
+// Draws balls and boxes whose distance from a wall of the world is zero or less than the resolution of float. Rounding
+// to mesh axes makes other ones touch than placing the wall in the world.
 inline QueryScene touching_scene(Random& random) {
   QueryScene scene;
   scene.world.name = "touching";
@@ -150,15 +150,15 @@ inline QueryScene touching_scene(Random& random) {
   return scene;
 }
 
-// Draws rays that graze triangles at the corner where they enter their bounds: the t of an exact hit is less certain
-// there than the bounds are.
+// Draws rays that graze triangles at the corner where they enter the triangles' bounds: there the t of an exact hit is
+// less certain than the bounds.
 inline QueryScene grazing_scene(Random& random) {
   QueryScene scene;
   scene.world.name = "grazing";
   PlacedMesh placed;
   placed.id = 1;
   placed.rotation = random.rotation();
-  placed.translation = random.vector(1000);  // brings back what lies far from the mesh's own origin
+  placed.translation = random.vector(1000);  // moves the mesh back that lies far from its own origin
   const Transform transform = make_transform(placed.translation, placed.rotation, 1);
   std::vector<Triangle> triangles;
   for (int i = 0; i < 20; ++i) {

@@ -1,4 +1,4 @@
-// Vectors in the compiler's 113 bits, for references that long double is too coarse for. Slow.
+// Vectors in the compiler's 113-bit floating point, for references that need more than long double. Slow.
 #ifndef LOCUS_TESTS_SUPPORT_QUAD_H_
 #define LOCUS_TESTS_SUPPORT_QUAD_H_
 
@@ -17,10 +17,10 @@ Vec3q to_quad(Vec3<S> v) {
   return {v.x, v.y, v.z};
 }
 
-// The root as precise as long double.
+// Returns the length. Its root is as precise as long double.
 inline Quad length(Vec3q v) { return std::sqrt(static_cast<long double>(dot(v, v))); }
 
-// A place or, without the translation, a direction in mesh axes, from what is stored.
+// Returns a position or, without the translation, a direction in mesh axes, computed from the stored values.
 inline Vec3q turned_to_mesh(const Transform& transform, Vec3q v) {
   const Quaternion& q = transform.quaternion;
   const Quad x = q.x, y = q.y, z = q.z, w = q.w;
@@ -29,7 +29,7 @@ inline Vec3q turned_to_mesh(const Transform& transform, Vec3q v) {
   return (v + (c * w + cross(u, c)) * (2 / (x * x + y * y + z * z + w * w))) * (1 / Quad{transform.scale});
 }
 
-// Where a line meets the plane of a triangle, and how far inside the edges that is: negative outside.
+// Point where a line meets the plane of a triangle, and its distance from the nearest edge: negative outside.
 struct QuadMeeting {
   Quad slope;  // direction . unit normal
   Quad t, inset;
@@ -41,7 +41,7 @@ class QuadTriangle {
       : corners_{to_quad(triangle.a), to_quad(triangle.b), to_quad(triangle.c)},
         normal_(cross(corners_[1] - corners_[0], corners_[2] - corners_[0])) {}
 
-  // Not for one that is exactly edge-on or has no area.
+  // Requires a triangle that is not exactly edge-on and has area.
   QuadMeeting meet(Vec3q origin, Vec3q direction) const {
     const Quad speed = dot(normal_, direction);
     QuadMeeting meeting{speed / length(normal_), dot(normal_, corners_[0] - origin) / speed, 0};

@@ -1,5 +1,5 @@
-// Answers blocks of queries the slow and plain way: every object and every triangle, by the geometry's predicates, into
-// one list that is sorted and cut. Shares with core/query the definition of placed bounds and nothing else.
+// Answers blocks of queries in the slow and simple way: tests every object and every triangle by the geometry's
+// predicates, collects one list, sorts it and cuts it. Shares with core/query only the definition of placed bounds.
 #ifndef LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
 #define LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
 
@@ -28,12 +28,12 @@ class QueryOracle {
     }
     snapshot.objects.for_each([this](const Object& object) { objects_.push_back(object); });
   }
-  // With objects of another time.
+  // Replaces the snapshot's objects by those of another time.
   QueryOracle(const SceneSnapshot& snapshot, std::vector<Object> objects) : QueryOracle(snapshot) {
     objects_ = std::move(objects);
   }
 
-  // Knows no limit of the reply's size.
+  // Answers a block without a limit on the size of the reply.
   BlockResult answer(const QueryBlock& block) const {
     BlockResult result;
     std::visit([&](const auto& kind) { answer_kind(block, kind, result); }, block.kind);
@@ -51,11 +51,11 @@ class QueryOracle {
     const Object* object = nullptr;
     const Instance* instance = nullptr;
     float u = 0, v = 0;
-    Vec3d normal;  // of what is nearest: the way there
+    Vec3d normal;  // direction to the nearest point, of nearest queries
   };
   using Rows = std::vector<Row>;
 
-  struct Question {  // of rays
+  struct Question {  // a ray query
     Vec3d origin, direction;
     float t_max;
     Cull cull;
@@ -120,7 +120,7 @@ class QueryOracle {
     }
   }
 
-  // Returns infinity where the ray misses them.
+  // Returns infinity if the ray misses the bounds.
   static float entry_of_bounds(const Instance& instance, const Triangle& triangle, const Question& question) {
     const SlabRay<double> slabs(Rayd{question.origin, question.direction}, kObjectPad);
     return entry_of(slabs, PlacedTriangles(instance).bounds_of_triangle(triangle)).value_or(kInfinity);
@@ -289,7 +289,7 @@ class QueryOracle {
     }
   }
 
-  // The distance of an instance's triangle, squared, and the way to its nearest point.
+  // Returns the squared distance of an instance's triangle, and the direction to its nearest point.
   static std::pair<double, Vec3d> way_to(Vec3d point, const Instance& instance, const Triangle& triangle,
                                          bool conservative) {
     const Aabbd bounds = PlacedTriangles(instance).bounds_of_triangle(triangle);

@@ -1,5 +1,5 @@
-// What a scene holds, as plain values, and the way from there to a snapshot: in a given or a shuffled order, after
-// unrelated history or none. For tests of queries.
+// Content of a scene as plain values, and functions that make a snapshot of it: with inserts in a given or a shuffled
+// order, after unrelated history or none. For tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_QUERY_WORLD_H_
 #define LOCUS_TESTS_SUPPORT_QUERY_WORLD_H_
 
@@ -34,7 +34,7 @@ struct QueryWorld {
   std::vector<Object> objects;
 };
 
-// Numbers are positions in the vector.
+// Makes a mesh whose triangle numbers are positions in the vector.
 inline StaticMeshPtr mesh_of(const std::vector<Triangle>& triangles) {
   std::vector<float> vertices;
   std::vector<uint32_t> indices;
@@ -91,7 +91,7 @@ inline void insert(Scene& scene, const std::vector<Object>& objects) {
   apply_whole(scene, batch);
 }
 
-// Objects and instances come, move and go; none of the world's own is left where it belongs before the world is made.
+// Inserts, moves and removes objects and instances. None of the world's own content is at its position afterwards.
 inline void live_through_history(Scene& scene, const QueryWorld& world, Random& random) {
   std::vector<Object> strangers = world.objects;
   for (Object& object : strangers) {
@@ -122,7 +122,7 @@ inline void live_through_history(Scene& scene, const QueryWorld& world, Random& 
 
 }  // namespace internal
 
-// Borrows nothing of `world`.
+// Makes a snapshot, which borrows nothing of `world`.
 inline SnapshotPtr snapshot_of(const QueryWorld& world) {
   Scene scene("world", {{}, world.winding}, 1, StaticSet::empty());
   if (!world.instances.empty()) internal::place(scene, world.instances);
@@ -130,7 +130,7 @@ inline SnapshotPtr snapshot_of(const QueryWorld& world) {
   return scene.latest();
 }
 
-// The same world: other orders of insertion, several batches, and a past.
+// Makes a snapshot of the same world in another way: other orders of insertion, several batches, and a past.
 inline SnapshotPtr snapshot_after_history(QueryWorld world, Random& random) {
   Scene scene("world", {{}, world.winding}, 1, StaticSet::empty());
   internal::live_through_history(scene, world, random);

@@ -1,5 +1,5 @@
 // Random worlds of instances and objects, and random batches of queries about them, made from the sketches of
-// adversarial_scenes.h and grid_scenes.h: what troubles a structure alone troubles all of them together.
+// adversarial_scenes.h and grid_scenes.h, so that difficult scenes of one index are tested with all indexes together.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 
@@ -27,7 +27,7 @@ inline Layers random_layers(Random& random) {
   return random.pick(kLayers);
 }
 
-// Near the sketch: where its vertices lie, turned and scaled, possibly far from the mesh's own origin.
+// Draws a placement near the sketch's vertices, rotated and scaled, possibly far from the mesh's own origin.
 inline PlacedMesh random_placement(Vec3d near, Random& random) {
   PlacedMesh placed;
   if (random.chance(0.4)) return placed;
@@ -38,8 +38,8 @@ inline PlacedMesh random_placement(Vec3d near, Random& random) {
   return placed;
 }
 
-// `triangles` in mesh axes, so that they stand where they were, unless
-// that is outside what a mesh may hold.
+// Returns `triangles` in mesh axes, so that the placement puts them back, unless their coordinates exceed those allowed
+// in a mesh.
 inline std::vector<Triangle> in_mesh_axes(const std::vector<Triangle>& triangles, const PlacedMesh& placed) {
   const Transform transform = make_transform(placed.translation, placed.rotation, placed.scale);
   constexpr Vec3d kEdge = {limits::kMaxCoordinate, limits::kMaxCoordinate, limits::kMaxCoordinate};
@@ -79,7 +79,7 @@ inline void add_objects(const SceneSketch& sketch, Random& random, QueryWorld& w
   world.objects = make_scene<Object>(part, random).values;
 }
 
-// One shuffled run of ids over both, some with bit 63.
+// Assigns ids of one shuffled range to instances and objects, some with bit 63 set.
 inline void label(Random& random, QueryWorld& world) {
   const std::vector<uint32_t> ids = shuffled_ids(world.instances.size() + world.objects.size(), random);
   size_t next = 0;
@@ -96,7 +96,7 @@ inline void label(Random& random, QueryWorld& world) {
 
 inline void append(std::vector<float>& column, Vec3f v) { column.insert(column.end(), {v.x, v.y, v.z}); }
 
-// Offsets from the frame, kept inside the world.
+// Appends the offset from the frame, kept inside the world.
 inline void append_point(OwnedBlock& block, Vec3d world) {
   Vec3d clamped = world;
   for (int axis = 0; axis < 3; ++axis)
@@ -259,7 +259,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
 
 inline SceneSketch random_sketch(uint64_t, Random& random) { return random_scene(random); }
 
-// Families made against trees and against grids take turns.
+// Draws from the families made against trees and against grids alternately.
 inline SceneSketch troublesome_sketch(uint64_t seed, Random& random) {
   return seed % 3 == 0 ? grid_scene(seed / 3, random) : adversarial_scene(seed, random);
 }

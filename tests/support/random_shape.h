@@ -15,7 +15,7 @@ inline ObjectRay ray_from(Vec3d origin, Vec3d direction, Inside inside = Inside:
   return ObjectRay(ray, inside);
 }
 
-// Any size from a centimetre to ten kilometres in one shape, thin and flat ones included.
+// Draws a shape of any size from a centimetre to ten kilometres, thin and flat ones included.
 inline Shape random_shape(Random& random, ShapeKind kind, double position_size) {
   Shape shape;
   shape.kind = kind;
@@ -30,7 +30,8 @@ inline Shape random_shape(Random& random, ShapeKind kind, double position_size) 
   return shape;
 }
 
-// Unturned, every number whole and at most `reach`. One coordinate of a capsule's half axis is kept.
+// Draws an unrotated shape. Its position is whole and at most `reach` on each axis; its size and radius are small whole
+// numbers.
 inline Shape lattice_shape(Random& random, ShapeKind kind, int reach) {
   Shape shape;
   shape.kind = kind;
@@ -40,8 +41,8 @@ inline Shape lattice_shape(Random& random, ShapeKind kind, int reach) {
   return shape;
 }
 
-// Tangent to the ball of the shape's radius, which becomes 5, around its centre: a 3-4-5 point of the surface and a
-// whole direction at right angles.
+// Draws a tangent to the ball of the shape's radius, which is set to 5, around its centre: it has a 3-4-5 point of the
+// surface and a whole direction at right angles to it.
 inline Rayd tangent_ray(Random& random, Shape& shape) {
   shape.radius = 5;
   const int x = random.whole(0, 2), y = (x + random.whole(1, 2)) % 3, z = 3 - x - y;
@@ -56,7 +57,7 @@ inline Rayd tangent_ray(Random& random, Shape& shape) {
   return {shape.position + surface - direction * static_cast<double>(random.whole(0, 4)), direction};
 }
 
-// Aimed at or just beside the shape, from near or far.
+// Draws a ray aimed at or just beside the shape, from near or far.
 inline Rayd random_ray(Random& random, const Shape& shape, double size) {
   const double away = size * random.magnitude(-2, 6);
   const Vec3d origin = shape.position + random.unit_vector() * away;

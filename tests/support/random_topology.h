@@ -1,5 +1,5 @@
-// Outlines of trees that no builder makes, of given many triangles: any triangles share a block, any blocks a node.
-// What a data directory could hold that is wrong and fits all the same.
+// Topologies of trees that no builder makes, for a given number of triangles: any triangles share a block, any blocks a
+// node. A data directory could hold such a topology, which is unusual but fits the mesh.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_TOPOLOGY_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_TOPOLOGY_H_
 
@@ -14,7 +14,7 @@ namespace locus::test {
 
 class RandomOutline {
  public:
-  // At least one triangle.
+  // `triangles` is at least one.
   RandomOutline(uint32_t triangles, Random& random) : numbers_(triangles) {
     std::iota(numbers_.begin(), numbers_.end(), 0);
     random.shuffle(numbers_);
@@ -29,8 +29,8 @@ class RandomOutline {
   const TreeTopology& topology() const { return outline_; }
 
  private:
-  // A node with so many blocks below it, and all that is below it. Half of them at most go to one child, so that the
-  // tree stays shallow.
+  // Adds a node with `blocks` blocks in its subtree, and that subtree. At most half of them go to one child, so that
+  // the tree stays shallow.
   void add_node(uint32_t blocks, Random& random) {
     const uint32_t most = std::min<uint32_t>(blocks, kTreeWidth);
     const uint32_t children = blocks == 1 ? 1 : 2 + static_cast<uint32_t>(random.below(most - 1));
@@ -47,7 +47,7 @@ class RandomOutline {
     outline_.nodes.emplace_back();
     std::vector<uint32_t> below;
     for (uint32_t slot = 0; slot < children; ++slot) {
-      // A node of a single block is legal, too.
+      // A node of a single block is valid, too.
       const bool is_block = shares[slot] == 1 && (blocks == 1 || random.chance(0.9));
       NodeOutline& node = outline_.nodes[number];
       uint8_t& kind = is_block ? node.blocks : node.nodes;

@@ -1,4 +1,4 @@
-// A call with bytes instead of messages: for sending what no client of ours would send.
+// A call with bytes instead of messages: for requests that none of the project's clients would send.
 #ifndef LOCUS_TESTS_SUPPORT_RAW_CALL_H_
 #define LOCUS_TESTS_SUPPORT_RAW_CALL_H_
 
@@ -17,7 +17,7 @@ struct RawReply {
   std::string bytes;
 };
 
-// Sends one message and no more to `method`, also to those that take streams, and reads at most one.
+// Sends exactly one message to `method`, which may be a streaming method, and reads at most one.
 inline RawReply raw_call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
                          const std::string& bytes, std::chrono::milliseconds timeout = kCallTimeout) {
   grpc::ClientContext context;

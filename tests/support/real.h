@@ -17,7 +17,7 @@ constexpr Vec3r to_real(Vec3<S> v) {
 
 inline Real length(Vec3r v) { return std::sqrt(dot(v, v)); }
 
-// v turned by q / |q|: v + 2 w (u x v) + 2 u x (u x v).
+// Returns v rotated by q / |q|: v + 2 w (u x v) + 2 u x (u x v).
 inline Vec3r turned(const Quaternion& q, Vec3r v) {
   const Real n2 = Real{q.x} * q.x + Real{q.y} * q.y + Real{q.z} * q.z + Real{q.w} * q.w;
   const Vec3r u = {q.x, q.y, q.z};

@@ -1,6 +1,6 @@
-// A scene with a log beside a model without one, put through everything that may befall it: random batches alone,
-// joined and in groups, static changes, snapshots, a disk that is full, and crashes, after which it is made again from
-// its log. The model is a scene that applied exactly what the log has, one call after another.
+// A scene with a log beside a model without one, put through every event that can happen to a scene: random batches
+// alone, joined and in groups, static changes, snapshots, a full disk, and crashes, after which it is restored from its
+// log. The model is a scene that applied exactly the logged changes, one call after another.
 #ifndef LOCUS_TESTS_SUPPORT_RECOVERY_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_RECOVERY_LOCKSTEP_H_
 
@@ -33,7 +33,7 @@ class RecoveryLockstep {
     model_ = new_model();
   }
 
-  // What differs first; empty for nothing.
+  // Returns the first difference; empty if there is none.
   std::string run(int steps) {
     for (int step = 0; step < steps; ++step) {
       std::string what = take_step();
@@ -51,7 +51,7 @@ class RecoveryLockstep {
   static constexpr uint64_t kIds = 60;
   static constexpr uint64_t kEpoch = 5;
 
-  // What one record says.
+  // Content of one record.
   struct Change {
     Id removed = kNoId;
     std::optional<Id> placed;  // kNoId: the scene chooses
@@ -59,7 +59,7 @@ class RecoveryLockstep {
     Vec3d translation;
   };
   struct Deed {
-    std::vector<UpdateBatch> batches;  // one, unless joined
+    std::vector<UpdateBatch> batches;  // one, unless several were joined
     bool joined = false;
     std::optional<Change> change;
   };
@@ -93,8 +93,8 @@ class RecoveryLockstep {
     return apply_one();
   }
 
-  // After a call of the scene: the log has `deeds`, or had no room for them, or was not asked. Whether to go on with
-  // the model.
+  // Processes the result of a call of the scene: the log has `deeds`, or had no space for them, or was not called.
+  // Returns whether to apply them to the model too.
   bool logged(const absl::Status& status, std::vector<Deed> deeds, uint64_t before, std::string& what) {
     const uint64_t records = scene_->log_position().sequence - before;
     if (absl::IsResourceExhausted(status)) {
@@ -104,7 +104,7 @@ class RecoveryLockstep {
     }
     if (records > deeds.size()) what = "more records than deeds";
     if (records > 0) tentative_.clear();
-    // What is not logged comes first.
+    // Calls that were not logged come first.
     deeds.erase(deeds.begin(), deeds.end() - static_cast<std::ptrdiff_t>(std::min<uint64_t>(records, deeds.size())));
     for (Deed& deed : deeds) deeds_.push_back(std::move(deed));
     return what.empty();
@@ -225,7 +225,7 @@ class RecoveryLockstep {
     snapshot_.reset();
   }
 
-  // The machine stops and starts: what was acknowledged is there, if that was promised.
+  // Crashes and restores the scene: acknowledged changes must be there if the ack level guaranteed that.
   std::string crash() {
     ++crashes_;
     snapshot_.reset();
@@ -269,8 +269,8 @@ class RecoveryLockstep {
   std::unique_ptr<MemoryLog> log_;
   ScenePtr scene_;
   std::unique_ptr<Scene> model_;
-  std::vector<Deed> deeds_;      // one a record
-  std::vector<Deed> tentative_;  // of the last append, if it failed
+  std::vector<Deed> deeds_;      // one for each record
+  std::vector<Deed> tentative_;  // those of the last append, if it failed
   std::optional<StateWriter> snapshot_;
   uint64_t frozen_sequence_ = 0;
   uint64_t frozen_bytes_ = 0;

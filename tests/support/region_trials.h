@@ -1,5 +1,5 @@
-// Families of balls and boxes that the region kernels are tried with: each is known to bring out one kind of mistake.
-// Made from seeds. For the tests that plant bugs in the kernels.
+// Families of balls and boxes for testing the region kernels: each is known to reveal one kind of mistake. Made from
+// seeds. For the tests of planted bugs in the kernels.
 #ifndef LOCUS_TESTS_SUPPORT_REGION_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_REGION_TRIALS_H_
 
@@ -15,7 +15,7 @@
 
 namespace locus::test {
 
-// A mesh, and balls and boxes with the numbers of all triangles that the predicates find in them. Immutable.
+// A mesh, and balls and boxes with the numbers of all triangles that overlap them by the predicates. Immutable.
 class RegionTrial {
  public:
   RegionTrial(std::string name, const std::vector<Triangle>& triangles, std::vector<Ballf> balls,
@@ -29,7 +29,7 @@ class RegionTrial {
       answers_.push_back(answer([&](const Triangle& triangle) { return box_overlaps(box, triangle); }));
   }
 
-  // What is answered wrong first, empty for nothing.
+  // Returns the first wrong answer, empty if there is none.
   std::string difference(const RegionKernels& kernels) const {
     for (size_t i = 0; i < balls_.size(); ++i)
       if (found(kernels.ball, balls_[i]) != answers_[i]) return absl::StrCat(name_, ", ball ", i);
@@ -68,7 +68,7 @@ class RegionTrial {
   std::vector<std::vector<uint32_t>> answers_;  // to the balls, then to the boxes
 };
 
-// Every kind of region, `count` of each, to a tree of that mesh.
+// Makes `count` regions of every kind, for a tree of that mesh.
 inline RegionTrial random_region_trial(std::string name, const std::vector<Triangle>& mesh, TriangleBvh tree,
                                        size_t count, uint64_t seed) {
   RandomRegions regions(mesh, seed);
@@ -94,7 +94,7 @@ inline std::vector<RegionTrial> ordinary_region_trials() {
   return trials;
 }
 
-// Small and large triangles side by side, whose bounds differ by much within a block.
+// Makes small and large triangles side by side, so that the bounds in a block differ greatly.
 inline RegionTrial mixed_region_trial() {
   Random random(10);
   std::vector<Triangle> mixed;
@@ -107,7 +107,7 @@ inline RegionTrial mixed_region_trial() {
   return random_region_trial("triangles of many sizes", mixed, scaled_count(4'000), 11);
 }
 
-// Squares, and products of more lengths, underflow at one scale after the other.
+// Makes trials at decreasing scales, at which squares and products of more lengths underflow one after the other.
 inline std::vector<RegionTrial> small_region_trials() {
   std::vector<RegionTrial> trials;
   const std::vector<Triangle> sphere = bumpy_sphere(4, 0.1, 1);
@@ -118,7 +118,7 @@ inline std::vector<RegionTrial> small_region_trials() {
   return trials;
 }
 
-// Single points, whose boxes are no larger than they are: only the pads of nodes keep them in reach.
+// Makes single points, whose boxes have no extent: only the padding of nodes lets regions reach them.
 inline std::vector<RegionTrial> point_region_trials() {
   Random random(20);
   std::vector<RegionTrial> trials;
@@ -139,8 +139,8 @@ inline std::vector<RegionTrial> point_region_trials() {
   return trials;
 }
 
-// Slivers that an edge of a box touches in the middle, one of whose own edges is so short that products with it
-// underflow. Whole numbers of a small unit, so that all of it is exact.
+// Makes slivers that an edge of a box touches in the middle, with an edge so short that products with it underflow. All
+// coordinates are whole multiples of a small unit, so that the computation is exact.
 inline std::vector<RegionTrial> short_edge_region_trials() {
   Random random(21);
   std::vector<RegionTrial> trials;
@@ -156,7 +156,7 @@ inline std::vector<RegionTrial> short_edge_region_trials() {
   return trials;
 }
 
-// Balls that touch narrow triangles, whose foot is near an edge while the two other edges are near as well.
+// Makes balls that touch narrow triangles at a point near one edge, while the two other edges are near as well.
 inline std::vector<RegionTrial> narrow_region_trials() {
   Random random(12);
   std::vector<RegionTrial> trials;

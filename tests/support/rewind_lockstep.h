@@ -1,8 +1,8 @@
-// Lets objects of a scene with history be born, move, jump, change and die at random, and compares questions about any
-// time with those to a model that keeps every tick in full: every column, bit for bit, by every instruction set, on one
-// and two threads, and by brute force. A tick has one batch or several, in which the same object goes far and comes
-// back, is replaced, jumps, dies and is born again. For the random tests, which expect no difference, and for planted
-// bugs.
+// Inserts, moves, teleports, changes and removes objects of a scene with history at random, and compares queries at any
+// time with a model that keeps every tick in full: every column, bit for bit, by every instruction set, on one and two
+// threads, and by brute force. A tick has one batch or several, in which the same object can go far and come back, be
+// replaced, teleport, be removed and be inserted again. For the random tests, which expect no difference, and for
+// planted bugs.
 #ifndef LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 
@@ -30,7 +30,7 @@ void append_column(const Column& from, Column& to) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-// The answer to one query, behind those to the queries before it.
+// Appends the answer to one query to those of the queries before it.
 inline void append_answer(const BlockResult& from, uint32_t query, BlockResult& to) {
   append_column(from.counts, to.counts);
   for (size_t i = 0; i < from.truncated.size(); ++i) to.truncated.push_back(query);
@@ -52,8 +52,8 @@ inline void append_answer(const BlockResult& from, uint32_t query, BlockResult& 
 
 class RewindLockstep {
  public:
-  // Objects move about `step` a batch and live within `world` of the origin; now and then one goes much farther. A
-  // batch begins a tick with the probability `new_tick`.
+  // Objects move about `step` a batch and stay within `world` of the origin; sometimes one goes much farther. A batch
+  // begins a tick with the probability `new_tick`.
   RewindLockstep(uint64_t seed, double world, double step, double new_tick)
       : random_(seed),
         world_(world),
@@ -63,7 +63,7 @@ class RewindLockstep {
         model_(history_ticks_),
         scene_("rewind", spec(), 1, StaticSet::empty()) {}
 
-  // What differs first; empty for nothing.
+  // Returns the first difference; empty if there is none.
   std::string run(int batches) {
     for (int number = 0; number < batches; ++number) {
       std::string what = apply_batch();
@@ -89,7 +89,7 @@ class RewindLockstep {
     return ids;
   }
 
-  // Where an object goes next, which may be back to about where the tick began.
+  // Returns the next position of an object, which may be close to its position at the beginning of the tick.
   Vec3d step_from(Id id, Vec3d place) {
     if (random_.chance(0.25))
       return model_.position_at_last_tick(id).value_or(place) + random_.vector(step_ * (random_.chance(0.5) ? 8 : 1));
@@ -139,7 +139,7 @@ class RewindLockstep {
     return insert;
   }
 
-  // Most ticks only move; most of those move everything.
+  // Draws a batch. Most batches only contain moves, and most of those move every object.
   UpdateBatch draw() {
     UpdateBatch batch;
     if (random_.chance(new_tick_)) batch.tick = model_.tick() + (random_.chance(0.2) ? random_.below(6) : 1);
@@ -177,7 +177,7 @@ class RewindLockstep {
     return "";
   }
 
-  // Any object, or one of those that went far lately, which are the ones that searches treat apart.
+  // Returns any object, or one of those that moved far recently, which searches treat separately.
   const Object& some_object(const std::vector<Object>& objects) {
     const Id far = random_.pick(far_ids_);
     const auto at =
@@ -185,7 +185,7 @@ class RewindLockstep {
     return at == objects.end() || random_.chance(0.3) ? random_.pick(objects) : *at;
   }
 
-  // Somewhere near an object of the present, or near one of the time that query `i` of the block asks about.
+  // Returns a position near a current object, or near one at the time of query `i` of the block.
   Vec3d place(const OwnedBlock& block, size_t i) {
     if (model_.objects().empty()) return {};
     if (random_.chance(0.5)) {
@@ -234,7 +234,7 @@ class RewindLockstep {
     if (kind == 5) block.settings.columns.add(Column::kPoint);
   }
 
-  // One time for all `n` queries, or one for each.
+  // Draws one time for all `n` queries, or one for each.
   void draw_times(size_t n, OwnedBlock& block) {
     block.settings.outside = OutsideHistory::kClamp;
     const uint64_t oldest = model_.oldest_tick(), ticks = model_.tick() - oldest;
@@ -291,17 +291,17 @@ class RewindLockstep {
   Random random_;
   double world_, step_, new_tick_;
   uint64_t history_ticks_;
-  std::array<Id, 32> far_ids_{};  // of objects that went far last
+  std::array<Id, 32> far_ids_{};  // of the objects that moved far most recently
   size_t next_far_ = 0;
   SceneModel model_;
   Scene scene_;
   Columns columns_;
 };
 
-// The chance that a batch begins a tick: most ticks have one batch, or most have several.
+// Probabilities that a batch begins a tick, for ticks of mostly one batch and of mostly several.
 constexpr double kTicksOfOneBatch = 0.7, kTicksOfManyBatches = 0.25;
 
-// The first difference over `count` scenes of `batches` batches each, empty when there is none.
+// Returns the first difference over `count` scenes of `batches` batches each, empty if there is none.
 inline std::string search_rewind_lockstep(uint64_t count, int batches, double new_tick = kTicksOfOneBatch) {
   for (uint64_t seed = 0; seed < count; ++seed) {
     const double step = std::exp2(static_cast<double>(seed % 7) - 3);

@@ -1,5 +1,5 @@
-// A fixture for tests that call a server: one server and an empty scene named world a test, short ways to call it, and
-// matchers for refusals.
+// A fixture for tests that call a server: each test has a server with an empty scene named world; helpers for calls,
+// and matchers for refusals.
 #ifndef LOCUS_TESTS_SUPPORT_RPC_TEST_H_
 #define LOCUS_TESTS_SUPPORT_RPC_TEST_H_
 
@@ -15,7 +15,7 @@
 
 namespace locus::test {
 
-// The Error in a status's details; an empty one, and a failure, where there is none.
+// Returns the Error in a status's details; fails the test and returns an empty one if there is none.
 inline v1::Error error_of(const grpc::Status& status) {
   v1::Status details;
   v1::Error error;
@@ -30,7 +30,7 @@ inline v1::Error error_of(const grpc::Status& status) {
   return error;
 }
 
-// What a refusal must say.
+// Expected content of a refusal.
 struct Refused {
   grpc::StatusCode code;
   v1::Reason reason;
@@ -65,7 +65,7 @@ struct CubeMesh {
                                    2, 3, 7, 2, 7, 6, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
 };
 
-// The first and only message of an upload.
+// Returns an upload's first and only message.
 inline v1::UploadMeshRequest whole_mesh(const std::string& name, const CubeMesh& mesh = {}) {
   v1::UploadMeshRequest request;
   request.set_mesh(name);
@@ -84,7 +84,7 @@ class RpcTest : public ::testing::Test {
 
   Stubs& stubs() { return running_.stubs(); }
 
-  // A unary call of a method of a stub, with the suite's timeout.
+  // Makes a unary call of a stub's method, with the suite's timeout.
   template <class Stub, class Request, class Response>
   grpc::Status call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                     const Request& request, Response* response) {
@@ -171,7 +171,7 @@ class RpcTest : public ::testing::Test {
     return reader->Finish();
   }
 
-  // Everything in a scene, its revision included, as text that can be compared.
+  // Returns everything in a scene, its revision included, as text for comparisons.
   std::string dump(const std::string& scene = "world") {
     std::vector<v1::DumpSceneResponse> pieces;
     const grpc::Status status = dump(scene, &pieces);
@@ -184,7 +184,7 @@ class RpcTest : public ::testing::Test {
   RunningServer running_;
 };
 
-// Balls of radius 1 on a line: id i at (3 i, 0, 0).
+// Returns inserts of balls of radius 1 on a line: id i at (3 i, 0, 0).
 inline v1::UpdateBatch insert_balls(uint64_t first_id, uint64_t last_id) {
   v1::UpdateBatch batch;
   v1::Insert* insert = batch.add_inserts();
@@ -198,7 +198,7 @@ inline v1::UpdateBatch insert_balls(uint64_t first_id, uint64_t last_id) {
   return batch;
 }
 
-// One ray along +x from the origin.
+// Returns a batch with one ray along +x from the origin.
 inline v1::QueryBatch ray_along_x() {
   v1::QueryBatch batch;
   v1::Rays* rays = batch.add_blocks()->mutable_rays();
@@ -207,7 +207,7 @@ inline v1::QueryBatch ray_along_x() {
   return batch;
 }
 
-// One mesh placed once.
+// Returns a change that places one mesh once.
 inline v1::ChangeInstancesRequest place_one(const std::string& mesh, uint64_t id, const std::string& scene = "world") {
   v1::ChangeInstancesRequest request;
   request.set_scene(scene);

@@ -1,4 +1,4 @@
-// A whole server inside the test's process, behind a real socket on a free loopback port, and stubs to call it with.
+// A complete server inside the test's process, behind a real socket on a free loopback port, and stubs to call it.
 #ifndef LOCUS_TESTS_SUPPORT_RUNNING_SERVER_H_
 #define LOCUS_TESTS_SUPPORT_RUNNING_SERVER_H_
 
@@ -23,7 +23,7 @@
 
 namespace locus::test {
 
-// Far above what any call takes, so that a hang fails a test instead of stopping the suite.
+// Far longer than any call takes, so that a hang fails a test instead of stopping the suite.
 inline constexpr std::chrono::seconds kCallTimeout{60};
 
 inline void set_timeout(grpc::ClientContext& context, std::chrono::milliseconds timeout = kCallTimeout) {
@@ -31,7 +31,7 @@ inline void set_timeout(grpc::ClientContext& context, std::chrono::milliseconds 
 }
 
 struct Stubs {
-  // Each has a connection of its own: gRPC would share one between channels with equal arguments.
+  // Opens a connection of its own: gRPC would share one between channels with equal arguments.
   explicit Stubs(const std::string& address) {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
@@ -50,7 +50,7 @@ struct Stubs {
   std::unique_ptr<v1::QueryService::Stub> queries;
 };
 
-// Options for a server of a test: two threads, a free port, no HTTP port.
+// Returns a server configuration for tests: two threads, a free port, no HTTP port.
 inline server::ServerConfig test_config() {
   server::ServerConfig config;
   config.listen = {"127.0.0.1:0"};
@@ -63,7 +63,7 @@ inline server::ServerConfig test_config() {
 
 class RunningServer {
  public:
-  // `log` outlives it.
+  // `log` must outlive the server.
   explicit RunningServer(const server::ServerConfig& config = test_config(), UpdateLog* log = nullptr) {
     server::start_logging(config.log_level, config.log_format);
     server::capture_library_logs(config.log_level);

@@ -1,4 +1,4 @@
-// Everything that two scenes show, compared: for tests in which one was made from what the other wrote down.
+// Comparison of the whole visible state of two scenes: for tests in which one was restored from the log of the other.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_DIFFERENCE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_DIFFERENCE_H_
 
@@ -13,7 +13,7 @@
 
 namespace locus::test {
 
-// Empty for none, as of all these.
+// Returns the first difference, empty if there is none, as do all functions below.
 inline std::string ack_difference(const UpdateAck& a, const UpdateAck& b) {
   if (a.epoch != b.epoch) return "epoch of the ack";
   if (a.revision != b.revision || a.tick != b.tick) return "revision or tick of the ack";
@@ -66,7 +66,7 @@ inline std::vector<Object> sorted_objects(const ObjectSet& set) {
   return objects;
 }
 
-// By the ids, by going through the grid and by asking it.
+// Compares by id, by iterating over the grid and by querying it.
 inline std::string objects_difference(const ObjectSet& a, const ObjectSet& b, Random& random) {
   if (a.size() != b.size()) return "number of objects";
   const std::vector<Object> objects = sorted_objects(a);
@@ -83,7 +83,7 @@ inline std::string objects_difference(const ObjectSet& a, const ObjectSet& b, Ra
   return found_in(a) == found_in(b) ? "" : "objects that a ball finds";
 }
 
-// At one moment that both have kept, which may lie between ticks.
+// Compares at one time that both have kept, possibly between ticks.
 inline std::string past_difference(const SceneSnapshot& a, const SceneSnapshot& b, Random& random) {
   const uint64_t oldest = std::max(a.oldest_tick(), b.oldest_tick());
   if (oldest > a.tick) return "the past";

@@ -1,4 +1,4 @@
-// A scene with short ways to change it: batches and placements as literals, refusals taken apart.
+// A scene with short ways to change it: batches and placements as literals, expectations about refusals.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
 
@@ -15,7 +15,7 @@
 
 namespace locus::test {
 
-// Tells a refusal by everything a program can read of it.
+// Checks every part of a refusal that a program can read.
 inline void expect_refusal(const absl::Status& status, absl::StatusCode code, Reason reason, const std::string& field,
                            std::optional<uint32_t> index = {}) {
   EXPECT_EQ(status.code(), code) << status;

@@ -1,5 +1,5 @@
-// What a scene promises about update batches, over a std::map and one item after the other: the reference of the random
-// tests. Knows neither index nor sharing nor differences. Of a scene with history it keeps every tick in full.
+// Reference of the random tests for the semantics of update batches: a std::map and one item after the other. Has no
+// index, no sharing and no differences. For a scene with history it keeps every tick in full.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
 
@@ -27,14 +27,14 @@ class SceneModel {
     ItemError error;  // reason, field and index of a refusal
   };
 
-  // `history_ticks` as in HistoryOptions.
+  // `history_ticks` has the meaning of HistoryOptions.
   explicit SceneModel(uint64_t history_ticks = 0) : history_ticks_(history_ticks) {}
 
   const Objects& objects() const { return objects_; }
   uint64_t tick() const { return tick_; }
   uint64_t oldest_tick() const { return past_.empty() ? tick_ : past_.begin()->first; }
   size_t recorded_ticks() const { return past_.size(); }
-  // As they were then; nothing for a time that is not kept.
+  // Returns the objects at that time; nothing for a time that is not kept.
   std::optional<std::vector<Object>> objects_at(uint64_t tick, float fraction) const {
     std::vector<Object> objects;
     if (tick == tick_ && fraction == 0) {
@@ -61,7 +61,7 @@ class SceneModel {
     }
     return objects;
   }
-  // Returns where an object was when the last recorded tick ended; nothing if it was not there.
+  // Returns the position of an object when the last recorded tick ended; nothing if it was not there.
   std::optional<Vec3d> position_at_last_tick(Id id) const {
     if (past_.empty()) return std::nullopt;
     const Objects& objects = past_.rbegin()->second.objects;
@@ -70,7 +70,7 @@ class SceneModel {
   }
   const std::set<Id>& instances() const { return instances_; }
 
-  // Takes an instance away, if `removed` is not 0, and places one as `placed`. False when that is refused.
+  // Removes an instance if `removed` is not 0, and places one as `placed`. Returns false if that is refused.
   bool change_instances(Id removed, Id placed) {
     std::set<Id> next = instances_;
     if (removed != kNoId && next.erase(removed) == 0) return false;
@@ -80,7 +80,7 @@ class SceneModel {
     return true;
   }
 
-  // Of a batch of right form.
+  // Applies a batch of valid form.
   Outcome apply(const UpdateBatch& batch) {
     if (batch.writer != 0) {
       const auto& [number, last] = writers_[batch.writer];
@@ -178,7 +178,7 @@ class SceneModel {
     return Reason::kUnspecified;
   }
 
-  // The field at fault, empty for none, and why.
+  // The wrong field, empty if there is none, and the reason.
   using Fault = std::pair<std::string, Reason>;
 
   template <class T>
@@ -262,7 +262,7 @@ class SceneModel {
     count(Reason::kUnspecified, field, i, columns.ids[i]);
   }
 
-  using Lives = std::map<Id, uint64_t>;  // numbers that no other life has
+  using Lives = std::map<Id, uint64_t>;  // unique number of each life
   struct Then {
     Objects objects;
     Lives lives;

@@ -1,6 +1,6 @@
-// A scene whose state at every revision is known without keeping it: which objects revision r changes, and to what, is
-// a function of r and of the object's id alone. So readers can check what they see at THEIR revision, however fast the
-// writer goes on. Objects move, teleport, go and come back; every tick has several revisions.
+// A scene whose state at every revision can be computed: which objects revision r changes, and how, is a function of r
+// and of the object's id alone. So readers can check the objects at the revision of their snapshot, however fast the
+// writer continues. Objects move, teleport, are removed and are inserted again; every tick has several revisions.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_SCHEDULE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_SCHEDULE_H_
 
@@ -25,13 +25,14 @@ class SceneSchedule {
   static uint64_t tick_of(uint64_t revision) { return revision / kRevisionsPerTick; }
   static uint64_t last_revision_of(uint64_t tick) { return tick * kRevisionsPerTick + kRevisionsPerTick - 1; }
 
-  // The last revision up to `revision` at which the object's turn came; 0 is the beginning, when all are there.
+  // Returns the last revision up to `revision` that changed the object; 0 is the beginning, when all objects exist.
   static uint64_t turn_of(Id id, uint64_t revision) {
     const uint64_t back = (revision + kTurns - id % kTurns) % kTurns;
     return revision >= back ? revision - back : 0;
   }
   static bool is_there(Id id, uint64_t turn) { return turn == 0 || mixed(id, turn) % 8 != 0; }
-  // A walk about the object's home, now and then far from it. Whole eighths, so that float32 holds them.
+  // Returns a position of a walk about the object's home, sometimes far from it. Whole eighths, so that float32 holds
+  // them exactly.
   static Vec3d position(Id id, uint64_t turn) {
     const uint64_t bits = mixed(id, turn + 77);
     const double far = bits % 64 == 0 ? 300 : 0;
@@ -40,20 +41,20 @@ class SceneSchedule {
     return {home(13) + part(8) + far, home(29) + part(16), home(41) / 4 + part(24)};
   }
 
-  // Where the object is at a revision; nothing while it is gone.
+  // Returns the object's position at a revision; nothing while it is removed.
   static std::optional<Vec3d> at(Id id, uint64_t revision) {
     const uint64_t turn = turn_of(id, revision);
     return is_there(id, turn) ? std::optional<Vec3d>(position(id, turn)) : std::nullopt;
   }
 
-  // Puts all objects into an empty scene: revision 0 of the schedule is the scene's first.
+  // Inserts all objects into an empty scene: revision 0 of the schedule is the scene's first.
   void begin(Scene& scene) const {
     std::vector<uint64_t> ids(objects_);
     for (uint64_t i = 0; i < objects_; ++i) ids[i] = i + 1;
     apply(scene, 0, {}, ids, {});
   }
 
-  // What becomes of those whose turn `revision` is, as one batch. Always changes something.
+  // Applies the changes of `revision` to the objects whose turn it is, as one batch. Always changes something.
   void advance(Scene& scene, uint64_t revision) const {
     std::vector<uint64_t> gone, come, move;
     for (Id id = 1 + (revision + kTurns - 1) % kTurns; id <= objects_; id += kTurns) {

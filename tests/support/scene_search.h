@@ -13,8 +13,8 @@
 
 namespace locus::test {
 
-// The first scene of seeds 0 to count - 1 on which `difference` is not empty, and what it says; empty when there is
-// none. `draw` makes the sketch of a seed, `difference` takes a TestScene<V>.
+// Returns the first difference found in the scenes of seeds 0 to count - 1, with its seed; empty if there is none.
+// `draw` makes the sketch of a seed, `difference` takes a TestScene<V>.
 template <Primitive V, class Draw, class Difference>
 std::string search_scenes(uint64_t count, const Draw& draw, const Difference& difference) {
   for (uint64_t seed = 0; seed < count; ++seed) {
@@ -25,7 +25,7 @@ std::string search_scenes(uint64_t count, const Draw& draw, const Difference& di
   return "";
 }
 
-// Ordinary scenes first, then those of the families that are known for trouble.
+// Searches ordinary scenes first, then the adversarial families.
 template <Primitive V, class Difference>
 std::string search_all_scenes(uint64_t random_count, uint64_t adversarial_count, const Difference& difference) {
   const auto draw_random = [](uint64_t, Random& random) { return random_scene(random); };
@@ -33,7 +33,7 @@ std::string search_all_scenes(uint64_t random_count, uint64_t adversarial_count,
   return what.empty() ? search_scenes<V>(adversarial_count, adversarial_scene, difference) : what;
 }
 
-// What differs first between the list and trees built with many bins, few and two.
+// Returns the first difference between the list and trees built with many bins, few and two.
 template <Primitive V>
 std::string tree_difference(const TestScene<V>& scene) {
   const auto list = make_list(scene.values);
@@ -48,7 +48,7 @@ std::string tree_difference(const TestScene<V>& scene) {
   return "";
 }
 
-// The same for the tree over a mesh's triangles.
+// Likewise for the tree over a mesh's triangles.
 inline std::string triangle_tree_difference(const TestScene<Triangle>& scene) {
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(scene.values);
   return tree.ok() ? first_difference(*tree, scene) : tree.status().ToString();

@@ -1,4 +1,4 @@
-// A small scene and the queries to put to it, in double and without a value type; make_scene() turns it into triangles
+// A small scene and queries on it, in double and independent of the value type; make_scene() converts it into triangles
 // or into objects, so that every index is tested on the same situations.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_SKETCH_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_SKETCH_H_
@@ -13,7 +13,7 @@
 
 namespace locus::test {
 
-// Where a value goes. Zero half extents make walls, lines and points.
+// Position and size of a value. Zero half extents make walls, lines and points.
 struct Placement {
   Vec3d center;
   Vec3d half;
@@ -33,7 +33,7 @@ struct TestScene {
   using Traits = PrimitiveTraits<V>;
 
   std::string name;
-  std::vector<V> values;  // unique ids, in no order
+  std::vector<V> values;  // unique ids, unsorted
   std::vector<typename Traits::RayQuery> rays;
   std::vector<typename Traits::BallQuery> balls;
   std::vector<typename Traits::BoxQuery> boxes;
@@ -46,7 +46,7 @@ inline void append_quad(std::vector<Triangle>& triangles, Vec3d a, Vec3d b, Vec3
   triangles.push_back({to_float(a), to_float(c), to_float(d)});
 }
 
-// The rectangle through `center` spanned by the two axes other than `axis`.
+// Appends the rectangle through `center` spanned by the two axes other than `axis`.
 inline void append_wall(std::vector<Triangle>& triangles, const Placement& placement, Vec3d center, int axis) {
   const Rotation rotation = rotation_of(placement.rotation);
   Vec3d u, v;
@@ -65,8 +65,8 @@ inline void append_closed_box(std::vector<Triangle>& triangles, const Placement&
   }
 }
 
-// Flat placements become rectangles of two triangles, or triangles without area; solid ones a closed box or a single
-// triangle within it.
+// Appends rectangles of two triangles, or triangles without area, for flat placements; a closed box or a single
+// triangle within it for solid ones.
 inline void append_triangles(std::vector<Triangle>& triangles, const Placement& placement, Random& random) {
   const Vec3d h = placement.half;
   if (h.x == 0 || h.y == 0 || h.z == 0) {
@@ -104,7 +104,7 @@ inline Object make_object(const Placement& placement, Random& random) {
   return object;
 }
 
-// Ids in random order, so that a lower id is not an earlier place.
+// Returns ids in random order, so that a lower id does not imply an earlier position.
 inline std::vector<uint32_t> shuffled_ids(size_t count, Random& random) {
   std::vector<uint32_t> ids;
   for (size_t i = 0; i < count; ++i) ids.push_back(static_cast<uint32_t>(i + 1));

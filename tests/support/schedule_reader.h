@@ -1,5 +1,5 @@
-// A reader of a scheduled scene: asks the latest snapshot, and random moments of its past, and compares with the
-// schedule. One thread each.
+// A reader of a scheduled scene: queries the latest snapshot, and random times of its past, and compares with the
+// schedule. One thread for each reader.
 #ifndef LOCUS_TESTS_SUPPORT_SCHEDULE_READER_H_
 #define LOCUS_TESTS_SUPPORT_SCHEDULE_READER_H_
 
@@ -19,7 +19,7 @@ class ScheduleReader {
   ScheduleReader(const Scene& scene, const SceneSchedule& schedule, uint64_t seed)
       : scene_(scene), schedule_(schedule), random_(seed) {}
 
-  // One look at the scene; what is wrong, or empty.
+  // Checks the scene once; returns the error, or an empty string.
   std::string look() {
     const SnapshotPtr snapshot = scene_.latest();
     if (snapshot->revision < last_) return "revision " + std::to_string(snapshot->revision) + " after a later one";

@@ -1,5 +1,5 @@
-// A disk of a few MiB, in memory, under a folder: to be filled up, or made read-only. Takes root; mounted() says
-// whether it is there. Goes with this.
+// A disk of a few MiB, in memory, mounted on a folder: for tests that fill it or make it read-only. Needs root;
+// mounted() returns whether mounting succeeded. The destructor unmounts it.
 #ifndef LOCUS_TESTS_SUPPORT_SMALL_DISK_H_
 #define LOCUS_TESTS_SUPPORT_SMALL_DISK_H_
 
@@ -25,7 +25,7 @@ class SmallDisk {
   SmallDisk& operator=(const SmallDisk&) = delete;
 
   bool mounted() const { return mounted_; }
-  // False while a file is open for writing.
+  // Fails, returning false, while a file is open for writing.
   bool make_read_only() { return mount("", path_.c_str(), "", MS_REMOUNT | MS_RDONLY, "") == 0; }
 
  private:

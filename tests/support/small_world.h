@@ -1,4 +1,4 @@
-// Few things at whole numbers, where every answer is known by heart. For tests of queries.
+// A few triangles and objects at whole numbers, with answers that are easy to derive. For tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_SMALL_WORLD_H_
 #define LOCUS_TESTS_SUPPORT_SMALL_WORLD_H_
 
@@ -27,7 +27,7 @@ inline Object box_object(Id id, Vec3d position, Vec3f half = {1, 1, 1}) {
   return object;
 }
 
-// In the plane of that x, around the x axis, front towards +x.
+// Returns a triangle in the plane x, around the x axis, with its front towards +x.
 inline Triangle wall_triangle(float x) { return {{x, -8, -8}, {x, 8, -8}, {x, 0, 8}}; }
 inline Triangle turned_over(const Triangle& triangle) { return {triangle.a, triangle.c, triangle.b, triangle.number}; }
 
@@ -39,10 +39,10 @@ inline PlacedMesh placed(Id id, StaticMeshPtr mesh, Vec3d translation = {}) {
   return result;
 }
 
-// A wall at x = 0 of its own axes.
+// Returns a wall at x = 0 of its own axes.
 inline StaticMeshPtr wall_mesh() { return mesh_of({wall_triangle(0)}); }
 
-// A cube from -1 to 1 in its own axes: six faces of two triangles each.
+// Returns a cube from -1 to 1 in its own axes: six faces of two triangles each.
 inline StaticMeshPtr cube_mesh() {
   std::vector<Triangle> triangles;
   for (int axis = 0; axis < 3; ++axis)
@@ -60,7 +60,7 @@ inline StaticMeshPtr cube_mesh() {
   return mesh_of(triangles);
 }
 
-// Rays of equal mode from `origins` along the x axis.
+// Returns rays of equal mode from `origins` along the x axis.
 inline OwnedBlock rays_along_x(RayMode mode, std::vector<float> origins = {0, 0, 0}) {
   OwnedBlock block;
   RayColumns rays;
@@ -95,7 +95,7 @@ inline OwnedBlock one_box(Vec3f center, Vec3f half, StaticDetail detail = Static
   return block;
 }
 
-// The `count` nearest to one point.
+// Returns a query for the `count` nearest values to one point.
 inline OwnedBlock one_point(Vec3f point, uint32_t count = 0, StaticDetail detail = StaticDetail::kInstances) {
   OwnedBlock block;
   block.settings.kind = NearestColumns{{}, {}, count, detail};

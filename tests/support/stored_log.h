@@ -1,6 +1,6 @@
-// A data directory of a test, its log, and what must be in it: appends records and writes snapshots whose bytes follow
-// from their numbers, and says in words what differs from that when everything is read back. One thread at a time, but
-// for scenes of their own.
+// A data directory of a test, its log, and its expected content: appends records and writes snapshots whose bytes
+// follow from their sequence numbers, and describes differences when everything is read back. One thread at a time for
+// each scene.
 #ifndef LOCUS_TESTS_SUPPORT_STORED_LOG_H_
 #define LOCUS_TESTS_SUPPORT_STORED_LOG_H_
 
@@ -21,7 +21,7 @@
 
 namespace locus::test {
 
-// Bytes that follow from a seed; every length up to `most` occurs.
+// Returns bytes that follow from a seed; every length up to `most` occurs.
 inline std::string bytes_of(uint64_t seed, size_t most) {
   Random random(seed);
   std::string bytes(random.below(most + 1), '\0');
@@ -41,10 +41,10 @@ class ChunksFrom {
 
  private:
   const std::vector<std::string> chunks_;
-  mutable size_t next_ = 0;  // a FunctionRef calls what is const
+  mutable size_t next_ = 0;  // mutable, because a FunctionRef calls a const function
 };
 
-// What a scene's record `sequence` and its snapshot up to there hold, in the tests that ask for nothing else.
+// Returns the content of a scene's record `sequence`, and of its snapshot up to there, in tests that set no other.
 inline std::string record_bytes(SceneKey scene, uint64_t sequence, size_t most = 200) {
   return bytes_of(scene * 1'000'003 + sequence, most);
 }
@@ -78,8 +78,8 @@ inline absl::Status append_records(UpdateLog& log, SceneKey scene, uint64_t epoc
   return absl::OkStatus();
 }
 
-// What of the scene's records from `from` to its end is not as append_records() wrote it; empty when all is. `last` is
-// how far they went.
+// Describes the first of the scene's records from `from` to its end that differs from those of append_records(); empty
+// if there is none. Sets `last` to the last sequence number read.
 inline std::string record_difference(const UpdateLog& log, SceneKey scene, uint64_t from, uint64_t& last,
                                      size_t most = 200) {
   std::string difference;
@@ -132,7 +132,8 @@ inline std::array<uint8_t, 32> hash_of(uint8_t number) {
   return sha256;
 }
 
-// A scene whose snapshot is snapshot_chunks() of its key at 0. Keys are given in order, from 1 in a new directory.
+// Creates a scene whose snapshot is snapshot_chunks() of its key at 0. Keys are assigned in order, from 1 in a new
+// directory.
 inline absl::StatusOr<SceneKey> create_scene(UpdateLog& log, const std::string& name, SceneKey expected,
                                              uint64_t epoch = 7) {
   ChunksFrom state(snapshot_chunks(expected, 0));

@@ -1,5 +1,5 @@
-// What a log promised while a test used it, and what is missing of that when it is opened again after a fault: every
-// acknowledged change and record must be there, in order, and nothing that nobody asked for. One thread.
+// Acknowledged operations of a log that a test used, and the check after it is opened again following a fault: every
+// acknowledged change and record must be there, in order, and nothing that was never requested. One thread.
 #ifndef LOCUS_TESTS_SUPPORT_STORED_MODEL_H_
 #define LOCUS_TESTS_SUPPORT_STORED_MODEL_H_
 
@@ -15,12 +15,12 @@
 
 namespace locus::test {
 
-// Whether damage that is said counts as an answer.
+// Policy for damage that the log reports: whether that is accepted as an answer.
 enum class Refusals : uint8_t { kNone, kAllowed };
 
 class StoredModel {
  public:
-  // One random step; what the log answers is what it promised.
+  // Makes one random step and notes the acknowledged result.
   void step(UpdateLog& log, Random& random) {
     const uint64_t kind = random.below(100);
     if (scenes_.empty() || kind < 4) {
@@ -38,7 +38,7 @@ class StoredModel {
     }
   }
 
-  // What the log does not have and must, or has and must not; empty where it keeps its word.
+  // Describes an element that the log lacks and must have, or has and must not have; empty if there is none.
   std::string difference(const UpdateLog& log, Refusals refusals) const {
     if (!log.catalogue_damage().ok() && refusals == Refusals::kNone)
       return std::string(log.catalogue_damage().message());
@@ -66,7 +66,7 @@ class StoredModel {
     uint64_t epoch = 7;
     uint64_t tried_epoch = 7;
     uint64_t last = 0;      // acknowledged, on the disk
-    uint64_t tried = 0;     // the last that was asked for
+    uint64_t tried = 0;     // last requested
     uint64_t snapshot = 0;  // acknowledged
     uint64_t tried_snapshot = 0;
   };
@@ -76,7 +76,7 @@ class StoredModel {
     Scene& scene = scenes_[name];
     ChunksFrom state(snapshot_chunks(next_name_, 0));
     const absl::StatusOr<SceneKey> key = log.create_scene(name, "spec", 7, state);
-    scene.key = next_name_;  // what the bytes follow from
+    scene.key = next_name_;  // seed of the bytes
     keys_[name] = key.ok() ? *key : 0;
     scene.state = key.ok() ? kThere : kUnknown;
   }
@@ -102,7 +102,7 @@ class StoredModel {
     if (log.restart_scene(keys_[name], scene->tried_epoch).ok()) {
       scene->epoch = scene->tried_epoch;
     } else {
-      scene->state = kUnknown;  // the epoch is not known any more
+      scene->state = kUnknown;  // the epoch is unknown
     }
   }
   void snapshot(UpdateLog& log, Random& random) {
@@ -162,7 +162,7 @@ class StoredModel {
     if (stored->snapshot_sequence < scene.snapshot) return "an older snapshot";
     if (stored->snapshot_sequence > std::max(scene.snapshot, scene.tried_snapshot)) return "a newer snapshot";
     const auto chunks = read_snapshot(log, stored->key);
-    if (absl::IsDataLoss(chunks.status())) return "";  // refused, but later
+    if (absl::IsDataLoss(chunks.status())) return "";  // refused at the first read
     if (!chunks.ok()) return std::string(chunks.status().message());
     if (*chunks != snapshot_chunks(scene.key, stored->snapshot_sequence)) return "another snapshot";
     uint64_t last = stored->snapshot_sequence;
@@ -184,7 +184,7 @@ class StoredModel {
     std::map<std::string, const StoredMesh*> stored;
     for (const StoredMesh& mesh : log.stored_meshes()) {
       if (!mesh.damage.ok() && refusals == Refusals::kNone) return std::string(mesh.damage.message());
-      // Where the catalogue of meshes is damaged, none is believed, and none is missed.
+      // If the catalogue of meshes is damaged, no mesh is expected and none is trusted.
       if (!mesh.damage.ok() || !log.catalogue_damage().ok()) return "";
       stored[mesh.name] = &mesh;
       const auto known = meshes_.find(mesh.name);

@@ -1,4 +1,4 @@
-// How much of a long random test to run: all of it, or a part where sanitizers or a debug build slow everything down.
+// Scale of long random tests: all of the steps, or a part of them in sanitizer and debug builds, which are slow.
 #ifndef LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
 #define LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
 

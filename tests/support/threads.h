@@ -25,7 +25,7 @@ inline ParallelFor on_threads(size_t threads) {
   };
 }
 
-// In falling order: nothing may lean on an order.
+// Runs the calls in falling order, since callers must not depend on an order.
 inline ParallelFor backwards() {
   return [](size_t count, const std::function<void(size_t)>& work) {
     while (count-- > 0) work(count);

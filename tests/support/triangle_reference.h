@@ -30,7 +30,7 @@ inline Triangle random_triangle(Random& random) {
 
 inline double size_of(const Triangle& t) { return std::sqrt(squared_length(to_double(bounds_of(t)).extent())); }
 
-// Least distance over all weights, by search within search: convex in each.
+// Returns the smallest distance over all weights, by search within search: it is convex in each.
 inline Real reference_distance(Vec3r point, const Triangle& t) {
   const Vec3r a = to_real(t.a) - point, ab = to_real(t.b) - to_real(t.a), ac = to_real(t.c) - to_real(t.a);
   const auto nearest_v = [&](Real u) {
@@ -41,8 +41,8 @@ inline Real reference_distance(Vec3r point, const Triangle& t) {
   return std::min(nearest_v(argmin(nearest_v, 0, 1)), std::min(nearest_v(0), nearest_v(1)));
 }
 
-// Vertices of whole numbers whose cross product is 1, and a third beside the origin: as thin as floats allow, with a
-// normal of which only a few bits are known.
+// Draws vertices of whole numbers whose cross product is 1, and a third beside the origin: as thin as floats allow,
+// with a normal of which only a few bits are significant.
 inline Triangle hairline(Random& random) {
   constexpr int64_t kLargest = 1 << 21;
   int64_t p = random.whole(1, kLargest), q = random.whole(1, kLargest);

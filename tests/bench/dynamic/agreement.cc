@@ -13,7 +13,7 @@ namespace {
 // One query's part of the answers.
 struct Part {
   absl::Span<const uint64_t> ids;
-  absl::Span<const float> distances;  // empty where the task has none
+  absl::Span<const float> distances;  // empty if the task has no distances
 };
 
 Part part_of(const Answers& answers, size_t begin, size_t count) {
@@ -93,7 +93,7 @@ std::vector<uint64_t> truth_of(const World& world, Task task, const Queries& que
 bool is_right(const World& world, Task task, const Queries& queries, size_t query, const Part& ours) {
   std::vector<uint64_t> truth = truth_of(world, task, queries, query);
   std::vector<uint64_t> given(ours.ids.begin(), ours.ids.end());
-  if (task != Task::kNearest) {  // whose order is part of the answer
+  if (task != Task::kNearest) {  // its order is part of the answer
     std::sort(truth.begin(), truth.end());
     std::sort(given.begin(), given.end());
   }
@@ -117,7 +117,7 @@ void compare(const std::string& case_name, Task task, const World& world, const 
       report.disagreements.push_back(absl::StrCat(case_name, ", query ", i, ": ours is wrong; ", peer, " differs"));
       return;
     }
-    if (task == Task::kNearest && are_as_far(task, our_part, their_part)) continue;  // others of those that tie
+    if (task == Task::kNearest && are_as_far(task, our_part, their_part)) continue;  // tied objects
     if (differ++ == 0) first = i;
   }
   if (differ == 0) return;

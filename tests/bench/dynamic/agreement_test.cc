@@ -26,7 +26,7 @@ class DynamicAgreementTest : public testing::Test {
     compare("ball", Task::kBall, world, queries, ours, "peer", theirs, report);
   }
 
-  // Without the first ids of so many queries.
+  // Returns the answers without the first ids of `wrong_queries` queries.
   Answers forgetful(size_t wrong_queries) const {
     Answers answers = balls;
     size_t begin = 0;
@@ -43,7 +43,7 @@ class DynamicAgreementTest : public testing::Test {
   Report report;
 };
 
-TEST_F(DynamicAgreementTest, TheSameIdsInAnyOrderAreTheSame) {
+TEST_F(DynamicAgreementTest, EqualIdsInAnyOrderAgree) {
   Answers theirs = balls;
   std::reverse(theirs.ids.begin(), theirs.ids.begin() + theirs.counts[0]);
   compare_balls(balls, theirs);
@@ -51,7 +51,7 @@ TEST_F(DynamicAgreementTest, TheSameIdsInAnyOrderAreTheSame) {
   EXPECT_THAT(report.disagreements, IsEmpty());
 }
 
-TEST_F(DynamicAgreementTest, AFewWrongAnswersOfAPeerAreNoted) {
+TEST_F(DynamicAgreementTest, FewWrongAnswersOfAPeerAreNoted) {
   compare_balls(balls, forgetful(2));
   EXPECT_THAT(report.notes, ElementsAre(HasSubstr("peer is wrong in 2 of 1000 queries, first in query 0")));
   EXPECT_THAT(report.disagreements, IsEmpty());
@@ -67,7 +67,7 @@ TEST_F(DynamicAgreementTest, OneWrongAnswerOfOursIsADisagreement) {
   EXPECT_THAT(report.disagreements, ElementsAre(HasSubstr("query 0: ours is wrong")));
 }
 
-TEST_F(DynamicAgreementTest, ARayThatEndsElsewhereDiffers) {
+TEST_F(DynamicAgreementTest, ARayWithAnotherDistanceDiffers) {
   Answers theirs = rays;
   ASSERT_FALSE(theirs.distances.empty());
   theirs.distances[0] += 2 * kSameDistance;
@@ -75,7 +75,7 @@ TEST_F(DynamicAgreementTest, ARayThatEndsElsewhereDiffers) {
   EXPECT_THAT(report.notes, ElementsAre(HasSubstr("peer is wrong in 1 of 1000")));
 }
 
-TEST_F(DynamicAgreementTest, AnotherNearestObjectThatIsAsFarIsTheSame) {
+TEST_F(DynamicAgreementTest, AnotherNearestObjectAtTheSameDistanceAgrees) {
   Answers theirs = nearest;
   theirs.ids[0] = 1;
   compare("nearest", Task::kNearest, world, queries, nearest, "peer", theirs, report);
@@ -91,7 +91,7 @@ TEST_F(DynamicAgreementTest, AFartherNearestObjectDiffers) {
   EXPECT_THAT(report.notes, ElementsAre(HasSubstr("peer is wrong in 1 of 1000")));
 }
 
-TEST_F(DynamicAgreementTest, AnotherNearestObjectOfOursIsADisagreementEvenIfAsFar) {
+TEST_F(DynamicAgreementTest, AWrongTieOfOursIsADisagreement) {
   Answers ours = nearest;
   ours.ids[0] = 1;
   compare("nearest", Task::kNearest, world, queries, ours, "peer", nearest, report);

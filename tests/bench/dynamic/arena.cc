@@ -11,13 +11,13 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr size_t kBatchesApart = 997;     // between what two readers start with
-constexpr size_t kBatchesToACount = 500;  // a reader counts all objects once in so many, outside its latencies
+constexpr size_t kBatchesApart = 997;     // distance between the first batches of two readers
+constexpr size_t kBatchesToACount = 500;  // batches between a reader's counts of all objects, outside its latencies
 
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-// How often the kernel took the core away from this thread: what other programs do, not we.
-int64_t times_taken_away() {
+// Returns how often the kernel preempted this thread, because of other programs.
+int64_t preemptions() {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);
   return usage.ru_nivcsw;
@@ -51,12 +51,12 @@ void Arena::write(const Window& window, Seen& seen) {
 
 void Arena::read(size_t first_batch, Seen& seen) const {
   for (size_t i = 0; !stop_; ++i) {
-    const int64_t taken_away = times_taken_away();
+    const int64_t preempted_before = preemptions();
     const double start = wall_seconds();
     const SnapshotPtr snapshot = ours_.latest();
     batches_.ask(*snapshot, first_batch + i);
     const double seconds = wall_seconds() - start;
-    if (times_taken_away() == taken_away)
+    if (preemptions() == preempted_before)
       seen.latencies.push_back(seconds);
     else
       ++seen.interrupted;

@@ -1,5 +1,5 @@
-// One uniform world that readers and a writer share for windows of time. The threads of a window are its own; between
-// windows nothing runs.
+// One uniform world that readers and a writer share for windows of time. Each window starts its own threads; between
+// windows none runs.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_ARENA_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_ARENA_H_
 
@@ -12,11 +12,11 @@
 
 namespace locus::bench::dynamic {
 
-// What runs beside the readers: nothing, a thread that only counts (what a busy second core costs by itself), or the
+// Load beside the readers: none, a thread that only counts (to measure the cost of a busy second core alone), or the
 // writer.
 enum class Beside : uint8_t { kNothing, kSpinning, kWriter };
 
-// How readers stand beside the writer: as equals, or as the daemon's threads for large batches do.
+// Priority of readers relative to the writer: equal, or that of the daemon's threads for large batches.
 enum class Readers : uint8_t { kEqual, kBelow };
 
 inline constexpr double kUnpaced = 0;
@@ -25,17 +25,17 @@ struct Window {
   double seconds = 1;
   uint32_t readers = 1;
   Beside beside = Beside::kNothing;
-  size_t batch = 1000;     // moves a revision
-  double rate = kUnpaced;  // moves a second, or as many as there can be
+  size_t batch = 1000;     // moves per revision
+  double rate = kUnpaced;  // moves per second, or unlimited
   Readers stand = Readers::kEqual;
 };
 
 struct Seen {
-  std::vector<double> latencies;  // seconds of each batch of 100 queries, of all readers, but for the interrupted
-  uint64_t interrupted = 0;       // batches during which the kernel gave the core to somebody else
+  std::vector<double> latencies;  // seconds of each batch of 100 queries, of all readers, without interrupted batches
+  uint64_t interrupted = 0;       // batches during which the kernel preempted the thread
   double moves_a_second = 0;
-  double moves_a_computed_second = 0;  // of the writer's thread, whatever else the machine did meanwhile
-  uint64_t wrong_counts = 0;           // revisions that did not hold every object once, of those that were counted
+  double moves_a_computed_second = 0;  // moves per second of the writer thread's processor time
+  uint64_t wrong_counts = 0;           // number of checked revisions that did not hold every object exactly once
 };
 
 class Arena {

@@ -13,7 +13,7 @@ TEST(ArenaTest, ReadersSeeEveryObjectOnceWhileAWriterMovesThem) {
   EXPECT_EQ(seen.wrong_counts, 0u);
 }
 
-TEST(ArenaTest, WithoutAWriterNothingMoves) {
+TEST(ArenaTest, WithoutAWriterNoObjectMoves) {
   Arena arena(10'000);
   EXPECT_EQ(arena.run({0.01, 1, Beside::kSpinning}).moves_a_second, 0);
 }

@@ -8,12 +8,12 @@ namespace locus::bench::dynamic {
 namespace {
 
 constexpr btScalar kMargin = 0.25f;
-constexpr btScalar kTicksAhead = 2;  // for which a box is stretched along the velocity
+constexpr btScalar kTicksAhead = 2;  // ticks by which a box is stretched along the velocity
 
 btVector3 vector_of(Vec3f v) { return {v.x, v.y, v.z}; }
 btDbvtVolume volume_of(Vec3f center, float radius) { return btDbvtVolume::FromCR(vector_of(center), radius); }
 
-// Every leaf whose box overlaps is handed over; `test` decides.
+// Passes every leaf whose box overlaps to `test`, which decides.
 template <class Test>
 class Leaves : public btDbvt::ICollide {
  public:

@@ -10,13 +10,13 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// As printed: rounded to their last digit.
+// Values as printed: rounded to their last digit.
 struct Known {
   Kind kind;
   uint32_t count;
-  double ball, box;           // ids a query
+  double ball, box;           // ids per query
   double ray_share, ray_sum;  // rays that hit, and the sum of their distances
-  double nearest_sum;         // of the distances to the centres of what is nearest
+  double nearest_sum;         // sum of the distances to the centres of the nearest objects
 };
 constexpr Known kKnown[] = {
     {Kind::kUniform, 10'000, 0.97, 1.16, 0.0058, 1131.4, 2419380.3},

@@ -1,5 +1,5 @@
-// What the workload must give, from other programs of the same definition: sums over kQueries queries of all answers. A
-// pure function.
+// Expected results of the workload, computed by other programs from the same definition: sums of all answers over
+// kQueries queries. A pure function.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_CHECK_VALUES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_CHECK_VALUES_H_
 
@@ -10,11 +10,11 @@
 
 namespace locus::bench::dynamic {
 
-// Ticks from the start of a world to its queries.
+// Returns the number of ticks from the start of a world to its queries.
 uint32_t ticks_before_queries(uint32_t count);
 
-// Reports sums that are not those known for this world, which has gone that many ticks. Worlds without known values
-// pass.
+// Reports sums that differ from the known ones for this world after that many ticks. Accepts worlds without known
+// values.
 void check_values(const std::string& case_name, Task task, const World& world, const Queries& queries,
                   const std::string& contender, const Answers& answers, Report& report);
 

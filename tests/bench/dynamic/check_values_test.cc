@@ -10,7 +10,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// So many ids in all, at that distance.
+// Returns answers with `ids` ids in all, at that distance.
 Answers answers_of(size_t ids, float distance) {
   Answers answers;
   answers.ids.assign(ids, 1);
@@ -36,7 +36,7 @@ TEST(CheckValuesTest, OtherSumsAreDisagreements) {
                                                 HasSubstr("sum of distances is 1160.0000")));
 }
 
-TEST(CheckValuesTest, WhatIsNearestIsSummedUpToItsCentres) {
+TEST(CheckValuesTest, NearestSumsUseDistancesToCentres) {
   const World world(Kind::kUniform, 10'000);
   const Queries queries = queries_of(world);
   Answers answers;
@@ -55,7 +55,7 @@ TEST(CheckValuesTest, WorldsWithoutKnownValuesPass) {
   EXPECT_THAT(report.disagreements, IsEmpty());
 }
 
-TEST(CheckValuesTest, LargeWorldsAreAskedAfterFewerTicks) {
+TEST(CheckValuesTest, LargeWorldsRunFewerTicksBeforeQueries) {
   EXPECT_EQ(ticks_before_queries(10'000), 20u);
   EXPECT_EQ(ticks_before_queries(100'000), 20u);
   EXPECT_EQ(ticks_before_queries(1'000'000), 3u);

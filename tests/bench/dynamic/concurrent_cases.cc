@@ -11,7 +11,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr double kPace = 1e6;  // moves a second
+constexpr double kPace = 1e6;  // moves per second
 
 struct Share {
   const char* name;
@@ -44,13 +44,13 @@ class Rounds {
     return false;
   }
 
-  // The world is made for the first case that wants it.
+  // Runs a window. Makes the world when the first case needs it.
   Seen run(const Window& window) {
     if (arena_ == nullptr) arena_ = std::make_unique<Arena>(count_);
     Window timed = window;
     timed.seconds = options_.quick ? 0.05 : 2;
     Seen seen = arena_->run(timed);
-    // Whatever is said of a window without a whole batch would be wrong.
+    // Without a complete batch in the window, the length of the window is the only known bound.
     if (timed.readers != 0 && seen.latencies.empty()) seen.latencies.push_back(timed.seconds);
     if (timed.readers == 1) {
       batches_ += seen.latencies.size();
@@ -62,7 +62,7 @@ class Rounds {
     return seen;
   }
 
-  // A quiet reader, one beside a thread that only counts, and one beside the writer, by turns.
+  // Measures one reader alone, beside a thread that only counts, and beside the writer, in turns.
   void run_latencies() {
     progress_(name_of_case("concurrent_p99/1reader"));
     const Window windows[] = {
@@ -133,7 +133,7 @@ class Rounds {
   const uint32_t count_;
   Report& report_;
   std::unique_ptr<Arena> arena_;
-  size_t batches_ = 0, interrupted_ = 0;  // of single readers
+  size_t batches_ = 0, interrupted_ = 0;  // of the cases with one reader
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The one interface behind which we and every peer stand: objects come, move and go by ids of the caller's choice, and
-// the same queries are asked in the same columns. One thread a contender.
+// The one interface of locus and of every peer: objects are inserted, moved and removed by ids that the caller chooses,
+// and all get the same queries in the same columns. One thread a contender.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_CONTENDER_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_CONTENDER_H_
 
@@ -18,18 +18,18 @@
 
 namespace locus::bench::dynamic {
 
-inline constexpr float kReach = 10;  // the radius of every ball, half the edge of every box
+inline constexpr float kReach = 10;  // radius of every ball, half the edge of every box
 inline constexpr float kRayLength = 100;
 inline constexpr uint32_t kNearestCount = 8;
 
-// Balls of N objects: positions are 3N.
+// Balls of N objects: positions has 3N entries.
 struct Objects {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions;
   absl::Span<const float> radii;
 };
 
-// Where they are now, and how far they go each tick: for those who can use it.
+// Current positions, and the velocity per tick for contenders that can use it.
 struct Moves {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions;
@@ -40,11 +40,11 @@ inline Vec3f point_at(absl::Span<const float> numbers, size_t i) {
   return {numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
 }
 
-// What was found, query after query.
+// Results, query after query.
 struct Answers {
   std::vector<uint64_t> ids;
-  std::vector<float> distances;  // rays and the nearest: one an id
-  std::vector<uint32_t> counts;  // ids a query
+  std::vector<float> distances;  // one per id, for rays and nearest
+  std::vector<uint32_t> counts;  // ids per query
 
   void clear() {
     ids.clear();
@@ -65,17 +65,17 @@ class Contender {
   const std::string& name() const { return name_; }
   virtual bool does(Task task) const = 0;
 
-  // All objects, by the fastest way there is. Called once, first.
+  // Loads all objects, by the contender's fastest method. Called once, first.
   virtual void load(const Objects& objects) = 0;
   virtual void move(const Moves& moves) = 0;
   virtual void remove(absl::Span<const uint64_t>) {}
   virtual void insert(const Objects&) {}
-  // Gives back what is kept only for looking back.
+  // Releases the data that is kept only for rewind.
   virtual void forget_past() {}
 
-  // Appended: everything that shares a point with the ball or box of kReach around each centre, in any order; the first
-  // object on each ray, if there is one, and its distance; the kNearestCount objects nearest to each centre, the
-  // nearest first, and their distances, which are 0 inside.
+  // Appends the results: every object that shares a point with the ball or box of kReach around each centre, in any
+  // order; the first object on each ray, if there is one, and its distance; the kNearestCount objects nearest to each
+  // centre, the nearest first, and their distances, which are 0 inside.
   virtual void balls(absl::Span<const Vec3f>, Answers&) {}
   virtual void boxes(absl::Span<const Vec3f>, Answers&) {}
   virtual void rays(absl::Span<const Rayf>, Answers&) {}
@@ -85,7 +85,7 @@ class Contender {
   const std::string name_;
 };
 
-// For N centres: `find(center, ids)` appends.
+// Answers N centres; `find(center, ids)` appends the ids of one.
 template <class Find>
 void each_region(absl::Span<const Vec3f> centers, Answers& answers, Find find) {
   for (const Vec3f& center : centers) {
@@ -113,10 +113,10 @@ void each_ray(absl::Span<const Rayf> rays, Answers& answers, Find find) {
   }
 }
 
-// The kNearestCount of what was offered, by any figure that grows with the distance, ascending.
+// The kNearestCount best candidates offered, by any key that grows with the distance, ascending.
 class NearestFound {
  public:
-  // What an offer has to stay below.
+  // Returns the key below which a candidate must be to be kept.
   float limit() const {
     return count_ < kNearestCount ? std::numeric_limits<float>::infinity() : figures_[kNearestCount - 1];
   }
@@ -130,7 +130,7 @@ class NearestFound {
     figures_[at] = figure;
     ids_[at] = id;
   }
-  // `to_distance` of each figure.
+  // Appends the result; `to_distance` converts each key.
   template <class ToDistance>
   void append_to(Answers& answers, const ToDistance& to_distance) const {
     answers.counts.push_back(static_cast<uint32_t>(count_));
@@ -144,10 +144,10 @@ class NearestFound {
   size_t count_ = 0;
 };
 
-// To the surface of a ball of this radius, from the squared distance to its centre.
+// Returns the distance to the surface of a ball of this radius, from the squared distance to its centre.
 inline float surface_distance(float squared, float radius) { return std::max(0.0f, std::sqrt(squared) - radius); }
 
-// Makes contenders of one kind.
+// Factory of one kind of contender.
 struct Maker {
   std::string name;
   bool one_size_only = false;

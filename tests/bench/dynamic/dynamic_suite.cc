@@ -17,18 +17,18 @@ namespace locus::bench::dynamic {
 namespace {
 
 constexpr uint32_t kCounts[] = {10'000, 100'000, 1'000'000};
-// Of one world each.
+// Cases that run for one world each.
 constexpr const char* kCases[] = {"memory",    "ball",      "box",           "ray",  "nearest", "ball_batch",
                                   "box_batch", "ray_batch", "nearest_batch", "move", "insert",  "reinsert"};
 
-// What runs without a filter.
+// Returns whether a world is in the default set, which runs without a filter.
 bool is_usual(Kind kind, uint32_t count) {
   if (kind == Kind::kOneCell) return count == 10'000;
   if (kind == Kind::kUniform) return true;
   return count == 100'000 || (kind == Kind::kClustered && count == 1'000'000);
 }
 
-// In one cell, everything finds everything.
+// Returns the number of queries. In a world of one cell every query finds every object, so it has fewer.
 size_t query_count(Kind kind, uint32_t count, const Options& options) {
   if (kind == Kind::kOneCell) return std::max(20u, 2'000'000 / count);
   return options.quick && kind != Kind::kUniform ? kQueries / 10 : kQueries;
@@ -39,7 +39,7 @@ bool wants_any(const Options& options, const std::string& world) {
                      [&](const char* name) { return options.filter.wants(absl::StrCat(name, "/", world)); });
 }
 
-// Adds to `bytes` what stays of it.
+// Runs `work` and adds the heap bytes that it keeps to `bytes`.
 template <class Work>
 void weigh(int64_t& bytes, const Work& work) {
   const int64_t before = heap_bytes();

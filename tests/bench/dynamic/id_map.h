@@ -1,5 +1,5 @@
-// What every caller keeps beside a library that knows no ids: which object is which. The numbers of removed objects are
-// given out again. One thread.
+// Map from ids to indices, which a caller needs beside a library without ids. Indices of removed objects are used
+// again. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_ID_MAP_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_ID_MAP_H_
 
@@ -12,7 +12,7 @@ namespace locus::bench::dynamic {
 
 class IdMap {
  public:
-  // Numbers them as they come.
+  // Assigns indices in order.
   explicit IdMap(absl::Span<const uint64_t> ids) {
     numbers_.reserve(ids.size());
     for (const uint64_t id : ids) numbers_.emplace(id, static_cast<uint32_t>(numbers_.size()));
@@ -24,7 +24,7 @@ class IdMap {
     numbers_.erase(at);
     return free_.back();
   }
-  // Only as many as were removed.
+  // Inserts an id. There must be at least one removed index that is free.
   uint32_t insert(uint64_t id) {
     const uint32_t number = free_.back();
     free_.pop_back();
@@ -37,7 +37,7 @@ class IdMap {
   std::vector<uint32_t> free_;
 };
 
-// The objects of a caller by their numbers.
+// A caller's object, by index.
 struct Body {
   Vec3f position;
   float radius = 0;

@@ -8,9 +8,9 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr uint32_t kReinserted = 10;  // one of so many
+constexpr uint32_t kReinserted = 10;  // reinserts one object in this many
 
-// The columns of some objects.
+// Columns of a part of the objects.
 struct Some {
   std::vector<uint64_t> ids;
   std::vector<float> positions, radii;

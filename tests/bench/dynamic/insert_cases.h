@@ -1,6 +1,6 @@
-// The cases insert (all objects into an empty structure) and reinsert (a tenth of them, drawn by seed 9, all removed
-// and then inserted again) of one world, and memory (what a structure holds with everything a caller of ids needs,
-// after the ticks before the queries, one revision alive). One thread.
+// The cases insert (all objects into an empty structure) and reinsert (a tenth of them, drawn with seed 9: all removed,
+// then inserted again) of one world, and memory (bytes of a structure, including everything that a caller of ids needs,
+// after the ticks before the queries, with one live revision). One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
 

@@ -1,4 +1,4 @@
-// What a reader asks of us again and again: batches of 100 queries, each of one revision. Const members from any
+// The repeated requests of a reader of locus: batches of 100 queries, each at one revision. Const members from any
 // thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_MIXED_BATCHES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_MIXED_BATCHES_H_
@@ -14,7 +14,8 @@ class MixedBatches {
  public:
   explicit MixedBatches(const Queries& queries);
 
-  // 40 balls, 30 boxes, 20 rays and 10 balls, the `number`th hundred of the queries, as one batch: the ids found.
+  // Runs hundred `number` of the queries as one batch: 40 balls, 30 boxes, 20 rays and 10 nearest. Returns the number
+  // of ids found.
   size_t ask(const SceneSnapshot& snapshot, size_t number) const;
 
  private:
@@ -26,7 +27,7 @@ class MixedBatches {
   std::vector<float> centers_, origins_, directions_;
 };
 
-// The objects in a box around the world and far more, each of which has to be there once.
+// Counts the objects in a box far larger than the world, each of which must be found exactly once.
 size_t count_objects(const SceneSnapshot& snapshot);
 
 }  // namespace locus::bench::dynamic

@@ -26,7 +26,7 @@ class MoveRace {
   explicit MoveRace(const WorldRun& run) : run_(run) {}
 
   void run() {
-    // Small worlds go several ticks at a time, or they would find only what the others left in the caches.
+    // Small worlds run several ticks at a time, since a single one would mostly measure caches filled by the others.
     const uint32_t count = run_.world.count();
     const size_t ticks = run_.options.quick ? 1 : std::clamp<size_t>(100'000 / count, 1, 8);
     const size_t chunks = run_.options.quick || count >= 1'000'000 ? 1 : 4;
@@ -50,7 +50,7 @@ class MoveRace {
       ticks_.emplace_back(run_.world.moves());
     }
   }
-  // Everybody finds the columns as if they had just been received.
+  // Reads the columns, so that every contender finds them in the caches as after receiving them.
   void touch() {
     for (const Tick& tick : ticks_)
       touched_ += static_cast<double>(std::accumulate(tick.ids.begin(), tick.ids.end(), uint64_t{0})) +

@@ -1,4 +1,5 @@
-// The case move of one world: whole ticks by ids of the caller's choice, through our scene's writer. One thread.
+// The case move of one world: whole ticks by ids that the caller chooses, through the scene's writer of locus. One
+// thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_MOVE_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_MOVE_CASES_H_
 
@@ -6,7 +7,7 @@
 
 namespace locus::bench::dynamic {
 
-// Moves the world on, and all contenders with it.
+// Advances the world and all contenders.
 void run_move_case(const WorldRun& run);
 
 }  // namespace locus::bench::dynamic

@@ -6,10 +6,10 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr float kRadius = 0.5f;  // of all: balls around the points are grown by it
+constexpr float kRadius = 0.5f;  // radius of all objects: query balls are grown by it
 constexpr size_t kLeafSize = 16;
 
-// What nanoflann asks of a set of points.
+// Set of points with the interface that nanoflann requires.
 struct Points {
   std::vector<Vec3f> points;
   size_t kdtree_get_point_count() const { return points.size(); }

@@ -11,7 +11,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// What GridSnapshot's visits take: puts ids of what meets() says so of into `ids`.
+// Visitor for GridSnapshot that appends the ids of objects for which meets() is true to `ids`.
 template <class Meets>
 auto collector(const Meets& meets, std::vector<uint64_t>& ids) {
   return [meets, &ids](const GridRef& object) {
@@ -20,7 +20,7 @@ auto collector(const Meets& meets, std::vector<uint64_t>& ids) {
   };
 }
 
-// Up to kRayLength; the lower id wins a tie.
+// Returns the first hit up to kRayLength; the lower id wins a tie.
 FirstHit first_of(const SceneSnapshot& snapshot, const ObjectRay& ray) {
   Work work;
   double nearest = kRayLength;
@@ -191,8 +191,8 @@ void Ours::insert(const Objects& objects) {
   apply(batch, objects.ids.size());
 }
 
-// As the query engine does: one region after the other, or in a walk where that pays. `region_of(center)` is the
-// region of a query; `meets_of(center)` what meets().
+// Answers regions as the query engine does: one after the other, or together in one walk if that is faster.
+// `region_of(center)` returns the region of a query, `meets_of(center)` its meets().
 template <class RegionOf, class MeetsOf>
 void Ours::ask_regions(absl::Span<const Vec3f> centers, Answers& answers, const RegionOf& region_of,
                        const MeetsOf& meets_of) {

@@ -1,5 +1,5 @@
-// The one place where the dynamic suite asks us: a scene's writer, its index alone, and whole batches as the server
-// runs them. One thread, but for what the scene promises itself.
+// The only code of the dynamic suite that calls locus: a scene's writer, its index alone, and whole batches as the
+// server runs them. One thread, except for threads that the scene itself promises.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 
@@ -12,11 +12,11 @@
 
 namespace locus::bench::dynamic {
 
-// Updates go through the writer, each call one batch, each move() a tick; queries are asked of the index of the latest
+// Updates go through the writer: each call is one batch, each move() a tick. Queries go to the index of the latest
 // revision.
 class Ours : public Contender {
  public:
-  // `history`: of the past that is kept.
+  // `history` sets how many past ticks are kept.
   explicit Ours(const HistoryOptions& history = {});
   bool does(Task) const override { return true; }
 
@@ -44,7 +44,7 @@ class Ours : public Contender {
   uint64_t tick_ = 0;
 };
 
-// Queries only, of `ours`: each call is one batch of one block, about now or about `time`.
+// Returns a contender for queries of `ours` only: each call is one batch of one block, at the present or at `time`.
 std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time = {});
 
 }  // namespace locus::bench::dynamic

@@ -6,16 +6,17 @@
 #include "tests/bench/dynamic/agreement.h"
 #include "tests/bench/dynamic/world_run.h"
 
-// Every contender, ours among them, against all objects one by one.
+// Compares every contender, including locus, with a test of all objects one by one.
 namespace locus::bench::dynamic {
 namespace {
 
 using ::testing::IsEmpty;
 
 constexpr uint32_t kCount = 3000;
-constexpr float kCrowded = 300;  // a side at which most queries find something
+constexpr float kCrowded = 300;  // side of a world in which most queries find something
 
-// One id that nobody has in every answer: whoever is right differs from it, so that all objects are asked.
+// Returns answers with an id that no object has, so that every right answer differs and the comparison tests all
+// objects.
 Answers wrong_answers(size_t queries) {
   Answers answers;
   answers.ids.assign(queries, 1);
@@ -24,7 +25,7 @@ Answers wrong_answers(size_t queries) {
   return answers;
 }
 
-// Of what ties, peers may find any: so they are compared with us, and we with the truth.
+// Among ties, peers may return any object, so the comparison is with locus, which is compared with brute force.
 void expect_right_nearest(Contender& contender, const World& world) {
   if (!contender.does(Task::kNearest)) return;
   const Queries queries = queries_of(world, 20);
@@ -57,7 +58,7 @@ void expect_right(Contender& contender, const World& world) {
   expect_right_nearest(contender, world);
 }
 
-TEST(PeersTest, FindWhatWasLoaded) {
+TEST(PeersTest, LoadedObjectsAreFound) {
   const World world(Kind::kUniform, kCount, kCrowded);
   for (const Maker& maker : makers_for(world)) {
     const std::unique_ptr<Contender> contender = maker.make();
@@ -66,7 +67,7 @@ TEST(PeersTest, FindWhatWasLoaded) {
   }
 }
 
-TEST(PeersTest, FindEverythingWhereItMoved) {
+TEST(PeersTest, MovedObjectsAreFoundAtTheirNewPositions) {
   World world(Kind::kBorder, kCount, kCrowded);
   std::vector<std::unique_ptr<Contender>> contenders;
   for (const Maker& maker : makers_for(world)) {
@@ -80,7 +81,7 @@ TEST(PeersTest, FindEverythingWhereItMoved) {
   for (const auto& contender : contenders) expect_right(*contender, world);
 }
 
-TEST(PeersTest, FindNothingThatWasRemovedAndAllThatCameBack) {
+TEST(PeersTest, RemovedObjectsAreNotFoundAndReinsertedOnesAre) {
   const World world(Kind::kUniform, kCount, kCrowded);
   const Objects all = world.objects();
   const Objects some = {all.ids.subspan(100, 500), all.positions.subspan(300, 1500), all.radii.subspan(100, 500)};
@@ -100,7 +101,7 @@ TEST(PeersTest, FindNothingThatWasRemovedAndAllThatCameBack) {
   }
 }
 
-TEST(PeersTest, WhoTakesOneSizeOnlyIsLeftOutOfOtherWorlds) {
+TEST(PeersTest, PeersOfOneSizeAreLeftOutOfWorldsWithSeveral) {
   const auto names = [](Kind kind) {
     std::vector<std::string> result;
     for (const Maker& maker : makers_for(World(kind, 10))) result.push_back(maker.name);
@@ -111,7 +112,7 @@ TEST(PeersTest, WhoTakesOneSizeOnlyIsLeftOutOfOtherWorlds) {
   EXPECT_EQ(names(Kind::kGiant).front(), "locus");
 }
 
-TEST(PeersTest, WhoTakesAllSizesFindsTheGiant) {
+TEST(PeersTest, PeersOfAllSizesFindTheGiant) {
   const World world(Kind::kGiant, kCount, kCrowded);
   for (const Maker& maker : makers_for(world)) {
     const std::unique_ptr<Contender> contender = maker.make();
@@ -120,7 +121,7 @@ TEST(PeersTest, WhoTakesAllSizesFindsTheGiant) {
   }
 }
 
-TEST(PeersTest, AWholeBatchAnswersAsTheIndexDoes) {
+TEST(PeersTest, ABatchHasTheAnswersOfTheIndex) {
   const World world(Kind::kMixed, kCount, kCrowded);
   Ours ours;
   ours.load(world.objects());

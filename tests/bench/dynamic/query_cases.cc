@@ -11,7 +11,8 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr size_t kParts = 10;  // all queries are so many calls: a call is a batch to those who take batches
+// Number of calls into which the queries are divided: contenders that take batches get one batch per call.
+constexpr size_t kParts = 10;
 
 struct QueryCase {
   const char* name;
@@ -23,7 +24,7 @@ constexpr QueryCase kCases[] = {{"ball", "ball_batch", Task::kBall},
                                 {"ray", "ray_batch", Task::kRay},
                                 {"nearest", "nearest_batch", Task::kNearest}};
 
-// One of kParts.
+// Returns one of kParts.
 template <class T>
 absl::Span<const T> part_of(const std::vector<T>& queries, size_t part) {
   const size_t begin = queries.size() * part / kParts, end = queries.size() * (part + 1) / kParts;
@@ -61,8 +62,8 @@ class QueryRace {
   }
 
  private:
-  // What one contender does in a turn: several times all queries, or it would find only what the others left in the
-  // caches; but fewer parts of them where it is slow.
+  // Work of one contender in a turn: several passes over all queries, since a single one would mostly measure caches
+  // filled by the others; but only some of the parts if the contender is slow.
   struct Entry {
     Contender* contender = nullptr;
     size_t parts = 1;
@@ -86,7 +87,7 @@ class QueryRace {
     }
   }
 
-  // `seconds`: of kParts.
+  // Returns the number of parts to run, if all kParts take `seconds`.
   size_t parts_of(double seconds) const {
     const double turn = run_.options.quick ? 0.002 : 0.1;
     return static_cast<size_t>(std::clamp(kParts * turn / seconds, 1.0, 5.0 * kParts));
@@ -104,7 +105,7 @@ class QueryRace {
     return {entry.contender->name(), run_turn, static_cast<double>(count), {}};
   }
 
-  // Of the first two contestants, which are ours, one stays out.
+  // Adds cells for all contestants but one of the first two, which are both locus.
   void add(const char* name, std::vector<Contestant> contestants, std::vector<std::vector<double>> times, size_t out) {
     if (!run_.options.filter.wants(run_.case_of(name))) return;
     contestants.erase(contestants.begin() + static_cast<ptrdiff_t>(out));

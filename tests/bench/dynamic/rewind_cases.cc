@@ -11,19 +11,19 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr std::array<uint32_t, 3> kAges = {1, 10, 30};  // ticks back
-constexpr float kFraction = 0.5f;                       // of the way from there to the next tick
-constexpr uint32_t kTicks = 32;                         // kept, and gone before the queries
+constexpr std::array<uint32_t, 3> kAges = {1, 10, 30};  // ticks before the present
+constexpr float kFraction = 0.5f;                       // part of the way from that tick to the next
+constexpr uint32_t kTicks = 32;                         // ticks that are kept, and run before the queries
 constexpr uint64_t kHistoryBytes = uint64_t{8} << 30;
-constexpr size_t kCalls = 10;     // all queries are so many batches
-constexpr size_t kChecked = 100;  // queries that are asked of all objects, at most
+constexpr size_t kCalls = 10;     // number of batches into which the queries are divided
+constexpr size_t kChecked = 100;  // maximum number of queries that brute force verifies
 
 std::string name_of_age(uint32_t age) { return absl::StrCat(age, age == 1 ? "tick" : "ticks"); }
 std::string name_of_case(uint32_t age, uint32_t count) {
   return absl::StrCat("rewind/", name_of_age(age), "/", name_of_count(count));
 }
 
-// A world whose past is kept: by us, and by positions for the ticks that are asked about.
+// A world whose past is kept by locus, and as lists of positions for the ticks of the queries.
 class PastWorld {
  public:
   explicit PastWorld(uint32_t count)
@@ -42,7 +42,7 @@ class PastWorld {
   uint32_t count() const { return world_.count(); }
   static AsOf time(uint32_t age) { return {kTicks - age, kFraction}; }
 
-  // The ids that a ball meets, ascending, by asking all objects.
+  // Returns the ids that a ball meets, ascending, by testing all objects.
   std::vector<uint64_t> truth(Vec3f center, uint32_t age) const {
     const std::vector<float>&at = positions_.at(age), &next = positions_.at(age - 1);
     const Objects objects = world_.objects();
@@ -67,7 +67,7 @@ class PastWorld {
   World world_;
   Queries queries_;
   Ours ours_;
-  std::map<uint32_t, std::vector<float>> positions_;  // by age
+  std::map<uint32_t, std::vector<float>> positions_;  // key: age
 };
 
 class Rewinding {
@@ -99,7 +99,8 @@ class Rewinding {
   }
 
  private:
-  // All queries several times in a turn, or each would find only what the others left in the caches.
+  // Returns the number of passes over all queries in a turn; a single one would mostly measure caches filled by the
+  // others.
   size_t passes() const { return options_.quick ? 1 : 5; }
 
   Contestant contestant(const std::string& name, Contender& contender) {
@@ -137,7 +138,7 @@ class Rewinding {
   PastWorld past_;
   std::unique_ptr<Contender> now_;
   std::vector<std::unique_ptr<Contender>> rewound_;
-  std::vector<std::string> hashes_;  // of rewound_
+  std::vector<std::string> hashes_;  // of the answers of rewound_
   Answers answers_;
 };
 

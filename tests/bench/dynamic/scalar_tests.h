@@ -1,5 +1,5 @@
-// What peers that only cull are given to decide by: plain float tests of a ball, as one would write them beside such a
-// library. Inline, since each peer's file is compiled on its own.
+// Exact tests for peers that only cull: plain float tests of a ball, as a user of such a library would write them.
+// Inline, since each peer's file is compiled on its own.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_SCALAR_TESTS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_SCALAR_TESTS_H_
 
@@ -10,13 +10,13 @@
 
 namespace locus::bench::dynamic {
 
-// The ball of kReach around `center`.
+// Returns whether an object meets the ball of kReach around `center`.
 inline bool scalar_ball_meets(Vec3f position, float radius, Vec3f center) {
   const float reach = kReach + radius;
   return squared_length(position - center) <= reach * reach;
 }
 
-// The box of kReach around `center`.
+// Returns whether an object meets the box of kReach around `center`.
 inline bool scalar_box_meets(Vec3f position, float radius, Vec3f center) {
   const float x = std::max(0.0f, std::fabs(position.x - center.x) - kReach);
   const float y = std::max(0.0f, std::fabs(position.y - center.y) - kReach);
@@ -24,7 +24,7 @@ inline bool scalar_box_meets(Vec3f position, float radius, Vec3f center) {
   return x * x + y * y + z * z <= radius * radius;
 }
 
-// Takes the ball as the first hit if it is. A ray that starts inside hits at 0.
+// Updates `first` if the ball is hit before it. A ray that starts inside hits at 0.
 inline void scalar_ray_meets(const Rayf& ray, Vec3f position, float radius, uint64_t id, FirstHit& first) {
   const Vec3f to_center = position - ray.origin;
   const float along = dot(to_center, ray.direction);

@@ -1,5 +1,5 @@
-// A writer of moves without locality: batches of objects in a stride of 7919, all of them once, then all again one tick
-// on, then back. The columns are made beforehand, as a message that was received. One thread.
+// A writer of moves without locality: batches of objects in a stride of 7919, all of them once to the next tick, then
+// all of them back, and so on. The columns are made beforehand, like a received message. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_SCATTERED_WRITER_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_SCATTERED_WRITER_H_
 
@@ -12,16 +12,16 @@ namespace locus::bench::dynamic {
 
 class ScatteredWriter {
  public:
-  // Takes the world one tick on. The count of objects is a multiple of every batch.
+  // Advances the world by one tick. The count of objects must be a multiple of every batch size.
   explicit ScatteredWriter(World& world);
 
-  // Moves the next objects, so many.
+  // Moves the next `batch` objects.
   void move(Contender& contender, size_t batch);
 
  private:
   std::vector<uint64_t> ids_;
   std::vector<float> velocities_;
-  std::array<std::vector<float>, 2> positions_;  // by turns
+  std::array<std::vector<float>, 2> positions_;  // used alternately
   size_t next_ = 0, turn_ = 0;
 };
 

@@ -9,7 +9,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// Remembers where objects are.
+// A contender that only stores the positions of objects.
 class Memory : public Contender {
  public:
   Memory() : Contender("memory") {}
@@ -21,7 +21,7 @@ class Memory : public Contender {
   std::map<uint64_t, Vec3f> places;
 };
 
-TEST(ScatteredWriterTest, MovesEveryObjectOnceATickOnAndThenBack) {
+TEST(ScatteredWriterTest, MovesEveryObjectToTheNextTickAndThenBack) {
   World world(Kind::kUniform, 1000);
   const World before = world;
   ScatteredWriter writer(world);

@@ -10,7 +10,7 @@ namespace locus::bench::dynamic {
 namespace {
 
 constexpr float kAround = 6.2831853f;
-constexpr float kStep = 8;  // of kBorder
+constexpr float kStep = 8;  // step of an object in kBorder
 constexpr uint32_t kTowns = 20;
 
 class Draws {
@@ -92,7 +92,7 @@ std::vector<float> drawn_radii(Kind kind, uint32_t count) {
   return radii;
 }
 
-// At an object drawn, moved a little.
+// Returns the position of a randomly drawn object, moved a little.
 Vec3f near_an_object(const World& world, Draws& draws) {
   Vec3f point = point_at(world.objects().positions, draws.next() % world.count());
   for (int axis = 0; axis < 3; ++axis) point[axis] += std::fma(10.0f, draws.unit(), -5.0f);

@@ -1,9 +1,9 @@
-// The moving objects of the dynamic suite: fixed by a kind, a count and fixed seeds, drawn in a fixed order, so that
-// they can be moved in any server, any time. One thread a world.
+// The moving objects of the dynamic suite: determined by a kind, a count and fixed seeds, and drawn in a fixed order,
+// so that the workload can be repeated in any server at any time. One thread a world.
 //
-// Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). Everything is float, and a product that
-// something is added to is not rounded before (a fused multiplication). Seed 1: twenty towns (x and y 100 + 1800 f,
-// drawn whatever the kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, without their
+// Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). Everything is float; a product to which
+// something is added is not rounded before the addition (a fused multiplication). Seed 1: twenty towns (x and y 100 +
+// 1800 f, drawn for every kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, without their
 // highest bit.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
@@ -25,44 +25,45 @@ enum class Kind : uint8_t { kUniform, kClustered, kFar, kOneCell, kBorder, kGian
 inline constexpr std::array<Kind, 7> kKinds = {Kind::kUniform, Kind::kClustered, Kind::kFar,  Kind::kOneCell,
                                                Kind::kBorder,  Kind::kGiant,     Kind::kMixed};
 const char* name_of(Kind kind);
-// Whether all radii are 0.5.
+// Returns whether all radii are 0.5.
 constexpr bool has_one_size(Kind kind) { return kind != Kind::kGiant && kind != Kind::kMixed; }
-// 10k, 1M.
+// Returns a short name, such as 10k or 1M.
 std::string name_of_count(uint32_t count);
 
 inline constexpr float kSide = 2000;
 
 class World {
  public:
-  // `side`: of a uniform world, in x and y.
+  // Makes a world. `side` is the size of a uniform one in x and y.
   World(Kind kind, uint32_t count, float side = kSide);
 
-  // One tick: everything goes on by its velocity, turned round per axis where it would leave the world.
+  // Advances by one tick: every object moves by its velocity, of which a component is reversed if it would leave the
+  // world.
   void step();
-  // One object's step alone.
+  // Advances one object only.
   void step(uint32_t object);
 
   Kind kind() const { return kind_; }
   uint32_t count() const { return static_cast<uint32_t>(ids_.size()); }
-  // Of now; valid while the world is, and current after each step().
+  // Returns the present objects: valid as long as the world, and updated by each step().
   Objects objects() const { return {ids_, positions_, radii_}; }
   Moves moves() const { return {ids_, positions_, velocities_}; }
-  // uniform/10k
+  // Returns a name such as uniform/10k.
   std::string name() const;
 
  private:
   Kind kind_;
   Vec3f low_, high_;
   std::vector<uint64_t> ids_;
-  std::vector<float> positions_;   // 3 an object
-  std::vector<float> velocities_;  // likewise, a tick
+  std::vector<float> positions_;   // 3 per object
+  std::vector<float> velocities_;  // 3 per object, per tick
   std::vector<float> radii_;
 };
 
-// Queries about a world as it is now, which the check values want to be its start: the positions of objects drawn,
-// moved by up to 5 on each axis.
+// Queries about a world at present (for the check values, at its start): positions of randomly drawn objects, moved by
+// up to 5 on each axis.
 struct Queries {
-  std::vector<Vec3f> centers;  // seed 3: of balls and boxes and for the nearest
+  std::vector<Vec3f> centers;  // seed 3: for balls, boxes and nearest
   std::vector<Rayf> rays;      // seed 4: z of the directions times 0.2, length kRayLength
 };
 inline constexpr size_t kQueries = 10'000;

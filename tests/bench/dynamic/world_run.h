@@ -1,4 +1,4 @@
-// What the cases of one world share: who is asked, and where results go. Plain data.
+// Data that the cases of one world share: contenders, and the report. Plain data.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_RUN_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_RUN_H_
 
@@ -16,24 +16,24 @@ namespace locus::bench::dynamic {
 
 struct Entrant {
   std::unique_ptr<Contender> contender;
-  int64_t bytes = 0;  // that it holds since it was loaded and moved
+  int64_t bytes = 0;  // bytes that it keeps after loading and moves
 };
 
 struct WorldRun {
   const Options& options;
   World& world;
-  const Queries& queries;                // about its start
-  const std::vector<Entrant>& entrants;  // loaded, and moved as the world was; ours is the first
-  const Ours& ours;                      // the same
+  const Queries& queries;                // made at its start
+  const std::vector<Entrant>& entrants;  // loaded, and moved like the world; locus is the first
+  const Ours& ours;                      // the first entrant
   Report& report;
 
   std::string case_of(const std::string& what) const { return absl::StrCat(what, "/", world.name()); }
 };
 
-// Ours, and all peers that can hold this world.
+// Returns the factories of locus and of all peers that can hold this world.
 std::vector<Maker> makers_for(const World& world);
 
-// The part of a cell that a case knows.
+// Returns a cell with the fields that a case knows.
 inline Cell cell_of(const std::string& case_name, const std::string& metric, const std::string& results_hash) {
   Cell cell;
   cell.suite = "dynamic";

@@ -5,7 +5,7 @@
 
 #include <set>
 
-// The expected numbers come from another program of the same definition.
+// Another program of the same definition computed the expected values.
 namespace locus::bench::dynamic {
 namespace {
 
@@ -29,13 +29,13 @@ TEST(WorldTest, PositionsOfEveryKindAreTheKnownOnes) {
   expect_near(third(World(Kind::kBorder, 1000)), {648, 312, 88});
 }
 
-TEST(WorldTest, TwentyTicksLeadToTheKnownPlaces) {
+TEST(WorldTest, TwentyTicksLeadToTheKnownPositions) {
   expect_near(third(moved(Kind::kUniform)), {648.713806f, 316.131989f, 90.5270233f});
   expect_near(third(moved(Kind::kOneCell)), {1002.44287f, 1001.05078f, 55.6047897f});
   expect_near(third(moved(Kind::kBorder)), {808, 312, 88});
 }
 
-TEST(WorldTest, NothingLeavesTheWorld) {
+TEST(WorldTest, NoObjectLeavesTheWorld) {
   const World world = moved(Kind::kBorder);
   for (uint32_t i = 0; i < world.count(); ++i) {
     const Vec3f p = point_at(world.objects().positions, i);
@@ -43,7 +43,7 @@ TEST(WorldTest, NothingLeavesTheWorld) {
   }
 }
 
-TEST(WorldTest, RadiiAreOfOneSizeButForTheKindsThatSayOtherwise) {
+TEST(WorldTest, RadiiAreEqualExceptInGiantAndMixedWorlds) {
   EXPECT_EQ(World(Kind::kUniform, 1000).objects().radii[0], 0.5f);
   EXPECT_EQ(World(Kind::kGiant, 1000).objects().radii[0], 5000);
   EXPECT_EQ(World(Kind::kGiant, 1000).objects().radii[1], 0.5f);
@@ -52,7 +52,7 @@ TEST(WorldTest, RadiiAreOfOneSizeButForTheKindsThatSayOtherwise) {
   EXPECT_NEAR(mixed.objects().radii[2], 0.353743374f, 1e-6);
 }
 
-TEST(WorldTest, IdsAreDifferentAndLeaveTheHighestBitFree) {
+TEST(WorldTest, IdsAreUniqueAndHaveTheHighestBitClear) {
   const World world(Kind::kUniform, 10'000);
   std::set<uint64_t> ids(world.objects().ids.begin(), world.objects().ids.end());
   EXPECT_EQ(ids.size(), 10'000u);

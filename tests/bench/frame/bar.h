@@ -1,4 +1,4 @@
-// What has to be shown of a ratio, said beside it. For suites that have such bars.
+// Required values of ratios, noted beside them. For suites that have requirements.
 #ifndef LOCUS_TESTS_BENCH_FRAME_BAR_H_
 #define LOCUS_TESTS_BENCH_FRAME_BAR_H_
 
@@ -9,10 +9,10 @@
 
 namespace locus::bench {
 
-// Of the cell just added; `how` explains the bar.
-inline void judge(Report& report, double bar, const std::string& how = "") {
+// Notes whether the cell just added reaches `bar`; `how` explains the bar.
+inline void note_bar(Report& report, double bar, const std::string& how = "") {
   const Cell& cell = report.cells.back();
-  report.notes.push_back(absl::StrFormat("%s beside %s: %.3f, to be shown %.3f%s: %s", cell.case_name, cell.peer_name,
+  report.notes.push_back(absl::StrFormat("%s beside %s: %.3f, required %.3f%s: %s", cell.case_name, cell.peer_name,
                                          cell.ratio, bar, how, cell.ratio >= bar ? "shown" : "MISSED"));
 }
 

@@ -1,4 +1,4 @@
-// Which cases run: those whose names a regular expression matches somewhere. For every suite. Copies are cheap and
+// Filter for cases by name: those in which a regular expression matches anywhere. For every suite. Copies are cheap and
 // share; const members may run concurrently.
 #ifndef LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_
 #define LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_
@@ -14,14 +14,14 @@ namespace locus::bench {
 
 class CaseFilter {
  public:
-  // Wants every case.
+  // Selects every case.
   CaseFilter() = default;
 
-  // POSIX extended syntax; an empty pattern is none. INVALID_ARGUMENT with what is wrong.
+  // Compiles a pattern in POSIX extended syntax; an empty one selects every case. INVALID_ARGUMENT with the reason.
   static absl::StatusOr<CaseFilter> create(const std::string& pattern);
 
   bool wants(const std::string& case_name) const;
-  // Whether there is no pattern.
+  // Returns whether there is no pattern.
   bool wants_every() const { return pattern_ == nullptr; }
 
  private:

@@ -8,7 +8,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(CaseFilterTest, WithoutAPatternEveryCaseIsWanted) {
+TEST(CaseFilterTest, WithoutAPatternEveryCaseIsSelected) {
   EXPECT_TRUE(CaseFilter().wants("ray/short/any/delta"));
   EXPECT_TRUE(CaseFilter().wants_every());
 }
@@ -21,14 +21,14 @@ TEST(CaseFilterTest, APatternMatchesAnywhereInTheName) {
   EXPECT_FALSE(filter->wants_every());
 }
 
-TEST(CaseFilterTest, AnEmptyPatternWantsEverything) {
+TEST(CaseFilterTest, AnEmptyPatternSelectsEveryCase) {
   const auto filter = CaseFilter::create("");
   ASSERT_TRUE(filter.ok());
   EXPECT_TRUE(filter->wants("build/delta"));
   EXPECT_TRUE(filter->wants_every());
 }
 
-TEST(CaseFilterTest, ABrokenPatternIsRefusedWithItsReason) {
+TEST(CaseFilterTest, AnInvalidPatternIsRefusedWithAReason) {
   const auto filter = CaseFilter::create("ray/(");
   EXPECT_EQ(filter.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(filter.status().message()), HasSubstr("`ray/(` is no regular expression"));

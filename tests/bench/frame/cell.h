@@ -1,5 +1,5 @@
-// What a benchmark says: cells, each our figure beside a peer's, and the sentences that belong to them. For every
-// suite.
+// Results of a benchmark: cells, each with a figure of locus and one of a peer, and the sentences that belong to them.
+// For every suite.
 #ifndef LOCUS_TESTS_BENCH_FRAME_CELL_H_
 #define LOCUS_TESTS_BENCH_FRAME_CELL_H_
 
@@ -13,21 +13,21 @@ namespace locus::bench {
 struct Cell {
   std::string suite;
   std::string case_name;
-  std::string metric;  // what `ours` and `peer` count, for example "ns/ray"; orientation only
+  std::string metric;  // unit of `ours` and `peer`, for example "ns/ray"; for information only
   double ours = 0;
   double peer = 0;
   std::string peer_name;
-  double ratio = 0;   // above 1 means ours is better; the median over the rounds
-  double spread = 0;  // of the rounds' ratios: the largest less the smallest, over the median
+  double ratio = 0;   // above 1 means locus is better; the median over the rounds
+  double spread = 0;  // of the rounds' ratios: (maximum - minimum) / median
   std::string results_hash;
 };
 
 struct Report {
-  // Hears of each cell as soon as it is known; may be empty.
+  // Called with each cell as soon as it is known; may be empty.
   std::function<void(const Cell& cell)> on_cell;
   std::vector<Cell> cells;
-  std::vector<std::string> notes;          // what the reader has to know: a peer that is not there, rays that differ
-  std::vector<std::string> disagreements;  // what nobody has explained; one is enough for exit status 1
+  std::vector<std::string> notes;          // facts for the reader: a missing peer, rays that differ
+  std::vector<std::string> disagreements;  // unexplained differences; one is enough for exit status 1
 
   void add(Cell cell) {
     if (on_cell) on_cell(cell);

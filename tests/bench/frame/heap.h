@@ -1,4 +1,4 @@
-// What a process has taken from malloc and not given back: for cases that count bytes. Any thread.
+// Bytes that the process has allocated by malloc and not freed: for cases that measure memory. Any thread.
 #ifndef LOCUS_TESTS_BENCH_FRAME_HEAP_H_
 #define LOCUS_TESTS_BENCH_FRAME_HEAP_H_
 

@@ -1,5 +1,4 @@
-// What the line of `locus-bench` asks for. For main.cc, which fills it, and for every suite, which reads it. Plain
-// data.
+// Options of the command line of `locus-bench`. main.cc fills them, every suite reads them. Plain data.
 #ifndef LOCUS_TESTS_BENCH_FRAME_OPTIONS_H_
 #define LOCUS_TESTS_BENCH_FRAME_OPTIONS_H_
 
@@ -16,13 +15,13 @@ inline constexpr int kMaxThreads = 256;
 
 struct Options {
   std::string suite;
-  std::string json;                 // a file to write; empty = none
-  bool quick = false;               // every case in small
-  CaseFilter filter;                // the cases to run
-  int rounds = kMinRounds;          // counted ones
-  std::vector<std::string> meshes;  // in place of the suite's own
-  int threads = 2;                  // of the cases that use several
-  std::string levels;               // where fetched levels are kept
+  std::string json;                 // output file; empty = none
+  bool quick = false;               // runs every case with a small workload
+  CaseFilter filter;                // cases to run
+  int rounds = kMinRounds;          // without the warm-up round
+  std::vector<std::string> meshes;  // replaces the suite's own
+  int threads = 2;                  // threads of the cases that use several
+  std::string levels;               // folder of fetched levels
 };
 
 }  // namespace locus::bench

@@ -1,5 +1,5 @@
-// Which libraries of peers this program was configured with, and the words for those that are not there. For every
-// suite. Plain data and pure functions.
+// Peer libraries, with a flag whether this program was configured with them, and the notes about missing ones. For
+// every suite. Plain data and pure functions.
 #ifndef LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
 #define LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
 
@@ -12,7 +12,7 @@
 namespace locus::bench {
 
 struct PeerLibrary {
-  const char* package;  // Debian's
+  const char* package;  // name in Debian
   bool is_here;
 };
 
@@ -22,7 +22,7 @@ inline constexpr PeerLibrary kBoost = {"libboost-dev", LOCUS_BENCH_BOOST != 0};
 inline constexpr PeerLibrary kCgal = {"libcgal-dev", LOCUS_BENCH_CGAL != 0};
 inline constexpr PeerLibrary kNanoflann = {"libnanoflann-dev", LOCUS_BENCH_NANOFLANN != 0};
 
-// One sentence for each that was not there when this program was configured.
+// Returns one sentence for each library that was missing when this program was configured.
 inline std::vector<std::string> missing_peers(absl::Span<const PeerLibrary> libraries) {
   std::vector<std::string> sentences;
   for (const PeerLibrary& library : libraries)

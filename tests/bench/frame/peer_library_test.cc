@@ -6,7 +6,7 @@
 namespace locus::bench {
 namespace {
 
-TEST(PeerLibraryTest, OnlyThoseThatAreNotHereAreSaidByTheirPackage) {
+TEST(PeerLibraryTest, MissingLibrariesAreReportedByTheirPackage) {
   EXPECT_THAT(missing_peers({{"libhere-dev", true}, {"libgone-dev", false}}),
               testing::ElementsAre("a peer is missing: libgone-dev was not installed when this program was configured; "
                                    "run deploy/packages.sh bench"));

@@ -13,7 +13,7 @@ double seconds_of(clockid_t clock) {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// Seconds of each contestant.
+// Runs one round and returns the seconds of each contestant.
 std::vector<double> one_round(const std::vector<Contestant>& contestants, size_t chunks, double (*clock)()) {
   std::vector<double> seconds(contestants.size());
   for (size_t chunk = 0; chunk < chunks; ++chunk) {

@@ -1,5 +1,5 @@
-// Races: the same work by several contestants in one process, interleaved in small chunks, so that whatever else the
-// machine does disturbs all of them alike. For every suite that measures in process; one thread runs a race.
+// Races: the same work by several contestants in one process, interleaved in small chunks, so that other load on the
+// machine disturbs all of them equally. For every suite that measures in process; one thread runs a race.
 #ifndef LOCUS_TESTS_BENCH_FRAME_RACE_H_
 #define LOCUS_TESTS_BENCH_FRAME_RACE_H_
 
@@ -13,7 +13,7 @@
 
 namespace locus::bench {
 
-// The time this thread has computed, what the whole process has, and what has passed; in seconds.
+// Returns the processor time of this thread, that of the process, or wall time; in seconds.
 double thread_seconds();
 double process_seconds();
 double wall_seconds();
@@ -21,19 +21,19 @@ double wall_seconds();
 struct Contestant {
   std::string name;
   std::function<void(size_t chunk)> run;
-  double operations = 1;                      // in all chunks together: what a time is divided by
-  std::function<void(size_t chunk)> prepare;  // before the clock starts; may be empty
+  double operations = 1;                      // in all chunks together: the divisor of times
+  std::function<void(size_t chunk)> prepare;  // runs before the clock starts; may be empty
 };
 
-// kDone: all have just done the same work already.
+// kDone: all contestants have done the same work just before.
 enum class WarmUp : uint8_t { kOneRound, kDone };
 
-// Nanoseconds an operation: one row a contestant, one column a round. A round is all contestants at the first chunk,
-// then all at the second and so on; the one to warm up goes before and is not counted.
+// Returns nanoseconds per operation: one row a contestant, one column a round. A round is all contestants at the first
+// chunk, then all at the second and so on; the warm-up round before is not counted.
 std::vector<std::vector<double>> race(const std::vector<Contestant>& contestants, size_t chunks, int rounds,
                                       double (*clock)(), WarmUp warm_up = WarmUp::kOneRound);
 
-// The first contestant is ours: one cell for each of the others. `cell` has what they share.
+// Adds one cell for each contestant but the first, which is locus. `cell` has the fields that they share.
 void add_cells(const std::vector<Contestant>& contestants, const std::vector<std::vector<double>>& times,
                const Cell& cell, Report& report);
 

@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-double now = 0;  // what the clock of these tests shows
+double now = 0;  // time of the clock of these tests
 
 double read_clock() { return now; }
 
@@ -29,20 +29,20 @@ TEST(RaceTest, ContestantsTakeTurnsChunkByChunkAndTheFirstRoundDoesNotCount) {
   EXPECT_THAT(times, ElementsAre(ElementsAre(1e9), ElementsAre(3e9)));
 }
 
-TEST(RaceTest, WhoIsWarmAlreadyRunsOnlyWhatCounts) {
+TEST(RaceTest, WarmContestantsRunNoWarmUpRound) {
   std::string order;
   race({taking("a", 1, order)}, 1, 2, read_clock, WarmUp::kDone);
   EXPECT_EQ(order, "a0a0");
 }
 
-TEST(RaceTest, WhatIsPreparedIsNotTimed) {
+TEST(RaceTest, PreparationIsNotTimed) {
   std::string order;
   Contestant one = taking("a", 1, order);
   one.prepare = [](size_t) { now += 100; };
   EXPECT_THAT(race({one}, 1, 3, read_clock), ElementsAre(ElementsAre(5e8, 5e8, 5e8)));
 }
 
-TEST(RaceTest, EveryOtherContestantGetsACellWithUsBesideIt) {
+TEST(RaceTest, EachPeerGetsACellWithOursBesideIt) {
   std::string order;
   const std::vector<Contestant> contestants = {taking("us", 1, order), taking("p", 3, order), taking("q", 0.5, order)};
   Cell shared;

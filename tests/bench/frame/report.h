@@ -1,5 +1,4 @@
-// How a report is written: a table to read, which grows case by case, and the JSON that other programs read. For
-// main.cc.
+// Output of a report: a table for people, which grows case by case, and JSON for other programs. For main.cc.
 #ifndef LOCUS_TESTS_BENCH_FRAME_REPORT_H_
 #define LOCUS_TESTS_BENCH_FRAME_REPORT_H_
 
@@ -11,20 +10,20 @@
 
 namespace locus::bench {
 
-// The cells in columns: their names first, then a row for each, at once in the hands of whoever reads.
+// Writes the cells as a table: the heading, then one row per cell, flushed at once.
 void write_heading(std::ostream& out);
 void write_row(const Cell& cell, std::ostream& out);
 
-// What stands below the rows: how to read them, the notes, then the disagreements.
+// Writes the text below the rows: an explanation of the columns, the notes, then the disagreements.
 void write_closing(const Report& report, std::ostream& out);
 
-// A list of objects {suite, case, metric, ours, peer, peer_name, ratio, spread, results_hash}.
+// Returns a list of objects {suite, case, metric, ours, peer, peer_name, ratio, spread, results_hash}.
 std::string json_of(const Report& report);
 
-// FAILED_PRECONDITION where the file cannot be written.
+// Writes the JSON; FAILED_PRECONDITION if the file cannot be written.
 absl::Status write_json(const Report& report, const std::string& path);
 
-// 1 if anything disagrees, else 0.
+// Returns 1 if there is a disagreement, else 0.
 int exit_status(const Report& report);
 
 }  // namespace locus::bench

@@ -33,7 +33,7 @@ TEST(ReportTest, JsonIsAListOfCellsWithEveryField) {
   EXPECT_EQ(list, expected);
 }
 
-TEST(ReportTest, WhoeverListensHearsOfEachCellAtOnce) {
+TEST(ReportTest, TheListenerIsCalledForEachCellAtOnce) {
   Report report;
   std::ostringstream out;
   report.on_cell = [&](const Cell& cell) { write_row(cell, out); };

@@ -1,5 +1,5 @@
-// A hash over results in their order, so that two runs, or two machines, can be compared by one word. One object, one
-// thread. Source: Fowler, Noll, Vo (FNV-1a), over 64-bit words.
+// A hash of results in their order, so that those of two runs, or two machines, can be compared by one word. One
+// object, one thread. Source: Fowler, Noll, Vo (FNV-1a), over 64-bit words.
 #ifndef LOCUS_TESTS_BENCH_FRAME_RESULTS_HASH_H_
 #define LOCUS_TESTS_BENCH_FRAME_RESULTS_HASH_H_
 
@@ -14,14 +14,14 @@ class ResultsHash {
  public:
   void add(uint64_t value) { state_ = (state_ ^ value) * 0x100000001B3u; }
   uint64_t value() const { return state_; }
-  // Sixteen hexadecimal digits.
+  // Returns sixteen hexadecimal digits.
   std::string text() const { return absl::StrCat(absl::Hex(state_, absl::kZeroPad16)); }
 
  private:
   uint64_t state_ = 0xCBF29CE484222325u;
 };
 
-// Of one number.
+// Returns the hash of one value.
 inline std::string hash_of_number(uint64_t value) {
   ResultsHash hash;
   hash.add(value);

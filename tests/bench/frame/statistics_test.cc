@@ -12,7 +12,7 @@ TEST(StatisticsTest, MedianOfAnOddCountIsTheMiddleValue) { EXPECT_EQ(median({5, 
 
 TEST(StatisticsTest, MedianOfAnEvenCountIsTheMeanOfTheMiddleTwo) { EXPECT_EQ(median({4, 1, 2, 100}), 3); }
 
-TEST(StatisticsTest, APercentileIsTheLeastValueThatTheShareDoesNotExceed) {
+TEST(StatisticsTest, APercentileIsTheSmallestValueThatTheShareDoesNotExceed) {
   EXPECT_EQ(percentile({4, 1, 3, 2}, 0.5), 2);
   EXPECT_EQ(percentile({4, 1, 3, 2}, 0.51), 3);
   EXPECT_EQ(percentile({4, 1, 3, 2}, 0.99), 4);

@@ -11,14 +11,13 @@
 
 namespace locus::bench {
 
-// For a person who waits: what is under way, on standard error.
+// Reports progress on standard error.
 using Progress = std::function<void(const std::string& sentence)>;
 
 struct Suite {
   std::string name;
   std::string description;
-  // Adds to the report case by case. Errors: what keeps the suite from running at all, for example a mesh that cannot
-  // be read.
+  // Adds to the report case by case. Fails if the suite cannot run at all, for example if a mesh cannot be read.
   absl::Status (*run)(const Options& options, const Progress& progress, Report& report);
 };
 

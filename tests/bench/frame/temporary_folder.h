@@ -1,4 +1,4 @@
-// A folder of a benchmark's own under TMPDIR, or /tmp, removed with what is in it. For suites that write files. One
+// A folder of a benchmark's own under TMPDIR, or /tmp, removed with its content. For suites that write files. One
 // thread at a time.
 #ifndef LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_
 #define LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_

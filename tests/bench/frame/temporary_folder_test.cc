@@ -7,7 +7,7 @@
 namespace locus::bench {
 namespace {
 
-TEST(TemporaryFolderTest, IsRemovedWithWhatIsInIt) {
+TEST(TemporaryFolderTest, IsRemovedWithItsContent) {
   std::string file;
   {
     const TemporaryFolder folder;

@@ -1,4 +1,4 @@
-// What every case of the suite `log` is given. Plain data.
+// Arguments of every case of the suite `log`. Plain data.
 #ifndef LOCUS_TESTS_BENCH_LOG_LOG_RUN_H_
 #define LOCUS_TESTS_BENCH_LOG_LOG_RUN_H_
 

@@ -28,18 +28,18 @@ constexpr size_t kWriters = 8;
 
 struct Size {
   size_t moves;
-  size_t commits;  // in a chunk
+  size_t commits;  // per chunk
   double bar;
 };
 constexpr Size kSizes[] = {{16, 400, 0.8}, {256, 400, 0.8}, {4096, 100, 0.6}};
 
 size_t commits_of(const LogRun& run, const Size& size) { return run.options.quick ? size.commits / 20 : size.commits; }
-// In all rounds, the one to warm up too.
+// Returns the number of commits in all rounds, including the warm-up round.
 size_t commits_of_all(const LogRun& run, const Size& size) {
   return commits_of(run, size) * run.chunks() * static_cast<size_t>(run.options.rounds + 1);
 }
 
-// Records as a scene writes them, of objects that move.
+// Returns records in the format of a scene's log, with moves of objects.
 std::vector<std::string> records_of(size_t moves, size_t count) {
   dynamic::World world(dynamic::Kind::kUniform, kObjects);
   std::vector<std::string> records(count);
@@ -64,7 +64,7 @@ void hash_of(absl::string_view bytes, ResultsHash& hash) {
   for (const char byte : bytes) hash.add(static_cast<uint8_t>(byte));
 }
 
-// A data directory with empty scenes, as the daemon has it.
+// A data directory with empty scenes, as the daemon creates it.
 class OurLog {
  public:
   static absl::StatusOr<OurLog> create(const std::string& path, size_t scenes) {
@@ -111,7 +111,7 @@ class OurLog {
 
 constexpr const char* kMetric = "ns/commit";
 
-// One writer, each commit on the disk before the next.
+// Measures one writer: each commit is on the disk before the next.
 absl::Status measure_commits(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("commit/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();
@@ -150,16 +150,16 @@ absl::Status measure_commits(const LogRun& run, const Size& size) {
   Report cells;
   add_cells(contestants, times, cell_of(name, kMetric, hash), cells);
   for (Cell& cell : cells.cells) {
-    const bool judged = cell.peer_name == "append";
+    const bool has_bar = cell.peer_name == "append";
     run.report.add(std::move(cell));
-    if (judged) judge(run.report, size.bar);
+    if (has_bar) note_bar(run.report, size.bar);
   }
   run.report.notes.push_back(
       absl::StrFormat("%s: %.0f commits a second of %d bytes", name, 1e9 / median(times[0]), records.front().size()));
   return status;
 }
 
-// Several scenes, each with a writer of its own: a sync may serve all.
+// Measures several scenes, each with a writer of its own: one sync can serve all.
 absl::Status measure_writers(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("writers/", kWriters, "/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();
@@ -199,7 +199,7 @@ absl::Status measure_writers(const LogRun& run, const Size& size) {
   }
   add_cells(contestants, times, cell_of(name, kMetric, hash), run.report);
   constexpr double kBar = 2;
-  if (size.moves == 256) judge(run.report, kBar);
+  if (size.moves == 256) note_bar(run.report, kBar);
   return absl::OkStatus();
 }
 

@@ -1,4 +1,4 @@
-// The suite `log`: what it costs to bring update batches to the disk. The cases are listed in tests/bench/README.md.
+// The suite `log`: time to bring update batches to the disk. The cases are listed in tests/bench/README.md.
 #ifndef LOCUS_TESTS_BENCH_LOG_LOG_SUITE_H_
 #define LOCUS_TESTS_BENCH_LOG_LOG_SUITE_H_
 
@@ -6,7 +6,7 @@
 
 namespace locus::bench::log {
 
-// UNAVAILABLE where files cannot be written.
+// Runs the suite; UNAVAILABLE if files cannot be written.
 absl::Status run_log_suite(const Options& options, const Progress& progress, Report& report);
 
 }  // namespace locus::bench::log

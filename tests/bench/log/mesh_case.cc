@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* kName = "mesh/2M";
 
-// Its triangles in storage order: that trees from outlines answer right is for the tests to say.
+// Returns a hash of the triangles in storage order. Other tests verify the answers of trees restored from a topology.
 uint64_t hash_of(const StaticMesh& mesh) {
   ResultsHash hash;
   mesh.tree().for_each([&hash](const Triangle& triangle) { hash.add(triangle.number); });
@@ -37,7 +37,7 @@ class MeshCase {
     };
   }
 
-  // Uploads it, and opens the directory again.
+  // Uploads the mesh and opens the directory again.
   absl::Status prepare(const std::string& name) {
     const absl::StatusOr<BenchMesh> level = load_mesh(name);
     if (!level.ok()) return level.status();
@@ -51,9 +51,9 @@ class MeshCase {
     return open();
   }
 
-  // From what the directory holds; before a build it loses the outline, as one of an earlier version is none.
-  void forget_outline() {
-    outline_ = log_->read_outline({1}).value_or("");
+  // Removes the stored topology, so that recovery builds the tree, as in a directory of an earlier version.
+  void forget_topology() {
+    topology_ = log_->read_outline({1}).value_or("");
     log_->keep_outline({1}, "");
     mesh_ = nullptr;
   }
@@ -67,9 +67,9 @@ class MeshCase {
   }
 
   const absl::Status& status() const { return status_; }
-  // Of the last one.
+  // Returns the mesh of the last restore or build.
   const MeshPtr& mesh() const { return mesh_; }
-  size_t outline_bytes() const { return outline_.size(); }
+  size_t topology_bytes() const { return topology_.size(); }
 
  private:
   absl::Status open() {
@@ -86,7 +86,7 @@ class MeshCase {
   server::WorkerPool pool_{kThreads};
   BvhOptions bvh_options_;
   std::unique_ptr<UpdateLog> log_;
-  std::string outline_;
+  std::string topology_;
   MeshPtr mesh_;
   absl::Status status_;
 };
@@ -101,7 +101,7 @@ absl::Status measure_mesh(const LogRun& run) {
     return status;
   const std::vector<Contestant> contestants = {
       {"restored", [&](size_t) { mesh.recover(false); }, 1, [&](size_t) { mesh.forget_mesh(); }},
-      {"built", [&](size_t) { mesh.recover(true); }, 1, [&](size_t) { mesh.forget_outline(); }}};
+      {"built", [&](size_t) { mesh.recover(true); }, 1, [&](size_t) { mesh.forget_topology(); }}};
   const auto times = race(contestants, 1, run.options.rounds, wall_seconds);
   if (!mesh.status().ok()) return mesh.status();
   const uint64_t built = hash_of(*mesh.mesh());
@@ -113,8 +113,8 @@ absl::Status measure_mesh(const LogRun& run) {
   hash.add(built);
   add_cells(contestants, times, cell_of(kName, "ns", hash), run.report);
   run.report.notes.push_back(absl::StrFormat(
-      "%s: %.3f s restored, %.3f s built, %.1f bytes of outline a triangle", kName, 1e-9 * median(times[0]),
-      1e-9 * median(times[1]), static_cast<double>(mesh.outline_bytes()) / mesh.mesh()->triangle_count()));
+      "%s: %.3f s restored, %.3f s built, %.1f bytes of topology a triangle", kName, 1e-9 * median(times[0]),
+      1e-9 * median(times[1]), static_cast<double>(mesh.topology_bytes()) / mesh.mesh()->triangle_count()));
   return absl::OkStatus();
 }
 

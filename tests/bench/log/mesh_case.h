@@ -1,5 +1,5 @@
-// Until a mesh that a data directory holds can be asked again: its tree restored from the outline beside it, against
-// built anew. On two threads, as a daemon with two cores does it.
+// Time until a mesh in a data directory can be queried again: its tree restored from the stored topology, compared with
+// a new build. On two threads, like a daemon with two cores.
 #ifndef LOCUS_TESTS_BENCH_LOG_MESH_CASE_H_
 #define LOCUS_TESTS_BENCH_LOG_MESH_CASE_H_
 

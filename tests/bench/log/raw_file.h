@@ -1,5 +1,5 @@
-// The least that a log can do: a file that records are appended to, each synced before the next. No checksums, no
-// numbers, no reader who would notice damage. One thread a file.
+// The minimum that a log must do: a file to which records are appended, each synced before the next. No checksums, no
+// sequence numbers, no detection of damage. One thread a file.
 #ifndef LOCUS_TESTS_BENCH_LOG_RAW_FILE_H_
 #define LOCUS_TESTS_BENCH_LOG_RAW_FILE_H_
 
@@ -14,16 +14,16 @@ namespace locus::bench::log {
 
 class RawFile {
  public:
-  // A new file. With `reserved` bytes it holds as many zeros on the disk already, which records overwrite: a sync then
-  // has no length to bring to the disk. UNAVAILABLE.
+  // Creates a file. With `reserved` bytes it already holds that many zeros on the disk, which records overwrite: then a
+  // sync has no new file length to write. UNAVAILABLE.
   static absl::StatusOr<std::unique_ptr<RawFile>> create(const std::string& path, uint64_t reserved);
   ~RawFile();
   RawFile(const RawFile&) = delete;
   RawFile& operator=(const RawFile&) = delete;
 
-  // Written and on the disk (fdatasync) when this returns. UNAVAILABLE.
+  // Writes a record; it is on the disk (fdatasync) at return. UNAVAILABLE.
   absl::Status append(absl::string_view record);
-  // All that was appended.
+  // Returns all appended bytes.
   absl::StatusOr<std::string> read_all() const;
 
  private:

@@ -7,7 +7,7 @@
 namespace locus::bench::log {
 namespace {
 
-TEST(RawFileTest, HoldsWhatWasAppendedWhetherRoomWasReservedOrNot) {
+TEST(RawFileTest, HoldsTheAppendedRecordsWithAndWithoutReservedSpace) {
   const TemporaryFolder folder;
   for (const uint64_t reserved : {uint64_t{0}, uint64_t{1} << 20}) {
     const auto file = RawFile::create(folder.file(std::to_string(reserved)), reserved);
@@ -19,7 +19,7 @@ TEST(RawFileTest, HoldsWhatWasAppendedWhetherRoomWasReservedOrNot) {
   }
 }
 
-TEST(RawFileTest, AFileThatCannotBeMadeIsSaid) {
+TEST(RawFileTest, AFileThatCannotBeCreatedIsAnError) {
   const TemporaryFolder folder;
   EXPECT_FALSE(RawFile::create(folder.file("no/such/folder"), 0).ok());
 }

@@ -13,11 +13,11 @@
 namespace locus::bench::serving {
 namespace {
 
-constexpr size_t kLarge = 8192;  // rays
+constexpr size_t kLarge = 8192;  // rays per batch
 constexpr size_t kBulkWindow = 4;
-constexpr double kUntilBusy = 0.2;  // seconds that the other client has to connect
-constexpr size_t kCalls = 16;       // that the overloaded server admits
-constexpr size_t kFlood = 10;       // times as many
+constexpr double kUntilBusy = 0.2;  // seconds for the other client to connect
+constexpr size_t kCalls = 16;       // calls that the overloaded server admits
+constexpr size_t kFlood = 10;       // factor by which callers exceed that
 constexpr const char* kAtOnce = "overload/10x/at_once";
 constexpr const char* kAsTold = "overload/10x/as_told";
 
@@ -25,7 +25,7 @@ class CrowdCases {
  public:
   CrowdCases(const ServingRun& run, const BenchMesh& mesh) : run_(run), mesh_(mesh) {}
 
-  // One small batch after another, alone and beside another client's large ones, by turns.
+  // Measures small batches one after another, alone and beside another client's large ones, in turns.
   absl::Status mixed(TwinScene& scene) const {
     run_.progress("mixed_p99/16");
     constexpr size_t kSmall = GoodClient::kRays;
@@ -52,11 +52,11 @@ class CrowdCases {
     add_cell(run_, cell_of("mixed_p50/16", "us/batch", hash), "idle", beside[0], idle[0], Better::kLess);
     add_cell(run_, cell_of("mixed_p99/16", "us/batch", hash), "idle", beside[1], idle[1], Better::kLess);
     constexpr double kBar = 1.0 / 3;
-    judge(run_.report, kBar, " = 1/3");
+    note_bar(run_.report, kBar, " = 1/3");
     return absl::OkStatus();
   }
 
-  // Ten times as many callers as are admitted; `again` is what they do when they are refused.
+  // Measures ten times as many callers as are admitted; `again` is their behaviour after a refusal.
   absl::Status overload(const std::string& name, Again again) const {
     if (!run_.wants(name)) return absl::OkStatus();
     run_.progress(name);
@@ -83,7 +83,7 @@ class CrowdCases {
     if (!status.ok()) return status;
     add_cell(run_, cell_of(name, "calls/s", hash_of_number(batches.queries)), "peak", flooded, peak, Better::kMore);
     constexpr double kBar = 0.8;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     note_refusals(name, crowd, seconds * run_.options.rounds);
     return status;
   }
@@ -91,9 +91,9 @@ class CrowdCases {
  private:
   static constexpr double kShares[] = {0.5, 0.99};
 
-  // What a flood was like, beside the calm before it.
+  // Measurements of a flood, and of the calm before it.
   struct Crowd {
-    std::vector<double> refusals;  // seconds that each took
+    std::vector<double> refusals;  // seconds of each
     std::vector<int64_t> memory;   // after each flood
     size_t calm_answers = 0, answers = 0;
     double calm_client = 0, calm_server = 0, client = 0, server = 0;  // seconds of processor time
@@ -107,8 +107,8 @@ class CrowdCases {
       client += flood.client_seconds;
       server += flood.server_seconds;
     }
-    // Microseconds of a process for each refusal: what goes beyond the answers, each of which takes what it does in
-    // the calm.
+    // Returns microseconds of processor time for each refusal: the time beyond that of the answers, each of which takes
+    // as much as in the calm.
     double each(double seconds, double calm_seconds) const {
       const double answering = calm_seconds * static_cast<double>(answers) / static_cast<double>(calm_answers);
       return 1e6 * (seconds - answering) / static_cast<double>(refusals.size());
@@ -121,7 +121,7 @@ class CrowdCases {
       run_.note(absl::StrCat(name, ": nothing was refused"));
     } else {
       const double p99 = percentile(crowd.refusals, 0.99);
-      run_.note(absl::StrFormat("%s: %d calls refused, p50 %.2f ms, p99 %.2f ms, to be shown 5: %s", name,
+      run_.note(absl::StrFormat("%s: %d calls refused, p50 %.2f ms, p99 %.2f ms, required 5: %s", name,
                                 crowd.refusals.size(), 1e3 * median(crowd.refusals), 1e3 * p99,
                                 p99 < kMaxSeconds ? "shown" : "MISSED"));
       run_.note(absl::StrFormat(

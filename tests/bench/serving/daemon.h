@@ -1,4 +1,4 @@
-// A locusd of the benchmark's own, with a client of the library to fill it. For every case. One thread.
+// A locusd started by the benchmark, with a client of the library to fill it. For every case. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DAEMON_H_
 #define LOCUS_TESTS_BENCH_SERVING_DAEMON_H_
 
@@ -14,7 +14,7 @@ namespace locus::bench::serving {
 
 class Daemon final : public LocalServer {
  public:
-  // `options` of locusd beside the ones for its port. UNAVAILABLE, with what it printed, if it does not serve in time.
+  // Starts locusd with `options` beside those for its port. UNAVAILABLE, with its output, if it does not serve in time.
   static absl::StatusOr<std::unique_ptr<Daemon>> start(const std::vector<std::string>& options = {});
 
   const client::Client& client() const { return *client_; }

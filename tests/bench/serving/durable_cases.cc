@@ -80,7 +80,7 @@ class DurableCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(kMovesName, "ns/move", hash_of_number(compare(kMovesName))), run_.report);
     constexpr double kBar = 0.5;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     const double micros = 1e-3 * static_cast<double>(kMovesAMessage);
     run_.note(absl::StrFormat("%s: %.0f us a message durable, %.0f with memory acks", kMovesName,
                               micros * median(times[0]), micros * median(times[1])));
@@ -89,7 +89,7 @@ class DurableCases {
     return status;
   }
 
-  // Beside a stream of a quarter of a million moves a second.
+  // Measures queries beside a stream of a quarter of a million moves a second.
   absl::Status queries() {
     run_.progress(kQueriesName);
     Batches batches;
@@ -120,7 +120,7 @@ class DurableCases {
     add_cells(contestants, times, cell_of(kQueriesName, "ns/ball", hash_of_number(server.hashes().front())),
               run_.report);
     constexpr double kBar = 0.9;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     for (const absl::Status& failure : failures) status.Update(failure);
     status.Update(server.status());
     return status;
@@ -131,7 +131,7 @@ class DurableCases {
 
   size_t chunks() const { return run_.options.quick ? 1 : 4; }
 
-  // A message each millisecond.
+  // Sends one message each millisecond.
   absl::Status keep_moving(size_t scene, const std::atomic<bool>& over) {
     std::vector<v1::StreamUpdatesRequest> one = {messages_[scene].front()};
     UpdateLoad load(daemon_, one, 1, UpdateLoad::Expect::kApplied);
@@ -144,7 +144,7 @@ class DurableCases {
     return load.status();
   }
 
-  // Both scenes say the same.
+  // Verifies that both scenes give the same answers.
   uint64_t compare(const std::string& name) const {
     uint64_t hashes[2] = {};
     for (size_t i = 0; i < 2; ++i) {
@@ -159,11 +159,11 @@ class DurableCases {
   const ServingRun& run_;
   const Daemon& daemon_;
   dynamic::World world_{dynamic::Kind::kUniform, kMoving};
-  std::vector<std::vector<v1::StreamUpdatesRequest>> messages_;  // of each scene
+  std::vector<std::vector<v1::StreamUpdatesRequest>> messages_;  // per scene
 };
 
-// A scene whose snapshot holds all objects, and after it so many records of moves; then the daemon is killed, and
-// started again and again.
+// A scene whose snapshot holds all objects, followed by records of moves; then the daemon is killed, and started again
+// several times.
 class RestartCase {
  public:
   explicit RestartCase(const ServingRun& run) : run_(run) {}
@@ -190,7 +190,7 @@ class RestartCase {
       bar.push_back(1);
     }
     add_cell(run_, cell_of(kRestartName, "s", hash_of_number(hash)), "bar", seconds, bar, Better::kLess);
-    judge(run_.report, 1);
+    note_bar(run_.report, 1);
     return absl::OkStatus();
   }
 
@@ -203,7 +203,7 @@ class RestartCase {
     if (!daemon.ok()) return daemon.status();
     absl::Status status = create(**daemon, "arena", v1::DURABILITY_LOCAL);
     status.Update((*daemon)->client().apply("arena", insert_all(world_)).status());
-    // Until the log outweighs the scene and a snapshot takes its place.
+    // Writes until the log is larger than the scene, so that a new snapshot replaces it.
     const size_t ticks = run_.options.quick ? 40 : 4;
     uint64_t written = 1, kept = 0;
     for (size_t tick = 0; status.ok() && tick < ticks && kept == 0; ++tick) {
@@ -221,17 +221,17 @@ class RestartCase {
     return status;
   }
 
-  // A tick, or the first records of one.
-  absl::Status move(const Daemon& daemon, size_t most, uint64_t& written) {
+  // Writes a tick, or its first records.
+  absl::Status move(const Daemon& daemon, size_t max_records, uint64_t& written) {
     std::vector<v1::StreamUpdatesRequest> messages = move_messages(world_, "arena", kMovesARecord, 1);
-    messages.resize(std::min(messages.size(), most));
+    messages.resize(std::min(messages.size(), max_records));
     written += messages.size();
     UpdateLoad load(daemon, messages, kWindow, UpdateLoad::Expect::kApplied);
     load.run(1);
     return load.status();
   }
 
-  // The number of the last record that it holds; 0 while there is none.
+  // Returns the sequence number of the last record in the snapshot; 0 if there is no snapshot.
   static uint64_t last_of_snapshot(const Daemon& daemon) {
     const std::string log = daemon.log();
     const size_t line = log.rfind("snapshot written");

@@ -1,4 +1,4 @@
-// What it costs that acks wait for the disk, and how soon a killed daemon answers again. For the suite serving.
+// Cost of acks that wait for the disk, and the time until a killed daemon answers again. For the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_
 
@@ -7,9 +7,9 @@
 
 namespace locus::bench::serving {
 
-// durable/256, durable_queries/256: moves over one stream, and queries beside such a stream, where acks wait for the
-// disk and where they do not, on one daemon by turns. restart/1M: seconds from the start of a daemon that was killed to
-// its first answer, which has to be the right one, beside the second that it may take.
+// Runs durable/256, durable_queries/256: moves over one stream, and queries beside such a stream, with acks that wait
+// for the disk and acks that do not, on one daemon in turns. Runs restart/1M: seconds from the start of a daemon that
+// was killed to its first answer, which must be right, compared with the bar of one second.
 absl::Status run_durable_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -1,5 +1,5 @@
-// What the echo answers: 24 bytes a ray, copied from the ray's own columns as fast as memory goes. For the server and
-// for whoever checks it. Pure function.
+// Answer of the echo server: 24 bytes a ray, copied from the ray's own columns at memory speed. For the server and for
+// its verification. Pure function.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
 #define LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
 
@@ -7,7 +7,7 @@
 
 namespace locus::bench::serving {
 
-// Of the batch's first block, which has rays with a t_max and a mask each.
+// Answers the batch's first block, which has rays with a t_max and a mask each.
 inline void answer_echo(const v1::QueryBatch& batch, v1::QueryResult& result) {
   result.Clear();
   v1::BlockResult& block = *result.add_blocks();

@@ -26,7 +26,7 @@ constexpr Echo kEchos[] = {{1024, 4}, {8192, 2}};
 
 struct Moves {
   size_t moves;
-  double bar;  // millions a second
+  double bar;  // required millions a second
 };
 constexpr Moves kMoves[] = {{256, 30}, {4096, 75}};
 
@@ -35,7 +35,7 @@ std::string empty_name(const Echo& echo) { return absl::StrCat("empty/", echo.ra
 std::string parsed_name(const Moves& moves) { return absl::StrCat("moves/", moves.moves); }
 std::string applied_name(const Moves& moves) { return absl::StrCat("moves_applied/", moves.moves); }
 
-// 32 bytes a ray there, 24 back: every column that says what is hit.
+// Makes batches of 32 bytes a ray, whose answers have 24: all columns of a hit.
 Batches echo_batches(size_t rays, size_t messages, const std::string& scene) {
   Batches batches;
   batches.queries = rays * messages;
@@ -62,7 +62,7 @@ class EchoCases {
   EchoCases(const ServingRun& run, const RawTcpServer& plain, TwinScene& scene)
       : run_(run), plain_(plain), scene_(scene) {}
 
-  // Columns there and back by what the server's calls are made of, and nothing else.
+  // Measures columns to the server and back through the server's call code, without other work.
   absl::Status echo(const Echo& echo) {
     const std::string name = echo_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -77,11 +77,11 @@ class EchoCases {
     }
     const absl::Status status = there_and_back(name, echo, **server, batches, expected);
     constexpr double kBar = 0.8;
-    if (status.ok()) judge(run_.report, kBar);
+    if (status.ok()) note_bar(run_.report, kBar);
     return status;
   }
 
-  // As many bytes by the daemon: the rays are checked and a scene without anything is asked.
+  // Measures as many bytes through the daemon: the rays are checked and run on an empty scene.
   absl::Status empty(const Echo& echo) {
     const std::string name = empty_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -90,7 +90,8 @@ class EchoCases {
     return there_and_back(name, echo, scene_.daemon(), batches, process.hashes());
   }
 
-  // The writer's first batch has been applied: as such every message is read whole and acked, and nothing moves.
+  // The writer's first batch has been applied, so as duplicates of it all messages are read whole and acked, and no
+  // object moves.
   absl::Status parsed(const Moves& moves) {
     const std::string name = parsed_name(moves);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -116,7 +117,7 @@ class EchoCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/move", hash_of_number(messages.size())), run_.report);
     const double rate = 1e3 / median(times[0]);
-    run_.note(absl::StrFormat("%s: %.1f M moves/s parsed and acked, to be shown %.0f: %s", name, rate, moves.bar,
+    run_.note(absl::StrFormat("%s: %.1f M moves/s parsed and acked, required %.0f: %s", name, rate, moves.bar,
                               rate >= moves.bar ? "shown" : "MISSED"));
     note_time(name, time, plain_time);
     absl::Status status = server.status();
@@ -124,7 +125,7 @@ class EchoCases {
     return status;
   }
 
-  // Ticks of a world, each object once a tick, there and in this process.
+  // Measures ticks of a world, each object once a tick, in the daemon and in this process.
   absl::Status applied(const Moves& moves) {
     const std::string name = applied_name(moves);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -192,7 +193,7 @@ class EchoCases {
         absl::StrFormat("%s: processor time a message: %s; over plain sockets %s", name, time.text(), plain.text()));
   }
 
-  // Everything is where it is in process.
+  // Verifies that all objects are at the same positions as in process.
   uint64_t compare_objects(const std::string& name) const {
     v1::QueryBatch batch;
     v1::Balls* const balls = batch.add_blocks()->mutable_balls();

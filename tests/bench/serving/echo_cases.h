@@ -1,5 +1,5 @@
-// What messages cost without the work: columns there and back, rays that meet nothing, and moves that are not applied
-// again, beside plain sockets with the same bytes. For the suite serving.
+// Cost of messages without the work: columns to the server and back, rays that meet nothing, and duplicate moves that
+// are not applied again, compared with plain sockets and the same bytes. For the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ECHO_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_ECHO_CASES_H_
 
@@ -11,7 +11,7 @@ namespace locus::bench::serving {
 
 bool wants_raw_tcp(const ServingRun& run);
 
-// echo/1024, echo/8192, empty/1024, empty/8192, moves/256, moves/4096, moves_applied/256, moves_applied/4096.
+// Runs echo/1024, echo/8192, empty/1024, empty/8192, moves/256, moves/4096, moves_applied/256, moves_applied/4096.
 absl::Status run_echo_cases(const ServingRun& run, const RawTcpServer& plain);
 
 }  // namespace locus::bench::serving

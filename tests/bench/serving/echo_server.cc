@@ -1,6 +1,6 @@
-// The program `locus-echo`: streams of queries on the server's own template for calls, on as many IO threads, under its
-// limits, but every batch is answered with columns of the same length at once. Nothing is checked and no scene asked:
-// what is left is what transport costs. Started by locus-bench, with locusd's options for the port.
+// The program `locus-echo`: streams of queries with the server's own template for calls, as many IO threads and its
+// limits, but every batch is answered at once with columns of the same length. It checks nothing and has no scene, so
+// that it measures transport alone. locus-bench starts it with locusd's options for the port.
 #include <fcntl.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
@@ -57,7 +57,7 @@ struct EchoMethod {
   Service* service;
 };
 
-// As locusd does before anything else.
+// Tunes malloc like locusd, before anything else.
 void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, 512 << 20);
@@ -73,7 +73,7 @@ void set_limits(const server::ServerConfig& config, grpc::ServerBuilder& builder
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
 }
 
-// Whole or not at all.
+// Writes the file atomically.
 bool write_port(const std::string& path, int port) {
   const std::string temporary = path + ".tmp", text = absl::StrCat(port, "\n");
   const int file = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
@@ -82,7 +82,7 @@ bool write_port(const std::string& path, int port) {
   return written && std::rename(temporary.c_str(), path.c_str()) == 0;
 }
 
-// Until a signal ends the process.
+// Serves until a signal ends the process.
 int serve(const server::ServerConfig& config) {
   server::Host host(config, nullptr);
   Service service;

@@ -13,11 +13,12 @@ namespace {
 
 constexpr uint32_t kObjects = 100'000;
 constexpr double kMaxMs = 5;
-constexpr double kSettled = 0.05;  // a server without work is left so long before it is looked at
+constexpr double kSettled = 0.05;  // seconds after which a server without work is checked
 constexpr const char* kDeadline = "deadline/1ms";
 constexpr const char* kCancel = "cancel/1000";
 
-// Balls that each meet every object: nothing ends it but its last test. `balls` so that it takes about a second.
+// Makes a request of balls that each meet every object, so that it ends only after its last test. `balls` is chosen so
+// that it takes about a second.
 v1::QueryRequest long_job(const std::string& scene, int balls) {
   v1::QueryRequest request;
   request.set_scene(scene);
@@ -34,7 +35,7 @@ class EndingCases {
   EndingCases(const ServingRun& run, TwinScene& scene)
       : run_(run), scene_(scene), stub_(v1::QueryService::NewStub(scene.daemon().channel())) {}
 
-  // How many balls take about a second (in small a tenth of one).
+  // Determines how many balls take about a second (a tenth of one in a quick run).
   absl::Status make_job() {
     const double wanted = run_.options.quick ? 0.1 : 1;
     for (int balls = 64; balls <= 65'536; balls *= 2) {
@@ -102,7 +103,8 @@ class EndingCases {
     }
   }
 
-  // A call that came while the machine left the server no time to drop the one before may have been refused.
+  // Returns whether the call ended as expected, or was refused because the server had no processor time to drop the
+  // call before.
   bool is_ended(const grpc::Status& status, grpc::StatusCode expected) {
     if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED)
       ++refused_;
@@ -111,8 +113,8 @@ class EndingCases {
     return status.error_code() == expected;
   }
 
-  // Milliseconds that the server has computed since, once it is quiet: whatever else the machine does meanwhile, a
-  // millisecond of its computing is one.
+  // Waits until the server is idle and returns the milliseconds that it has computed since `before`. Processor time
+  // does not depend on the machine's other load.
   double settle(double before) const {
     double last = computed();
     for (int i = 0; i < 200; ++i) {
@@ -138,7 +140,7 @@ class EndingCases {
     const double most = *std::max_element(after.begin(), after.end());
     run_.note(absl::StrFormat(
         "%s: the server computes for another %.2f ms (p50), %.2f (p99), %.2f (most) of a job of "
-        "%.0f, to be shown 5: %s",
+        "%.0f, required 5: %s",
         name, percentile(after, 0.5), percentile(after, 0.99), most, whole_ms_, worst < kMaxMs ? "shown" : "MISSED"));
   }
 

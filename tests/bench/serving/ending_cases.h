@@ -1,4 +1,5 @@
-// How soon work ends that nobody waits for any more: after a deadline, after callers cancelled. For the suite serving.
+// Time until the server stops work whose result no caller waits for: after a deadline, after a cancellation. For the
+// suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_
 
@@ -9,7 +10,7 @@ namespace locus::bench::serving {
 
 bool wants_ending(const ServingRun& run);
 
-// deadline/1ms, cancel/1000: milliseconds of computing that the server goes on with, beside the whole job.
+// Runs deadline/1ms and cancel/1000: milliseconds that the server still computes, compared with the complete job.
 absl::Status run_ending_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

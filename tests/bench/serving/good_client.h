@@ -1,5 +1,5 @@
-// A caller who does nothing wrong: one small batch after another over a stream of its own. How long it waits says what
-// others do to it. For every case with a crowd. One thread.
+// A well-behaved client: one small batch after another over a stream of its own. Its waiting times show the effect of
+// other clients. For every case with other clients. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 #define LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 
@@ -14,12 +14,12 @@ namespace locus::bench::serving {
 
 class GoodClient {
  public:
-  static constexpr size_t kRays = 16;  // a batch
+  static constexpr size_t kRays = 16;  // rays per batch
 
-  // Of the scene's `rays`, its answers compared with this process's.
+  // Sends the scene's `rays` and compares the answers with this process's.
   GoodClient(const ServingRun& run, TwinScene& scene, const std::string& case_name, Batches batches);
 
-  // So many batches: adds the seconds that each took.
+  // Sends `count` batches and appends the seconds of each.
   void ask(size_t count, std::vector<double>& seconds);
 
   const std::vector<uint64_t>& expected() const { return expected_; }

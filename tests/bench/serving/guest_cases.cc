@@ -9,7 +9,7 @@
 namespace locus::bench::serving {
 namespace {
 
-// One, and many.
+// Returns the numbers of readers: one, and many.
 std::vector<size_t> silent_readers(const ServingRun& run) { return {1, run.options.quick ? size_t{8} : size_t{32}}; }
 size_t churners(const ServingRun& run) { return run.options.quick ? 50 : 1000; }
 std::string silent_name(size_t readers) { return absl::StrCat("silent_reader/", readers); }
@@ -21,7 +21,7 @@ class GuestCases {
  public:
   GuestCases(const ServingRun& run, const BenchMesh& mesh) : run_(run), mesh_(mesh) {}
 
-  // Their questions have long answers that take little work: what hurts is not the work.
+  // Sends queries with long answers that need little work, so that the work itself is not the load.
   absl::Status silent(size_t readers) const {
     const std::string name = silent_name(readers);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -40,7 +40,7 @@ class GuestCases {
   }
 
  private:
-  // What a server holds when nobody but the good client is there.
+  // Resources of a server without clients other than the good one.
   struct Held {
     int64_t files = 0, bytes = 0;
   };
@@ -49,8 +49,7 @@ class GuestCases {
     int64_t most = 0;
   };
 
-  // Guests of a kind come to a daemon of their own. Those who churn go when they have done what they came for, those
-  // who are silent vanish.
+  // Runs guests of a kind on a daemon of their own. Those of churn end by themselves; silent ones are killed.
   absl::Status beside(const std::string& name, const std::string& kind, size_t guests,
                       const v1::QueryBatch& batch) const {
     run_.progress(name);
@@ -82,7 +81,7 @@ class GuestCases {
     add_cell(run_, cell_of(name, "us/batch p99", hash_of_number(good.expected().front())), "idle", crowded, idle,
              Better::kLess);
     constexpr double kBar = 1.0 / 5;
-    judge(run_.report, kBar, " = 1/5");
+    note_bar(run_.report, kBar, " = 1/5");
     note_left_behind(name, left);
     return status;
   }
@@ -90,7 +89,7 @@ class GuestCases {
   absl::Status while_they_are_there(const GuestProgram& program, GoodClient& good, std::vector<double>& seconds) const {
     const absl::StatusOr<std::unique_ptr<Process>> guests = program.start();
     if (!guests.ok()) return guests.status();
-    constexpr double kUntilStuck = 0.5;  // at least
+    constexpr double kUntilStuck = 0.5;  // seconds, at least
     const double start = wall_seconds();
     const auto enough = [&] { return seconds.size() >= count() && wall_seconds() - start > kUntilStuck; };
     while (good.status().ok() && !(*guests)->has_ended() && (program.ends() || !enough()))
@@ -101,7 +100,7 @@ class GuestCases {
 
   size_t count() const { return run_.options.quick ? 300 : 5000; }
 
-  // Waits for connections to close, a moment after their calls.
+  // Waits for connections to close shortly after their calls.
   static Held held(const Daemon& daemon, int64_t files) {
     constexpr double kMaxSeconds = 5, kPatience = 0.02;
     for (double waited = 0; waited < kMaxSeconds && daemon.process().open_files() > files; waited += kPatience)
@@ -109,7 +108,7 @@ class GuestCases {
     return {daemon.process().open_files(), daemon.process().resident_bytes()};
   }
 
-  // Memory that was freed is kept for the next guests: so it may not grow from the first time on.
+  // The server keeps freed memory for later guests, so memory must not grow after the first time.
   void note_left_behind(const std::string& name, const LeftBehind& left) const {
     constexpr double kMaxGrowth = 1.1;
     const bool returned = left.last.files <= left.before.files &&

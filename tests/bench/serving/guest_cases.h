@@ -1,5 +1,5 @@
-// Whether callers who do not read, or who come and go by the hundred, hurt another, and what they leave behind. For the
-// suite serving.
+// Effects of clients that do not read, or that connect and leave by the hundred, on another client, and the resources
+// that stay occupied after them. For the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 
@@ -11,7 +11,8 @@ namespace locus::bench::serving {
 
 bool wants_guests(const ServingRun& run);
 
-// silent_reader/1, silent_reader/32, churn/1000 (in small fewer): p99 of another client, alone and beside them.
+// Runs silent_reader/1, silent_reader/32, churn/1000 (fewer in a quick run): p99 of another client, alone and beside
+// them.
 absl::Status run_guest_cases(const ServingRun& run, const BenchMesh& mesh);
 
 }  // namespace locus::bench::serving

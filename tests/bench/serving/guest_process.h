@@ -1,4 +1,4 @@
-// The program locus-guests as the cases start it: who comes, and what they ask. One thread.
+// The program locus-guests as the cases start it: the kind of guests and their query. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUEST_PROCESS_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUEST_PROCESS_H_
 
@@ -18,7 +18,7 @@ namespace locus::bench::serving {
 
 class GuestProgram {
  public:
-  // `kind` and `guests` as guest_program.cc says.
+  // Starts the program; guest_program.cc explains `kind` and `guests`.
   GuestProgram(const Daemon& daemon, const std::string& kind, size_t guests, const std::string& scene,
                const v1::QueryBatch& batch)
       : words_{"locus-guests", kind, daemon.address(), absl::StrCat(guests), folder_.file("message")},
@@ -33,7 +33,7 @@ class GuestProgram {
   absl::StatusOr<std::unique_ptr<Process>> start() const {
     return Process::start(program_beside("locus-guests"), words_, folder_.file("log"));
   }
-  // Whether it does by itself.
+  // Returns whether the program ends by itself.
   bool ends() const { return ends_; }
   std::string log() const {
     std::ostringstream text;

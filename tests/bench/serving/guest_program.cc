@@ -1,9 +1,9 @@
-// The program `locus-guests`: another client with much to ask, callers who misbehave, or who come by the hundred.
-// Started by locus-bench, as
+// The program `locus-guests`: clients beside the measured one. locus-bench starts it as
 //   locus-guests bulk|silent|churn ADDRESS COUNT FILE
-// where the file has the message that each of them sends. Bulk is one client with COUNT messages under way. Churn ends
-// by itself, the others with a signal. Those who misbehave run at a lower priority, which takes nothing from the
-// server's part: from machines of their own, they would not compute on the cores that the server has.
+// where FILE has the message that each client sends. Bulk is one client with COUNT messages in flight; silent clients
+// never read their answers; clients of churn connect, send one query and leave. Churn ends by itself, the others by a
+// signal. Silent and churn clients run at a lower priority, so that they take no processor time from the server, as
+// clients on other machines would not.
 #include <unistd.h>
 
 #include <cstdlib>

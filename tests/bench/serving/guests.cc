@@ -73,7 +73,7 @@ void SilentReaders::write_until_stuck() {
   }
 }
 
-// One operation is under way at a time, but for those who stay: then there is none.
+// Each guest has at most one operation pending; silent ones have none.
 struct Churn::Guest {
   enum class Step : uint8_t { kCalls, kAsks, kIsAnswered, kStays, kSaysGoodbye, kGoes };
 

@@ -1,7 +1,7 @@
-// Callers beside the one who is measured: one with large batches all the time, many who never read what they asked for,
-// and many who come, ask once and go. Each has a connection and a stream of its own; one thread drives them all. For
-// the cases that look what they leave behind, in a program of their own: gRPC shares threads between the connections of
-// a process, and who waits for an answer would do the work of the others.
+// Clients beside the measured one: one with large batches all the time, many that never read their answers, and many
+// that connect, send one query and leave. Each has a connection and a stream of its own; one thread drives them all.
+// They run in a program of their own, since gRPC shares threads between the connections of a process, so that a client
+// waiting for an answer would do work of the others.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 
@@ -16,15 +16,15 @@
 
 namespace locus::bench::serving {
 
-// As many connections as the system lets this process have: each is a file.
+// Raises the limit of open files, which bounds connections, to the maximum that the system allows.
 void allow_many_files();
 
-// Keeps so many messages under way, all the same.
+// Keeps a fixed number of equal messages in flight.
 class BulkCaller {
  public:
   BulkCaller(const std::string& address, size_t window, v1::StreamQueriesRequest message);
 
-  // Some of them. Whatever goes wrong shows in status().
+  // Sends some messages. Errors show in status().
   void run();
   const absl::Status& status() const { return status_; }
 
@@ -37,17 +37,17 @@ class BulkCaller {
   absl::Status status_;
 };
 
-// They write until nothing more is taken from them, and read nothing.
+// Clients that write until flow control stops them, and read nothing.
 class SilentReaders {
  public:
   // Borrows the message.
   SilentReaders(const std::string& address, size_t count, const v1::StreamQueriesRequest& message);
-  // They vanish.
+  // Drops the connections without ending the calls.
   ~SilentReaders();
   SilentReaders(const SilentReaders&) = delete;
   SilentReaders& operator=(const SilentReaders&) = delete;
 
-  // Until none has been able to write for a while.
+  // Writes until no client has been able to write for a while.
   void write_until_stuck();
 
  private:
@@ -58,8 +58,8 @@ class SilentReaders {
   std::vector<std::unique_ptr<Guest>> guests_;
 };
 
-// They come until so many are there; then the one who has been there the longest goes for each that comes, by turns in
-// an orderly way and by breaking off. All have gone at the end.
+// Connects guests until `at_once` are there; then each new one replaces the oldest, which alternately ends its call in
+// order and breaks it off. All have left at the end.
 class Churn {
  public:
   // Borrows the message.
@@ -68,7 +68,7 @@ class Churn {
   Churn(const Churn&) = delete;
   Churn& operator=(const Churn&) = delete;
 
-  // Until `guests` have come and gone. Whatever goes wrong shows in status().
+  // Runs until `guests` have connected and left. Errors show in status().
   void run(size_t guests);
   const absl::Status& status() const { return status_; }
 
@@ -85,7 +85,7 @@ class Churn {
   const size_t at_once_;
   const v1::StreamQueriesRequest& message_;
   grpc::CompletionQueue queue_;
-  std::deque<std::unique_ptr<Guest>> guests_;  // in the order in which they came
+  std::deque<std::unique_ptr<Guest>> guests_;  // oldest first
   size_t came_ = 0, coming_ = 0, staying_ = 0;
   absl::Status status_;
 };

@@ -26,7 +26,7 @@ TEST(BulkCallerTest, IsAnswered) {
   EXPECT_TRUE(caller.status().ok()) << caller.status();
 }
 
-TEST(ChurnTest, AllGuestsComeAreAnsweredAndGo) {
+TEST(ChurnTest, AllGuestsAreAnsweredAndLeave) {
   const auto server = LocalServer::start("locus-echo");
   ASSERT_TRUE(server.ok()) << server.status();
   const v1::StreamQueriesRequest message = one_ray();
@@ -35,11 +35,11 @@ TEST(ChurnTest, AllGuestsComeAreAnsweredAndGo) {
   EXPECT_TRUE(guests.status().ok()) << guests.status();
 }
 
-TEST(ChurnTest, GuestsWhoAreNotAnsweredAreAnError) {
+TEST(ChurnTest, UnansweredGuestsAreAnError) {
   const auto server = LocalServer::start("locus-echo");
   ASSERT_TRUE(server.ok()) << server.status();
   v1::StreamQueriesRequest message = one_ray();
-  message.mutable_batch()->mutable_blocks(0)->add_masks(1);  // one too many
+  message.mutable_batch()->mutable_blocks(0)->add_masks(1);  // one mask too many
   Churn guests((*server)->address(), 5, message);
   guests.run(20);
   EXPECT_FALSE(guests.status().ok());
@@ -54,7 +54,7 @@ TEST(SilentReadersTest, GetStuck) {
   block.mutable_rays()->mutable_t_max()->Resize(8192, 1);
   block.mutable_masks()->Resize(8192, 1);
   SilentReaders guests((*server)->address(), 2, message);
-  guests.write_until_stuck();  // returns, though there is no end to what they would write
+  guests.write_until_stuck();  // returns, although the writers have no end
 }
 
 }  // namespace

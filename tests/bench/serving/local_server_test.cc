@@ -8,7 +8,7 @@
 namespace locus::bench::serving {
 namespace {
 
-TEST(LocalServerTest, AProgramThatIsNotThereIsNamed) {
+TEST(LocalServerTest, AMissingProgramIsNamed) {
   const auto server = LocalServer::start("no-such-program");
   EXPECT_EQ(server.status().code(), absl::StatusCode::kUnavailable);
   EXPECT_NE(server.status().message().find("no-such-program"), absl::string_view::npos);

@@ -33,7 +33,8 @@ int64_t entries_in(const std::string& folder) {
   return entries;
 }
 
-// Between fork() and exec(): nothing but system calls. `parent` notices if it died before prctl() was heard.
+// Runs between fork() and exec(): makes only system calls. `parent` detects that the parent died before prctl() took
+// effect.
 [[noreturn]] void become(const char* path, char* const* arguments, int log, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kNoProgram);

@@ -1,5 +1,5 @@
-// Programs that a benchmark starts beside itself, and what the kernel says of them. For the suite serving. One thread a
-// process; none outlives the thread that started it, however that ends.
+// Programs that a benchmark starts, and their resources according to the kernel. For the suite serving. One thread a
+// process; none outlives the thread that started it, even if that is killed.
 #ifndef LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
 #define LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
 
@@ -15,24 +15,24 @@
 
 namespace locus::bench::serving {
 
-// That all threads of a process have computed, to the nanosecond; 0 if there is no such process.
+// Returns the processor time of all threads of a process, in nanosecond resolution; 0 if there is no such process.
 double cpu_seconds_of(pid_t pid);
 
 class Process {
  public:
-  // Runs the program `path` under the names in `arguments`, the first of which is its own; what it prints goes to the
-  // file `log`. UNAVAILABLE if there is no such program.
+  // Runs the program `path` with `arguments`, the first of which is its own name; its output goes to the file `log`.
+  // UNAVAILABLE if there is no such program.
   static absl::StatusOr<std::unique_ptr<Process>> start(const std::string& path,
                                                         const std::vector<std::string>& arguments,
                                                         const std::string& log);
-  // Asks it to end; after five seconds makes it.
+  // Asks the process to end, and kills it after five seconds.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
   pid_t pid() const { return pid_; }
   bool has_ended();
-  // Of one that has ended: what it returned; -1 if a signal ended it.
+  // Returns the exit code of a process that has ended; -1 if a signal ended it.
   int exit_code() const { return exit_code_; }
 
   double cpu_seconds() const { return cpu_seconds_of(pid_); }
@@ -48,7 +48,7 @@ class Process {
   int exit_code_ = -1;
 };
 
-// The program of that name beside this one, or in the PATH; empty if there is none.
+// Returns the path of the program in the folder of this one, or in the PATH; empty if there is none.
 std::string program_beside(const std::string& name);
 std::string program_in_path(const std::string& name);
 

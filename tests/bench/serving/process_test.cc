@@ -16,7 +16,7 @@ std::unique_ptr<Process> started(const TemporaryFolder& folder, const std::vecto
   return process.ok() ? *std::move(process) : nullptr;
 }
 
-TEST(ProcessTest, AProgramThatIsNotThereIsNamed) {
+TEST(ProcessTest, AMissingProgramIsNamed) {
   const TemporaryFolder folder;
   const auto process = Process::start("/no/such/program", {"program"}, folder.file("log"));
   EXPECT_EQ(process.status().code(), absl::StatusCode::kUnavailable);
@@ -33,7 +33,7 @@ TEST(ProcessTest, EndsWithItsObject) {
   EXPECT_NE(kill(pid, 0), 0);
 }
 
-TEST(ProcessTest, WhatItPrintsIsInItsLog) {
+TEST(ProcessTest, ItsOutputIsInItsLog) {
   const TemporaryFolder folder;
   auto process = started(folder, {"echo", "seven"});
   ASSERT_NE(process, nullptr);

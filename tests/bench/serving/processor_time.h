@@ -1,5 +1,5 @@
-// Who of a client and its server computes how much: the processor time of both processes while messages go back and
-// forth. Says what of a ratio is the client's own. One thread.
+// Processor time of a client and of its server while they exchange messages, to show the client's own part of a ratio.
+// One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_PROCESSOR_TIME_H_
 #define LOCUS_TESTS_BENCH_SERVING_PROCESSOR_TIME_H_
 
@@ -15,10 +15,10 @@ namespace locus::bench::serving {
 
 class ProcessorTime {
  public:
-  // This process is the client.
+  // Measures this process as the client.
   explicit ProcessorTime(pid_t server) : server_(server) {}
 
-  // `messages` of them are sent and answered by `run`.
+  // Measures `run`, which sends `messages` messages and receives their answers.
   template <class Run>
   void during(size_t messages, const Run& run) {
     const double here = process_seconds(), there = cpu_seconds_of(server_);
@@ -28,7 +28,7 @@ class ProcessorTime {
     messages_ += messages;
   }
 
-  // Microseconds a message.
+  // Returns microseconds a message.
   double client() const { return 1e6 * here_ / static_cast<double>(messages_); }
   double server() const { return 1e6 * there_ / static_cast<double>(messages_); }
   std::string text() const { return absl::StrFormat("client %.1f us, server %.1f us", client(), server()); }

@@ -7,7 +7,7 @@
 namespace locus::bench::serving {
 namespace {
 
-// The batches that belong to one of `shares` workers, round and round: first, first + shares ...
+// Batches of one of `shares` workers, repeated in a cycle: first, first + shares ...
 class Share {
  public:
   Share(size_t first, size_t shares, size_t count) : first_(first), shares_(shares), count_(count), at_(first) {}
@@ -17,7 +17,7 @@ class Share {
     if (at_ >= count_) at_ = first_;
     return batch;
   }
-  // How many there are.
+  // Returns the number of batches of this share.
   size_t size() const { return (count_ - first_ + shares_ - 1) / shares_; }
 
  private:

@@ -1,5 +1,5 @@
-// Batches of queries over and over: by a server, over streams that each have a connection of their own, or in this
-// process by threads. For every case that counts queries a second. One thread.
+// Repeated batches of queries: in a server, over streams that each have a connection of their own, or in this process
+// by threads. For every case that counts queries a second. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 
@@ -23,7 +23,7 @@ struct Batches {
   std::vector<QueryBatch> columns;  // borrowed from the messages
   size_t queries = 0;               // in all messages together
 
-  // Call it when the messages are complete.
+  // Sets the columns. Call it when the messages are complete.
   void borrow();
 };
 
@@ -31,10 +31,9 @@ class ServerLoad {
  public:
   ServerLoad(const LocalServer& server, Batches& batches, size_t streams, size_t window);
 
-  // As many messages as there are batches, `passes` times, by all streams together. Whatever goes wrong shows in
-  // status().
+  // Sends all batches, `passes` times, divided among the streams. Errors show in status().
   void run(size_t passes);
-  // Every batch once: a hash of each answer, in the order of the batches, and the rows in all of them.
+  // Sends every batch once; returns a hash of each answer, in the order of the batches, and counts the rows of all.
   std::vector<uint64_t> hashes();
   size_t rows() const { return rows_; }
 

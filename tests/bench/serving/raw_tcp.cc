@@ -59,7 +59,7 @@ void answer(int socket) {
   _exit(0);
 }
 
-// The port is told; -1 if there is none.
+// Returns a listening socket and sets `port`; -1 on failure.
 int listen_on_free_port(int& port) {
   const int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};

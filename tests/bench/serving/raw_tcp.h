@@ -1,5 +1,5 @@
-// What the kernel's sockets can do with the same bytes: a process that reads messages of one size and answers each with
-// as many bytes of another, and its clients. For the cases that count what messages cost. One thread.
+// Baseline with plain kernel sockets and the same bytes: a process that reads messages of one size and answers each
+// with as many bytes of another, and its clients. For the cases that measure the cost of messages. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
 
@@ -21,7 +21,7 @@ struct MessageBytes {
 
 class RawTcpServer {
  public:
-  // A copy of this process, so it must be made before there is another thread; ends with this object.
+  // Forks this process, so it must be called while there is one thread; the copy ends with this object.
   static absl::StatusOr<std::unique_ptr<RawTcpServer>> start();
   ~RawTcpServer();
   RawTcpServer(const RawTcpServer&) = delete;
@@ -42,7 +42,7 @@ class RawTcpLoad {
  public:
   RawTcpLoad(const RawTcpServer& server, const MessageBytes& bytes, size_t connections, size_t window);
 
-  // So many messages by all connections together.
+  // Sends `messages` messages, divided among the connections.
   void run(size_t messages);
   const absl::Status& status() const { return status_; }
 

@@ -8,7 +8,7 @@ namespace {
 TEST(RawTcpTest, EveryMessageIsAnsweredOverEveryConnection) {
   const auto server = RawTcpServer::start();
   ASSERT_TRUE(server.ok()) << server.status();
-  RawTcpLoad load(**server, {100'000, 3'000'000}, 2, 4);  // more than sockets hold
+  RawTcpLoad load(**server, {100'000, 3'000'000}, 2, 4);  // more than the sockets' buffers hold
   load.run(20);
   load.run(1);
   EXPECT_TRUE(load.status().ok()) << load.status();

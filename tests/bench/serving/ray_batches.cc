@@ -20,7 +20,7 @@ absl::StatusOr<BenchMesh> level_of(const ServingRun& run) {
   struct stat facts {};
   if (!run.options.quick && stat(fetched.substr(0, fetched.find('#')).c_str(), &facts) == 0) return load_mesh(fetched);
   if (!run.options.quick)
-    run.note("the level delta is left out, a made-up one stands in: run tests/bench/fetch_levels.sh");
+    run.note("the level delta is missing, a generated one is used instead: run tests/bench/fetch_levels.sh");
   return load_mesh(kMadeUpLevel);
 }
 

@@ -1,4 +1,4 @@
-// The rays that the cases send: of a level, in messages. Pure functions.
+// Rays of a level that the cases send, in messages. Pure functions.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAY_BATCHES_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAY_BATCHES_H_
 
@@ -12,14 +12,15 @@
 
 namespace locus::bench::serving {
 
-// The one that was asked for, or a real one that has been fetched, or, in small and where there is none, a made-up one.
+// Returns the level named in the options, else a real one that was fetched; in a quick run, or if none was fetched, a
+// generated one.
 absl::StatusOr<BenchMesh> level_of(const ServingRun& run);
 
-// From anywhere in the level to anywhere; neighbours in a picture of it.
+// Returns rays between random points of the level, or neighbouring rays of a picture of it.
 std::vector<RayQuery> scattered_rays(const BenchMesh& mesh, size_t count);
 std::vector<RayQuery> coherent_rays(const BenchMesh& mesh, size_t count);
 
-// `size` rays a message; the last may have fewer.
+// Makes messages of `size` rays; the last may have fewer.
 Batches batches_of(const std::vector<RayQuery>& rays, size_t size, const std::string& scene);
 
 }  // namespace locus::bench::serving

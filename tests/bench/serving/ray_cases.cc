@@ -8,10 +8,10 @@
 namespace locus::bench::serving {
 namespace {
 
-constexpr size_t kThreads = 2;  // the two cores: streams of the client, threads in process
+constexpr size_t kThreads = 2;  // for two cores: streams of the client, threads in process
 
-// What a batch size costs beside its queries: a message, in nanoseconds a query, and the share of the limit that has to
-// be reached. `window` messages under way on each stream are what fits the second cache.
+// Size of a batch, its cost beside the queries (a message, in nanoseconds per query), and the required share of the
+// possible rate. `window` messages in flight on each stream fit into the second-level cache.
 struct Size {
   size_t rays;
   size_t window;
@@ -20,7 +20,8 @@ struct Size {
 };
 constexpr Size kSizes[] = {{1024, 4, 45, 0.95}, {8192, 2, 20, 0.92}};
 
-// The names are what a ray costs in process, about: neighbours of a picture, and rays from anywhere to anywhere.
+// Workloads, named by the approximate cost of a ray in process: neighbouring rays of a picture, and rays between random
+// points.
 struct Work {
   const char* name;
   double nanoseconds;
@@ -58,7 +59,7 @@ class RayCases {
                                                  {"in_process", [&](size_t) { process.run(1); }, count, {}}};
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/ray", hash_of_all(here)), run_.report);
-    judge_overhead(work, size, kThreads * median(times[1]));
+    note_overhead_bar(work, size, kThreads * median(times[1]));
     return server.status();
   }
 
@@ -77,7 +78,7 @@ class RayCases {
     const auto times = race(contestants, chunks(), run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/ray", hash_of_all(hashes)), run_.report);
     constexpr double kBar = 0.9;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     absl::Status status = one.status();
     status.Update(two.status());
     return status;
@@ -93,11 +94,11 @@ class RayCases {
       run_.disagree(absl::StrCat(name, ": ", differ, " of ", ours.size(), " batches have other answers over gRPC"));
   }
 
-  // `cost`: nanoseconds that a ray takes one core in process.
-  void judge_overhead(const Work& work, const Size& size, double cost) const {
+  // Notes whether the ratio reaches the bar. `cost`: nanoseconds of one core for a ray in process.
+  void note_overhead_bar(const Work& work, const Size& size, double cost) const {
     constexpr double kNameHolds = 0.2;
-    judge(run_.report, size.share * cost / (cost + size.overhead),
-          absl::StrFormat(" = %.2f c/(c+%.0f) at c = %.0f ns in process", size.share, size.overhead, cost));
+    note_bar(run_.report, size.share * cost / (cost + size.overhead),
+             absl::StrFormat(" = %.2f c/(c+%.0f) at c = %.0f ns in process", size.share, size.overhead, cost));
     if (!run_.options.quick && std::abs(cost / work.nanoseconds - 1) > kNameHolds)
       run_.note(absl::StrFormat("%s: on this machine now %.0f ns", work.name, cost));
   }

@@ -9,14 +9,15 @@ namespace {
 constexpr double kStartSeconds = 10;
 constexpr double kPatience = 0.005;
 
-// Debian's redis-tools has the whole server under another name: it does what its first argument says. So no package
-// that would start a service is needed.
+// Returns the path of Redis. Debian's redis-tools contains the server under another name; its first argument selects
+// the program. So no package that would start a service is needed.
 std::string redis_program() {
   const std::string server = program_in_path("redis-server");
   return server.empty() ? program_in_path("redis-check-rdb") : server;
 }
 
-// The line's number behind its first character, and where the next line starts; false while the line is not whole.
+// Reads the number after the first character of the line, and sets `at` to the next line; returns false if the line is
+// incomplete.
 bool read_line(absl::string_view text, size_t& at, int64_t& number) {
   const size_t end = text.find("\r\n", at);
   if (end == absl::string_view::npos) return false;
@@ -25,7 +26,7 @@ bool read_line(absl::string_view text, size_t& at, int64_t& number) {
   return true;
 }
 
-// One element that is no list.
+// Skips one element that is no list.
 bool pass_element(absl::string_view text, size_t& at) {
   if (at >= text.size()) return false;
   const bool is_string = text[at] == '$';

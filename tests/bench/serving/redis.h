@@ -1,6 +1,6 @@
-// Redis as a benchmark starts it for itself: in memory, on a socket in a folder of its own, ended with this object; and
-// the few words of its protocol that are needed. Messages are written ahead and replies only counted, so that its
-// client takes nothing that is not Redis's. One thread.
+// Redis as started by a benchmark: in memory, on a socket in a folder of its own, stopped with this object; and the
+// part of its protocol that is needed. Messages are serialized beforehand and replies only counted, so that its client
+// costs almost nothing. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_REDIS_H_
 #define LOCUS_TESTS_BENCH_SERVING_REDIS_H_
 
@@ -18,12 +18,12 @@ namespace locus::bench::serving {
 
 class Redis {
  public:
-  // UNAVAILABLE where it is not installed, or does not answer in time.
+  // Starts Redis; UNAVAILABLE if it is not installed, or does not answer in time.
   static absl::StatusOr<std::unique_ptr<Redis>> start();
 
-  // Sends all messages, `passes` times, so many at once under way. An error of Redis shows in status().
+  // Sends all messages, `passes` times, with up to `window` in flight. An error of Redis shows in status().
   void run(const std::vector<std::string>& messages, size_t passes, size_t window);
-  // The members of every list that was answered, or the numbers, together; of the last run.
+  // Returns the number of list members, or the sum of the integers, in all replies of the last run.
   size_t counted() const { return counted_; }
   const absl::Status& status() const { return status_; }
 
@@ -37,10 +37,10 @@ class Redis {
   absl::Status status_;
 };
 
-// A command as Redis reads it: a list of strings.
+// Returns a command in Redis's format: a list of strings.
 std::string redis_command(const std::vector<std::string>& words);
 
-// Bytes of the first whole reply in what came; 0 while there is none.
+// Returns the length of the first complete reply in `received`; 0 if there is none.
 size_t redis_reply_bytes(absl::string_view received);
 
 }  // namespace locus::bench::serving

@@ -16,22 +16,24 @@ using dynamic::name_of_count;
 
 constexpr size_t kMovesAMessage = 4096;
 constexpr size_t kBallsAMessage = 1024;
-constexpr size_t kWindow = 8;          // messages of ours, and of 4,096 positions
-constexpr size_t kSearchWindow = 256;  // of single questions
+constexpr size_t kWindow = 8;          // messages in flight, of locus and of 4,096 positions each in Redis
+constexpr size_t kSearchWindow = 256;  // single queries in flight
 constexpr float kReach = dynamic::kReach;
 
-// Redis keeps places on the globe in 52 bits: 0.6 m at the equator. So a unit of our world is 20 m there, 2,000 of them
-// 40 km about (0, 0), where a metre is a metre to 5e-6, and places are off by up to 0.015 units on each axis.
+// Redis stores positions on the globe in 52 bits: 0.6 m at the equator. So a unit of the world is 20 m there, and 2,000
+// of them are 40 km about (0, 0), where a metre is exact to 5e-6 and the error of positions is up to 0.015 units on
+// each axis.
 constexpr double kMetres = 20;
 constexpr double kEarthRadius = 6372797.560856;  // Redis's
 constexpr double kDegrees = kMetres / kEarthRadius * 180 / std::numbers::pi;
-// Of a ball's hits, about 2 * 0.01 / kReach lie that close to its border; they even out.
+// About 2 * 0.01 / kReach of a ball's hits lie so close to its border that Redis may decide otherwise; both errors
+// balance.
 constexpr double kMayDiffer = 0.001;
 constexpr double kFewHits = 5;
 
 std::string longitude(float x) { return absl::StrFormat("%.8f", (double{x} - dynamic::kSide / 2) * kDegrees); }
 
-// What is compared, at each size: how often as fast we have to be.
+// Sizes of the comparison, and the required ratio at each.
 struct BallBar {
   uint32_t count;
   double bar;
@@ -52,7 +54,7 @@ class FlatWorld {
     fill(0, world_.count(), *insert);
     return batch;
   }
-  // Every object, in messages for both.
+  // Adds moves of every object, as messages for both.
   void add_moves(const std::string& scene, std::vector<v1::StreamUpdatesRequest>& ours,
                  std::vector<std::string>& redis) const {
     for (size_t first = 0; first < world_.count(); first += kMovesAMessage) {
@@ -125,7 +127,7 @@ class RedisCases {
     const Hits hits = search_all(flat, scene, name);
     add_cells(contestants, times, cell_of(name, "ns/move", hash_of_number(hits.ours)), run_.report);
     constexpr double kBar = 4;
-    judge(run_.report, kBar);
+    note_bar(run_.report, kBar);
     return server.status();
   }
 
@@ -134,7 +136,7 @@ class RedisCases {
     const Hits hits = search_all(flat, scene, name);
     Searches searches = searches_of(flat, scene);
     ServerLoad server(daemon_, searches.ours, 1, kWindow);
-    // Redis is given fewer of the same questions where it needs long for each.
+    // Redis gets fewer of the same queries where each takes long.
     std::vector<std::string> theirs = searches.redis;
     theirs.resize(run_.options.quick ? 200 : theirs.size() / 4);
     const size_t passes = passes_of_a_chunk(run_, [&](size_t) { server.run(1); });
@@ -143,7 +145,7 @@ class RedisCases {
         {"redis", [&](size_t) { redis_.run(theirs, 1, kSearchWindow); }, static_cast<double>(theirs.size()), {}}};
     const auto times = race(contestants, 1, run_.options.rounds, wall_seconds);
     add_cells(contestants, times, cell_of(name, "ns/ball", hash_of_number(hits.ours)), run_.report);
-    judge(run_.report, bar);
+    note_bar(run_.report, bar);
     return server.status();
   }
 
@@ -175,7 +177,7 @@ class RedisCases {
     return searches;
   }
 
-  // Every ball once: by the server, in this process where the objects have not moved, and by Redis.
+  // Runs every ball once: on the server, in this process if the objects have not moved, and in Redis.
   Hits search_all(const FlatWorld& flat, TwinScene& scene, const std::string& name) {
     Searches searches = searches_of(flat, scene);
     ServerLoad server(daemon_, searches.ours, 1, kWindow);

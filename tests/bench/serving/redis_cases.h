@@ -1,4 +1,5 @@
-// Moves and balls over one connection beside Redis's GEOADD and GEOSEARCH, in a flat world. For the suite serving.
+// Moves and balls over one connection, compared with Redis's GEOADD and GEOSEARCH, in a flat world. For the suite
+// serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
 
@@ -7,8 +8,8 @@
 
 namespace locus::bench::serving {
 
-// moves/100k, ball/10k, ball/100k, ball/1M; in small moves/10k and ball/10k. Without Redis they are left out, and that
-// is said.
+// Runs moves/100k, ball/10k, ball/100k, ball/1M; in a quick run moves/10k and ball/10k. Without Redis it leaves them
+// out and adds a note.
 absl::Status run_redis_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

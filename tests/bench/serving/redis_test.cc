@@ -15,20 +15,20 @@ TEST(RedisTest, ANumberAnErrorAndAWordAreALineEach) {
   EXPECT_EQ(redis_reply_bytes("+OK\r\n"), 5u);
 }
 
-TEST(RedisTest, AListIsWholeWithItsLastString) {
+TEST(RedisTest, AListIsCompleteWithItsLastString) {
   const std::string list = "*2\r\n$1\r\n7\r\n$2\r\n12\r\n";
   EXPECT_EQ(redis_reply_bytes(list), list.size());
   EXPECT_EQ(redis_reply_bytes(list + "*0\r\n"), list.size());
   EXPECT_EQ(redis_reply_bytes("*0\r\n"), 4u);
 }
 
-TEST(RedisTest, EveryBeginningOfAReplyIsNotWhole) {
+TEST(RedisTest, EveryPrefixOfAReplyIsIncomplete) {
   const std::string list = "*2\r\n$1\r\n7\r\n$2\r\n12\r\n";
   for (size_t bytes = 0; bytes < list.size(); ++bytes)
     EXPECT_EQ(redis_reply_bytes(absl::string_view(list).substr(0, bytes)), 0u) << bytes;
 }
 
-TEST(RedisTest, AStartedOneFindsWhatIsInItAndTellsItsErrors) {
+TEST(RedisTest, AStartedServerAnswersSearchesAndReportsErrors) {
   const auto redis = Redis::start();
   if (!redis.ok()) GTEST_SKIP() << redis.status();
   (*redis)->run({redis_command({"GEOADD", "key", "0", "0", "a", "0.001", "0", "b", "1", "1", "c"})}, 1, 1);

@@ -1,4 +1,4 @@
-// What the cases of the suite share: what was asked for and where results go. Plain data and short words for it.
+// Data that the cases of the suite share, the options and the report, with short helpers. Plain data.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SERVING_RUN_H_
 #define LOCUS_TESTS_BENCH_SERVING_SERVING_RUN_H_
 
@@ -37,7 +37,7 @@ inline Cell cell_of(const std::string& case_name, const std::string& metric, con
   return cell;
 }
 
-// Ours and one peer's figures, round by round; `more_is_better` for rates, not for times.
+// Direction of a comparison between locus and one peer, round by round: kMore for rates, kLess for times.
 enum class Better : uint8_t { kLess, kMore };
 inline void add_cell(const ServingRun& run, Cell cell, const std::string& peer, const std::vector<double>& ours,
                      const std::vector<double>& theirs, Better better) {
@@ -50,7 +50,8 @@ inline void add_cell(const ServingRun& run, Cell cell, const std::string& peer, 
   run.report.add(std::move(cell));
 }
 
-// How many passes make a chunk that starting threads and filling windows is nothing beside: after one that warms up.
+// Returns the number of passes in a chunk that is long enough for the time of starting threads and filling windows not
+// to matter; makes one warm-up pass.
 template <class Run>
 size_t passes_of_a_chunk(const ServingRun& run, const Run& pass) {
   if (run.options.quick) return 1;

@@ -9,7 +9,7 @@
 namespace locus::bench::serving {
 absl::Status run_serving_suite(const Options& options, const Progress& progress, Report& report) {
   const ServingRun run{options, progress, report};
-  // First of all: while there is one thread.
+  // Started first, while the process has one thread.
   absl::StatusOr<std::unique_ptr<RawTcpServer>> plain = nullptr;
   if (wants_raw_tcp(run)) plain = RawTcpServer::start();
   if (!plain.ok()) return plain.status();

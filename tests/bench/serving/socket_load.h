@@ -1,5 +1,5 @@
-// The load generator for peers that speak over plain sockets: one connection, so many messages under way, never blocked
-// in a write while answers wait to be read. One thread at a time.
+// The load generator for peers with plain sockets: one connection, a window of messages in flight; a write never blocks
+// while answers can be read. One thread at a time.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SOCKET_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_SOCKET_LOAD_H_
 
@@ -14,11 +14,11 @@ namespace locus::bench::serving {
 
 class SocketLoad {
  public:
-  // Bytes of the first answer in what has come, 0 while it is not whole.
+  // Returns the length of the first answer in `received`, 0 if it is incomplete.
   using Whole = std::function<size_t(absl::string_view received)>;
-  // The next message, borrowed until it is answered; empty = there is no more.
+  // Returns the next message, borrowed until it is answered; empty = there are no more.
   using Next = std::function<absl::string_view()>;
-  // Answers come in the order of the messages.
+  // Called with the answers, in the order of the messages.
   using Reply = std::function<void(absl::string_view reply)>;
 
   // Owns the connected socket.
@@ -27,7 +27,7 @@ class SocketLoad {
   SocketLoad(const SocketLoad&) = delete;
   SocketLoad& operator=(const SocketLoad&) = delete;
 
-  // As StreamLoad::run(). UNAVAILABLE if the peer closes the connection or keeps silent.
+  // Works like StreamLoad::run(). UNAVAILABLE if the peer closes the connection or sends nothing for too long.
   absl::Status run(size_t window, const Next& next, const Reply& reply);
 
  private:
@@ -40,13 +40,13 @@ class SocketLoad {
   const int socket_;
   const Whole whole_;
   std::vector<char> buffer_;
-  size_t begin_ = 0, end_ = 0;  // of what has come and was not handed out
-  absl::string_view writing_;   // the rest of the message that is being written
+  size_t begin_ = 0, end_ = 0;  // bounds of the received bytes that were not passed on
+  absl::string_view writing_;   // unwritten rest of the current message
   size_t under_way_ = 0;
   bool more_ = false;
 };
 
-// A socket connected to a port of the loopback, or to a path; -1 if nothing answers there.
+// Returns a socket connected to a port of the loopback, or to a path; -1 on failure.
 int connect_to_port(int port);
 int connect_to_path(const std::string& path);
 

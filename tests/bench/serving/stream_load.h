@@ -1,7 +1,7 @@
-// The load generator: bidirectional calls, each on a connection of its own, so many messages under way on each, all on
-// one completion queue and driven by the thread that runs them. Messages are written and read as any client would:
-// serialised and parsed. Blocking clients, or a thread a connection, would take more of the cores than what they
-// measure. One thread at a time.
+// The load generator: bidirectional calls, each on a connection of its own, with a window of messages in flight on
+// each, all on one completion queue and driven by the thread that calls run(). Messages are serialized and parsed as by
+// any client. Blocking clients, or a thread a connection, would use more processor time than the measured server. One
+// thread at a time.
 #ifndef LOCUS_TESTS_BENCH_SERVING_STREAM_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_STREAM_LOAD_H_
 
@@ -24,7 +24,7 @@
 
 namespace locus::bench::serving {
 
-// So long may a server keep silent before it counts as hung.
+// Time without a message from the server after which it counts as hung.
 inline constexpr std::chrono::seconds kSilence{60};
 
 inline absl::Status failed(const grpc::Status& status) {
@@ -35,11 +35,12 @@ template <class Request, class Response>
 class StreamLoad {
  public:
   using Call = grpc::ClientAsyncReaderWriter<Request, Response>;
-  // stub.AsyncStreamQueries and its like.
+  // Opens a call, for example by stub.AsyncStreamQueries.
   using Open = std::function<std::unique_ptr<Call>(grpc::ClientContext*, grpc::CompletionQueue*, void* tag)>;
-  // The next message and a number to know it by; nullptr = there is no more. Its `sequence` is set.
+  // Returns the next message and sets a number that identifies it; nullptr = there are no more. run() sets
+  // its `sequence`.
   using Next = std::function<Request*(uint64_t& number)>;
-  // An answer, and how long it took since its message was written.
+  // Called with an answer and the time since its message was written.
   using Reply = std::function<void(uint64_t number, const Response& response, double seconds)>;
 
   explicit StreamLoad(const Open& open) : StreamLoad(std::vector<Open>{open}) {}
@@ -68,12 +69,12 @@ class StreamLoad {
   StreamLoad(const StreamLoad&) = delete;
   StreamLoad& operator=(const StreamLoad&) = delete;
 
-  // Keeps `window` messages under way on the only stream until there are no more and all are answered.
+  // Keeps `window` messages in flight on the only stream until there are no more and all are answered.
   absl::Status run(size_t window, const Next& next, const Reply& reply) {
     return run(window, std::vector<Next>{next}, reply);
   }
 
-  // The same on each stream, with messages of its own.
+  // Works likewise on several streams, each with messages of its own.
   absl::Status run(size_t window, const std::vector<Next>& next, const Reply& reply) {
     for (size_t i = 0; i < streams_.size(); ++i) {
       streams_[i]->begin(window, next[i]);
@@ -135,7 +136,7 @@ class StreamLoad {
       call->Write(*request, &written);
     }
 
-    // False: an answer to nothing.
+    // Processes an answer; returns false if it belongs to no message.
     bool take(const Reply& reply) {
       const size_t slot = response.sequence();
       if (slot >= slots.size()) return false;
@@ -155,7 +156,7 @@ class StreamLoad {
     bool writing = false;
   };
 
-  // Null where nothing came for long.
+  // Returns the next event; null if none comes in time.
   Event* await() {
     void* event = nullptr;
     const auto deadline = std::chrono::system_clock::now() + kSilence;
@@ -163,7 +164,7 @@ class StreamLoad {
     return static_cast<Event*>(event);
   }
 
-  // Why nothing comes any more.
+  // Returns the status with which a stream ended.
   absl::Status end(Stream& stream) {
     alive_ = false;
     grpc::Status status;

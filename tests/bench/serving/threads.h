@@ -1,4 +1,4 @@
-// Work that is shared by the threads of a load. For whoever drives several connections.
+// Distribution of work among the threads of a load. For loads with several connections.
 #ifndef LOCUS_TESTS_BENCH_SERVING_THREADS_H_
 #define LOCUS_TESTS_BENCH_SERVING_THREADS_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus::bench::serving {
 
-// fn(0) ... fn(count - 1), each on a thread of its own, the first on this one; returns when all have.
+// Runs fn(0) ... fn(count - 1), each on a thread of its own, the first on this one; returns when all have ended.
 template <class Fn>
 void on_threads(size_t count, const Fn& fn) {
   std::vector<std::thread> threads;
@@ -19,7 +19,7 @@ void on_threads(size_t count, const Fn& fn) {
   for (std::thread& thread : threads) thread.join();
 }
 
-// So many turns for all threads together. Any thread.
+// A number of turns shared by all threads. Any thread.
 class Turns {
  public:
   explicit Turns(size_t turns) : left_(static_cast<int64_t>(turns)) {}

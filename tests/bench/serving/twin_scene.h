@@ -22,10 +22,10 @@ class TwinScene {
  public:
   TwinScene(const Daemon& daemon, const std::string& name);
 
-  // Each once; the error of the server otherwise.
+  // Creates both; returns the error of the server.
   absl::Status create();
   absl::Status place(const BenchMesh& mesh);
-  // Applied on both sides; an error too if an item is refused.
+  // Applies a batch to both; fails also if an item is refused.
   absl::Status apply(const v1::UpdateBatch& batch);
 
   const std::string& name() const { return name_; }
@@ -38,19 +38,18 @@ class TwinScene {
   Scene here_;
 };
 
-// The columns of a message, borrowed, as the server borrows them: rays and balls, inserts of points and balls, moves.
+// Returns the columns of a message, borrowed as in the server: rays and balls; inserts of points and balls, and moves.
 QueryBatch columns_of(const v1::QueryBatch& batch);
 UpdateBatch columns_of(const v1::UpdateBatch& batch);
 
-// What the server does with a batch that it has parsed: every value is checked, then the batch answered, by this thread
-// alone.
+// Checks every value of a parsed batch and answers it as the server does, in this thread alone.
 test::BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& batch);
 
-// Equal for equal answers, wherever they come from.
+// Returns a hash that is equal for equal answers of server and process.
 uint64_t hash_of(const test::BatchResult& result);
 uint64_t hash_of(const v1::QueryResult& result);
 
-// How many rows there are: hits of rays, results of balls.
+// Returns the number of rows: hits of rays, results of balls.
 size_t rows_of(const v1::QueryResult& result);
 
 }  // namespace locus::bench::serving

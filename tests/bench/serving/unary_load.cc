@@ -10,9 +10,9 @@
 namespace locus::bench::serving {
 namespace {
 
-constexpr double kComing = 0.05;  // of the time, until all callers are there
+constexpr double kComing = 0.05;  // share of the time until all callers have started
 
-// Never gives up.
+// Returns a policy that retries for ever.
 client::RetryPolicy patient() {
   client::RetryPolicy policy;
   policy.max_attempts = std::numeric_limits<int>::max();
@@ -77,7 +77,7 @@ class Calls {
     ++under_way_;
   }
 
-  // The next call that is over, or nothing where one is to be started before.
+  // Processes the next completed call, unless another call must be started first.
   void take_one() {
     const double silence = std::chrono::duration<double>(kSilence).count();
     const double wait = waiting_.empty() ? silence : std::min(waiting_.begin()->first, end_) - wall_seconds();
@@ -102,7 +102,7 @@ class Calls {
       start(slot);
   }
 
-  // Seconds until the caller's next call.
+  // Returns the seconds until the caller's next call.
   double book(Slot& slot) {
     if (slot.status.ok()) {
       ++flood_.answered;
@@ -124,7 +124,7 @@ class Calls {
   grpc::CompletionQueue queue_;
   std::vector<v1::QueryRequest> requests_;
   std::vector<Slot> slots_;
-  std::multimap<double, Slot*> waiting_;  // by when they call
+  std::multimap<double, Slot*> waiting_;  // by time of their next call
   size_t under_way_ = 0;
   double end_ = 0;
   size_t sent_ = 0;

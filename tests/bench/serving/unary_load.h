@@ -1,6 +1,6 @@
-// Single calls, so many callers at once, each of whom sends its next one when the one before is answered. One who is
-// refused tries again at once, as a flood does, or waits as it is told, as the client library does. Asynchronous, over
-// a connection of its own. One thread.
+// Unary calls by a number of concurrent callers, each of which sends its next one when the one before is answered. A
+// refused caller retries at once, like a flood, or waits for the retry hint, like the client library. Asynchronous,
+// over a connection of its own. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_UNARY_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_UNARY_LOAD_H_
 
@@ -18,12 +18,12 @@ enum class Again : uint8_t { kAtOnce, kAsTold };
 
 struct Flood {
   size_t answered = 0;
-  std::vector<double> refusals;                   // seconds that each took
-  double client_seconds = 0, server_seconds = 0;  // of processor time
-  absl::Status failure;                           // of a call that was neither answered nor refused for the time being
+  std::vector<double> refusals;                   // seconds of each
+  double client_seconds = 0, server_seconds = 0;  // processor time
+  absl::Status failure;                           // error of a call that is neither an answer nor a temporary refusal
 };
 
-// For `seconds`, during the first twentieth of which the callers come, then until every call is over.
+// Runs for `seconds`, during the first twentieth of which the callers start, then until every call has ended.
 Flood run_unary_load(const Daemon& daemon, const Batches& batches, size_t callers, double seconds, Again again);
 
 }  // namespace locus::bench::serving

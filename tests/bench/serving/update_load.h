@@ -1,5 +1,4 @@
-// Batches of updates over one stream, in their order, over and over. For every case that counts moves a second. One
-// thread.
+// Batches of updates over one stream, in order, repeatedly. For every case that counts moves a second. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_UPDATE_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_UPDATE_LOAD_H_
 
@@ -15,16 +14,16 @@ namespace locus::bench::serving {
 
 class UpdateLoad {
  public:
-  // What every ack has to be: of a batch that was applied without refusals, or of one that had been applied before.
+  // Expected kind of every ack: of a batch applied without refusals, or of a duplicate.
   enum class Expect : uint8_t { kApplied, kDuplicate };
 
   // Borrows the messages.
   UpdateLoad(const Daemon& daemon, std::vector<v1::StreamUpdatesRequest>& messages, size_t window, Expect expect);
 
-  // All messages, `passes` times. Whatever goes wrong shows in status().
+  // Sends all messages, `passes` times. Errors show in status().
   void run(size_t passes);
   const absl::Status& status() const { return status_; }
-  // Of the last ack.
+  // Returns the size of the last ack.
   size_t ack_bytes() const { return ack_bytes_; }
 
  private:

@@ -10,10 +10,10 @@
 
 namespace locus::bench::serving {
 
-// Everything that is there, as balls.
+// Returns inserts of all objects, as balls.
 v1::UpdateBatch insert_all(const dynamic::World& world);
 
-// So many ticks, cut into messages of `size`; the last of a tick may be shorter.
+// Returns moves of `ticks` ticks in messages of `size`; the last of a tick may have fewer.
 std::vector<v1::StreamUpdatesRequest> move_messages(dynamic::World& world, const std::string& scene, size_t size,
                                                     size_t ticks);
 

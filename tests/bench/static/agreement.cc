@@ -9,7 +9,7 @@
 namespace locus::bench {
 namespace {
 
-// Triangles that may be asked to decide about the differing rays of one comparison.
+// Maximum number of triangle tests to decide about the differing rays of one comparison.
 constexpr size_t kMaxTests = 400'000'000;
 
 RayAnswer by_every_triangle(const BenchMesh& mesh, const RayQuery& query) {
@@ -41,7 +41,7 @@ bool right(uint8_t answer, const RayAnswer& truth) { return hits(answer) == hits
 std::string words(const RayAnswer& answer) { return hits(answer) ? absl::StrFormat("t = %.9g", answer.t) : "a miss"; }
 std::string words(uint8_t answer) { return hits(answer) ? "a hit" : "a miss"; }
 
-// The first of the differing rays, and how many there are.
+// Describes the first of the differing rays, and their number.
 std::string difference(const std::string& case_name, const Peer& peer, size_t count, size_t of,
                        const std::string& first) {
   return absl::StrCat(case_name, ": ", peer.name(), " differs from us in ", count, " of ", of,
@@ -92,7 +92,7 @@ void compare_any(const std::string& case_name, const BenchMesh& mesh, const Peer
   compare_rays(case_name, mesh, peer, Task::kAny, asked, ours, theirs, report);
 }
 
-void judge(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report) {
+void report_tally(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report) {
   if (tally.queries == 0) return;
   const std::string sentence = absl::StrCat(case_name, ": ", peer.name(), " differs from us in ", tally.ids, " ids of ",
                                             tally.queries, " queries; the first: ", tally.first_difference);

@@ -1,6 +1,6 @@
-// Whether a peer's answers and ours are the same, and who is right where they are not: that is decided by asking every
-// triangle with the predicates of core/geometry. Ours have to be right everywhere. A peer may differ within the limits
-// below, which is noted, or where it names its fault; anything else is a disagreement. Writes into a report; pure
+// Comparison of a peer's answers with those of locus. If they differ, a test of every triangle by the predicates of
+// core/geometry decides which are right. Those of locus must always be right. A peer may differ within the limits
+// below, which is noted, or if it names a known fault; anything else is a disagreement. Writes into a report; pure
 // otherwise.
 #ifndef LOCUS_TESTS_BENCH_STATIC_AGREEMENT_H_
 #define LOCUS_TESTS_BENCH_STATIC_AGREEMENT_H_
@@ -16,35 +16,37 @@
 
 namespace locus::bench {
 
-// Rays differ where only one of both hits, or where the hits are further apart than this part of the diagonal.
+// Rays differ if only one of both hits, or if the hits are further apart than this part of the diagonal.
 inline constexpr double kSameHit = 1e-4;
-// At most so many rays in so many may differ (silhouettes that a ray skims), and the part of all ids that may (float
+// Tolerated shares: one differing ray in kDifferingRays (silhouettes that a ray skims), and the part of all ids (float
 // tests that round).
 inline constexpr size_t kDifferingRays = 20;
 inline constexpr size_t kDifferingRaysOf = 500'000;
 inline constexpr double kDifferingIds = 1e-3;
 
-// `ours` has the answers to all of a case's rays, `theirs` those to the asked ones.
+// Compares first hits. `ours` has the answers to all of a case's rays, `theirs` those to the rays that the peer was
+// asked.
 void compare_first(const std::string& case_name, const BenchMesh& mesh, const Peer& peer, Task task,
                    const Asked<RayQuery>& asked, absl::Span<const RayAnswer> ours, absl::Span<const RayAnswer> theirs,
                    Report& report);
 void compare_any(const std::string& case_name, const BenchMesh& mesh, const Peer& peer, const Asked<RayQuery>& asked,
                  absl::Span<const uint8_t> ours, absl::Span<const uint8_t> theirs, Report& report);
 
-// Ids of one query, of both, in any order.
+// Counts over the queries of a case.
 struct RegionTally {
-  size_t queries = 0;            // that differ
-  size_t ids = 0;                // that differ
-  size_t all_ids = 0;            // of ours in all queries
+  size_t queries = 0;            // differing queries
+  size_t ids = 0;                // differing ids
+  size_t all_ids = 0;            // of locus in all queries
   std::string first_difference;  // in words
 };
-// `overlaps` decides by core/geometry. Counts what the peer has wrong; what we have wrong is reported at once.
+// Compares the ids of one query, in any order. `overlaps` decides by core/geometry. Counts the peer's errors; reports
+// those of locus at once.
 template <class Overlaps>
 void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vector<uint32_t> theirs, Overlaps overlaps,
                  RegionTally& tally, Report& report);
 
-// After the last query.
-void judge(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report);
+// Reports the tally after the last query.
+void report_tally(const std::string& case_name, const Peer& peer, Task task, const RegionTally& tally, Report& report);
 
 template <class Overlaps>
 void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vector<uint32_t> theirs, Overlaps overlaps,

@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// Answers right, but for the first of each batch that hits.
+// A peer whose answers are right, except for the first hit of each batch.
 class Liar : public Peer {
  public:
   explicit Liar(const BenchMesh& mesh, std::string fault = "") : Peer("liar"), right_(mesh), fault_(std::move(fault)) {}
@@ -57,7 +57,7 @@ class AgreementTest : public testing::Test {
     options_.quick = true;
     options_.rounds = 1;
   }
-  // All cases of rays, balls and boxes that the filter wants.
+  // Runs all cases of rays, balls and boxes that the filter selects.
   Report report_of(Peer& ours, std::unique_ptr<Peer> peer, const std::string& filter) {
     options_.filter = *CaseFilter::create(filter);
     Peers peers;
@@ -74,7 +74,7 @@ class AgreementTest : public testing::Test {
   Ours right_{mesh_};
 };
 
-TEST_F(AgreementTest, EqualAnswersAgreeWithoutAWord) {
+TEST_F(AgreementTest, EqualAnswersAgreeWithoutANote) {
   const Report report = report_of(right_, std::make_unique<Ours>(mesh_), "");
   EXPECT_THAT(report.cells, SizeIs(12));
   EXPECT_THAT(report.notes, IsEmpty());
@@ -94,7 +94,7 @@ TEST_F(AgreementTest, AWrongAnyHitOfOursMakesTheExitStatusOne) {
   EXPECT_EQ(exit_status(report_of(ours, std::make_unique<Ours>(mesh_), "ray/incoherent/any")), 1);
 }
 
-TEST_F(AgreementTest, ATriangleThatWeLeaveOutMakesTheExitStatusOne) {
+TEST_F(AgreementTest, AMissingTriangleOfOursMakesTheExitStatusOne) {
   for (const char* filter : {"ray/incoherent/all", "ball/10", "box/10"}) {
     Liar ours(mesh_);
     const Report report = report_of(ours, std::make_unique<Ours>(mesh_), filter);
@@ -156,7 +156,7 @@ TEST_F(AgreementTest, ATriangleGivenTwiceIsADisagreement) {
   EXPECT_THAT(report.disagreements[0], HasSubstr("we gave a triangle twice"));
 }
 
-TEST_F(AgreementTest, SlowPeersAreAskedSixteenOfEach128) {
+TEST_F(AgreementTest, SlowPeersGetSixteenOfEach128Queries) {
   class Slow : public Ours {
    public:
     using Ours::Ours;

@@ -69,7 +69,7 @@ absl::StatusOr<BenchMesh> generated(const Kind& kind, const std::vector<std::str
   const bool read = words.size() <= 3 && absl::SimpleAtoi(words[1], &triangles) && triangles > 0 &&
                     triangles <= kind.max_triangles && (words.size() < 3 || absl::SimpleAtoi(words[2], &seed));
   if (!read) {
-    return absl::InvalidArgumentError(absl::StrCat("a made-up mesh is ", kind.name, ":TRIANGLES or ", kind.name,
+    return absl::InvalidArgumentError(absl::StrCat("a generated mesh is ", kind.name, ":TRIANGLES or ", kind.name,
                                                    ":TRIANGLES:SEED, TRIANGLES from 1 to ", kind.max_triangles));
   }
   std::string name = absl::StrCat(kind.name, "-", rounded_count(triangles));
@@ -77,7 +77,7 @@ absl::StatusOr<BenchMesh> generated(const Kind& kind, const std::vector<std::str
   return bench_mesh(name, {kind.generate(triangles, seed)});
 }
 
-// The last part of a path, without its ending.
+// Returns the last part of a path, without its extension.
 std::string stem(const std::string& path) {
   const std::string file = path.substr(path.find_last_of('/') + 1);
   return file.substr(0, file.find_last_of('.'));

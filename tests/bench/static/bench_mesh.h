@@ -1,5 +1,5 @@
-// A level as the static suite asks it: indexed as it was imported, and as triangles with their bounds, without those
-// that have no area. For the workloads, for us and for every peer. Immutable once made; safe to share.
+// A level for the static suite: indexed as it was imported, and as triangles with their bounds, without triangles that
+// have no area. For the workloads, for locus and for every peer. Immutable once made; safe to share.
 #ifndef LOCUS_TESTS_BENCH_STATIC_BENCH_MESH_H_
 #define LOCUS_TESTS_BENCH_STATIC_BENCH_MESH_H_
 
@@ -14,20 +14,19 @@
 namespace locus::bench {
 
 struct BenchMesh {
-  std::string name;               // as case names end
-  std::vector<float> vertices;    // 3 a vertex
-  std::vector<uint32_t> indices;  // 3 a triangle
+  std::string name;               // last part of case names
+  std::vector<float> vertices;    // 3 per vertex
+  std::vector<uint32_t> indices;  // 3 per triangle
   std::vector<Triangle> triangles;
   Aabbf bounds;
   float diagonal = 0;  // of the bounds
 };
 
-// All meshes of a level as one. INVALID_ARGUMENT if no triangle has an area; errors as those of
-// TriangleMesh::create().
+// Joins all meshes of a level. INVALID_ARGUMENT if no triangle has an area; errors as those of TriangleMesh::create().
 absl::StatusOr<BenchMesh> bench_mesh(const std::string& name, const std::vector<cli::ImportedMesh>& meshes);
 
-// `mesh` as the help of the program describes it. Errors: as import_file(), and INVALID_ARGUMENT for a made-up mesh of
-// an unknown kind or a wrong number.
+// Loads or generates `mesh`, which has a form that the help of the program describes. Errors: as import_file(), and
+// INVALID_ARGUMENT for a generated mesh of an unknown kind or a wrong number.
 absl::StatusOr<BenchMesh> load_mesh(const std::string& mesh);
 
 }  // namespace locus::bench

@@ -47,18 +47,18 @@ TEST(BenchMeshTest, AMeshBeyondTheWorldIsRefused) {
   EXPECT_THAT(std::string(bench_mesh("far", {mesh}).status().message()), HasSubstr("far: "));
 }
 
-TEST(BenchMeshTest, MadeUpMeshesAreNamedByKindSizeAndSeed) {
+TEST(BenchMeshTest, GeneratedMeshesAreNamedByKindSizeAndSeed) {
   EXPECT_EQ(load_mesh("city:2000")->name, "city-2k");
   EXPECT_EQ(load_mesh("terrain:500:3")->name, "terrain-500-3");
   EXPECT_LE(load_mesh("blob:5000")->triangles.size(), 5000u);
 }
 
-TEST(BenchMeshTest, AMadeUpMeshOfAWrongNumberIsRefusedWithItsForm) {
+TEST(BenchMeshTest, AGeneratedMeshOfAWrongNumberIsRefusedWithTheExpectedForm) {
   for (const char* mesh : {"city:", "city:0", "city:many", "city:10:x", "city:10:1:1", "city:999999999999"})
     EXPECT_THAT(refusal_of(mesh), HasSubstr("city:TRIANGLES or city:TRIANGLES:SEED")) << mesh;
 }
 
-TEST(BenchMeshTest, AFileIsReadAndNamedWithoutItsFolderAndEnding) {
+TEST(BenchMeshTest, AFileIsReadAndNamedWithoutItsFolderAndExtension) {
   const std::string path = testing::TempDir() + "/sheet.obj";
   std::ofstream(path) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   const auto mesh = load_mesh(path);

@@ -9,7 +9,7 @@ namespace {
 
 using Builders = std::vector<std::unique_ptr<Builder>>;
 
-// By the time of the whole process: nobody may hand work to other threads for nothing.
+// Measures the time of the whole process, so that the work of other threads counts.
 void run_build(const std::string& name, const MeshRun& run, const Builders& builders, const Cell& shared) {
   run.progress(name);
   const auto count = static_cast<double>(run.mesh.triangles.size());

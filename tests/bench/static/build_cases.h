@@ -1,4 +1,5 @@
-// The cases of building: a tree from triangles by one thread, and what stays resident for each triangle.
+// The cases of building: time for a tree from triangles by one thread, and the bytes that stay resident for each
+// triangle.
 #ifndef LOCUS_TESTS_BENCH_STATIC_BUILD_CASES_H_
 #define LOCUS_TESTS_BENCH_STATIC_BUILD_CASES_H_
 
@@ -6,7 +7,7 @@
 
 namespace locus::bench {
 
-// build and memory. Asks no peers of `run`: it makes its own and lets go of them.
+// Runs build and memory. Uses no peers of `run`: it makes its own builders and destroys them.
 void run_build_cases(const MeshRun& run);
 
 }  // namespace locus::bench

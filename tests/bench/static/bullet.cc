@@ -22,7 +22,7 @@ class NearestHit : public btTriangleRaycastCallback {
   uint32_t number = kNoTriangle;
 };
 
-// Every triangle whose box overlaps is handed over; `test` decides.
+// Passes every triangle whose box overlaps to `test`, which decides.
 template <class Test>
 class Collect : public btTriangleCallback {
  public:
@@ -83,7 +83,8 @@ class Bullet : public Peer {
   }
 
  private:
-  // Rays have to end: no hit is further than twice the diagonal from an origin within the bounds or a camera's.
+  // Bullet's rays need an end: no hit is further than twice the diagonal from an origin within the bounds or a
+  // camera's.
   RayAnswer first_of(const RayQuery& ray) {
     const float length = std::min(ray.t_max, 2 * mesh_.diagonal);
     const btVector3 from = vector_of(ray.origin), to = from + vector_of(ray.direction) * length;

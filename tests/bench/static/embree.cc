@@ -106,7 +106,7 @@ void set(RTCRayHit& to, const RayQuery& ray) {
 
 constexpr char kLeaks[] = "Embree lets rays pass between triangles where its scene is not RTC_SCENE_FLAG_ROBUST";
 
-// rtcIntersect1 and rtcOccluded1, one ray a call.
+// Uses rtcIntersect1 and rtcOccluded1, one ray a call.
 class SingleRays : public Peer {
  public:
   SingleRays(std::string name, std::shared_ptr<const Scene> scene, std::vector<Task> tasks, std::string fault)
@@ -138,7 +138,7 @@ class SingleRays : public Peer {
   std::string fault_;
 };
 
-// rtcIntersect1M, a stream of rays a call; told whether they are coherent.
+// Uses rtcIntersect1M, a stream of rays a call, with the flag for coherent rays if they are.
 class RayStream : public Peer {
  public:
   explicit RayStream(std::shared_ptr<const Scene> scene) : Peer("embree_intersect1m"), scene_(std::move(scene)) {}
@@ -182,7 +182,7 @@ void intersect(const int* valid, RTCScene scene, RTCIntersectContext* context, R
   rtcIntersect16(valid, scene, context, rays);
 }
 
-// rtcIntersect8 and rtcIntersect16: coherent rays side by side.
+// Uses rtcIntersect8 and rtcIntersect16: coherent rays side by side.
 template <class Packet, size_t kWidth>
 class RayPackets : public Peer {
  public:
@@ -223,7 +223,7 @@ class RayPackets : public Peer {
   std::shared_ptr<const Scene> scene_;
 };
 
-// rtcOccluded1 with a filter that takes down each hit and goes on as if there were none.
+// Uses rtcOccluded1 with a filter that records each hit and rejects it, so that the search continues.
 class AllHits : public Peer {
  public:
   explicit AllHits(std::shared_ptr<const Scene> scene) : Peer("embree_robust"), scene_(std::move(scene)) {}
@@ -242,7 +242,7 @@ class AllHits : public Peer {
 
  private:
   struct Found {
-    RTCIntersectContext context;  // first: Embree knows this much of it
+    RTCIntersectContext context;  // first member: Embree's part
     uint32_t* ids;
     uint32_t count;
   };
@@ -256,7 +256,8 @@ class AllHits : public Peer {
   std::shared_ptr<const Scene> scene_;
 };
 
-// rtcPointQuery; each triangle it hands over is decided by a float test. Boxes go by the ball around them.
+// Uses rtcPointQuery; a float test decides about each triangle that it finds. Boxes are searched by the ball around
+// them.
 class PointQuery : public Peer {
  public:
   PointQuery(const BenchMesh& mesh, std::shared_ptr<const Scene> scene)
@@ -301,7 +302,7 @@ class PointQuery : public Peer {
     const auto decide = [](RTCPointQueryFunctionArguments* arguments) {
       auto& into = *static_cast<Found<Test>*>(arguments->userPtr);
       if (into.test(into.triangles[arguments->primID])) into.ids[into.count++] = arguments->primID;
-      return false;  // the radius stays
+      return false;  // keeps the radius
     };
     rtcPointQuery(scene_->get(), &query, &context, decide, &found);
     return found.count;

@@ -1,5 +1,5 @@
 // Embree 3 as peers of the static suite: a device of one thread, scenes of MEDIUM quality, Embree's own choice of
-// instruction set. Only where Debian's libembree-dev is; see peers.h.
+// instruction set. Only if Debian's libembree-dev is installed; see peers.h.
 #ifndef LOCUS_TESTS_BENCH_STATIC_EMBREE_H_
 #define LOCUS_TESTS_BENCH_STATIC_EMBREE_H_
 
@@ -7,11 +7,13 @@
 
 namespace locus::bench {
 
-// embree_intersect1, embree_intersect1m, embree_intersect8 and embree_intersect16 (first hits), embree_occluded1 (any
-// hits), embree_robust (both, with RTC_SCENE_FLAG_ROBUST), embree_point_query (balls, and boxes by the ball around).
+// Adds embree_intersect1, embree_intersect1m, embree_intersect8 and embree_intersect16 (first hits), embree_occluded1
+// (any hits), embree_robust (both, with RTC_SCENE_FLAG_ROBUST), embree_point_query (balls, and boxes by the ball
+// around).
 void add_embree_peers(const BenchMesh& mesh, Needs needs, Peers& peers);
 
-// embree_medium: a scene's commit from buffers of vertices and indices; bytes by Embree's memory monitor, with these.
+// Makes embree_medium: a scene's commit from buffers of vertices and indices; bytes by Embree's memory monitor, with
+// these buffers.
 std::unique_ptr<Builder> embree_builder(const BenchMesh& mesh);
 
 }  // namespace locus::bench

@@ -23,7 +23,7 @@ void set(RTCBounds* to, const Aabbf& bounds) {
   to->upper_z = bounds.max.z;
 }
 
-// Geometry that Embree knows by its bounds alone.
+// Geometry of which Embree knows the bounds only.
 template <class Thing>
 RTCScene scene_of(const Thing* things, size_t count, RTCBoundsFunction bounds, RTCBuildQuality quality) {
   const RTCScene scene = rtcNewScene(device());
@@ -57,7 +57,7 @@ class EmbreeCollide : public Peer {
   EmbreeCollide& operator=(const EmbreeCollide&) = delete;
 
   bool does(Task task) const override { return task == Task::kBox; }
-  // The ids of a batch come mixed: they follow each other in `ids`, from its start again when it is full.
+  // The ids of a batch arrive unsorted: they are appended to `ids`, from its start again when it is full.
   void box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) override {
     std::fill_n(counts, boxes.size(), 0);
     Found found{triangles_, boxes, ids, counts, 0};

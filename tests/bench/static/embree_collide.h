@@ -1,5 +1,6 @@
-// Embree's rtcCollide as a peer for boxes: the boxes of a batch become a scene of their own, built anew for each batch,
-// whose pairs with the triangles' boxes are decided one by one. Only where Debian's libembree-dev is; see peers.h.
+// Embree's rtcCollide as a peer for boxes: the boxes of a batch become a scene of their own, built for each batch, and
+// an exact test decides about each of its pairs with the triangles' boxes. Only if Debian's libembree-dev is installed;
+// see peers.h.
 #ifndef LOCUS_TESTS_BENCH_STATIC_EMBREE_COLLIDE_H_
 #define LOCUS_TESTS_BENCH_STATIC_EMBREE_COLLIDE_H_
 

@@ -7,15 +7,15 @@
 namespace locus::bench {
 namespace {
 
-// From a box town in the first cache to a body beyond the last.
+// Sizes from a city that fits into the first-level cache to a body larger than the last-level cache.
 const std::vector<std::string> kGenerated = {"city:10000", "city:70000", "terrain:270000", "blob:4300000"};
 const std::vector<std::string> kQuick = {"city:2000", "blob:5000"};
 
-// A level that comes in a Debian package, as fetch_levels.sh leaves it.
+// A level from a Debian package, at the path where fetch_levels.sh puts it.
 struct Fetched {
   const char* name;
   const char* file;
-  const char* entry;  // with its mark; empty = none
+  const char* entry;  // with its separator; empty = none
 };
 constexpr Fetched kFetched[] = {{"delta", "pak1-maps.pk3", "#maps/delta.bsp"}, {"bunny", "bunny.obj", ""}};
 

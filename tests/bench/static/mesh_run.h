@@ -1,4 +1,4 @@
-// What the cases of one mesh share. Borrowed; one thread.
+// Data that the cases of one mesh share. Borrowed; one thread.
 #ifndef LOCUS_TESTS_BENCH_STATIC_MESH_RUN_H_
 #define LOCUS_TESTS_BENCH_STATIC_MESH_RUN_H_
 
@@ -26,14 +26,14 @@ inline std::string case_of(const std::string& start, const BenchMesh& mesh) {
   return absl::StrCat(start, "/", mesh.name);
 }
 
-// The queries that a contestant is asked, and where they stand among all.
+// Queries that a contestant is asked, and their positions among all.
 template <class Query>
 struct Asked {
   std::vector<Query> queries;
   std::vector<size_t> places;
 };
 
-// All of them, or 16 of each 128 for slow peers.
+// Returns all queries, or 16 of each 128 for slow peers.
 template <class Query>
 Asked<Query> asked_of(const Peer& peer, const std::vector<Query>& queries) {
   Asked<Query> asked;
@@ -45,7 +45,7 @@ Asked<Query> asked_of(const Peer& peer, const std::vector<Query>& queries) {
   return asked;
 }
 
-// Where one chunk of `count` queries begins; that of chunk `chunks` is `count`.
+// Returns the position at which one chunk of `count` queries begins; that of chunk `chunks` is `count`.
 inline size_t chunk_begin(size_t count, size_t chunk, size_t chunks) { return count * chunk / chunks; }
 
 inline size_t chunks_for(size_t count, size_t chunk_size) {

@@ -16,9 +16,9 @@
 namespace locus::bench {
 namespace {
 
-constexpr size_t kBatch = 1024;      // rays given to the kernels at once
-constexpr size_t kRegionBatch = 16;  // balls or boxes given at once
-constexpr size_t kAllBatch = 256;    // rays of which all hits are asked, and how many of each
+constexpr size_t kBatch = 1024;      // rays per call of the kernels
+constexpr size_t kRegionBatch = 16;  // balls or boxes per call
+constexpr size_t kAllBatch = 256;    // rays per call for all hits, and the maximum number of hits of each
 constexpr uint32_t kMaxRows = 128;
 
 using AskKernel = void (*)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
@@ -39,7 +39,8 @@ KernelRay kernel_ray(const RayQuery& ray) {
           true};
 }
 
-// The workloads' directions are of length one: only the reach can leave what the kernels' bounds hold for.
+// Returns whether the kernels' bounds hold. The workloads' directions have unit length, so only the ray's length can
+// exceed the bounds.
 bool kernels_hold(const RayQuery& ray, float magnitude) {
   const double reach = double{max_component(abs(ray.origin))} + double{magnitude};
   return reach >= kMinKernelReach && reach <= kMaxKernelReach;
@@ -47,7 +48,7 @@ bool kernels_hold(const RayQuery& ray, float magnitude) {
 
 TriangleRay triangle_ray(const RayQuery& ray) { return {to_double(ray.origin), to_double(ray.direction)}; }
 
-// The questions below end before a distance, those of the workloads with it.
+// Returns the float above t: the searches below exclude their limit, the workloads include it.
 float just_beyond(float t) { return std::nextafter(t, std::numeric_limits<float>::infinity()); }
 
 RayAnswer first_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {
@@ -61,7 +62,7 @@ bool any_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {
   return any_ray(tree, triangle_ray(ray), just_beyond(ray.t_max));
 }
 
-// Asks the kernels batch by batch; `settled` and `unsettled` get each ray's place.
+// Runs the kernels batch by batch; `settled` and `unsettled` get each ray's position.
 template <class Settled, class Unsettled>
 void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQuery> rays, Settled settled,
                  Unsettled unsettled) {
@@ -81,7 +82,7 @@ void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQue
   }
 }
 
-// All hits of one ray, from the start of `ids`.
+// Finds all hits of one ray, written from the start of `ids`.
 uint32_t all_by_triangles(const TriangleBvh& tree, const RayQuery& ray, uint32_t* ids) {
   std::vector<RayHit<Triangle>> found;
   all_rays(tree, triangle_ray(ray), just_beyond(ray.t_max), tree.size(), found);
@@ -89,7 +90,8 @@ uint32_t all_by_triangles(const TriangleBvh& tree, const RayQuery& ray, uint32_t
   return static_cast<uint32_t>(found.size());
 }
 
-// The same by the kernels, where they hold; of up to kAllBatch rays. Starts again where `ids` might not do.
+// Finds all hits of up to kAllBatch rays, by the kernels where their bounds hold. Writes from the start of `ids` again
+// if the rest could be too small.
 void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<const RayQuery> rays,
               absl::Span<uint32_t> ids, uint32_t* counts, KernelRow* rows) {
   std::array<KernelRay, kAllBatch> batch;
@@ -108,7 +110,7 @@ void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<con
   }
 }
 
-// Each batch from the start of `ids` again; what does not fit behind the others is asked once more.
+// Writes each batch from the start of `ids` again; repeats queries whose ids do not fit behind the others.
 template <class Shape>
 void find_in_batches(const TriangleBvh& tree, absl::Span<const Shape> shapes, absl::Span<uint32_t> ids,
                      uint32_t* counts) {

@@ -1,4 +1,4 @@
-// Locus in the static suite: the one place where it is asked, by the calls that the server's queries make for a mesh.
+// The only code of the static suite that calls locus, by the functions that the server's queries use for a mesh.
 // Immutable; any number of threads may ask.
 #ifndef LOCUS_TESTS_BENCH_STATIC_OURS_H_
 #define LOCUS_TESTS_BENCH_STATIC_OURS_H_
@@ -26,9 +26,10 @@ class Ours : public Peer {
   std::shared_ptr<const StaticMesh> mesh_;
 };
 
-// The tree from triangles, on one thread; bytes() are the whole StaticMesh's, with the uploaded mesh.
+// Makes a builder of the tree from triangles, on one thread; bytes() are the whole StaticMesh's, with the uploaded
+// mesh.
 std::unique_ptr<Builder> our_builder(const BenchMesh& mesh);
-// Of the storage order that a build gives: the results of the cases build and memory.
+// Returns a hash of the storage order of a built tree: the results of the cases build and memory.
 std::string storage_order_hash(const BenchMesh& mesh);
 
 }  // namespace locus::bench

@@ -1,4 +1,4 @@
-// All peers of the static suite that this build has. CMake decides by what is installed; deploy/packages.sh has the set
+// All peers of the static suite that this build has. CMake selects the installed ones; deploy/packages.sh has the set
 // `bench`.
 #ifndef LOCUS_TESTS_BENCH_STATIC_PEERS_H_
 #define LOCUS_TESTS_BENCH_STATIC_PEERS_H_
@@ -10,10 +10,10 @@
 
 namespace locus::bench {
 
-// Made from the mesh and ready. A note for each that cannot take this mesh.
+// Makes the peers for a mesh. Adds a note for each that cannot take this mesh.
 Peers all_peers(const BenchMesh& mesh, Needs needs, std::vector<std::string>& notes);
 
-// Of the cases build and memory.
+// Makes the builders of the cases build and memory.
 std::vector<std::unique_ptr<Builder>> all_builders(const BenchMesh& mesh);
 
 }  // namespace locus::bench

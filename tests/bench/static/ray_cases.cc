@@ -12,11 +12,11 @@ namespace locus::bench {
 namespace {
 
 constexpr size_t kRaysAChunk = 20'000;
-// Large, so that starting threads is nothing beside it.
+// Large enough for the time of starting threads not to matter.
 constexpr size_t kRaysAThreadsChunk = 60'000;
 constexpr uint64_t kIncoherentSeed = 101;
 constexpr uint64_t kShortSeed = 202;
-constexpr float kShortReach = 0.05f;  // of the diagonal
+constexpr float kShortReach = 0.05f;  // part of the diagonal
 
 enum class Rays : uint8_t { kIncoherent, kShort, kCamera };
 struct RayCase {
@@ -77,7 +77,7 @@ struct Entry {
   std::vector<Answer> answers;
 };
 
-// We first, then those that do it.
+// Lists locus first, then the peers that support the task.
 template <class Answer>
 std::vector<Entry<Answer>> entries_of(const MeshRun& run, Task task, const std::vector<RayQuery>& rays) {
   std::vector<Entry<Answer>> entries;
@@ -126,7 +126,7 @@ std::string threads_case(const MeshRun& run) { return case_of(absl::StrCat("thre
 // Threads that wait for the next chunk: starting one can take longer than a chunk.
 class Team {
  public:
-  // `work` gets a member's number, from 0; member 0 is whoever calls run().
+  // Makes a team. `work` gets a member's index, from 0; member 0 is the thread that calls run().
   Team(size_t members, std::function<void(size_t member)> work)
       : work_(std::move(work)), begin_(static_cast<ptrdiff_t>(members)), end_(static_cast<ptrdiff_t>(members)) {
     for (size_t member = 1; member < members; ++member) {
@@ -159,7 +159,7 @@ class Team {
   std::vector<std::thread> others_;
 };
 
-// The same rays by several threads, each a part of every chunk.
+// Rays divided among several threads, each with a part of every chunk.
 class SharedRays {
  public:
   SharedRays(Peer& peer, const std::vector<RayQuery>& rays, size_t chunks, size_t threads)

@@ -6,13 +6,13 @@
 
 namespace locus::bench {
 
-// Whether the filter wants one that asks peers, or asks us alone.
+// Returns whether the filter selects a case that has peers.
 bool wants_ray_peers(const Options& options, const BenchMesh& mesh);
 
-// ray/incoherent/first, ray/incoherent/any, ray/short/first, ray/short/any, ray/camera/first.
+// Runs ray/incoherent/first, ray/incoherent/any, ray/short/first, ray/short/any, ray/camera/first.
 void run_ray_cases(const MeshRun& run);
 
-// threads2, or as many as were asked for: beside one_thread, by the clock on the wall.
+// Runs threads2, or as many as the options say, compared with one_thread, by wall time.
 void run_threads_case(const MeshRun& run);
 
 }  // namespace locus::bench

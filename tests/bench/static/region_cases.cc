@@ -14,7 +14,7 @@ namespace {
 struct RegionCase {
   const char* name;
   Task task;
-  float fraction;  // of the diagonal; rays end nowhere
+  float fraction;  // radius or size as a part of the diagonal
   uint64_t seed;
   size_t count;  // a tenth for meshes of more than a million triangles
   size_t quick_count;
@@ -55,10 +55,10 @@ template <class Query>
 struct Entry {
   Peer* peer;
   Asked<Query> asked;
-  std::vector<uint32_t> counts;  // of ids, one a query
+  std::vector<uint32_t> counts;  // ids per query
 };
 
-// Of a set of ids, whatever their order.
+// Hash of a set of ids, independent of their order.
 struct SetOfIds {
   uint32_t count = 0;
   uint64_t sum = 0;
@@ -113,7 +113,7 @@ class RegionRace {
     return absl::MakeConstSpan(ids_.data(), count);
   }
 
-  // Query by query, before anything is timed.
+  // Compares query by query, before anything is timed.
   void compare_all() {
     for (const Query& query : queries_) {
       sets_.push_back(set_of(ids_of(run_.ours, query)));
@@ -130,7 +130,7 @@ class RegionRace {
       if (set_of(ids_of(*entry.peer, entry.asked.queries[i])) != ours)
         settle(entry, entry.asked.queries[i], entry.asked.places[i], tally);
     }
-    judge(name_, *entry.peer, case_.task, tally, run_.report);
+    report_tally(name_, *entry.peer, case_.task, tally, run_.report);
   }
 
   void settle(const Entry<Query>& entry, const Query& query, size_t place, RegionTally& tally) {
@@ -153,7 +153,7 @@ class RegionRace {
     return {entry.peer->name(), run_chunk, static_cast<double>(count), {}};
   }
 
-  // What was timed was what was compared.
+  // Verifies that the timed runs found as many ids as the compared ones.
   void check_counts() {
     const std::vector<uint32_t>& timed = entries_.front().counts;
     for (size_t i = 0; i < timed.size(); ++i) {
@@ -170,7 +170,7 @@ class RegionRace {
   const std::vector<Query> queries_;
   std::vector<uint32_t> ids_;
   std::vector<Entry<Query>> entries_;
-  std::vector<SetOfIds> sets_;  // ours, query by query
+  std::vector<SetOfIds> sets_;  // of locus, per query
   ResultsHash hash_;
 };
 

@@ -6,10 +6,10 @@
 
 namespace locus::bench {
 
-// Whether the filter wants one of them.
+// Returns whether the filter selects one of these cases.
 bool wants_region_peers(const Options& options, const BenchMesh& mesh);
 
-// ball/0.5, ball/2, ball/10, box/0.5, box/2, box/10.
+// Runs ball/0.5, ball/2, ball/10, box/0.5, box/2, box/10.
 void run_region_cases(const MeshRun& run);
 
 }  // namespace locus::bench

@@ -1,6 +1,6 @@
-// What peers that only cull are given to decide by: plain float tests of one triangle, as one would write them beside
-// such a library. Faster than core/geometry's in double, and now and then wrong by a rounding; static_suite settles
-// that. Inline, since each peer's file is compiled on its own.
+// Tests for peers that only cull: plain float tests of one triangle, as a user of such a library would write them.
+// Faster than core/geometry's in double, and sometimes wrong by a rounding, which static_suite tolerates. Inline, since
+// each peer's file is compiled on its own.
 #ifndef LOCUS_TESTS_BENCH_STATIC_SCALAR_OVERLAP_H_
 #define LOCUS_TESTS_BENCH_STATIC_SCALAR_OVERLAP_H_
 
@@ -11,12 +11,14 @@
 
 namespace locus::bench {
 
-// Squared length of `to_point` less s times one edge and t times the other: to a point of the triangle.
+// Returns the squared length of `to_point` minus s times one edge and t times the other: the distance to a point of the
+// triangle.
 inline float squared_distance_at(Vec3f to_point, Vec3f ab, Vec3f ac, float s, float t) {
   return squared_length(to_point - ab * s - ac * t);
 }
 
-// Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5 (regions of the nearest point).
+// Returns the squared distance of a point to a triangle. Source: Ericson, Real-Time Collision Detection, 2005, section
+// 5.1.5 (regions of the nearest point).
 inline float scalar_squared_distance(Vec3f point, const Triangle& triangle) {
   const Vec3f ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, ap = point - triangle.a;
   const float d1 = dot(ab, ap), d2 = dot(ac, ap);
@@ -40,12 +42,12 @@ inline float scalar_squared_distance(Vec3f point, const Triangle& triangle) {
   return squared_distance_at(ap, ab, ac, vb * whole, vc * whole);
 }
 
-// Whether an axis separates: `p0`, `p1`, `p2` are the vertices along it, `reach` is the box's half.
+// Returns whether an axis separates: `p0`, `p1`, `p2` are the vertices along it, `reach` is the box's half extent.
 inline bool separates(float p0, float p1, float p2, float reach) {
   return std::max(std::min(p0, std::min(p1, p2)), -std::max(p0, std::max(p1, p2))) > reach;
 }
 
-// The three axes edge x unit vector. The vertices are seen from the box's centre.
+// Tests the three axes edge x unit vector. Vertices are relative to the box's centre.
 inline bool edge_separates(Vec3f a, Vec3f b, Vec3f c, Vec3f edge, Vec3f half) {
   const float x = std::fabs(edge.x), y = std::fabs(edge.y), z = std::fabs(edge.z);
   return separates(edge.y * a.z - edge.z * a.y, edge.y * b.z - edge.z * b.y, edge.y * c.z - edge.z * c.y,
@@ -56,10 +58,11 @@ inline bool edge_separates(Vec3f a, Vec3f b, Vec3f c, Vec3f edge, Vec3f half) {
                    half.x * y + half.y * x);
 }
 
-// Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001: three axes of the box, the normal, nine products.
+// Tests three axes of the box, the normal, nine products. Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing,
+// 2001.
 inline bool scalar_box_overlaps(Vec3f centre, Vec3f half, const Triangle& triangle) {
   const Vec3f a = triangle.a - centre, b = triangle.b - centre, c = triangle.c - centre;
-  // All three before one branch: most triangles that are handed over end here, by no axis more than another.
+  // Computes all three before one branch: most candidate triangles end here, equally often by each axis.
   if (static_cast<int>(separates(a.x, b.x, c.x, half.x)) | static_cast<int>(separates(a.y, b.y, c.y, half.y)) |
       static_cast<int>(separates(a.z, b.z, c.z, half.z)))
     return false;

@@ -1,5 +1,5 @@
-// The suite `static`: one level, never changed, asked by one thread as fast as it goes; us beside the libraries that
-// are best at it. Cases and workloads: README.md.
+// The suite `static`: queries of one immutable level by one thread at full speed, in locus and in the best libraries
+// for it. Cases and workloads: README.md.
 #ifndef LOCUS_TESTS_BENCH_STATIC_STATIC_SUITE_H_
 #define LOCUS_TESTS_BENCH_STATIC_STATIC_SUITE_H_
 
@@ -8,7 +8,7 @@
 
 namespace locus::bench {
 
-// Errors: those of load_mesh() for a mesh that was asked for by name. Fetched levels that are absent are only noted.
+// Runs the suite. Errors: those of load_mesh() for a mesh named in the options. Missing fetched levels are only noted.
 absl::Status run_static_suite(const Options& options, const Progress& progress, Report& report);
 
 }  // namespace locus::bench

@@ -41,7 +41,7 @@ Vec3f on_surface(const BenchMesh& mesh, Draws& draws) {
 
 struct Camera {
   Vec3d eye, forward, right, up;
-  double tangent = 0;  // of half the vertical field of view
+  double tangent = 0;  // tangent of half the vertical field of view
 };
 
 Camera camera_of(const BenchMesh& mesh) {

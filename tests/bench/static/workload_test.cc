@@ -4,7 +4,7 @@
 
 #include "tests/bench/static/two_sheets.h"
 
-// The expected numbers come from another program of the same definition.
+// Another program of the same definition computed the expected values.
 namespace locus::bench {
 namespace {
 
@@ -32,7 +32,7 @@ TEST(WorkloadTest, ShortRaysAreTheKnownOnes) {
   EXPECT_NEAR(rays[1].t_max, 0.320156217f, 1e-7);
 }
 
-TEST(WorkloadTest, ThePictureGoesByTilesOfFourByFour) {
+TEST(WorkloadTest, ThePictureHasTilesOfFourByFour) {
   const std::vector<RayQuery> rays = camera_rays(two_sheets(), 8, 8);
   ASSERT_EQ(rays.size(), 64u);
   expect_near(rays[0].origin, {4.88414717f, 4.16311026f, 4.67256212f});
@@ -41,7 +41,7 @@ TEST(WorkloadTest, ThePictureGoesByTilesOfFourByFour) {
   expect_near(rays[17].direction, {-0.543648899f, -0.078734383f, -0.835611582f});
 }
 
-TEST(WorkloadTest, BallsStandOnTheSurfaceAndAnywhereByTurns) {
+TEST(WorkloadTest, BallsAreAlternatelyOnTheSurfaceAndAnywhere) {
   const std::vector<Ballf> drawn = balls(two_sheets(), 3, 301, 0.005f);
   expect_near(drawn[0].center, {1.12074053f, 0.160431579f, 0});
   expect_near(drawn[1].center, {2.65813136f, 1.09687781f, 1.76872826f});
@@ -49,7 +49,7 @@ TEST(WorkloadTest, BallsStandOnTheSurfaceAndAnywhereByTurns) {
   EXPECT_NEAR(drawn[2].radius, 0.0320156217f, 1e-8);
 }
 
-TEST(WorkloadTest, BoxesHaveTheKnownEnds) {
+TEST(WorkloadTest, BoxesHaveTheKnownBounds) {
   const std::vector<Obbf> drawn = boxes(two_sheets(), 2, 401, 0.005f);
   expect_near(drawn[0].center - drawn[0].half, {0.248744369f, 2.79447031f, -0.045318149f});
   expect_near(drawn[0].center + drawn[0].half, {0.302234113f, 2.84807539f, 0.045318149f});

@@ -1,5 +1,5 @@
-// Closed meshes with a known inside, for the proof that no ray leaks out of them: neighbours share the very same
-// vertices, and the ball of `inner_radius` around the origin lies within. Plain data and functions without state.
+// Closed meshes with a known interior, for the proof that no ray leaks out of them: neighbours have bitwise equal
+// vertices, and the ball of `inner_radius` around the origin lies inside. Plain data and functions without state.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_CLOSED_MESHES_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_CLOSED_MESHES_H_
 
@@ -16,10 +16,10 @@ namespace locus::test {
 struct ClosedMesh {
   std::vector<Triangle> triangles;
   double inner_radius;
-  double lattice = 0;  // all coordinates are multiples of it; 0: they are not
+  double lattice = 0;  // all coordinates are multiples of it; 0: no lattice
 };
 
-// Each edge of an icosahedron is halved `level` times and the whole blown up to a sphere of radius 1 give or take
+// Halves each edge of an icosahedron `level` times and projects the vertices to a sphere of radius 1 plus or minus
 // `noise`; vertices are rounded to multiples of `lattice` unless that is 0. 20 * 4^level triangles.
 inline ClosedMesh icosphere(int level, double noise, double lattice, uint64_t seed) {
   using Corners = std::array<size_t, 3>;
@@ -56,7 +56,7 @@ inline ClosedMesh icosphere(int level, double noise, double lattice, uint64_t se
   return mesh;
 }
 
-// What `locus generate blob` makes, shrunk to a radius of about one.
+// Returns the mesh of `locus generate blob`, scaled to a radius of about one.
 inline ClosedMesh small_blob(uint64_t triangles, uint64_t seed) {
   const cli::ImportedMesh blob = cli::generate_blob(triangles, seed);
   ClosedMesh mesh{{}, 0.9 * 0.1 * cli::kMinBlobRadius, 0};

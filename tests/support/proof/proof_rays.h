@@ -1,6 +1,6 @@
-// The rays of the proof that none misses: random ones, ones aimed at insides, edges and corners of triangles, ones that
-// start on triangles, graze them, come from far away, and rays of a lattice from the planes of walls. Functions of the
-// generator's state alone.
+// The rays of the proof that no ray misses: random ones; ones aimed at the interiors, edges and corners of triangles;
+// ones that start on triangles, graze them or come from far away; and rays of a lattice from the planes of walls.
+// Functions of the generator's state alone.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_PROOF_RAYS_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_PROOF_RAYS_H_
 
@@ -14,7 +14,7 @@ namespace locus::test {
 
 namespace internal {
 
-// In mesh axes.
+// A ray in mesh axes.
 struct MeshRay {
   Vec3d origin, target;
 };
@@ -28,7 +28,7 @@ inline Vec3d inner_point(const Triangle& triangle, Random& random) {
   return point_in(triangle, u, random.unit() * (1 - u));
 }
 
-// A corner, or a place of the edge between the first and the second vertex.
+// Returns a corner, or a point of the edge between the first and the second vertex.
 inline Vec3d boundary_point(const Triangle& triangle, Random& random) {
   return random.chance(0.3) ? to_double(triangle.a) : point_in(triangle, random.chance(0.3) ? 0.5 : random.unit(), 0);
 }
@@ -61,7 +61,7 @@ inline MeshRay surface_ray(const ProofMesh& mesh, Random& random) {
   return {origin, inner_point(random.pick(mesh.triangles), random)};
 }
 
-// Nearly within the triangle's plane, down to a millionth of its slope.
+// Draws a ray that is nearly in the triangle's plane, down to a slope of a millionth.
 inline MeshRay grazing_ray(const ProofMesh& mesh, Random& random) {
   const Triangle& triangle = random.pick(mesh.triangles);
   const Vec3d from = inner_point(triangle, random), to = inner_point(triangle, random);
@@ -74,7 +74,7 @@ inline MeshRay far_ray(const ProofMesh& mesh, Random& random) {
   return {target + random.unit_vector() * mesh.size * random.magnitude(0, 10), target};
 }
 
-// From a point of the lattice, on a wall's plane more often than not, along an axis or a diagonal.
+// Draws a ray from a point of the lattice, usually on a wall's plane, along an axis or a diagonal.
 inline MeshRay lattice_ray(const ProofMesh& mesh, Random& random) {
   if (mesh.lattice == 0) return boundary_ray(mesh, random);
   const Vec3d corner = to_double(random.pick(mesh.triangles).a);
@@ -92,7 +92,7 @@ inline constexpr RayFamily kRayFamilies[] = {random_ray,  random_ray,  aimed_ray
 
 inline void add_ray(const ProofInstance& instance, const MeshRay& ray, Random& random, OwnedBlock& block) {
   const Vec3d frame = block.settings.frame;
-  constexpr double kFarthest = 9e8;  // the world ends soon after
+  constexpr double kFarthest = 9e8;  // near the limit of coordinates
   const Vec3d from = instance.transform.point_to_world(ray.origin);
   const Vec3d within = max(min(from, {kFarthest, kFarthest, kFarthest}), {-kFarthest, -kFarthest, -kFarthest});
   const Vec3f origin = to_float(within - frame);
@@ -110,11 +110,11 @@ inline void add_ray(const ProofInstance& instance, const MeshRay& ray, Random& r
 
 }  // namespace internal
 
-// Rays that go nearly the same way, in one block of four: the kernels take them together.
+// Length of a run of rays in nearly equal directions, in one block of four: the kernels process them as packets.
 inline constexpr size_t kBeamRays = 24;
 
-// `count` rays, the families in turn. Origins are floats of the block's frame, which is near their instance or, for one
-// block in four, anywhere within a kilometre of it: the reference starts from what the block says.
+// Draws `count` rays from the families in turn. Origins are floats in the block's frame, which is near their instance
+// or, for one block in four, anywhere within a kilometre of it: the reference starts from the values in the block.
 inline OwnedBlock proof_rays(const ProofScene& scene, size_t count, Random& random) {
   OwnedBlock block = rays_along_x(RayMode::kFirst, {});
   block.sizes.clear();

@@ -1,5 +1,5 @@
-// The scenes of the proof that no ray misses: meshes of several kinds and sizes, each placed as it is, moved, far away,
-// turned and scaled, and several times over. Immutable; safe from any thread.
+// The scenes of the proof that no ray misses: meshes of several kinds and sizes, each placed unchanged, moved, far
+// away, rotated and scaled, and several times over. Immutable; safe from any thread.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_PROOF_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_PROOF_SCENES_H_
 
@@ -18,7 +18,7 @@ struct ProofMesh {
   ReferenceTree reference;
   Real extent;         // the largest |coordinate|
   double size;         // the longest side of its bounds
-  double lattice = 0;  // all corners are multiples of it; 0: they are not
+  double lattice = 0;  // all corners are multiples of it; 0: no lattice
 };
 
 struct ProofInstance {
@@ -44,14 +44,14 @@ inline std::shared_ptr<const ProofMesh> proof_mesh(std::vector<Triangle> triangl
 
 namespace internal {
 
-// Scaled, then moved: each vertex rounded once, so that what was closed stays closed.
+// Scales, then moves: each vertex is rounded once, so that closed meshes stay closed.
 inline std::vector<Triangle> moved(std::vector<Triangle> triangles, double scale, Vec3d by) {
   for (Triangle& triangle : triangles)
     for (Vec3f* vertex : {&triangle.a, &triangle.b, &triangle.c}) *vertex = to_float(to_double(*vertex) * scale + by);
   return triangles;
 }
 
-// Long thin triangles across each other, down to a hundred thousandth of their length.
+// Returns long thin triangles that cross each other, as thin as 1/100,000 of their length.
 inline std::vector<Triangle> slivers(uint32_t count, uint64_t seed) {
   Random random(seed);
   std::vector<Triangle> triangles;
@@ -63,7 +63,7 @@ inline std::vector<Triangle> slivers(uint32_t count, uint64_t seed) {
   return triangles;
 }
 
-// Triangles of all sizes through each other, each tenth one a copy of one before.
+// Returns triangles of all sizes that intersect each other; each tenth one is a copy of an earlier one.
 inline std::vector<Triangle> soup(uint32_t count, uint64_t seed) {
   Random random(seed);
   std::vector<Triangle> triangles;
@@ -101,7 +101,7 @@ inline std::vector<PlacedMesh> three_through_each_other(double size, Random& ran
   return three;
 }
 
-// So that rays meet several, in one order by their bounds and in another by their hits.
+// Places a mesh many times, so that rays meet several instances, in one order by bounds and in another by hits.
 inline std::vector<PlacedMesh> many_all_over(double size, Random& random) {
   std::vector<PlacedMesh> many(20);
   for (PlacedMesh& placed : many) {
@@ -140,7 +140,7 @@ inline std::vector<std::shared_ptr<const ProofMesh>> proof_meshes(uint64_t seed)
           proof_mesh(bumpy_sphere(100, 0.02, seed))};
 }
 
-// Every mesh at every placement, three of it through each other, and many.
+// Returns every mesh at every placement, three intersecting instances of it, and many.
 inline std::vector<ProofScene> proof_scenes(uint64_t seed) {
   Random random(seed);
   std::vector<ProofScene> scenes;

@@ -1,14 +1,14 @@
-// Judges answers to rays by a reference in long double that starts from the stored values. For the proof that no ray
+// Verifies answers to rays by a reference in long double that starts from the stored values. For the proof that no ray
 // misses. With e = 2^-20 (|origin in mesh axes| + mesh extent), in mesh axes:
 //
 // - miss: the reference hits a triangle at least e within its border, and the answer has no hit up to there plus
 //   e / |direction|.
-// - false hit: the answer names a triangle that is farther than e from the answer's place on the ray, or one that is
+// - false hit: the answer names a triangle that is farther than e from the answer's point on the ray, or one that is
 //   culled, or a t beyond t_max.
-// - undecidable: the answer differs from what the reference finds without e, and none of these.
+// - undecidable: the answer differs from the reference without e, and is none of these.
 //
-// An answer with all hits misses a triangle so met that it does not name. No angle is left out: a triangle that is all
-// but edge-on is judged as any other.
+// An answer with all hits misses a triangle if the reference hits it in this way and the answer does not list it. No
+// angle is exempt: a nearly edge-on triangle is verified like any other.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_JUDGE_H_
 
@@ -23,12 +23,12 @@ namespace locus::test {
 
 struct RayTally {
   uint64_t rays = 0;
-  uint64_t hits = 0;  // the answer has one
+  uint64_t hits = 0;  // answers with a hit
   uint64_t misses = 0;
   uint64_t false_hits = 0;
   uint64_t undecidable = 0;
-  uint64_t repeats = 0;             // of the same rays by other modes and limits
-  uint64_t differing_repeats = 0;   // that answered otherwise
+  uint64_t repeats = 0;             // repetitions of the same rays with other modes and limits
+  uint64_t differing_repeats = 0;   // repetitions with a different answer
   std::vector<std::string> faults;  // the first few, described
 
   void add(const RayTally& other) {
@@ -47,7 +47,7 @@ struct RayTally {
   bool clean() const { return misses == 0 && false_hits == 0 && differing_repeats == 0; }
 };
 
-// A hit as an answer gives it. No hit: id kNoId, t +inf.
+// A hit of an answer. No hit: id kNoId, t +inf.
 struct RayRow {
   Real t;
   Id id;
@@ -66,14 +66,14 @@ class RayJudge {
     const auto column = [ray](const std::vector<float>& c) {
       return Vec3d{c[3 * ray], c[3 * ray + 1], c[3 * ray + 2]};
     };
-    // A position is frame plus offset, rounded once.
+    // Positions are frame plus offset, rounded once.
     ray_ = {to_real(block.settings.frame + column(block.points)), to_real(column(block.sizes))};
   }
 
-  // The worse, the greater.
+  // In order of severity.
   enum class Verdict { kRight, kUndecidable, kFalseHit, kMiss };
 
-  // Of an answer with the first hit.
+  // Verifies an answer with the first hit.
   Verdict judge_first(const RayRow& answer) const {
     const bool hit = answer.id != kNoId;
     Verdict verdict = hit ? judge_row(answer) : Verdict::kRight;
@@ -82,7 +82,7 @@ class RayJudge {
     return verdict;
   }
 
-  // Of rows begin to end (exclusive) with all hits: each is right and none is missing.
+  // Verifies rows begin to end (exclusive) of an answer with all hits: each is right and none is missing.
   Verdict judge_all(const BlockResult& answer, size_t begin, size_t end) const {
     Verdict verdict = Verdict::kRight;
     for (size_t row = begin; row < end; ++row) verdict = std::max(verdict, judge_row(ray_row(answer, row)));
@@ -112,7 +112,7 @@ class RayJudge {
   }
   bool culled(Real slope) const { return cull_ != Cull::kNone && (cull_ == Cull::kBack) == (slope > 0); }
 
-  // The triangle that the row names.
+  // Verifies the triangle that the row names.
   Verdict judge_row(const RayRow& row) const {
     const auto instance = std::find_if(scene_.instances.begin(), scene_.instances.end(),
                                        [&](const ProofInstance& i) { return i.id == row.id; });
@@ -127,14 +127,14 @@ class RayJudge {
     return meeting && meeting->inset >= 0 ? Verdict::kRight : Verdict::kUndecidable;
   }
 
-  // A triangle that the reference meets, the answer's rows up to `end` do not.
+  // Verifies that the answer may lack a triangle that the reference meets, with rows up to `end`.
   Verdict judge_missing(const Placed& in, const Meeting& meeting, Real end) const {
     if (meeting.inset < 0 || culled(meeting.slope)) return Verdict::kRight;
     const bool within = meeting.inset >= in.e && meeting.t + in.e / in.speed < end;
     return within ? Verdict::kMiss : Verdict::kUndecidable;
   }
 
-  // What the reference hits so much before `t` that an answer there is late.
+  // Verifies that the reference hits nothing in an instance so much before `t` that an answer at `t` is late.
   Verdict judge_before(const ProofInstance& instance, Real t) const {
     const Placed in = placed(instance);
     const Real limit = t < kForever ? t - in.e / in.speed : t_max_;
@@ -171,7 +171,7 @@ inline void count(RayJudge::Verdict verdict, const OwnedBlock& block, size_t ray
 
 }  // namespace internal
 
-// Judges the answer to a block of rays of mode kFirst.
+// Verifies the answer to a block of rays of mode kFirst.
 inline RayTally judge_first_hits(const ProofScene& scene, const OwnedBlock& block, const BlockResult& result) {
   RayTally tally;
   for (size_t i = 0; i < result.t.size(); ++i) {
@@ -181,7 +181,7 @@ inline RayTally judge_first_hits(const ProofScene& scene, const OwnedBlock& bloc
   return tally;
 }
 
-// Judges the answer to a block of rays of mode kAll, of which none was cut.
+// Verifies the answer to a block of rays of mode kAll, of which none was cut.
 inline RayTally judge_all_hits(const ProofScene& scene, const OwnedBlock& block, const BlockResult& result) {
   RayTally tally;
   for (size_t i = 0, row = 0; i < result.counts.size(); row += result.counts[i++]) {

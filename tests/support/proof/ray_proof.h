@@ -1,5 +1,5 @@
-// The proof that no ray misses, as a run of as many rays as one has time for: the same rays for the same seed, on any
-// number of threads, whatever the processor; the instruction sets it has share them.
+// The proof that no ray misses, as a run of any number of rays. Equal seeds give equal rays, on any number of threads
+// and any processor; the instruction sets of the processor share the rays.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_PROOF_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_PROOF_H_
 
@@ -32,7 +32,7 @@ class RayProof {
   RayProof(uint64_t rays, uint64_t seed, unsigned threads)
       : blocks_((rays + internal::kBlockRays - 1) / internal::kBlockRays), seed_(seed), threads_(threads) {}
 
-  // Leaves the widest instruction set in use.
+  // Runs the proof. Selects the widest instruction set at the end.
   RayTally run() {
     for (uint64_t begin = 0; begin < blocks_; begin += kRoundBlocks) {
       scenes_ = proof_scenes(seed_ + begin);
@@ -42,7 +42,7 @@ class RayProof {
     return tally_;
   }
 
-  // What the run says in one line.
+  // Returns the result of the run in one line.
   std::string line() const {
     return absl::StrFormat(
         "proof: %d rays, %d hits, %d misses, %d false hits, %d undecidable within the allowance; "
@@ -53,14 +53,15 @@ class RayProof {
 
  private:
   static constexpr uint64_t kRoundBlocks = 5'000;  // between new scenes
-  // In eighths: at least one for the portable code, the rest for those with kernels alike.
+  // Number of shares of the blocks: at least one for the portable code, the rest divided equally among those with
+  // kernels.
   static constexpr uint64_t kShares = 8;
   static uint64_t share_before(size_t set, size_t sets) {
     if (set == sets) return kShares;
     return sets == 1 ? 0 : (kShares - 1) * set / (sets - 1);
   }
 
-  // Of `count` blocks, by one instruction set after the other.
+  // Runs `count` blocks, each by the next instruction set.
   void run_round(uint64_t begin, uint64_t count) {
     const std::vector<std::string> sets = instruction_sets();
     for (size_t i = 0; i < sets.size(); ++i) {

@@ -1,5 +1,6 @@
-// The rays of a block asked once more in other ways, whose answers follow from the first hits: any hit, the nearest of
-// all, limits at the hits. For the proof that no ray misses. All hits follow from nothing: they are judged.
+// Repeats the rays of a block with other modes and limits, whose answers follow from the first hits: any hit, the
+// nearest of all, limits at the hits. For the proof that no ray misses. Answers with all hits do not follow from first
+// hits, so the reference verifies them.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 
@@ -37,7 +38,7 @@ inline RayTally repeat_as_all(const ProofScene& scene, OwnedBlock block, const B
   const BlockResult all = run_block(*scene.snapshot, block);
   RayTally tally;
   if (all.truncated.empty()) tally = judge_all_hits(scene, block, all);
-  tally.rays = tally.hits = tally.undecidable = 0;  // counted as first hits
+  tally.rays = tally.hits = tally.undecidable = 0;  // counted with the first hits
   for (size_t i = 0, row = 0; i < first.t.size(); row += all.counts[i++]) {
     const bool hit = first.ids[i] != kNoId;
     const bool same = (all.counts[i] != 0) == hit && (!hit || same_row(all, row, first, i));
@@ -46,7 +47,7 @@ inline RayTally repeat_as_all(const ProofScene& scene, OwnedBlock block, const B
   return tally;
 }
 
-// A limit exactly at the hit keeps it.
+// Repeats with a limit exactly at the hit, which keeps the hit.
 inline RayTally repeat_with_limit_at_hit(const ProofScene& scene, OwnedBlock block, const BlockResult& first) {
   RayTally tally;
   for (size_t i = 0; i < first.t.size(); ++i)
@@ -57,7 +58,7 @@ inline RayTally repeat_with_limit_at_hit(const ProofScene& scene, OwnedBlock blo
   return tally;
 }
 
-// A limit just before the hit loses it, and finds no other.
+// Repeats with a limit just before the hit, which excludes it and must find no other.
 inline RayTally repeat_with_limit_before_hit(const ProofScene& scene, OwnedBlock block, const BlockResult& first) {
   RayTally tally;
   for (size_t i = 0; i < first.t.size(); ++i)
@@ -73,7 +74,7 @@ inline RayTally repeat_with_limit_before_hit(const ProofScene& scene, OwnedBlock
 
 }  // namespace internal
 
-// One of the ways by chance.
+// Repeats in a randomly chosen way.
 inline RayTally repeat_rays(const ProofScene& scene, const OwnedBlock& block, const BlockResult& first,
                             Random& random) {
   switch (random.below(4)) {

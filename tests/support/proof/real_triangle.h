@@ -1,5 +1,5 @@
-// One triangle and one ray in long double: where they meet, how far from the triangle's border, at what angle. For the
-// proof that no ray misses; shares no arithmetic with the product. Immutable.
+// One triangle and one ray in long double: the point where they meet, its distance from the triangle's border, and the
+// angle. For the proof that no ray misses; shares no arithmetic with the product. Immutable.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REAL_TRIANGLE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REAL_TRIANGLE_H_
 
@@ -12,7 +12,7 @@
 
 namespace locus::test {
 
-// Along v; zero for zero.
+// Returns the unit vector along v; zero for zero.
 inline Vec3r unit(Vec3r v) {
   const Real size = length(v);
   return size == 0 ? Vec3r{} : v * (1 / size);
@@ -22,11 +22,11 @@ struct RealRay {
   Vec3r origin, direction;
 };
 
-// Where a ray meets the plane of a triangle.
+// Point where a ray meets the plane of a triangle.
 struct Meeting {
   Real t;
-  Real inset;  // of the point from the triangle's nearest edge, within the plane; negative outside
-  Real slope;  // direction . unit normal: below zero where the front is seen
+  Real inset;  // distance of the point from the triangle's nearest edge, within the plane; negative outside
+  Real slope;  // direction . unit normal: negative if the front is seen
 };
 
 class RealTriangle {
@@ -39,7 +39,7 @@ class RealTriangle {
 
   Real slope(const RealRay& ray) const { return dot(normal_, ray.direction); }
 
-  // Nothing for a triangle without area, for an exactly edge-on one, and where t is not within 0 .. limit.
+  // Returns nothing for a triangle without area, for an exactly edge-on one, and if t is not within 0 .. limit.
   std::optional<Meeting> meet(const RealRay& ray, Real limit) const {
     Meeting meeting;
     meeting.slope = slope(ray);

@@ -1,6 +1,6 @@
-// A tree of its own over triangles in long double, for judging more rays than a plain list could: median splits, double
-// boxes inflated far beyond any rounding of their test. For the proof that no ray misses; itself held against the list.
-// Immutable after construction; safe from any thread.
+// Tree over triangles in long double that shares no code with the product, for verifying more rays than a plain list
+// could: median splits, and double boxes inflated far beyond any rounding of their test. For the proof that no ray
+// misses; a test compares it with the list. Immutable after construction; safe from any thread.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
 
@@ -16,7 +16,7 @@ namespace locus::test {
 
 class ReferenceTree {
  public:
-  // Numbers are positions in `triangles`, which is not empty.
+  // Builds the tree. Triangle numbers are positions in `triangles`, which is not empty.
   explicit ReferenceTree(const std::vector<Triangle>& triangles) : order_(triangles.size()) {
     std::vector<Aabbd> boxes;
     for (const Triangle& triangle : triangles) {
@@ -33,7 +33,7 @@ class ReferenceTree {
   uint32_t size() const { return static_cast<uint32_t>(triangles_.size()); }
 
   // Calls visit(number, meeting) for every triangle that the ray meets within its border at 0 <= t <= limit, and for
-  // some that it meets outside, whose inset is negative. The visitor may lower `limit`.
+  // some that it meets outside, with a negative inset. The visitor may lower `limit`.
   template <class Visit>
   void visit(const RealRay& ray, const Real& limit, Visit visit) const {
     const RoughRay rough_ray(ray, magnitude_);
@@ -61,8 +61,8 @@ class ReferenceTree {
 
   struct Node {
     Aabbd box;
-    uint32_t first;  // of `order_` in a leaf, else the first of two children
-    uint32_t count;  // of a leaf, else 0
+    uint32_t first;  // position in `order_` of a leaf's first triangle, else the first of two children
+    uint32_t count;  // number of triangles of a leaf, else 0
   };
 
   // A triangle in double: points p of its plane have normal . p = level, and within it inward[i] . p >= border[i].
@@ -71,7 +71,8 @@ class ReferenceTree {
     double level, border[3];
   };
 
-  // A ray in double. Its rounding and that of the test move it by some 2^-51 of its reach, the pad is 2^-30 of it.
+  // A ray in double. Its rounding and that of the test move it by some 2^-51 of its reach, the length up to which it is
+  // tested; the pad is 2^-30 of that.
   struct RoughRay {
     RoughRay(const RealRay& ray, double magnitude) {
       double reach = magnitude;
@@ -83,7 +84,7 @@ class ReferenceTree {
       }
       pad = 0x1p-30 * reach;
       for (int axis = 0; axis < 3; ++axis) {
-        // Over the whole of its reach such a ray leaves the slab's plane by less than the pad.
+        // Over its whole reach such a ray leaves the slab's plane by less than the pad.
         parallel[axis] = std::abs(direction[axis]) < 1e-25 * longest;
         inverse[axis] = parallel[axis] ? 0 : 1 / direction[axis];
       }
@@ -103,8 +104,8 @@ class ReferenceTree {
       return near <= far;
     }
 
-    // False only where the hit is out of the question: at more than 2^-20 of a right angle the place where the ray
-    // meets the plane is off by some 2^-30 of the reach, and four pads are 2^-28.
+    // Returns false only if a hit is impossible: at more than 2^-20 of a right angle the error of the point where the
+    // ray meets the plane is some 2^-30 of the reach, and four pads are 2^-28.
     bool may_meet(const Rough& triangle, double limit) const {
       const double slope = dot(triangle.normal, direction);
       if (std::abs(slope) < 0x1p-20 * longest) return true;
