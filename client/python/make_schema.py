@@ -1,11 +1,12 @@
-"""Makes what the Python package takes from the protocol: the mirrored schema and the enums.
+"""Generates the parts of the Python package that depend on the protocol: the mirrored schema and the enums.
 
     make_schema.py DESCRIPTOR_SET SCHEMA ENUMS
 
-DESCRIPTOR_SET is what `protoc --include_imports --include_source_info --descriptor_set_out=` writes of the real files.
-SCHEMA gets the same files with every packed fixed-width column declared `bytes`: on the wire both are a length and
-little-endian numbers, so a column goes in and out as one buffer instead of number by number. ENUMS gets a Python module
-with the protocol's enums and their comments. Run by the build; nothing made here is kept in the repository.
+DESCRIPTOR_SET is the output of `protoc --include_imports --include_source_info --descriptor_set_out=` for the real
+files. SCHEMA gets the same files with every packed fixed-width column declared `bytes`: on the wire both are a length
+and little-endian numbers, so that Python reads and writes a column as one buffer instead of number by number. ENUMS
+gets a Python module with the protocol's enums and their comments. Run by the build; its output is not kept in the
+repository.
 """
 from __future__ import annotations
 
@@ -27,13 +28,13 @@ ENUM_TYPE, ENUM_VALUE = 5, 2  # field numbers in FileDescriptorProto and EnumDes
 
 
 def is_column(field: Any) -> bool:
-    """True for packed numbers of fixed width. Varints are no columns: their width depends on their value."""
+    """Returns True for packed numbers of fixed width. Varints are not columns: their width depends on their value."""
     packed = not field.options.HasField("packed") or field.options.packed
     return bool(field.label == Field.LABEL_REPEATED and field.type in FIXED_WIDTH and packed)
 
 
 def mirror(files: descriptor_pb2.FileDescriptorSet) -> descriptor_pb2.FileDescriptorSet:
-    """The same files, with columns as `bytes` and without comments."""
+    """Returns the files with columns declared `bytes` and without comments."""
     result = descriptor_pb2.FileDescriptorSet()
     for file in files.file:
         copy = result.file.add()
@@ -54,7 +55,8 @@ def mirror(files: descriptor_pb2.FileDescriptorSet) -> descriptor_pb2.FileDescri
 
 
 def health() -> descriptor_pb2.FileDescriptorProto:
-    """grpc.health.v1.Health/Check, whose file Debian does not ship. The status travels as its number."""
+    """Returns the file of grpc.health.v1.Health/Check, which Debian does not ship. The status is declared as an int32.
+    """
     file = descriptor_pb2.FileDescriptorProto(name="grpc/health/v1/health.proto", package="grpc.health.v1",
                                               syntax="proto3")
     for name, field, kind in (("HealthCheckRequest", "service", Field.TYPE_STRING),
@@ -66,7 +68,7 @@ def health() -> descriptor_pb2.FileDescriptorProto:
 
 
 def comments(file: descriptor_pb2.FileDescriptorProto) -> Dict[Tuple[int, ...], str]:
-    """The comment of each element of a file, by path."""
+    """Returns the comment of each element of a file, by path."""
     return {tuple(location.path): location.leading_comments for location in file.source_code_info.location}
 
 
@@ -75,15 +77,16 @@ def commented(text: str, indent: str) -> List[str]:
 
 
 def enum_lines(file: descriptor_pb2.FileDescriptorProto) -> Iterator[str]:
-    """Python source of a file's enums: members lose the prefix that repeats the enum's name."""
+    """Yields the Python source of a file's enums. The prefix that repeats the enum's name is removed from its members.
+    """
     text = comments(file)
-    for number, enum in enumerate(file.enum_type):
+    for index, enum in enumerate(file.enum_type):
         prefix = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", enum.name).upper() + "_"
-        summary = " ".join(text.get((ENUM_TYPE, number), "").split())
+        summary = " ".join(text.get((ENUM_TYPE, index), "").split())
         yield f"\n\nclass {enum.name}(enum.IntEnum):"
         yield textwrap.fill(f'"""{summary}"""', 119, initial_indent="    ", subsequent_indent="    ") + "\n"
         for position, value in enumerate(enum.value):
-            yield from commented(text.get((ENUM_TYPE, number, ENUM_VALUE, position), ""), "    ")
+            yield from commented(text.get((ENUM_TYPE, index, ENUM_VALUE, position), ""), "    ")
             yield f"    {value.name[len(prefix):]} = {value.number}"
 
 

@@ -1,4 +1,5 @@
-// From a mesh on the server to a mesh in memory, with a progress line. For commands that write meshes to files.
+// Download of a server's mesh into memory, with a progress line. For commands that write meshes to files. A function
+// without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_MESH_FETCH_H_
 #define LOCUS_CLIENT_CLI_LEVELS_MESH_FETCH_H_
 
@@ -10,7 +11,8 @@
 
 namespace locus::cli {
 
-// The mesh of that name, whole. Progress goes to the context's error stream if that is live.
+// Downloads the mesh `name` with all its parts. Prints progress to the context's error stream if progress is live.
+// Errors are those of the connection and of the download.
 absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& context);
 
 }  // namespace locus::cli

@@ -8,7 +8,8 @@
 
 namespace locus::cli {
 
-// Coordinates in the shortest decimals that read back as the same floats; parts become groups. Errors are the stream's.
+// Writes coordinates as the shortest decimals that read back as the same floats, and each part as a group. The caller
+// checks the stream for errors.
 void write_obj(std::ostream& out, const ImportedMesh& mesh);
 
 }  // namespace locus::cli

@@ -7,9 +7,9 @@
 
 namespace locus::cli {
 
-// Of two numbers any; of two vectors + and -; of a vector and a number * and /. Unknown if one of them is.
-// INVALID_ARGUMENT naming the values for other pairs, OUT_OF_RANGE for division by zero and results that are not finite
-// or leave 64 bits.
+// Applies any operator to two numbers, + and - to two vectors, * and / to a vector and a number. The result is unknown
+// if an operand is. INVALID_ARGUMENT naming the values for other pairs, OUT_OF_RANGE for division by zero and results
+// that are not finite or leave 64 bits.
 absl::StatusOr<Value> calculate(char sign, const Value& left, const Value& right);
 
 }  // namespace locus::cli

@@ -49,7 +49,7 @@ class Cursor {
     return std::string(since(begin));
   }
 
-  // What is next, for messages.
+  // Returns the text at the cursor, for messages.
   std::string found() const {
     return ended() ? "the end of the line" : absl::StrCat("`", rest().substr(0, kShownBytes), "`");
   }

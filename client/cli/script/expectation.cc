@@ -24,7 +24,7 @@ absl::StatusOr<std::string> read_comparison(Cursor& cursor) {
   return absl::InvalidArgumentError(absl::StrCat("expected one of == != < <= > >= contains, found ", cursor.found()));
 }
 
-// Nothing if no `within` follows.
+// Returns the tolerance after `within`, or nullopt if no `within` follows.
 absl::StatusOr<std::optional<Value>> read_tolerance(Cursor& cursor, const Variables& variables) {
   cursor.skip_blanks();
   if (!cursor.accept("within")) return std::nullopt;
@@ -122,7 +122,7 @@ absl::Status judge(const Expectation& expectation) {
   const absl::StatusOr<bool> held = holds(expectation);
   if (held.ok() && *held) return absl::OkStatus();
   std::string message = absl::StrCat("expected ", expectation.text);
-  // What stands behind a variable on the right is of interest too.
+  // Show the value of an expression with variables on the right side too.
   if (absl::StrContains(expectation.right_text, "$")) {
     absl::StrAppend(&message, ", which is ", shown(expectation.right));
   }

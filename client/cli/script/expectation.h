@@ -1,5 +1,5 @@
-// What an `expect` line says: `EXPR OP EXPR`, with OP one of == != < <= > >= contains, and after == perhaps
-// `within TOLERANCE`. For the runner of scripts. Functions without state.
+// Parsed `expect` line: `EXPR OP EXPR`, with OP one of == != < <= > >= contains, optionally followed by
+// `within TOLERANCE` after ==. For the runner of scripts. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_EXPECTATION_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_EXPECTATION_H_
 

@@ -150,7 +150,7 @@ Answer read_unary(Cursor& cursor, const Variables& variables) {
   return calculate('*', Value::of(Json(-1)), *value);
 }
 
-// What `read` reads, with any of `signs` between.
+// Reads operands with `read`, separated by any of `signs`, and calculates from left to right.
 template <class Read>
 Answer read_chain(Cursor& cursor, const Variables& variables, absl::string_view signs, Read read) {
   Answer left = read(cursor, variables);
@@ -209,7 +209,7 @@ Answer read_path(Cursor& cursor, const Variables& variables, Value value) {
   }
 }
 
-// Whether a default stands in for the value: a miss, or the column of no rows.
+// Returns whether a default replaces the value: null, or a column without rows.
 bool is_missing(const Value& value) {
   if (value.kind == Value::Kind::kColumn && value.result->rows.empty()) return true;
   const absl::StatusOr<Json> json = value.known() ? plain(value) : Json(0);
@@ -221,7 +221,7 @@ Answer read_braced_variable(Cursor& cursor, const Variables& variables) {
   const std::string name = cursor.read_name();
   if (name.empty()) return expected("a name behind `${`", cursor);
   const Value* const variable = variables.find(name);
-  // What is not there has no path to follow: the path is only read over.
+  // If the variable is not defined, the path is parsed and ignored.
   const Answer value = read_path(cursor, variables, variable == nullptr ? Value::unknown() : *variable);
   if (!value.ok()) return value;
   if (cursor.accept("}")) return variable == nullptr ? Answer(not_defined(name)) : value;

@@ -20,7 +20,7 @@ using Number = std::variant<absl::int128, double>;
 // The whole text as a number: decimal, 0x hexadecimal, or with point or exponent. Nothing for anything else, "inf" and
 // integers beyond 64 bits included.
 std::optional<Number> parse_number(absl::string_view text);
-// Nothing for what is no number in JSON.
+// Returns the number, or nullopt if the JSON value is not a number.
 std::optional<Number> number_from(const Json& json);
 Json json_of(const Number& number);
 // Reads back as the same number; doubles in the fewest digits.
@@ -35,7 +35,7 @@ absl::StatusOr<Number> add(const Number& a, const Number& b);
 absl::StatusOr<Number> subtract(const Number& a, const Number& b);
 absl::StatusOr<Number> multiply(const Number& a, const Number& b);
 absl::StatusOr<Number> divide(const Number& a, const Number& b);
-// Of integers: the remainder, with the sign of `b`.
+// Returns the remainder of two integers, with the sign of `b`.
 absl::StatusOr<Number> modulo(const Number& a, const Number& b);
 
 // Below 0, 0 or above 0 as a < b, a == b, a > b; exact also between an integer and a double.

@@ -66,7 +66,7 @@ absl::StatusOr<Statement> parse_expect_error(absl::string_view rest) {
   return statement;
 }
 
-// Nothing for a line without statement.
+// Parses a line. Returns nullopt for a line without a statement.
 absl::StatusOr<std::optional<Statement>> parse_line(absl::string_view line) {
   line = absl::StripAsciiWhitespace(line);
   if (line.empty() || line.front() == '#') return std::nullopt;

@@ -15,9 +15,9 @@ inline constexpr uint64_t kMaxRepeats = 100'000;
 // Lines run in all, those in loops each time.
 inline constexpr uint64_t kMaxLinesRun = 1'000'000;
 inline constexpr size_t kMaxVariables = 1'000;
-// Of a word or text with everything filled in.
+// Maximum size of a word or text after substitution.
 inline constexpr size_t kMaxTextBytes = size_t{1} << 20;
-// Of parentheses, indexes, calls and quoted texts within each other. The reader of expressions recurses as deep.
+// Maximum nesting of parentheses, indexes, calls and quoted texts. The reader of expressions recurses to this depth.
 inline constexpr int kMaxExpressionDepth = 64;
 inline constexpr double kMaxSleepSeconds = 3600;
 

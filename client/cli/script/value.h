@@ -1,4 +1,4 @@
-// What a variable of a script holds: a number, a text, a list, a result of a command, or a column of its rows. For
+// Value of a script's variable: a number, a text, a list, a result of a command, or a column of its rows. For
 // expressions. Plain values; functions without state. Texts that read as numbers, as ids in answers do, count as
 // numbers.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_VALUE_H_
@@ -52,13 +52,13 @@ absl::StatusOr<uint64_t> size_of(const Value& value);
 // A column of one row as its entry, another one as a list. INVALID_ARGUMENT for a whole result.
 absl::StatusOr<Json> plain(const Value& value);
 
-// What is calculated with. INVALID_ARGUMENT saying what the value is instead.
+// Operand of a calculation. The conversions return INVALID_ARGUMENT naming the value's kind if it is another one.
 using Operand = std::variant<Number, Vector>;
 absl::StatusOr<Operand> operand_of(const Value& value);
 absl::StatusOr<Number> number_of(const Value& value);
 absl::StatusOr<Vector> vector_of(const Value& value);
 
-// As a word of a line: lists with commas, doubles in the fewest digits, null as "null".
+// Returns the value as a word of a line: lists with commas, doubles in the fewest digits, null as "null".
 absl::StatusOr<std::string> text_of(const Value& value);
 // For messages: the same, cut to a readable length; never fails.
 std::string shown(const Value& value);

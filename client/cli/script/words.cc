@@ -11,7 +11,7 @@ namespace {
 
 bool ends_word(const Cursor& cursor) { return cursor.ended() || cursor.peek() == ' ' || cursor.peek() == '\t'; }
 
-// What is filled in here, or nothing if plain characters follow.
+// Reads the variable, the expression in braces or the quoted text at the cursor.
 absl::StatusOr<Value> read_part(Cursor& cursor, const Variables& variables) {
   if (cursor.accept("$")) return read_variable(cursor, variables);
   if (cursor.peek() == '{') return read_braces(cursor, variables);

@@ -1,9 +1,9 @@
-"""A game server's loop: each tick it streams the players' moves and asks what they see, at the revision just made.
+"""Loop of a game server: each tick it streams the players' moves and queries what they see, at the new revision.
 
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/game_tick.py --address 127.0.0.1:7575
 
-Makes a scene of its own and deletes it at the end. Players walk on circles around a wall; each tick asks who is in
-reach of each player (balls) and whether each player sees the next one (rays to it).
+Creates a scene of its own and deletes it at the end. Players walk on circles around a wall. Each tick queries the
+players in reach of each player (balls) and whether each player sees the next one (a ray to it).
 """
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from typing import Iterable, List, NamedTuple
 
 import locus
 
-WALL = 1  # an id; players are FIRST and up
+WALL = 1  # id of the wall; the players' ids begin with FIRST
 FIRST = 100
 RADIUS = 0.5
 REACH = 6.0
 
 
 class Tick(NamedTuple):
-    """What one tick found."""
+    """Results of one tick."""
 
     revision: int
     in_reach: int
@@ -32,7 +32,7 @@ class Tick(NamedTuple):
 
 
 def positions(players: int, tick: int) -> "array.array[float]":
-    """3N float32: players walk on three circles around the wall, in both directions."""
+    """Returns the players' positions, 3N float32: they walk on three circles around the wall, in both directions."""
     column = array.array("f")
     for player in range(players):
         distance = 10.0 + 5.0 * (player % 3)
@@ -42,17 +42,17 @@ def positions(players: int, tick: int) -> "array.array[float]":
 
 
 def shifted(column: "array.array[float]") -> "array.array[float]":
-    """The positions of each player's next one."""
+    """Returns for each player the position of the next player."""
     return column[3:] + column[:3]
 
 
 def difference(a: Iterable[float], b: Iterable[float]) -> "array.array[float]":
-    """From each of `b` to its counterpart in `a`."""
+    """Returns the vectors from each of `b` to its counterpart in `a`."""
     return array.array("f", (x - y for x, y in zip(a, b)))
 
 
 class Game:
-    """One scene, its update stream and its query stream."""
+    """Scene of the game, with its update stream and its query stream."""
 
     def __init__(self, client: locus.Client, scene: str, players: int) -> None:
         self.ids = array.array("Q", range(FIRST, FIRST + players))
@@ -64,13 +64,14 @@ class Game:
         self.updates.send(start).result()
 
     def step(self, number: int) -> Tick:
-        """Moves everybody, then asks at the revision that shows it."""
+        """Moves all players, then queries at the resulting revision."""
         begin = time.perf_counter()
         here = positions(len(self.ids), number)
         ack = self.updates.send(locus.UpdateBatch(tick=number).move(self.ids, here)).result()
         batch = locus.QueryBatch(at_least=ack)
         batch.balls(here, REACH, block=locus.Block(ignore_groups=self.ids, ignore_ids=[WALL]))
-        # From player to next player, past itself: what is hit first is the one that was looked for, or hides it.
+        # Each ray goes from a player to the next one and ignores the player itself: its first hit is the next player,
+        # or an obstacle that hides it.
         batch.rays(here, difference(shifted(here), here), t_max=1.0, block=locus.Block(ignore_groups=self.ids))
         near, sight = self.queries.send(batch).result().blocks
         next_ids = self.ids[1:] + self.ids[:1]
@@ -78,13 +79,13 @@ class Game:
         return Tick(ack.revision, near.rows, seen, time.perf_counter() - begin)
 
     def close(self) -> None:
-        """Ends both streams in peace."""
+        """Waits for all answers and closes both streams."""
         self.updates.close()
         self.queries.close()
 
 
 def run(client: locus.Client, scene: str, players: int, ticks: int, rate: float) -> List[Tick]:
-    """So many ticks at `rate` a second; the rate is kept as long as a tick is shorter than its slot."""
+    """Runs `ticks` ticks at `rate` a second; ticks are late if one takes longer than 1 / rate seconds."""
     game = Game(client, scene, players)
     done = []
     due = time.perf_counter()

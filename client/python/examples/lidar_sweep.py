@@ -1,10 +1,9 @@
-"""A spinning lidar on a vehicle: one sweep of rays after another from a moving sensor, and what each ray cost the client.
+"""Spinning lidar on a vehicle: sweeps of rays from a moving sensor, and the client's cost of each ray.
 
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/lidar_sweep.py --address 127.0.0.1:7575
 
-Makes a scene of its own, a street of boxes with moving balls, and deletes it at the end. "Client time" is what this
-process spends on making the request's bytes and on turning the answer's bytes into columns; gRPC and the network count
-as waiting.
+Creates a scene of its own, a street of boxes with balls, and deletes it at the end. "Client time" is the time that this
+process spends on encoding the request and decoding the answer into columns; gRPC and the network count as waiting.
 """
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ STEP = 0.25  # metres between sweeps; exact in float32
 
 
 class Cost(NamedTuple):
-    """Nanoseconds of one sweep."""
+    """Times of one sweep, in nanoseconds."""
 
     encode: int
     wait: int
@@ -33,7 +32,7 @@ class Cost(NamedTuple):
 
 
 def directions(rays: int) -> "array.array[float]":
-    """3N float32: one turn of `rays` unit directions, ring by ring; z is up."""
+    """Returns the unit directions of one revolution, 3N float32 for `rays` rays, ring by ring; z is up."""
     steps = -(-rays // RINGS)
     column = array.array("f")
     for ray in range(rays):
@@ -45,12 +44,12 @@ def directions(rays: int) -> "array.array[float]":
 
 
 def position(sweep: int) -> Tuple[float, float, float]:
-    """Where the sensor is."""
+    """Returns the position of the sensor."""
     return (STEP * sweep, 0.0, HEIGHT)
 
 
 def build_street(client: locus.Client, scene: str) -> locus.Revision:
-    """A ground, houses on both sides, and balls on the road; the revision that shows them."""
+    """Inserts a ground, houses on both sides, and balls on the road; returns the resulting revision."""
     client.create_scene(scene)
     batch = locus.UpdateBatch()
     batch.insert_boxes([1], [0.0, 0.0, -0.5], [500.0, 500.0, 0.5], tags=1)
@@ -63,7 +62,7 @@ def build_street(client: locus.Client, scene: str) -> locus.Revision:
 
 def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, directed: Any,
                    built: locus.Revision) -> Tuple[locus.BlockResult, Cost]:
-    """One sweep. All rays start in the frame's origin, so only the frame moves."""
+    """Runs one sweep. All rays start in the frame's origin, so only the frame moves."""
     begin = time.perf_counter_ns()
     batch = locus.QueryBatch(at_least=built)
     batch.rays(zeros, directed, t_max=RANGE, block=locus.Block(frame=position(sweep)))
@@ -77,7 +76,7 @@ def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, dir
 
 
 def report(costs: Sequence[Cost], rays: int, hits: int) -> List[str]:
-    """Lines of name and value; times are medians over the sweeps, in nanoseconds a ray."""
+    """Returns lines of name and value; times are medians over the sweeps, in nanoseconds a ray."""
     encode, wait, decode = (statistics.median(column) / rays for column in zip(*costs))
     own = statistics.median(cost.encode + cost.decode for cost in costs) / rays
     return [f"rays a sweep            {rays}", f"sweeps                  {len(costs)}", f"hits                    {hits}",

@@ -1,11 +1,11 @@
-"""Python client of locusd, exact spatial queries as a service: scenes, updates and queries in columns.
+"""Python client of locusd, a server for exact spatial queries: scenes, updates and queries in columns.
 
-Start at locus.connect(). Columns go in as numpy arrays, array.array, other buffers or lists, and come out as numpy
-arrays, or array.array where numpy is not installed.
+Start at locus.connect(). Columns are given as numpy arrays, array.array, other buffers or lists, and returned as numpy
+arrays, or array.array if numpy is not installed.
 """
 import pkgutil
 
-# Modules that protoc makes of the protocol's files lie in a folder `locus/v1`: let both be imported side by side.
+# Modules that protoc generates from the protocol are in a folder `locus/v1`. Allow both to be imported together.
 __path__ = pkgutil.extend_path(__path__, __name__)
 
 from .client import DEFAULT_ADDRESS, Client, connect

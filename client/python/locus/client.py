@@ -1,4 +1,4 @@
-"""The door of the package: a connection to one locusd, its calls, and the streams opened from it.
+"""Entry point of the package: a connection to one locusd, its calls, and the streams opened from it.
 
     import locus
 
@@ -6,9 +6,9 @@
         result = client.query("arena", locus.QueryBatch().rays([0, 0, 100], [0, 0, -1]))
         print(result.blocks[0].t, result.blocks[0].ids)
 
-Calls block. Errors are LocusError (locus/errors.py); wrong arguments are TypeError and ValueError. Calls that change
-nothing are repeated while the server cannot be reached, within their timeout; an update only if it carries `writer` and
-`number`; anything else never.
+Calls block. Errors are LocusError (locus/errors.py); wrong arguments are TypeError and ValueError. While the server
+cannot be reached, calls that change nothing are retried within their timeout. An update is retried only if it carries
+`writer` and `number`; other calls never are.
 """
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeo
             retry: Retry = Retry()) -> "Client":
     """Connects to a locusd at `host:port` (the port may be left out: 7575) or `unix:/path`.
 
-    `timeout`: seconds a call may take, its repetitions included; `long_timeout` the same for mesh uploads and changes of
-    instances. With `wait_for_server` it goes on trying for `timeout`, else a refused connection fails at once: LocusError
-    UNAVAILABLE naming the address. The server's default receives 32 MiB; answers may be as large as a batch's
-    `max_reply_bytes`.
+    `timeout`: seconds a call may take, including retries; `long_timeout`: likewise for mesh uploads and changes of
+    instances. With `wait_for_server` it retries until `timeout`; without it a refused connection fails at once with
+    LocusError UNAVAILABLE naming the address. `max_send_bytes`, `max_receive_bytes`: maximum message sizes; the server
+    accepts 32 MiB by default, and an answer may have up to the batch's `max_reply_bytes`.
     """
     client = Client(Connection(address, timeout=timeout, long_timeout=long_timeout, max_send_bytes=max_send_bytes,
                                max_receive_bytes=max_receive_bytes, retry=retry))
@@ -58,7 +58,7 @@ def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeo
 
 
 class Client:
-    """Got from connect(). Every method may be called from any thread; use it as a context manager, or close() it."""
+    """Connection returned by connect(). Thread-safe. Use it as a context manager, or call close()."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
@@ -66,11 +66,11 @@ class Client:
 
     @property
     def address(self) -> str:
-        """What the client is connected to."""
+        """Address of the server, with its port."""
         return self._connection.address
 
     def close(self) -> None:
-        """Ends the connection; streams opened from it end too."""
+        """Closes the connection and the streams opened from it."""
         self._connection.close()
 
     def __enter__(self) -> "Client":
@@ -80,12 +80,12 @@ class Client:
         self.close()
 
     def server(self) -> Server:
-        """Version, features and limits of the server."""
+        """Returns the version, features and limits of the server."""
         rpc = _rpc("Server", "GetServer")
         return Server.of(self._unary(rpc, rpc.request(), repeat=True))
 
     def healthy(self, service: str = "") -> bool:
-        """True if the server, or one of its services by its full name, says that it serves."""
+        """Returns True if the server, or the service of this full name, reports that it is serving."""
         return bool(self._unary(_HEALTH, _HEALTH.request(service=service), repeat=True).status == _SERVING)
 
     def create_scene(self, name: str, *, if_absent: bool = False, labels: Optional[Mapping[str, str]] = None,
@@ -93,10 +93,11 @@ class Client:
                      history_bytes: int = 0, overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED) -> Scene:
         """Creates an empty scene, or one that starts with the instances of `static_from`.
 
-        `history_ticks`: for how many ticks the past can be asked about; `history_bytes`: memory it may take, 0 = 256 MiB.
-        A restart of the server keeps of the past only what came after the scene's last snapshot on disk.
-        `overload`: what becomes of moves that come faster than they can be applied.
-        `if_absent` returns a scene of that name as it is; otherwise that is ALREADY_EXISTS.
+        `history_ticks`: number of past ticks that can be queried; `history_bytes`: maximum memory of the history, 0 =
+        256 MiB. After a restart of the server, the history holds only the ticks after the scene's last snapshot on
+        disk.
+        `overload`: handling of moves that arrive faster than they can be applied.
+        `if_absent`: returns an existing scene of this name unchanged instead of failing with ALREADY_EXISTS.
         """
         rpc = _rpc("Scene", "CreateScene")
         request = rpc.request(name=name, if_absent=if_absent)
@@ -109,12 +110,12 @@ class Client:
         return Scene.of(self._unary(rpc, request, scene=name).scene)
 
     def scene(self, name: str) -> Scene:
-        """Describes a scene as it is now."""
+        """Returns the current description of a scene."""
         rpc = _rpc("Scene", "GetScene")
         return Scene.of(self._unary(rpc, rpc.request(name=name), scene=name, repeat=True).scene)
 
     def scenes(self, labels: Optional[Mapping[str, str]] = None) -> List[Scene]:
-        """All scenes that have these labels, ascending by name."""
+        """Returns all scenes that have these labels, ascending by name."""
         pages = self._pages(_rpc("Scene", "ListScenes"), labels=labels or {})
         return [Scene.of(scene) for page in pages for scene in page.scenes]
 
@@ -125,9 +126,9 @@ class Client:
 
     def upload_mesh(self, name: str, vertices: columns.ColumnLike, indices: columns.ColumnLike,
                     parts: Sequence[MeshPart] = (), progress: Optional[meshes.Progress] = None) -> Mesh:
-        """Uploads a mesh: 3V float32 `vertices` x, y, z and 3T uint32 `indices`; returns when its tree stands.
+        """Uploads a mesh: 3V float32 `vertices` x, y, z and 3T uint32 `indices`; returns when its tree is built.
 
-        Bytes that the server knows are not sent again. Safe to repeat.
+        A mesh whose content the server already has is not sent again. Safe to repeat.
         """
         rpc = _rpc("Scene", "UploadMesh")
         messages = meshes.upload_messages(name, vertices, indices, parts, progress)
@@ -139,7 +140,7 @@ class Client:
         return Mesh.of(parsed(rpc.response, raw).mesh)
 
     def download_mesh(self, name: str) -> MeshColumns:
-        """An uploaded mesh as it is stored: 3V float32 vertices and 3T uint32 indices."""
+        """Returns an uploaded mesh as stored: 3V float32 vertices and 3T uint32 indices."""
         rpc = _rpc("Scene", "DownloadMesh")
         call = self._connection.channel.unary_stream(rpc.path)
         try:
@@ -150,7 +151,7 @@ class Client:
         return MeshColumns.of(pieces)
 
     def meshes(self) -> List[Mesh]:
-        """All uploaded meshes, ascending by name."""
+        """Returns all uploaded meshes, ascending by name."""
         return [Mesh.of(mesh) for page in self._pages(_rpc("Scene", "ListMeshes")) for mesh in page.meshes]
 
     def delete_mesh(self, name: str) -> None:
@@ -169,29 +170,32 @@ class Client:
         return PlacedInstances.of(response)
 
     def apply(self, scene: str, batch: UpdateBatch) -> Ack:
-        """Applies one batch. For a steady flow use update_stream()."""
+        """Applies one batch. For a sequence of batches use update_stream()."""
         rpc = _rpc("Update", "ApplyUpdates")
         once_only = batch.message.writer != 0 and batch.message.batch != 0
         raw = self._connection.unary_bytes(rpc.path, batch.request_bytes(scene), scene=scene, repeat=once_only)
         return Ack.of(parsed(rpc.response, raw).ack)
 
     def query(self, scene: str, batch: QueryBatch) -> QueryResult:
-        """Asks one batch, answered whole at one revision. For a steady flow use query_stream()."""
+        """Runs one batch of queries, all at one revision. For a sequence of batches use query_stream()."""
         return QueryResult.from_bytes(self.query_bytes(scene, batch.request_bytes(scene)))
 
     def query_bytes(self, scene: str, request: bytes) -> bytes:
-        """The middle of query(): from QueryBatch.request_bytes() to what QueryResult.from_bytes() takes.
+        """Runs an encoded batch: takes the bytes of QueryBatch.request_bytes() and returns those of the response, for
+        QueryResult.from_bytes().
 
-        For callers that keep requests, or measure what the client itself costs.
+        For callers that reuse requests, or measure the cost of encoding and decoding.
         """
         return self._connection.unary_bytes(_rpc("Query", "Query").path, request, scene=scene, repeat=True)
 
     def update_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(attempts=10)) -> UpdateStream:
-        """A pipelined stream of batches into one scene, each applied exactly once. Connects with the first batch."""
+        """Returns a pipelined stream of update batches to one scene, each applied exactly once. It connects when the
+        first batch is sent.
+        """
         return UpdateStream(self._connection, scene, max_in_flight, reconnect)
 
     def query_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry()) -> QueryStream:
-        """A pipelined stream of query batches against one scene. Connects with the first batch."""
+        """Returns a pipelined stream of query batches to one scene. It connects when the first batch is sent."""
         return QueryStream(self._connection, scene, max_in_flight, reconnect)
 
     def _pages(self, rpc: schema.Method, **fields: Any) -> Iterator[Any]:
@@ -204,7 +208,7 @@ class Client:
             request.page_token = page.next_page_token
 
     def _greet(self, wait_for_server: bool) -> None:
-        """The first call: tells a wrong address at once and in plain words."""
+        """Makes a first call, so that a wrong address fails in connect() with a clear message."""
         rpc = _rpc("Server", "GetServer")
         call = self._connection.channel.unary_unary(rpc.path)
         try:

@@ -1,12 +1,13 @@
-"""Columns between Python and the wire: any buffer or list goes in, numpy arrays or array.array come out.
+"""Conversion of columns between Python and the wire: buffers and lists to bytes, bytes to numpy arrays or array.array.
 
-A column is packed little-endian numbers, several to an entry where an entry is a vector: N positions are 3N float32.
-Going in, a buffer of the right type (numpy array of any shape, array.array, memoryview) is taken in C order, so arrays
-with gaps are fine; `bytes` and `bytearray` are taken as they are; numbers and (nested) lists are converted.
-Nothing of another type is converted silently: float64 given for float32 would round, int64 for ids would wrap.
+A column is packed little-endian numbers. An entry that is a vector has several numbers: N positions are 3N float32.
 
-Coming out, a column is a numpy array over the received bytes, without a copy and therefore read-only, of shape (R,) or
-(R, width); where numpy is not installed it is a flat array.array, copied once.
+As arguments: a buffer of the right type (numpy array of any shape, array.array, memoryview) is read in C order and need
+not be contiguous; `bytes` and `bytearray` are used unchanged; numbers and (nested) lists are converted. A buffer of
+another type is never converted silently: float64 given for float32 would round, int64 for ids would wrap.
+
+As results: a column is a numpy array of shape (R,) or (R, width) over the received bytes, not copied and therefore
+read-only. If numpy is not installed it is a flat array.array, copied once.
 """
 from __future__ import annotations
 
@@ -22,25 +23,25 @@ except ImportError:
 
 HAS_NUMPY = numpy is not None
 
-# What a column can be given as: a buffer, bytes, one number, a list of numbers or a list of vectors.
+# Argument types of a column: a buffer, bytes, one number, a list of numbers or a list of vectors.
 ColumnLike = Any
-# A column's bytes, little-endian.
+# Encoded column: little-endian bytes.
 Raw = Union[bytes, bytearray, memoryview]
 
 
 class Values(Protocol):
-    """A column that came back: a numpy array or an array.array."""
+    """Received column: a numpy array or an array.array."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, index: Any) -> Any: ...
     def __iter__(self) -> Iterator[Any]: ...
 
     def tolist(self) -> List[Any]:
-        """The column as a list of Python numbers."""
+        """Returns the column as a list of Python numbers."""
 
 
 class Kind(NamedTuple):
-    """A type of number: its name, its code in array.array, its size in bytes, its codes in buffers."""
+    """Number type: its name, its code in array.array, its size in bytes, its format codes in buffers."""
 
     name: str
     code: str
@@ -69,7 +70,7 @@ def _name_of(view: memoryview) -> str:
 
 
 def _from_buffer(path: str, view: memoryview, kind: Kind) -> Raw:
-    """The view's bytes in C order, borrowed where they lie so already."""
+    """Returns the view's bytes in C order, borrowed if the view is contiguous, else copied."""
     format = view.format
     if view.itemsize != kind.size or (format not in kind.formats and format.lstrip("@=<") not in kind.formats):
         raise TypeError(f"{path}: holds {_name_of(view)}, but {kind.name} is wanted: convert it, "
@@ -95,10 +96,10 @@ def _from_numbers(path: str, value: Any, kind: Kind) -> bytes:
 
 
 def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
-    """The column as it goes over the wire; None is an empty one. A buffer is not copied: it is read when it is sent.
+    """Returns the encoded column, empty for None. A contiguous buffer is borrowed, not copied: it is read when sent.
 
-    `path` names the column in errors. TypeError for numbers of another type, ValueError if there are not `width`
-    numbers for each entry. Linear for lists and for arrays with gaps.
+    `path` names the column in errors. TypeError for numbers of another type, ValueError if the count of numbers is not
+    a multiple of `width`. Cost: linear for lists and for arrays that are not contiguous, else constant.
     """
     if value is None:
         return b""
@@ -121,7 +122,7 @@ def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
 
 
 def entries(raw: Raw, kind: Kind, width: int = 1) -> int:
-    """Number of entries of an encoded column."""
+    """Returns the number of entries of an encoded column."""
     return len(raw) // (kind.size * width)
 
 
@@ -145,7 +146,9 @@ def encode_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int 
 
 
 def decode(raw: Raw, kind: Kind, width: int = 1) -> Values:
-    """The received column as an array: see the module. `raw` holds whole entries."""
+    """Returns a received column as an array, as described at the top. The size of `raw` must be a multiple of an
+    entry's.
+    """
     if numpy is None:
         column = array.array(kind.code)
         column.frombytes(raw)
@@ -155,8 +158,8 @@ def decode(raw: Raw, kind: Kind, width: int = 1) -> Values:
 
 
 def vector(path: str, value: ColumnLike) -> List[float]:
-    """Three Python floats from anything that holds three numbers, for frames."""
-    items = [float(number) for number in value]
+    """Returns three Python floats from any iterable of three numbers, for frames."""
+    items = [float(item) for item in value]
     if len(items) != 3:
         raise ValueError(f"{path}: has {len(items)} numbers: give x, y and z")
     return items

@@ -1,4 +1,4 @@
-"""A gRPC channel to one locusd: addresses, deadlines, and repeating what may be repeated. Internal to the package."""
+"""gRPC channel to one locusd: addresses, deadlines and retries. Internal to the package."""
 from __future__ import annotations
 
 import dataclasses
@@ -20,10 +20,11 @@ _Answer = TypeVar("_Answer")
 
 @dataclasses.dataclass(frozen=True)
 class Retry:
-    """How often and how patiently something is tried again.
+    """Policy of retries with exponential backoff.
 
-    `attempts` counts the first try too; 1 = never again. The wait starts at `first_wait` seconds and doubles up to
-    `max_wait`, varied by a fifth so that many clients do not come back in step; a server's own hint lengthens it.
+    `attempts` counts the first attempt too; 1 = no retry. The wait starts at `first_wait` seconds and doubles up to
+    `max_wait`, with a random variation of 20 % so that many clients do not retry simultaneously. If the server's error
+    carries a longer retry hint, that is the wait.
     """
 
     attempts: int = 5
@@ -31,7 +32,7 @@ class Retry:
     max_wait: float = 2.0
 
     def wait_after(self, failures: int, error: LocusError) -> Optional[float]:
-        """Seconds to wait after so many failures in a row; None when the tries are used up."""
+        """Returns the seconds to wait after this many consecutive failures, or None if no attempt is left."""
         if failures >= self.attempts:
             return None
         wait = min(self.first_wait * 2.0 ** min(failures - 1, 20), self.max_wait)
@@ -39,7 +40,7 @@ class Retry:
 
 
 def target_of(address: str) -> str:
-    """What gRPC is to connect to: `address` with the default port where it names none."""
+    """Returns the target for gRPC: `address`, with the default port if it has none."""
     if not address:
         raise ValueError("the address is empty: give host:port or unix:/path")
     has_port = not address.endswith("]") if address.startswith("[") else ":" in address
@@ -47,12 +48,14 @@ def target_of(address: str) -> str:
 
 
 def scene_metadata(scene: str) -> List[Tuple[str, str]]:
-    """The header that routers go by; left out for a name that is no legal header, which the server then refuses."""
+    """Returns the `x-scene` header, which routers use. A name that is not a legal header value is left out; the server
+    refuses such a name in the request.
+    """
     return [("x-scene", scene)] if _LEGAL_SCENE.fullmatch(scene) else []
 
 
 class Connection:
-    """One channel of its own. Every method may be called from any thread."""
+    """Owner of one gRPC channel. Thread-safe."""
 
     def __init__(self, address: str, *, timeout: float, long_timeout: float, max_send_bytes: int,
                  max_receive_bytes: int, retry: Retry) -> None:
@@ -64,23 +67,25 @@ class Connection:
                    ("grpc.max_receive_message_length", max_receive_bytes),
                    ("grpc.use_local_subchannel_pool", 1),
                    ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 2000)]
-        if self.address.startswith(_LOCAL):  # a proxy of the environment cannot reach this machine's loopback
+        if self.address.startswith(_LOCAL):  # a proxy set in the environment cannot reach this host's loopback
             options.append(("grpc.enable_http_proxy", 0))
         self.channel = grpc.insecure_channel(self.address, options)
 
     def close(self) -> None:
-        """Ends the connection and every call on it."""
+        """Closes the channel and cancels every call on it."""
         self.channel.close()
 
     def unary(self, rpc: schema.Method, request: Any, *, scene: str = "", repeat: bool = False,
               timeout: Optional[float] = None) -> Any:
-        """Calls with a message and returns the answer as one. `repeat`: the call changes nothing, or not twice."""
+        """Calls a unary rpc with a message and returns the response message. `repeat`: the call is idempotent and may
+        be retried.
+        """
         raw = self.unary_bytes(rpc.path, request.SerializeToString(), scene=scene, repeat=repeat, timeout=timeout)
         return parsed(rpc.response, raw)
 
     def unary_bytes(self, path: str, request: bytes, *, scene: str = "", repeat: bool = False,
                     timeout: Optional[float] = None) -> bytes:
-        """The same with messages in their wire form."""
+        """Like unary(), with encoded messages."""
         call = self.channel.unary_unary(path)
         deadline = time.monotonic() + (self.timeout if timeout is None else timeout)
 

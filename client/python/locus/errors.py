@@ -1,4 +1,4 @@
-"""Refusals and failures as one exception, with what the server said about them."""
+"""LocusError: the exception for refused requests and failed calls, with the details that the server sent."""
 from __future__ import annotations
 
 from typing import Any, Optional
@@ -12,7 +12,7 @@ _Status, _Error = schema.message("Status"), schema.message("Error")
 _CODES = {code.value[0]: code for code in grpc.StatusCode}
 _ERROR_TYPE = "type.googleapis.com/locus.v1.Error"
 
-# What to do where the server itself did not speak; its own messages say it themselves.
+# Hints for errors that did not come from the server. The server's own messages already suggest a remedy.
 _HINTS = {
     grpc.StatusCode.UNAVAILABLE: "try again when the server answers",
     grpc.StatusCode.DEADLINE_EXCEEDED: "give it more time (timeout); a change may have been made all the same",
@@ -25,12 +25,13 @@ _HINTS = {
 
 
 class LocusError(Exception):
-    """A call, a batch or a stream that failed.
+    """Failure of a call, a batch or a stream.
 
-    `code` is the gRPC status code. Where the server refused, `reason` says why, `field` is the path of the offending
-    field (`blocks[2].rays.directions`) and `index` the offending entry counted from 0; `limit`, `limit_value` and
-    `asked` name a limit that was hit; `retry_after` is the wait in seconds after which the same request may succeed,
-    0 = not unchanged. Where the server did not speak, `reason` is UNSPECIFIED and `hint` says what to try.
+    `code` is the gRPC status code. If the server refused the request, `reason` is its reason, `field` the path of the
+    wrong field (`blocks[2].rays.directions`) and `index` the wrong entry, from 0. `limit`, `limit_value` and `asked`
+    are the name of an exceeded limit, its value and the requested value. `retry_after` is the time in seconds after
+    which the same request may succeed, 0 = it cannot succeed unchanged. If the error did not come from the server,
+    `reason` is UNSPECIFIED and `hint` suggests a remedy.
     """
 
     def __init__(self, code: grpc.StatusCode, message: str, *, reason: Reason = Reason.UNSPECIFIED, field: str = "",
@@ -49,19 +50,19 @@ class LocusError(Exception):
 
     @property
     def hint(self) -> str:
-        """What to do next, where the message does not say it; may be empty."""
+        """Suggested remedy if the message has none; may be empty."""
         if self.refused or "nothing answers" in self.message:
             return ""
         return _HINTS.get(self.code, "")
 
     @property
     def refused(self) -> bool:
-        """True if the server refused, so that nothing was changed; False also where the outcome is unknown."""
+        """True if the server refused the request, so that nothing was changed; False also if the outcome is unknown."""
         return self.reason != Reason.UNSPECIFIED
 
     @property
     def worth_repeating(self) -> bool:
-        """True if a call that is safe to repeat may succeed later, unchanged."""
+        """True if an idempotent call may succeed when it is retried unchanged."""
         return self.code == grpc.StatusCode.UNAVAILABLE or (
             self.code == grpc.StatusCode.RESOURCE_EXHAUSTED and self.retry_after > 0)
 
@@ -71,12 +72,12 @@ class LocusError(Exception):
 
 
 def reason_of(number: int) -> Reason:
-    """The reason of a number; UNSPECIFIED for one that a newer server knows."""
+    """Returns the reason of this enum number, or UNSPECIFIED for a number that only a newer server knows."""
     return Reason(number) if number in Reason._value2member_map_ else Reason.UNSPECIFIED
 
 
 def from_error(error: Any) -> LocusError:
-    """From the protocol's Error, as streams report it. A code that no refusal has becomes UNKNOWN."""
+    """Converts the protocol's Error, as streams report it. OK and unknown codes become UNKNOWN."""
     code = _CODES.get(error.code, grpc.StatusCode.UNKNOWN)
     return LocusError(code if code != grpc.StatusCode.OK else grpc.StatusCode.UNKNOWN, error.message,
                       reason=reason_of(error.reason), field=error.field,
@@ -85,7 +86,7 @@ def from_error(error: Any) -> LocusError:
 
 
 def from_call(call: Any) -> LocusError:
-    """From a failed gRPC call. Details that cannot be read are left out: code and message still hold."""
+    """Converts a failed gRPC call. Details that cannot be decoded are left out; code and message are kept."""
     for key, value in call.trailing_metadata() or ():
         if key == "grpc-status-details-bin":
             error = _error_in(value)
@@ -95,12 +96,12 @@ def from_call(call: Any) -> LocusError:
 
 
 def unreadable(what: str) -> LocusError:
-    """For an answer whose bytes are no answer."""
+    """Returns the error for a response that cannot be decoded."""
     return LocusError(grpc.StatusCode.DATA_LOSS, f"the server's answer cannot be read: {what}; is this a locus server?")
 
 
 def parsed(message_class: Any, raw: bytes) -> Any:
-    """A message from its wire form; LocusError DATA_LOSS for bytes that are none."""
+    """Decodes a message. Raises LocusError DATA_LOSS if the bytes are not a valid message."""
     try:
         return message_class.FromString(raw)
     except schema.DecodeError as error:

@@ -1,4 +1,4 @@
-"""Static geometry: uploading meshes, and placing and removing their instances as one change."""
+"""Static geometry: upload of meshes, and placement and removal of their instances as one change."""
 from __future__ import annotations
 
 import contextlib
@@ -16,7 +16,7 @@ _Change = schema.message("ChangeInstancesRequest")
 _Upload = schema.message("UploadMeshRequest")
 _BYTES_A_MESSAGE = 12 * 87_040  # a little under 1 MiB; messages end between triples
 
-# Called after each message of an upload with the bytes sent so far and the bytes in all.
+# Callback that is called after each message of an upload with the bytes sent so far and the total.
 Progress = Callable[[int, int], None]
 
 
@@ -27,7 +27,7 @@ class InstanceChange:
         self.message = _Change()
 
     def remove(self, ids: ColumnLike) -> "InstanceChange":
-        """Removes instances: uint64 ids. An unknown one refuses the change."""
+        """Removes instances: uint64 ids. With an unknown id, the server refuses the whole change."""
         self.message.remove_ids += columns.encode("remove_ids", ids, UINT64)
         return self
 
@@ -41,7 +41,7 @@ class InstanceChange:
               groups: ColumnLike = None, tags: ColumnLike = None) -> "InstanceChange":
         """Places an uploaded mesh N times: world = translation + scale * (rotation * mesh).
 
-        N is the number of `ids` (uint64, not 0), or of `translations` where the server is to choose ids. `translations`:
+        N is the number of `ids` (uint64, not 0), or of `translations` if the server chooses the ids. `translations`:
         3N float64 or three; `rotations`: 4N float32 or four, unit quaternions x, y, z, w, none = identity; `scales`: N
         float32 or one, none = 1; `layers` N uint32 (none = bit 0), `groups` and `tags` N uint64 (none = 0).
         """
@@ -70,7 +70,7 @@ class InstanceChange:
 
 @dataclasses.dataclass(frozen=True)
 class PlacedInstances:
-    """A change of instances that is visible at `revision`, or, with `no_wait`, accepted (`revision` is None).
+    """Result of a change of instances: visible at `revision`, or, with `no_wait`, only accepted (`revision` is None).
 
     `ids`: uint64, one for each placed instance in the order of the request. `change` counts changes within the epoch.
     """
@@ -89,7 +89,7 @@ class PlacedInstances:
 
 @dataclasses.dataclass(frozen=True)
 class MeshColumns:
-    """A mesh with its columns: `vertices` 3V float32 in mesh axes, `indices` 3T uint32, both as uploaded."""
+    """Mesh with its columns: `vertices` 3V float32 in mesh axes, `indices` 3T uint32, both as uploaded."""
 
     mesh: Mesh
     vertices: Values
@@ -97,7 +97,7 @@ class MeshColumns:
 
     @classmethod
     def of(cls, pieces: Sequence[Any]) -> "MeshColumns":
-        """From all of the protocol's DownloadMeshResponse. LocusError DATA_LOSS if they do not hold what they announce."""
+        """Joins all messages of a download. LocusError DATA_LOSS if the content does not match the mesh's SHA-256."""
         vertices = b"".join(piece.vertices for piece in pieces)
         indices = b"".join(piece.indices for piece in pieces)
         mesh = Mesh.of(pieces[0].mesh) if pieces else None
@@ -107,7 +107,7 @@ class MeshColumns:
 
 
 def mesh_sha256(vertices: bytes, indices: bytes) -> bytes:
-    """The name of a mesh's bytes: SHA-256 over both counts as uint32, the float32 vertices and the uint32 indices."""
+    """Returns a mesh's content hash: SHA-256 of both counts as uint32, the float32 vertices and the uint32 indices."""
     digest = hashlib.sha256(struct.pack("<II", len(vertices) // 12, len(indices) // 12))
     digest.update(vertices)
     digest.update(indices)
@@ -116,7 +116,7 @@ def mesh_sha256(vertices: bytes, indices: bytes) -> bytes:
 
 def upload_messages(name: str, vertices: ColumnLike, indices: ColumnLike, parts: Sequence[MeshPart],
                     progress: Optional[Progress]) -> Iterator[Any]:
-    """The messages of UploadMesh: what comes, then the columns in pieces of less than 1 MiB."""
+    """Yields the messages of UploadMesh: an opening with counts and hash, then the columns in chunks below 1 MiB."""
     columns_: Tuple[Tuple[str, bytes], ...] = (("vertices", columns.encode("vertices", vertices, FLOAT32, 3)),
                                                ("indices", columns.encode("indices", indices, UINT32, 3)))
     raw = dict(columns_)

@@ -1,10 +1,10 @@
-"""The machinery under UpdateStream and QueryStream: a bidirectional call whose messages are answered under their
-sequence numbers, with a bounded number under way, that comes back after a broken connection and sends again what was not
-answered. Internal to the package.
+"""Base class of UpdateStream and QueryStream: a bidirectional call with a bounded number of messages in flight, whose
+responses are matched by sequence number. After a broken connection it opens a new call and sends the unanswered
+messages again. Internal to the package.
 
-One thread of its own per stream opens call after call and reads the answers; messages are written by gRPC's thread.
-Invariants: `_items` holds what was accepted and not answered, in the order of sending; after `_ended` is set there are
-none, and never will be.
+One thread per stream opens the calls, one after another, and reads the responses; gRPC's thread writes the messages.
+Invariants: `_items` holds the messages that were accepted and not answered, in the order of sending. After `_ended` is
+set no message is accepted, and `_abandon()` empties `_items`.
 """
 from __future__ import annotations
 
@@ -18,25 +18,26 @@ from .connection import Connection, Retry, scene_metadata
 from .errors import LocusError, from_call
 
 Result = TypeVar("Result")
-_AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)  # ends of a call after which a new one may do better
+# Codes of a broken call after which a new call may succeed.
+_AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)
 
 
 class Item(Generic[Result]):
-    """A message that was accepted and not answered."""
+    """Message that was accepted and not answered."""
 
     def __init__(self, batch: bytes) -> None:
         self.batch = batch
         self.sequence = 0
-        self.number = 0  # of the writer's batch
+        self.number = 0  # batch number within the writer
         self.future: "Future[Result]" = Future()
-        self.written = False  # on the current call
+        self.written = False  # True if sent on the current call
         self.future.set_running_or_notify_cancel()
 
 
 class PipelinedStream(Generic[Result]):
-    """What both kinds of stream have in common; every method may be called from any thread.
+    """Common part of both kinds of stream. Thread-safe.
 
-    Use as a context manager: leaving it waits for all answers, or breaks off after an exception.
+    Use as a context manager: leaving it waits for all answers, or cancels the stream after an exception.
     """
 
     def __init__(self, connection: Connection, path: str, scene: str, max_in_flight: int, retry: Retry) -> None:
@@ -60,23 +61,23 @@ class PipelinedStream(Generic[Result]):
         self._end: Optional[LocusError] = None
         self._thread: Optional[threading.Thread] = None
 
-    # How one kind of stream differs from another; called with the lock held.
+    # Methods that a kind of stream overrides; called with the lock held.
 
     def _number(self, item: Item[Result]) -> None:
-        """Gives a new item its sequence and other numbers."""
+        """Assigns the item its sequence number and, in an update stream, its batch number."""
         self._last_sequence += 1
         item.sequence = self._last_sequence
 
     def _request_of(self, item: Item[Result]) -> bytes:
-        """The message to send."""
+        """Returns the encoded request of an item."""
         raise NotImplementedError
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
-        """The sequence of a response, and its result or LocusError."""
+        """Returns the sequence number of a response, and its result or LocusError."""
         raise NotImplementedError
 
     def _answered(self, outcome: Any, position: int) -> None:
-        """Called after the item at `position` was answered, by a result or a LocusError, and taken out."""
+        """Called after the item at `position` was answered, by a result or a LocusError, and removed from `_items`."""
 
     def _send(self, batch: bytes) -> "Future[Result]":
         item: Item[Result] = Item(batch)
@@ -95,9 +96,9 @@ class PipelinedStream(Generic[Result]):
         return item.future
 
     def sync(self, timeout: Optional[float] = None) -> None:
-        """Blocks until all that was sent has been answered; refusals of single batches are in their futures.
+        """Blocks until every sent batch has been answered. Errors of single batches are in their futures.
 
-        LocusError if the stream ended instead; TimeoutError after `timeout` seconds.
+        LocusError if the stream ended with an error; TimeoutError after `timeout` seconds.
         """
         with self._changed:
             if not self._changed.wait_for(lambda: not self._items and not self._handing_over, timeout):
@@ -106,7 +107,7 @@ class PipelinedStream(Generic[Result]):
                 raise self._end
 
     def close(self, timeout: Optional[float] = None) -> None:
-        """sync(), then ends the stream. Later sends fail."""
+        """Calls sync() and ends the stream. Later sends fail."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
@@ -115,7 +116,7 @@ class PipelinedStream(Generic[Result]):
             self._thread.join(timeout)
 
     def cancel(self) -> None:
-        """Breaks the stream off at once; unanswered batches get CANCELLED, and their outcome is unknown."""
+        """Cancels the stream. Unanswered batches get CANCELLED, and their outcome is unknown."""
         with self._changed:
             self._closing = self._broken_off = True
             if self._call is not None:
@@ -140,7 +141,9 @@ class PipelinedStream(Generic[Result]):
         self._abandon()
 
     def _another_call(self, end: Optional[LocusError]) -> bool:
-        """Waits until there is something to send after the call that ended so; False once the stream has ended."""
+        """Waits, after a call that ended with `end`, until there is a message to send, and returns True; returns False
+        if the stream has ended.
+        """
         with self._changed:
             wait = self._wait_before_next(end) if end is not None else 0.0
             if wait is not None:
@@ -155,7 +158,7 @@ class PipelinedStream(Generic[Result]):
             return False
 
     def _run_call(self) -> Optional[LocusError]:
-        """Opens a call and reads its answers until it is over; how it ended, None in peace."""
+        """Opens a call and reads its responses to the end. Returns the error that ended it, or None."""
         over = threading.Event()
         method = self._connection.channel.stream_stream(self._path)
         try:
@@ -173,7 +176,7 @@ class PipelinedStream(Generic[Result]):
             return unreadable
         except grpc.RpcError as failure:
             return from_call(failure)
-        except ValueError as failure:  # what gRPC says of a closed channel
+        except ValueError as failure:  # raised by gRPC for a closed channel
             return LocusError(grpc.StatusCode.FAILED_PRECONDITION, f"the client was closed: open a new one ({failure})")
         finally:
             with self._changed:
@@ -182,7 +185,7 @@ class PipelinedStream(Generic[Result]):
                 self._changed.notify_all()
 
     def _requests(self, over: threading.Event) -> Iterator[bytes]:
-        """What one call writes, drawn by gRPC's thread."""
+        """Yields the messages of one call; iterated by gRPC's thread."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: over.is_set() or self._unwritten() is not None
@@ -198,10 +201,12 @@ class PipelinedStream(Generic[Result]):
         return next((item for item in self._items if not item.written), None)
 
     def _receive(self, response: bytes) -> None:
-        """Answers that nobody waits for belong to items that were numbered anew since."""
+        """Resolves the item that a response answers. A response with an unknown sequence number is ignored: its item
+        has got a new number since.
+        """
         sequence, outcome = self._answer_in(response)
         with self._changed:
-            position = next((place for place, item in enumerate(self._items) if item.sequence == sequence), None)
+            position = next((index for index, item in enumerate(self._items) if item.sequence == sequence), None)
             if position is None:
                 return
             item = self._items.pop(position)
@@ -223,7 +228,9 @@ class PipelinedStream(Generic[Result]):
             return LocusError(grpc.StatusCode.UNAVAILABLE, "the server ended the stream before it had answered everything")
 
     def _wait_before_next(self, end: LocusError) -> Optional[float]:
-        """None: the stream has ended. An idle stream may lose its connection as often as it likes."""
+        """Returns the seconds to wait before the next call, or None if the stream has ended. Failures of an idle stream
+        are not counted.
+        """
         if self._broken_off or self._fatal is not None:
             return None
         if not (end.worth_repeating or (end.code in _AGAIN and not end.refused)):
@@ -234,7 +241,7 @@ class PipelinedStream(Generic[Result]):
         return self._retry.wait_after(self._failures, end)
 
     def _abandon(self) -> None:
-        """Ends for good: everything that was not answered gets the stream's error."""
+        """Resolves every unanswered item with the stream's error."""
         with self._changed:
             items, end = list(self._items), self._end
         for item in items:
@@ -249,7 +256,7 @@ def _broken_off() -> LocusError:
 
 
 def neither() -> LocusError:
-    """For a response that holds nothing."""
+    """Returns the error for a response with neither a result nor an error."""
     return LocusError(grpc.StatusCode.DATA_LOSS, "the server answered a batch with neither a result nor an error")
 
 

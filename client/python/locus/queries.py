@@ -1,4 +1,4 @@
-"""Query batches: blocks of rays, balls, boxes, lookups and what is nearest in columns, answered together at one revision."""
+"""Query batches: blocks of rays, balls, boxes, nearest queries and lookups in columns, answered at one revision."""
 from __future__ import annotations
 
 from typing import NamedTuple, Optional, Sequence
@@ -14,20 +14,21 @@ _KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", 
 
 
 class Block(NamedTuple):
-    """Settings that every kind of block has, N queries to a block. All optional.
+    """Settings common to all kinds of block, for N queries. All are optional.
 
     - `frame`: three floats, added to every position of the block; positions in its result are relative to it.
-    - `source`: where to look; `precision`: what decides.
-    - `columns`: what to return of each row, by default T, ID and TRIANGLE for rays and what is nearest, ID for balls
-      and boxes (TRIANGLE too where their detail is triangles), ID and POSE for lookups.
-    - `masks`: N uint32 or one; found is only what has (layers & mask) != 0.
-    - `ignore_groups`: N uint64 or one; objects and instances of that group are passed over.
-    - `ignore_ids`: at most 64 uint64 to pass over, for the whole block.
-    - `max_results`: most rows a query, 0 = 1,024.
-    - `after_id`: only rows with a higher id, to go on after a cut.
-    - `as_of_ticks`: N uint64 or one; asks about objects as they were when that tick ended. `as_of_fractions`: N float32
-      or one, 0 <= f < 1, with them: how far from there to the next tick. `outside_history`: what to do about times that
-      are not kept; they are refused by default.
+    - `source`: search static instances, moving objects or both; `precision`: exact shapes or their bounds.
+    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays and nearest queries, ID for
+    balls
+      and boxes (TRIANGLE too if their detail is triangles), ID and POSE for lookups.
+    - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
+    - `ignore_groups`: N uint64 or one; objects and instances of that group are ignored.
+    - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
+    - `max_results`: maximum number of rows a query, 0 = 1,024.
+    - `after_id`: only rows with a higher id, to continue after a truncated result.
+    - `as_of_ticks`: N uint64 or one; the queries see objects as they were at the end of that tick. `as_of_fractions`: N
+      float32 or one, 0 <= f < 1, only with `as_of_ticks`: fraction of the way to the next tick. `outside_history`:
+      handling of times that are not in the history; they are refused by default.
     """
 
     frame: Optional[ColumnLike] = None
@@ -44,7 +45,7 @@ class Block(NamedTuple):
     outside_history: OutsideHistory = OutsideHistory.UNSPECIFIED
 
     def write(self, block: wire.Parts, path: str, count: int) -> None:
-        """Into the protocol's QueryBlock of `count` queries, called `path` in errors. Defaults cost nothing."""
+        """Appends the settings to a QueryBlock of `count` queries, named `path` in errors. Defaults add no bytes."""
         if self.frame is not None:
             block.add(_BLOCK["frame"], wire.vector(columns.vector(path + "frame", self.frame)))
         if self.source:
@@ -79,14 +80,14 @@ class QueryBatch:
     N, the number of queries of a block, comes from its first column; other columns hold N entries, one for all, or none
     for their default. Positions and lengths are float32 in the caller's unit, relative to the block's frame.
 
-    `at_least`: the oldest revision that will do, an Ack for example ("read your own writes"); `exactly`: this very
-    revision, while the server keeps it; the default is the latest. Both check the epoch: LocusError with
-    Reason.SCENE_RESTARTED if the scene started over. `max_work`: a budget in nodes, cells and tests; `explain`: report
-    the work done; `max_reply_bytes`: the answer's largest size, 0 = 4,000,000.
+    `at_least`: the minimum revision, for example an Ack ("read your own writes"); `exactly`: exactly this revision, if
+    the server still keeps it. The default is the latest revision. Both check the epoch: LocusError with
+    Reason.SCENE_RESTARTED if the scene has another one. `max_work`: a budget in nodes, cells and tests; `explain`:
+    report the work done; `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
 
     Columns are checked for type and length here (TypeError and ValueError name the column), values by the server. Buffers
-    are borrowed: leave them unchanged until the batch was sent. It may be sent again. Methods return the batch, so that
-    calls chain. Not for several threads at once.
+    are borrowed: leave them unchanged until the batch was sent. A batch may be sent several times. Methods return the
+    batch, so that calls chain. Not thread-safe.
     """
 
     def __init__(self, *, at_least: Optional[Revision] = None, exactly: Optional[Revision] = None, max_work: int = 0,
@@ -111,8 +112,9 @@ class QueryBatch:
     def rays(self, origins: ColumnLike, directions: ColumnLike, *, t_max: ColumnLike = None,
              mode: RayMode = RayMode.FIRST, cull: Cull = Cull.NONE, inside: Inside = Inside.SOLID,
              block: Block = Block()) -> "QueryBatch":
-        """What do N rays hit? `origins`: 3N float32; `directions`: 3N float32 or three, of any length but zero, never
-        made unit: t counts in this length; `t_max`: N float32 or one, included, +infinity by default.
+        """Adds a block of N rays. `origins`: 3N float32; `directions`: 3N float32 or three, of any length but zero.
+        They are not normalized: t is in units of the direction's length. `t_max`: N float32 or one, inclusive,
+        +infinity by default.
         """
         new = _NewBlock(self._blocks, "rays")
         new.first("origins", origins, FLOAT32, 3)
@@ -124,7 +126,9 @@ class QueryBatch:
 
     def balls(self, centers: ColumnLike, radii: ColumnLike, *, detail: StaticDetail = StaticDetail.INSTANCES,
               block: Block = Block()) -> "QueryBatch":
-        """What touches N balls? `centers`: 3N float32; `radii`: N float32 or one, 0 .. 1e9."""
+        """Adds a block of N balls, to find all that overlaps them. `centers`: 3N float32; `radii`: N float32 or one, 0
+        .. 1e9.
+        """
         new = _NewBlock(self._blocks, "balls")
         new.first("centers", centers, FLOAT32, 3)
         new.column("radii", radii, FLOAT32)
@@ -133,8 +137,9 @@ class QueryBatch:
 
     def boxes(self, centers: ColumnLike, half_extents: ColumnLike, *, rotations: ColumnLike = None,
               detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
-        """What touches N boxes? `centers`: 3N float32; `half_extents`: 3N float32 or three, along the box's own axes;
-        `rotations`: 4N float32 or four, unit quaternions x, y, z, w, none = axis-aligned.
+        """Adds a block of N boxes, to find all that overlaps them. `centers`: 3N float32; `half_extents`: 3N float32 or
+        three, along the box's own axes; `rotations`: 4N float32 or four, unit quaternions x, y, z, w, none =
+        axis-aligned.
         """
         new = _NewBlock(self._blocks, "boxes")
         new.first("centers", centers, FLOAT32, 3)
@@ -145,9 +150,10 @@ class QueryBatch:
 
     def nearest(self, points: ColumnLike, *, k: int = 1, max_distances: ColumnLike = None,
                 detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
-        """What is nearest to N points? `points`: 3N float32; `k`: how many rows a point at most, by ascending distance,
-        which is in column T: 0 in an object, to the surface for meshes; `max_distances`: N float32 or one, included,
-        +infinity by default; `detail`: INSTANCES counts an instance once, by its nearest triangle.
+        """Adds a block of N points, to find the nearest objects and instances. `points`: 3N float32; `k`: maximum
+        number of rows a point, by ascending distance. The distance is in column T: 0 inside an object, to the surface
+        for meshes. `max_distances`: N float32 or one, inclusive, +infinity by default; `detail`: INSTANCES returns an
+        instance once, by its nearest triangle.
         """
         new = _NewBlock(self._blocks, "nearest")
         new.first("points", points, FLOAT32, 3)
@@ -156,30 +162,30 @@ class QueryBatch:
         return self._add(new, block)
 
     def lookup(self, ids: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
-        """Where are these objects and instances? N uint64 ids: one row each, in this order; id 0 for an unknown one."""
+        """Adds a lookup of objects and instances. N uint64 ids: one row each, in this order, with id 0 if unknown."""
         new = _NewBlock(self._blocks, "lookup")
         new.first("ids", ids, UINT64)
         return self._add(new, block)
 
     def lookup_groups(self, groups: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
-        """What belongs to these groups? N uint64 groups, not 0: all their objects and instances, ascending by id."""
+        """Adds a lookup of N uint64 groups, not 0: returns all their objects and instances, ascending by id."""
         new = _NewBlock(self._blocks, "lookup")
         new.first("groups", groups, UINT64)
         return self._add(new, block)
 
     def request_bytes(self, scene: str) -> bytes:
-        """The whole request for Query, as it goes over the wire. Columns are read now."""
+        """Returns the encoded request for Query. Columns are read now."""
         request = wire.Parts()
         request.add(_REQUEST["scene"], scene.encode())
         request.add_parts(_REQUEST["batch"], self._parts)
         return b"".join(request.pieces)
 
     def batch_bytes(self) -> bytes:
-        """The protocol's QueryBatch, as it goes over the wire. Columns are read now."""
+        """Returns the encoded QueryBatch. Columns are read now."""
         return b"".join(self._parts.pieces)
 
     def _add(self, new: _NewBlock, settings: Block) -> QueryBatch:
-        """Only a block without faults becomes part of the batch."""
+        """Adds a complete block to the batch. A block whose settings are refused is not added."""
         block = wire.Parts()
         settings.write(block, new.path, new.count)
         block.add_parts(_BLOCK[new.name], new.kind)
@@ -189,7 +195,7 @@ class QueryBatch:
 
 
 class _NewBlock:
-    """The kind of a block that is being filled."""
+    """Part of a block that depends on its kind, while the block is being built."""
 
     def __init__(self, blocks_before: int, name: str) -> None:
         self.path = f"blocks[{blocks_before}]."
@@ -197,19 +203,19 @@ class _NewBlock:
         self.kind = wire.Parts()
         self.count = 0
 
-    def first(self, name: str, value: ColumnLike, number: columns.Kind, width: int = 1) -> None:
-        """The column that tells how many queries there are."""
-        raw = columns.borrow(f"{self.path}{self.name}.{name}", value, number, width)
-        self.count = columns.entries(raw, number, width)
+    def first(self, name: str, value: ColumnLike, number_type: columns.Kind, width: int = 1) -> None:
+        """Adds the first column, which determines the number of queries."""
+        raw = columns.borrow(f"{self.path}{self.name}.{name}", value, number_type, width)
+        self.count = columns.entries(raw, number_type, width)
         self.kind.add(_KINDS[self.name][name], raw)
 
-    def column(self, name: str, value: ColumnLike, number: columns.Kind, width: int = 1) -> None:
+    def column(self, name: str, value: ColumnLike, number_type: columns.Kind, width: int = 1) -> None:
         if value is not None:
             path = f"{self.path}{self.name}.{name}"
-            self.kind.add(_KINDS[self.name][name], columns.borrow_for(path, value, number, self.count, width))
+            self.kind.add(_KINDS[self.name][name], columns.borrow_for(path, value, number_type, self.count, width))
 
     def options(self, **fields: int) -> None:
-        """Fields of the kind that are no columns."""
+        """Adds the fields of the kind that are not columns."""
         for name, value in fields.items():
             if value:
                 self.kind.add_varint(_KINDS[self.name][name], value)

@@ -1,5 +1,5 @@
-"""A steady flow of query batches against one scene: pipelined, answers matched whatever order they come in. For callers
-that ask every tick.
+"""Pipelined stream of query batches to one scene. Answers may arrive in any order and are matched by sequence number.
+For callers that query every tick.
 """
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _SEQUENCE, _RESULT, _ERROR = (_METHOD.response.DESCRIPTOR.fields_by_name[name].n
 
 
 class QueryStream(PipelinedStream[QueryResult]):
-    """Got from Client.query_stream(). Every method may be called from any thread. After a broken connection unanswered
-    batches are asked again on a new one, since asking changes nothing.
+    """Stream returned by Client.query_stream(). Thread-safe. After a broken connection, unanswered batches are sent
+    again on a new one, since queries change nothing.
     """
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
         super().__init__(connection, _METHOD.path, scene, max_in_flight, retry)
 
     def send(self, batch: QueryBatch) -> "Future[QueryResult]":
-        """Asks; blocks while `max_in_flight` batches are unanswered.
+        """Sends a batch. Blocks while `max_in_flight` batches are unanswered.
 
-        The future gets the answer, or the LocusError of this batch. The batch is read now and may be used again.
+        The future gets the result, or the LocusError of this batch. The batch is read now and may be used again.
         LocusError if the stream has ended. 8 batches of 1,024 queries, or 2 of 8,192, keep a local server busy.
         """
         return self._send(batch.batch_bytes())

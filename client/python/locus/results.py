@@ -1,4 +1,4 @@
-"""Answers to query batches: columns over the received bytes, by query and row."""
+"""Results of query batches: columns over the received bytes, by query and row."""
 from __future__ import annotations
 
 import dataclasses
@@ -18,7 +18,7 @@ NO_TRIANGLE = 0xFFFFFFFF
 _RESULT = schema.numbers("QueryResult")
 _BLOCK = schema.numbers("BlockResult")
 _IN_RESPONSE = schema.numbers("QueryResponse")["result"]
-# Bytes a row of each column that tells how many rows there are; the two wanted most often first.
+# Bytes a row of each column from which the number of rows can be computed; the two most frequent columns are first.
 _COUNTS = _BLOCK["counts"]
 _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
     ("ids", 8), ("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
@@ -26,7 +26,7 @@ _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
 
 
 class _Column:
-    """A column of a BlockResult: made when first read, then an ordinary attribute of it."""
+    """Descriptor of a column of a BlockResult: decoded when first read, then stored as an attribute of the block."""
 
     def __init__(self, doc: str, kind: columns.Kind, width: int = 1, *, by_row: bool = True) -> None:
         self.__doc__ = doc
@@ -59,10 +59,10 @@ class _Column:
 
 
 class BlockResult:
-    """The answer to one block: R rows in columns, the rows of its queries one after another, in their order.
+    """Result of one block: R rows in columns, the rows of the first query first, then those of the second, and so on.
 
-    A column is a read-only numpy array of shape (R,) or (R, width), or, without numpy, a flat array.array. One that was
-    not asked for is empty. Columns are made when first read. Immutable.
+    A column is a read-only numpy array of shape (R,) or (R, width), or, without numpy, a flat array.array. A column
+    that was not requested is empty. Columns are decoded when first read. Immutable.
     """
 
     def __init__(self, message: memoryview) -> None:
@@ -71,7 +71,7 @@ class BlockResult:
 
     counts = _Column("Rows of each query: N uint32; empty where each has one (rays FIRST, lookups of ids) or none (rays ANY).",
                      UINT32, by_row=False)
-    truncated = _Column("Numbers of the queries that had more rows than they report: uint32, ascending.",
+    truncated = _Column("Indices of the queries that found more rows than they return: uint32, ascending.",
                         UINT32, by_row=False)
     hits = _Column("Rays ANY: N uint8, 1 where something is hit, else 0.", UINT8, by_row=False)
     t = _Column("R float32, in lengths of the ray's direction; +infinity for a miss.", FLOAT32)
@@ -88,19 +88,21 @@ class BlockResult:
                         FLOAT64, 3)
     rotations = _Column("4R float32: the rotation as stored, x, y, z, w; 0 for a miss.", FLOAT32, 4)
 
-    resolved_ticks = _Column("N uint64: the ticks that were asked in fact; empty without `as_of_ticks`.", UINT64,
+    resolved_ticks = _Column("N uint64: the effective tick of each query; empty without `as_of_ticks`.", UINT64,
                              by_row=False)
-    resolved_fractions = _Column("N float32: the fractions that were asked in fact; empty without `as_of_ticks`.",
+    resolved_fractions = _Column("N float32: the effective fraction of each query; empty without `as_of_ticks`.",
                                  FLOAT32, by_row=False)
-    clamped = _Column("Numbers of the queries whose time was not kept: uint32, ascending.", UINT32, by_row=False)
+    clamped = _Column("Indices of the queries whose time was outside the history: uint32, ascending.", UINT32,
+                      by_row=False)
 
     @property
     def work(self) -> Optional[Work]:
-        """The work of this block; None without `explain`."""
+        """Work of this block; None without `explain`."""
         return _work_in(self._fields, _BLOCK["work"])
 
     def rows_of(self, query: int) -> slice:
-        """The rows of one query, to index columns of one number a row with. Linear in N once."""
+        """Returns the rows of one query, as an index for columns with one number a row. The first call is linear in N.
+        """
         if not len(self.counts):
             return slice(query, query + 1)
         return slice(self._begins[query], self._begins[query + 1])
@@ -114,7 +116,7 @@ class BlockResult:
 
     @property
     def rows(self) -> int:
-        """R, the number of rows."""
+        """Number of rows, R."""
         if self._rows is None:
             if _COUNTS in self._fields:
                 self._rows = self._begins[-1]
@@ -129,9 +131,9 @@ class BlockResult:
 
 @dataclasses.dataclass(frozen=True, eq=False, init=False)
 class QueryResult(Revision):
-    """The answer to a batch, all at one revision: `blocks` in the order of the request, `tick` the scene's.
+    """Result of a batch at one revision: `blocks` in the order of the request; `tick` is the scene's tick.
 
-    `work` is that of the whole batch; None without `explain`.
+    `work` is the work of the whole batch; None without `explain`.
     """
 
     tick: int
@@ -140,10 +142,10 @@ class QueryResult(Revision):
 
     @classmethod
     def of(cls, message: memoryview) -> "QueryResult":
-        """From the protocol's QueryResult in its wire form, which is kept as long as a column of it is."""
+        """Decodes the protocol's QueryResult. Columns are views, so the bytes are kept as long as any column."""
         found = wire.fields(message)
         result = cls.__new__(cls)
-        # All at once: a frozen class sets attribute by attribute, which shows in what an answer costs.
+        # One update() of the dictionary is measurably faster than a frozen class's setting of each attribute.
         result.__dict__.update(
             epoch=wire.fixed64(found, _RESULT["epoch"]), revision=wire.fixed64(found, _RESULT["revision"]),
             tick=wire.fixed64(found, _RESULT["tick"]), work=_work_in(found, _RESULT["work"]),
@@ -152,7 +154,7 @@ class QueryResult(Revision):
 
     @classmethod
     def from_bytes(cls, response: bytes) -> "QueryResult":
-        """From a whole response of Query, as it came over the wire."""
+        """Decodes a response of Query."""
         return cls.of(wire.column(wire.fields(memoryview(response)), _IN_RESPONSE))
 
 

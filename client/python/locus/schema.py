@@ -1,8 +1,8 @@
-"""The protocol's messages as the wire sees them, with columns as `bytes`; internal to the package.
+"""Message classes of the protocol, with columns declared `bytes`; internal to the package.
 
-The mirrored schema (schema.binpb, made by make_schema.py) is loaded into a pool of its own, so it never meets classes
-that somebody generated from the real files in the same process. Every class is reached by its protocol name:
-`message("QueryBatch")`.
+The mirrored schema (schema.binpb, made by make_schema.py) is loaded into its own descriptor pool, so that it does not
+conflict with classes that protoc generated from the real files in the same process. Classes are accessed by protocol
+name: `message("QueryBatch")`.
 """
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if sys.byteorder != "little":
 
 
 class Method(NamedTuple):
-    """How to call one rpc: its path, and what goes in and out."""
+    """One rpc: its path, and the classes of its request and response."""
 
     path: str
     request: Any
@@ -42,16 +42,16 @@ else:
 
 
 def message(name: str) -> Any:
-    """The class of a message of locus.v1."""
+    """Returns the class of a message of locus.v1."""
     return _class_of(POOL.FindMessageTypeByName("locus.v1." + name))
 
 
 def numbers(name: str) -> Dict[str, int]:
-    """The field numbers of a message of locus.v1, by name."""
+    """Returns the field numbers of a message of locus.v1, by name."""
     return {field.name: field.number for field in message(name).DESCRIPTOR.fields}
 
 
 def method(service: str, name: str) -> Method:
-    """The rpc `name` of a service given by its full name."""
+    """Returns the rpc `name` of the service with this full name."""
     found = POOL.FindServiceByName(service).methods_by_name[name]
     return Method(f"/{service}/{name}", _class_of(found.input_type), _class_of(found.output_type))

@@ -1,5 +1,5 @@
-"""A steady flow of update batches into one scene: pipelined, and applied exactly once each even across broken
-connections. For game servers that send a batch a tick.
+"""Pipelined stream of update batches to one scene, each applied exactly once even if connections break. For game
+servers that send a batch a tick.
 """
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _BATCH = _METHOD.request.DESCRIPTOR.fields_by_name["batch"].number
 
 
 class UpdateStream(PipelinedStream[Ack]):
-    """Got from Client.update_stream(). Every method may be called from any thread.
+    """Stream returned by Client.update_stream(). Thread-safe.
 
-    Each batch carries the stream's random `writer` number and a dense batch number. After a broken connection every
-    batch without an ack is sent again, in order; the server answers what it had applied with Ack.duplicate. A batch that
-    the server refuses does not use up its number: the batches behind it are numbered anew and sent again. The stream
-    ends for good when the server refuses it or forgot the writer (the scene started over), or when reconnecting fails
-    too often: then every unanswered batch gets that LocusError, and their outcome is unknown.
+    Each batch carries the stream's random `writer` and a dense batch number. After a broken connection every batch
+    without an ack is sent again, in order; the ack of a batch that the server had already applied has `duplicate` set.
+    A refused batch does not consume its number: the batches after it are renumbered and sent again. The stream ends if
+    the server refuses it, if the server no longer knows the writer (the scene has a new epoch), or if reconnecting
+    fails too often: then every unanswered batch gets that LocusError, and their outcome is unknown.
     """
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
@@ -36,16 +36,16 @@ class UpdateStream(PipelinedStream[Ack]):
         self._last_ack: Optional[Ack] = None
 
     def send(self, batch: UpdateBatch) -> "Future[Ack]":
-        """Sends a batch; blocks while `max_in_flight` are unanswered: that is how the server's pace reaches the caller.
+        """Sends a batch. Blocks while `max_in_flight` batches are unanswered, which is the back pressure of the server.
 
         The future gets the Ack, or the LocusError of this batch. The batch is copied and may be used again; its own
-        writer and number do not count. LocusError if the stream has ended.
+        writer and number are ignored. LocusError if the stream has ended.
         """
         return self._send(batch.message.SerializeToString())
 
     @property
     def last_ack(self) -> Optional[Revision]:
-        """Where the latest ack put its batch: a query `at_least` this sees every batch acked so far."""
+        """Revision of the latest ack, or None: a query with `at_least` this revision sees every batch acked so far."""
         with self._changed:
             return self._last_ack
 
@@ -55,7 +55,7 @@ class UpdateStream(PipelinedStream[Ack]):
         self._next_batch += 1
 
     def _request_of(self, item: Item[Ack]) -> bytes:
-        # The batch stands there twice, which makes one of both: its columns, then its numbers.
+        # The field `batch` is written twice, and protobuf merges both: first the columns, then writer and batch number.
         numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
         numbers.batch.writer, numbers.batch.batch = self.writer, item.number
         return b"".join((wire.head(_BATCH, len(item.batch)), item.batch, numbers.SerializeToString()))
@@ -71,7 +71,8 @@ class UpdateStream(PipelinedStream[Ack]):
         if not isinstance(outcome, LocusError):
             self._last_ack = outcome
         elif not outcome.refused or outcome.reason == Reason.BATCH_GAP:
-            # Whether the number was used is open, or the server does not know the writer: going on could lose a batch.
+            # Either it is unknown whether the number was consumed, or the server does not know the writer. To continue
+            # could lose a batch.
             self._fatal = outcome
         else:
             self._next_batch -= len(self._items) - position + 1

@@ -1,4 +1,4 @@
-"""Update batches: changes of moving objects, written in columns, that become one revision of a scene."""
+"""Update batches: changes of moving objects in columns, applied as one revision of a scene."""
 from __future__ import annotations
 
 import contextlib
@@ -11,7 +11,7 @@ _Request = schema.message("ApplyUpdatesRequest")
 
 
 class UpdateBatch:
-    """Changes that become one revision, applied in this order: clear, removes, inserts, moves, relabels.
+    """Changes that are applied as one revision, in this order: clear, removes, inserts, moves, relabels.
 
     N is the number of ids of a call. Another column holds N entries, one for all, or none for its default. `positions`
     are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64` are 3N float64, absolute;
@@ -20,19 +20,19 @@ class UpdateBatch:
     uint64, chosen by the caller, never 0. Lengths and angles are in the caller's units.
 
     Columns are checked for type and length here (TypeError and ValueError name the column), values by the server: it
-    refuses wrong items one by one and lists them in Ack.errors, or the whole batch with `all_or_nothing`.
+    refuses wrong items individually and lists them in Ack.errors, or refuses the whole batch with `all_or_nothing`.
 
-    Settings: `tick` the caller's time step; `clear` removes every object first; `upsert` makes an insert of a known id
-    a replace; `restart_ticks` takes `tick` even if it is lower than the scene's; `writer` (random, not 0) and `number`
-    (1, 2, 3 ...) make a repeated batch apply once, streams set them by themselves.
+    Settings: `tick` is the caller's time step; `clear` removes every object first; with `upsert` an insert of a known
+    id replaces the object; `restart_ticks` accepts a `tick` lower than the scene's; `writer` (random, not 0) and
+    `number` (1, 2, 3 ...) let the server recognize a repeated batch and apply it once. Streams set them automatically.
 
-    Methods return the batch, so that calls chain. Not for several threads at once.
+    Methods return the batch, so that calls chain. Not thread-safe.
     """
 
     def __init__(self, *, frame: Optional[ColumnLike] = None, tick: Optional[int] = None, clear: bool = False,
                  upsert: bool = False, all_or_nothing: bool = False, restart_ticks: bool = False, writer: int = 0,
                  number: int = 0) -> None:
-        # Within a request from the start: putting a batch into one later would copy it.
+        # The batch is part of a request from the start: adding it to one later would copy it.
         self._request = _Request()
         self.message = self._request.batch
         self.message.clear, self.message.upsert, self.message.all_or_nothing = clear, upsert, all_or_nothing
@@ -44,7 +44,7 @@ class UpdateBatch:
             origin.x, origin.y, origin.z = columns.vector("frame", frame)
 
     def remove(self, ids: ColumnLike) -> "UpdateBatch":
-        """Removes objects: N uint64 ids, after those of earlier calls."""
+        """Removes objects: N uint64 ids, appended to those of earlier calls."""
         self.message.remove_ids += columns.encode("remove_ids", ids, UINT64)
         return self
 
@@ -56,7 +56,7 @@ class UpdateBatch:
     def insert_points(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
                       rotations: ColumnLike = None, layers: ColumnLike = None, groups: ColumnLike = None,
                       tags: ColumnLike = None) -> "UpdateBatch":
-        """N new objects without extent: found by overlaps and lookups, never hit by a ray."""
+        """Inserts N points: found by overlap queries and lookups, never hit by a ray."""
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.point.SetInParent()
             insert.pose(positions, positions_f64, rotations)
@@ -66,7 +66,7 @@ class UpdateBatch:
     def insert_balls(self, ids: ColumnLike, positions: ColumnLike = None, radii: ColumnLike = None, *,
                      positions_f64: ColumnLike = None, rotations: ColumnLike = None, layers: ColumnLike = None,
                      groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
-        """N new solid balls. `radii`: N float32 or one, 0 .. 1e9."""
+        """Inserts N solid balls. `radii`: N float32 or one, 0 .. 1e9."""
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.ball.SetInParent()
             insert.pose(positions, positions_f64, rotations)
@@ -77,7 +77,7 @@ class UpdateBatch:
     def insert_boxes(self, ids: ColumnLike, positions: ColumnLike = None, half_extents: ColumnLike = None, *,
                      positions_f64: ColumnLike = None, rotations: ColumnLike = None, layers: ColumnLike = None,
                      groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
-        """N new solid boxes. `half_extents`: 3N float32 or three, half the size along the box's own axes."""
+        """Inserts N solid boxes. `half_extents`: 3N float32 or three, half the size along the box's own axes."""
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.box.SetInParent()
             insert.pose(positions, positions_f64, rotations)
@@ -88,8 +88,8 @@ class UpdateBatch:
     def insert_capsules(self, ids: ColumnLike, positions: ColumnLike = None, half_axes: ColumnLike = None,
                         radii: ColumnLike = None, *, positions_f64: ColumnLike = None, rotations: ColumnLike = None,
                         layers: ColumnLike = None, groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
-        """N new solid capsules. `half_axes`: 3N float32 or three, from the centre to one end of the inner segment, in
-        the object's own axes; `radii`: N float32 or one, 0 .. 1e9.
+        """Inserts N solid capsules. `half_axes`: 3N float32 or three, from the centre to one end of the inner segment,
+        in the object's own axes; `radii`: N float32 or one, 0 .. 1e9.
         """
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.capsule.SetInParent()
@@ -101,7 +101,7 @@ class UpdateBatch:
 
     def move(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
              rotations: ColumnLike = None, teleport: bool = False) -> "UpdateBatch":
-        """New centres and rotations of N objects. `teleport`: they jumped, and were never in between."""
+        """Sets new centres and rotations of N objects. `teleport`: past queries do not interpolate this movement."""
         with _new_entry(self.message.moves, "moves", ids) as entry:
             entry.pose(positions, positions_f64, rotations)
             entry.message.teleport = teleport
@@ -109,19 +109,19 @@ class UpdateBatch:
 
     def relabel(self, ids: ColumnLike, *, layers: ColumnLike = None, groups: ColumnLike = None,
                 tags: ColumnLike = None) -> "UpdateBatch":
-        """New labels of N objects; a column that is not given keeps what each object has."""
+        """Sets new labels of N objects. A label whose column is not given is kept."""
         with _new_entry(self.message.relabels, "relabels", ids) as entry:
             entry.labels(layers, groups, tags)
         return self
 
     def request_bytes(self, scene: str) -> bytes:
-        """The whole request for ApplyUpdates, as it goes over the wire."""
+        """Returns the encoded request for ApplyUpdates."""
         self._request.scene = scene
         return bytes(self._request.SerializeToString())
 
 
 class _Entry:
-    """A new entry of one of the batch's lists, whose columns are named `moves[1].positions` in errors."""
+    """New entry of one of the batch's lists. Errors name its columns, for example `moves[1].positions`."""
 
     def __init__(self, message: Any, path: str, ids: ColumnLike) -> None:
         self.message = message
@@ -145,7 +145,7 @@ class _Entry:
 
 @contextlib.contextmanager
 def _new_entry(entries: Any, name: str, ids: ColumnLike) -> Iterator[_Entry]:
-    """Adds an entry to fill; one with a column that is refused is taken out again."""
+    """Adds an entry to be filled by the caller, and removes it again if a column is refused."""
     path = f"{name}[{len(entries)}]."
     message = entries.add()
     try:

@@ -1,4 +1,6 @@
-"""Plain answers: scenes, meshes, acks and the like. Immutable; each is made from the protocol's message of that name."""
+"""Plain result types: scenes, meshes, acks and so on. Immutable; each is converted from the protocol's message of its
+name.
+"""
 from __future__ import annotations
 
 import dataclasses
@@ -10,7 +12,7 @@ from .errors import reason_of
 
 @dataclasses.dataclass(frozen=True)
 class Revision:
-    """A moment of a scene. Revisions count within an epoch; a scene that started over has another epoch."""
+    """Version of a scene. Revisions count within an epoch, which names one unbroken sequence of revisions."""
 
     epoch: int
     revision: int
@@ -18,7 +20,7 @@ class Revision:
 
 @dataclasses.dataclass(frozen=True)
 class ItemError:
-    """One item of a batch that was refused while the rest was applied: `field` is the column, `index` the entry in it."""
+    """Item that was refused while the rest of its batch was applied: `field` is the column, `index` the entry in it."""
 
     field: str
     index: int
@@ -28,10 +30,10 @@ class ItemError:
 
 @dataclasses.dataclass(frozen=True)
 class Ack(Revision):
-    """What became of an update batch. A query with `at_least=ack` sees it.
+    """Result of an update batch. A query with `at_least=ack` sees the batch.
 
-    `applied` and `refused` count items; `errors` has the first 1,000 refused ones. `tick` is the tick it was applied
-    under. `duplicate`: this writer's batch had been applied before and was not applied again.
+    `applied` and `refused` count items; `errors` has the first 1,000 refused ones. `tick` is the scene's tick when the
+    batch was applied. `duplicate`: this writer's batch had been applied before and was not applied again.
     """
 
     tick: int
@@ -50,11 +52,12 @@ class Ack(Revision):
 
 @dataclasses.dataclass(frozen=True)
 class Scene(Revision):
-    """A scene as it was when it was asked for.
+    """Description of a scene at the time of the call.
 
     `objects`, `instances` and `triangles` are counts, `memory_bytes` an estimate without meshes. `bounds` holds the
     lower and upper corner, each x, y, z in the caller's unit, possibly somewhat too wide; None in an empty scene.
-    Of a past of at most `history_ticks` ticks, `recorded_ticks` from `oldest_tick` on are kept, in `history_bytes`.
+    `history_ticks` is the maximum length of the history; it now holds `recorded_ticks` ticks, beginning with
+    `oldest_tick`, in `history_bytes` bytes.
     """
 
     name: str
@@ -90,7 +93,7 @@ class Scene(Revision):
 
 @dataclasses.dataclass(frozen=True)
 class MeshPart:
-    """A named run of triangles within a mesh, from `first_triangle` to where the next part begins."""
+    """Named range of triangles within a mesh, from `first_triangle` up to the next part's first triangle."""
 
     name: str
     first_triangle: int
@@ -98,7 +101,8 @@ class MeshPart:
 
 @dataclasses.dataclass(frozen=True)
 class Mesh:
-    """An uploaded mesh. `memory_bytes` is what it takes, its tree included; `uses` the number of its instances in all scenes."""
+    """Uploaded mesh. `memory_bytes` is its memory including its tree; `uses` the number of its instances in all scenes.
+    """
 
     name: str
     sha256: bytes
@@ -118,7 +122,7 @@ class Mesh:
 
 @dataclasses.dataclass(frozen=True)
 class Limit:
-    """A maximum of the server; `used` is how much is in use now, 0 for limits of one request or scene."""
+    """Maximum of the server; `used` is the current use, 0 for limits of one request or scene."""
 
     value: float
     used: float
@@ -126,7 +130,7 @@ class Limit:
 
 @dataclasses.dataclass(frozen=True)
 class Server:
-    """The server's description of itself; `limits` by name."""
+    """Description of the server; `limits` by name."""
 
     version: str
     instruction_set: str
@@ -142,7 +146,7 @@ class Server:
 
 @dataclasses.dataclass(frozen=True)
 class Work:
-    """How much a query took: nodes and cells visited, triangles and objects tested, time of all threads together."""
+    """Work of a query: nodes and cells visited, triangles and objects tested, summed time of all threads."""
 
     nodes: int
     cells: int

@@ -1,8 +1,8 @@
-"""Protobuf's wire format, as far as columns need it: reading answers without copying them, and framing batches that are
-bytes already; internal to the package.
+"""Part of protobuf's wire format that columns need: decoding of answers without copies, and framing of encoded batches;
+internal to the package.
 
-Parsing an answer with protobuf would copy each column twice (into the message and out of it), which is most of what an
-answer costs a client. Here a column is a view of the received bytes. Everything else goes through the mirrored schema.
+Parsing an answer with protobuf would copy each column twice (into the message and out of it), which is most of the
+client's cost of an answer. Here a column is a view of the received bytes. All other messages use the mirrored schema.
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .errors import unreadable
 
 Fields = Dict[int, List[Any]]
 _VARINT, _FIXED64, _DELIMITED, _FIXED32 = 0, 1, 2, 5
-_MOST_VARINT_BYTES = 10
+_MAX_VARINT_BYTES = 10
 _NOTHING = memoryview(b"")
 _VECTOR = struct.Struct("<BdBdBd")
 _AXES = tuple(number << 3 | _FIXED64 for number in schema.numbers("Vec3d").values())
@@ -23,7 +23,7 @@ _AXES = tuple(number << 3 | _FIXED64 for number in schema.numbers("Vec3d").value
 
 def _varint(data: memoryview, position: int) -> Tuple[int, int]:
     value = 0
-    for count in range(_MOST_VARINT_BYTES):
+    for count in range(_MAX_VARINT_BYTES):
         if position >= len(data):
             raise unreadable("it ends within a number")
         byte = data[position]
@@ -35,9 +35,9 @@ def _varint(data: memoryview, position: int) -> Tuple[int, int]:
 
 
 def fields(data: memoryview) -> Fields:
-    """A message's fields by number, each with its occurrences: ints of varints, views of everything else.
+    """Returns a message's fields by number, each with its occurrences: ints for varints, views for all other types.
 
-    Linear in the number of fields, whatever their size. LocusError DATA_LOSS for bytes that are no message.
+    Linear in the number of fields, independent of their size. LocusError DATA_LOSS if the bytes are not a message.
     """
     found: Fields = {}
     position = 0
@@ -67,7 +67,9 @@ def fields(data: memoryview) -> Fields:
 
 
 def column(found: Fields, number: int) -> memoryview:
-    """A column's bytes; empty where there is none. One that was sent in pieces, as protobuf allows, is joined."""
+    """Returns a column's bytes, empty if the field is absent. Joins a column sent in several chunks, as protobuf
+    allows.
+    """
     pieces = views(found, number)
     if not pieces:
         return _NOTHING
@@ -75,7 +77,7 @@ def column(found: Fields, number: int) -> memoryview:
 
 
 def views(found: Fields, number: int) -> List[memoryview]:
-    """Every occurrence of a field that is no varint, messages for example."""
+    """Returns every occurrence of a field that is not a varint, for example of a repeated message."""
     pieces = found.get(number, [])
     for piece in pieces:
         if isinstance(piece, int):
@@ -84,7 +86,7 @@ def views(found: Fields, number: int) -> List[memoryview]:
 
 
 def fixed64(found: Fields, number: int) -> int:
-    """A fixed64 field; 0 where there is none."""
+    """Returns a fixed64 field, 0 if it is absent."""
     pieces = views(found, number)
     return int.from_bytes(pieces[-1], "little") if pieces else 0
 
@@ -104,25 +106,27 @@ _SMALL = tuple(bytes((value,)) for value in range(128))
 
 
 def head(number: int, size: int) -> bytes:
-    """What stands before the content of field `number` that has so many bytes: a message, a string or a column."""
+    """Returns the tag and length of field `number`, a message, string or column of `size` bytes."""
     return _encoded(number << 3 | _DELIMITED) + _encoded(size)
 
 
 def vector(xyz: Sequence[float]) -> bytes:
-    """The protocol's Vec3d."""
+    """Returns the encoded Vec3d."""
     x, y, z = _AXES
     return _VECTOR.pack(x, xyz[0], y, xyz[1], z, xyz[2])
 
 
 class Parts:
-    """A message in pieces to be joined: columns are borrowed until then, and so copied once in all."""
+    """Encoded message as a list of byte strings. Columns are borrowed and copied once, when the list is joined."""
 
     def __init__(self) -> None:
         self.pieces: List[Raw] = []
         self.size = 0
 
     def add(self, number: int, content: Raw) -> None:
-        """Field `number` with this content; nothing for an empty column, which is an absent one."""
+        """Appends field `number` with this content. Appends nothing if it is empty: an empty column equals an absent
+        one.
+        """
         size = len(content)
         if size:
             before = head(number, size)
@@ -130,22 +134,22 @@ class Parts:
             self.size += len(before) + size
 
     def add_parts(self, number: int, parts: Parts) -> None:
-        """Field `number` with this message, which may be empty."""
+        """Appends field `number` with this message, which may be empty."""
         before = head(number, parts.size)
         self.pieces.append(before)
         self.pieces += parts.pieces
         self.size += len(before) + parts.size
 
     def add_fixed64(self, number: int, value: int) -> None:
-        """Field `number`, a fixed64. OverflowError for a value that is none."""
+        """Appends field `number`, a fixed64. OverflowError if the value is out of range."""
         self._put(_encoded(number << 3 | _FIXED64) + value.to_bytes(8, "little"))
 
     def add_fixed32(self, number: int, value: int) -> None:
-        """Field `number`, a fixed32."""
+        """Appends field `number`, a fixed32. OverflowError if the value is out of range."""
         self._put(_encoded(number << 3 | _FIXED32) + value.to_bytes(4, "little"))
 
     def add_varint(self, number: int, value: int) -> None:
-        """Field `number`, a bool, an enum or a uint32."""
+        """Appends field `number`, a bool, an enum or a uint32. OverflowError if the value is out of range."""
         if not 0 <= value < 1 << 32:
             raise OverflowError(f"{value} is no uint32")
         self._put(_encoded(number << 3 | _VARINT) + _encoded(value))

@@ -1,4 +1,4 @@
-"""The mirrored schema against the real one: equal bytes on the wire, for every message and field."""
+"""Tests that the mirrored schema gives the same bytes as the real one, for every message and field."""
 import array
 import os
 import random
@@ -34,7 +34,7 @@ def scalar(field, random_numbers):
 
 
 def fill(real, mirror, random_numbers, depth=0):
-    """Sets random fields of both to the same, columns as lists on one side and as bytes on the other."""
+    """Sets random fields of both messages to equal values; columns are lists in one and bytes in the other."""
     chosen_of_oneof = {oneof.name: random_numbers.choice(oneof.fields) for oneof in real.DESCRIPTOR.oneofs}
     for field in real.DESCRIPTOR.fields:
         oneof = field.containing_oneof
@@ -71,7 +71,7 @@ class MirrorTest(unittest.TestCase):
             cls.real.update({name: getattr(module, name) for name in module.DESCRIPTOR.message_types_by_name})
 
     def pairs(self):
-        """Random messages of every type, in both schemas."""
+        """Yields random messages of every type, in both schemas."""
         random_numbers = random.Random(SEED)
         for name, real_class in sorted(self.real.items()):
             for number in range(ROUNDS):
@@ -106,14 +106,14 @@ class MirrorTest(unittest.TestCase):
                 columns += is_column
         self.assertGreater(columns, 60)
 
-    def test_an_empty_column_is_an_absent_one(self):
+    def test_an_empty_column_equals_an_absent_one(self):
         rays = schema.message("Rays")(origins=b"")
         self.assertEqual(rays.SerializeToString(), self.real["Rays"](origins=[]).SerializeToString())
 
 
 class MakeSchemaTest(unittest.TestCase):
     def mirrored(self, body):
-        """The fields of message M of a made-up file, by name."""
+        """Returns the fields of message M of an invented file, by name."""
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "made_up.proto")
             with open(path, "w", encoding="utf-8") as file:
@@ -124,11 +124,11 @@ class MakeSchemaTest(unittest.TestCase):
                 files = make_schema.mirror(descriptor_pb2.FileDescriptorSet.FromString(file.read()))
         return {field.name: field for field in files.file[0].message_type[0].field}
 
-    def test_varints_are_no_columns(self):
+    def test_varints_are_not_columns(self):
         fields = self.mirrored("repeated uint32 a = 1; repeated sint64 b = 2; repeated bool c = 3; repeated fixed32 d = 4;")
         self.assertEqual([name for name, field in fields.items() if field.type == Field.TYPE_BYTES], ["d"])
 
-    def test_numbers_that_are_not_packed_are_no_columns(self):
+    def test_unpacked_numbers_are_not_columns(self):
         fields = self.mirrored("repeated float a = 1 [packed = false]; repeated float b = 2 [packed = true];")
         self.assertEqual([name for name, field in fields.items() if field.type == Field.TYPE_BYTES], ["b"])
 

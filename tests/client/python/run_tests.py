@@ -1,7 +1,7 @@
 """Runs one test file of the Python package: run_tests.py FILE --package DIR --bin DIR --protoc PROGRAM [--without-numpy].
 
-The package is the one that was built. Without numpy, importing it fails as on a machine that does not have it, whether
-this one does or not; with numpy a machine that does not have it fails every test.
+It tests the built package. With --without-numpy, importing numpy fails even if it is installed; without this option,
+every test fails if numpy is not installed.
 """
 import argparse
 import importlib.util
@@ -29,7 +29,7 @@ def main():
     if chosen.without_numpy:
         sys.modules["numpy"] = None
     else:
-        import numpy  # noqa: F401  fails here, and says so, rather than as a skipped test
+        import numpy  # noqa: F401  fails here with a clear error instead of skipping tests
     spec = importlib.util.spec_from_file_location("tests", chosen.file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

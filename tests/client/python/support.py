@@ -1,4 +1,4 @@
-"""What the Python tests share: a real locusd of their own, the command line, and the protocol as protoc generates it."""
+"""Support of the Python tests: a locusd process, the command line, and the modules that protoc generates."""
 import glob
 import importlib
 import json
@@ -19,7 +19,7 @@ WAIT_SECONDS = 60
 
 
 class Daemon:
-    """A locusd on a free port, ended by stop()."""
+    """Process of locusd on a free port, ended by stop()."""
 
     def __init__(self, *options, address="127.0.0.1:0"):
         self.folder = tempfile.TemporaryDirectory()
@@ -44,14 +44,14 @@ class Daemon:
             raise RuntimeError(f"locusd ended with {code}")
 
     def kill(self):
-        """Ends it as a crash would."""
+        """Kills the process, to simulate a crash."""
         self.process.kill()
         self.process.wait(timeout=WAIT_SECONDS)
         self.folder.cleanup()
 
 
 class DaemonTest(unittest.TestCase):
-    """Tests of one class share a locusd and a client; each gets a scene named after it."""
+    """Base class whose tests share a locusd and a client; each test gets a scene named after it."""
 
     @classmethod
     def setUpClass(cls):
@@ -71,11 +71,11 @@ class DaemonTest(unittest.TestCase):
         return self.client.apply(self.scene, batch)
 
     def ask(self, batch):
-        """The blocks of the answer."""
+        """Returns the blocks of the answer."""
         return self.client.query(self.scene, batch).blocks
 
     def command_line(self, *arguments):
-        """What `locus -o json ...` prints, as Python values; fails with what it says."""
+        """Runs `locus -o json ...` and returns its output as Python values; fails the test with its error text."""
         command = [os.path.join(BIN, "locus"), "--address", self.daemon.address, "-o", "json", *arguments]
         done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_SECONDS)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -88,17 +88,17 @@ class DaemonTest(unittest.TestCase):
 
 
 def listed(values):
-    """A column as a flat list, whichever form it came in."""
+    """Returns a column, a numpy array or array.array, as a flat list."""
     return values.ravel().tolist() if columns.numpy else values.tolist()
 
 
 def number(text):
-    """The number behind a value of JSON, where infinity and ids are strings."""
+    """Converts a JSON value to a number: infinity and ids are strings in JSON."""
     return float(text) if text in ("inf", "-inf", "nan") else int(text)
 
 
 def generated_protocol(test_class):
-    """Modules that protoc makes of the real files, by name; removed with the test class."""
+    """Returns the modules that protoc generates from the real files, by name; their files are removed after the class."""
     folder = tempfile.TemporaryDirectory()
     test_class.addClassCleanup(folder.cleanup)
     files = sorted(glob.glob(os.path.join(PROTO, "locus/v1/*.proto")))
@@ -110,7 +110,7 @@ def generated_protocol(test_class):
 
 
 def floats(values):
-    """The same numbers rounded to float32."""
+    """Returns the numbers rounded to float32."""
     return memoryview(columns.encode("floats", list(values), columns.FLOAT32)).cast("f").tolist()
 
 

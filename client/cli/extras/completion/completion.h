@@ -1,7 +1,7 @@
-// Completion scripts for shells, written from the parser. A script holds one table, a line for each command, option and
-// positional, and a few functions that read it: what is between them and the cursor is decided in the shell, without a
-// call of the program. Only the names of scenes are asked for, from the server that the line names, for a second at
-// most.
+// Completion scripts for shells, generated from the command-line parser. A script holds a table with a line for each
+// command, option and positional argument, and shell functions that read it. The shell computes the candidates without
+// running the program, except for scene names: these it requests from the server that the command line names, with a
+// timeout of one second. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_COMPLETION_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_COMPLETION_H_
 
@@ -13,8 +13,8 @@ namespace locus::cli {
 
 enum class Shell { kBash, kZsh, kFish };
 
-// The script that completes lines of `program`. Its commands may stand on any number of levels; the options of a
-// command are also those of all commands below it.
+// Returns the script that completes command lines of `program`. Subcommands may be nested to any depth; a subcommand
+// also accepts the options of all commands above it.
 std::string completion_script(const CommandWords& program, Shell shell);
 
 }  // namespace locus::cli

@@ -7,9 +7,9 @@
 namespace locus::cli {
 namespace {
 
-// NAME is the program's.
+// Functions that read the table. NAME is replaced by the program's name.
 constexpr char kFunctions[] = R"shell(
-# What the option $option of the command $place takes; nothing if it is a flag or unknown.
+# Prints the kind of value of the option $option of the command $place; nothing if it is a flag or unknown.
 function __NAME_value --argument-names place option
     for line in (__NAME_table $place)
         set -l fields (string split \t -- $line)
@@ -19,7 +19,7 @@ function __NAME_value --argument-names place option
     end
 end
 
-# The words of a kind in the table of the command $place, each with its text.
+# Prints the words of the kind $kind in the table of the command $place, each with its description.
 function __NAME_offer --argument-names place kind
     for line in (__NAME_table $place)
         set -l fields (string split \t -- $line)
@@ -29,7 +29,7 @@ function __NAME_offer --argument-names place kind
     end
 end
 
-# The scenes of the server at $address, asked by the program $program; nothing if it does not answer at once.
+# Prints the scenes of the server at $address, using $program; nothing if the server does not answer within a second.
 function __NAME_scenes --argument-names program address
     set -l where
     test -n "$address"; and set where --address=$address
@@ -37,7 +37,8 @@ function __NAME_scenes --argument-names program address
         string replace -rf '^\{.*"name":"([a-z0-9-]*)".*' '$1'
 end
 
-# Offers what a value can be, each behind $before, the part of the word that is no value. $typed is the part that is.
+# Prints the candidates for a value of the kind $wanted, each prefixed with $before, the part of the word before the
+# value. $typed is the part of the value typed so far.
 function __NAME_offer_values --argument-names wanted before typed program address
     switch "$wanted"
         case 'choice *'
@@ -52,8 +53,8 @@ function __NAME_offer_values --argument-names wanted before typed program addres
     end
 end
 
-# Reads the words before the cursor: prints the command, the positionals given, what the option before the cursor takes,
-# and the server's address.
+# Parses the words before the cursor. Prints the command, the number of positional arguments, the kind of value of the
+# option before the cursor (or an empty line), and the server's address.
 function __NAME_walk
     set -l place $argv[1]
     set -e argv[1]
@@ -112,9 +113,8 @@ std::string quoted(const std::string& text) {
 }
 
 std::string table_function(const CommandWords& program) {
-  std::string script =
-      absl::StrCat("# A line for each thing to complete: its kind, its word, what it takes, its text.\nfunction __",
-                   program.path, "_table\n    switch $argv[1]\n");
+  std::string script = absl::StrCat("# A line for each candidate: kind, word, kind of value, description.\nfunction __",
+                                    program.path, "_table\n    switch $argv[1]\n");
   for (const TableEntry& entry : completion_table(program)) {
     absl::StrAppend(&script, "        case ", quoted(entry.path), "\n            printf '%s\\n'");
     for (const std::string& line : entry.lines) absl::StrAppend(&script, " \\\n                ", quoted(line));

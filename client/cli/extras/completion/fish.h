@@ -1,4 +1,4 @@
-// The completion script of fish, whose language is its own. Internal to the completion scripts.
+// Completion script for fish, whose language is not that of sh. Internal to the completion scripts.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_FISH_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_FISH_H_
 
@@ -8,7 +8,7 @@
 
 namespace locus::cli {
 
-// The script, complete.
+// Returns the whole script.
 std::string fish_script(const CommandWords& program);
 
 }  // namespace locus::cli

@@ -7,9 +7,9 @@
 namespace locus::cli {
 namespace {
 
-// Reads the table. NAME is the program's.
+// Functions that read the table, for both shells. NAME is replaced by the program's name.
 constexpr char kReadersOfTheTable[] = R"shell(
-# What the option $2 of the command $1 takes; nothing if it is a flag or unknown.
+# Prints the kind of value of the option $2 of the command $1; nothing if it is a flag or unknown.
 _NAME_value() {
   local kind word value text
   while IFS=$'\t' read -r kind word value text; do
@@ -17,7 +17,7 @@ _NAME_value() {
   done < <(_NAME_table "$1")
 }
 
-# What the positional number $2, from 0, of the command $1 takes.
+# Prints the kind of value of the positional argument with index $2, from 0, of the command $1.
 _NAME_positional() {
   local kind word value text number=0
   while IFS=$'\t' read -r kind word value text; do
@@ -28,8 +28,8 @@ _NAME_positional() {
   done < <(_NAME_table "$1")
 }
 
-# Reads the words before the cursor: sets place, the command; position, the positionals given; wanted, what the option
-# before the cursor takes; address, the server's.
+# Parses the words before the cursor. Sets place (the command), position (the number of positional arguments), wanted
+# (the kind of value of the option before the cursor, or empty) and address (the server's).
 _NAME_walk() {
   place=NAME position=0 wanted= address=
   while [ $# -gt 0 ]; do
@@ -57,7 +57,7 @@ _NAME_walk() {
   done
 }
 
-# The scenes of the server, asked by the program $1; nothing if it does not answer at once.
+# Prints the scenes of the server, using the program $1; nothing if the server does not answer within a second.
 _NAME_scenes() {
   "$1" ${address:+"--address=$address"} --timeout 1 --output ndjson scene list 2> /dev/null < /dev/null |
     sed -n 's/^{.*"name":"\([a-z0-9-]*\)".*/\1/p'
@@ -65,7 +65,7 @@ _NAME_scenes() {
 )shell";
 
 constexpr char kBash[] = R"shell(
-# The words up to the cursor as they were typed; bash divides them at = and : too.
+# Sets typed to the words up to the cursor, split at blanks only; bash itself also splits them at = and :.
 _NAME_typed_words() {
   local rest=${COMP_LINE:0:COMP_POINT} i
   typed=()
@@ -79,7 +79,7 @@ _NAME_typed_words() {
   done
 }
 
-# The words of the kind $2 in the table of the command $1.
+# Prints the words of the kind $2 in the table of the command $1.
 _NAME_words() {
   local kind word value text
   while IFS=$'\t' read -r kind word value text; do
@@ -120,7 +120,7 @@ complete -F _NAME NAME
 )shell";
 
 constexpr char kZsh[] = R"shell(
-# Offers the words of the kind $2 in the table of the command $1, each with its text.
+# Offers the words of the kind $2 in the table of the command $1, each with its description.
 _NAME_offer() {
   local kind word value text
   local -a found
@@ -162,9 +162,8 @@ std::string quoted(const std::string& text) {
 }
 
 std::string table_function(const CommandWords& program) {
-  std::string script =
-      absl::StrCat("# A line for each thing to complete: its kind, its word, what it takes, its text.\n_", program.path,
-                   "_table() {\n  case $1 in\n");
+  std::string script = absl::StrCat("# A line for each candidate: kind, word, kind of value, description.\n_",
+                                    program.path, "_table() {\n  case $1 in\n");
   for (const TableEntry& entry : completion_table(program)) {
     absl::StrAppend(&script, "    ", quoted(entry.path), ") printf '%s\\n'");
     for (const std::string& line : entry.lines) absl::StrAppend(&script, " \\\n      ", quoted(line));

@@ -1,5 +1,5 @@
-// The table in a completion script: what there is to complete, in lines of four fields divided by tabs. For the scripts
-// of the three shells, which differ only in how they quote it.
+// Table of all completion candidates, in lines of four fields separated by tabs: kind, word, kind of value,
+// description. For the scripts of the three shells, which differ only in how they quote it.
 //
 //   command     ray     -                  Ask what rays hit
 //   option      --mode  choice first any   Which hits ...
@@ -18,11 +18,11 @@
 namespace locus::cli {
 
 struct TableEntry {
-  std::string path;                // of the command: "locus query ray"
-  std::vector<std::string> lines;  // without ends of lines
+  std::string path;                // full name of the command: "locus query ray"
+  std::vector<std::string> lines;  // without newlines
 };
 
-// An entry for each command; the options of the commands above are among its lines.
+// Returns an entry for each command. Its lines include the options of the commands above it.
 std::vector<TableEntry> completion_table(const CommandWords& program);
 
 }  // namespace locus::cli

@@ -10,7 +10,8 @@ namespace {
 
 bool before(const FirstHit& a, const FirstHit& b) { return (a <=> b) < 0; }
 
-// Where the ray enters the instance's world bounds: part of the verdict on each of its triangles.
+// Returns the t at which the ray enters the instance's world bounds, or nullopt if it misses them. Hits on the
+// instance's triangles are clamped to this t from below, as in the server.
 std::optional<float> entry(const Rayd& ray, const CheckedInstance& instance) {
   const Interval<double> interval =
       SlabRay<double>(ray, kInstancePad).interval(bounds_to_world(instance.transform, instance.mesh_bounds));
@@ -20,13 +21,13 @@ std::optional<float> entry(const Rayd& ray, const CheckedInstance& instance) {
 
 FirstHit first_on_instance(const Rayd& ray, const CheckedInstance& instance) {
   FirstHit best;
-  const std::optional<float> nearest = entry(ray, instance);
-  if (!nearest) return best;
+  const std::optional<float> min_t = entry(ray, instance);
+  if (!min_t) return best;
   const TriangleRay mesh_ray(instance.transform, ray.origin, ray.direction);
   for (const Triangle& triangle : instance.triangles) {
     const std::optional<TriangleHit> hit = mesh_ray.hit(triangle);
     if (!hit) continue;
-    const FirstHit found{std::max(mesh_ray.from_scaled(hit->t), *nearest), instance.id, triangle.number};
+    const FirstHit found{std::max(mesh_ray.from_scaled(hit->t), *min_t), instance.id, triangle.number};
     best = std::min(best, found, before);
   }
   return best;

@@ -1,5 +1,5 @@
-// Answers by trying everything: every triangle and every object, with the same predicates as the server and none of its
-// structures. What the server answers must equal this bit for bit. Immutable; threads may share one.
+// Brute-force query evaluation: tests every triangle and every object with the server's predicates, without its index
+// structures. The server's answers must equal these bit for bit. Immutable; threads may share one.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_BRUTE_FORCE_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_BRUTE_FORCE_H_
 
@@ -15,11 +15,11 @@
 
 namespace locus::cli {
 
-// One placed mesh.
+// Mesh placed in the scene, with its triangles in mesh axes.
 struct CheckedInstance {
   uint64_t id;
   Transform transform;
-  std::vector<Triangle> triangles;  // by number
+  std::vector<Triangle> triangles;  // in index order
   Aabbf mesh_bounds;
 };
 
@@ -45,13 +45,15 @@ struct OverlapRow {
 
 class BruteForce {
  public:
-  // Both are borrowed.
+  // Borrows both arguments.
   BruteForce(const std::vector<CheckedInstance>& instances, const std::vector<CheckedObject>& objects)
       : instances_(instances), objects_(objects) {}
 
-  // As FIRST with every option at its default and no end. ANY is whether the id is not 0.
+  // Returns the answer to a ray query in mode FIRST with default options and unlimited length. Mode ANY reports a hit
+  // if and only if the returned id is not 0.
   FirstHit first(Vec3d origin, Vec3d direction) const;
-  // As TRIANGLES_SORTED: (instance, triangle) and (object, no triangle), ascending.
+  // Return the answer to an overlap query with detail TRIANGLES_SORTED: ascending rows (instance, triangle) and
+  // (object, no triangle).
   std::vector<OverlapRow> ball(const Balld& ball) const;
   std::vector<OverlapRow> box(const Obbd& box) const;
 

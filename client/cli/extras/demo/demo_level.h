@@ -1,4 +1,4 @@
-// The level of `locus demo`: uploaded to a server and placed, and kept here for checking.
+// Level of `locus demo`: uploaded to a server and placed there, and kept in memory for checking answers.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
 
@@ -18,10 +18,10 @@ struct DemoLevel {
   uint64_t triangles = 0;
 };
 
-// Where the level's meshes stand, as create_level() places them: mesh i as instance i + 1.
+// Returns the level with its meshes placed as create_level() places them: mesh i is instance i + 1.
 DemoLevel place_level(const ImportedLevel& level);
 
-// Makes `scene` anew on the server, with the level in it. A scene of that name goes.
+// Creates `scene` on the server with the level in it. An existing scene of that name is deleted first.
 absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level);
 
 }  // namespace locus::cli

@@ -23,7 +23,7 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// The first error of several threads. Thread-safe.
+// First error of several threads. Thread-safe.
 class FirstError {
  public:
   void report(const absl::Status& status) {
@@ -40,7 +40,8 @@ class FirstError {
   absl::Status status_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Keeps samples evenly over a run whose length is not known: every second one goes when there are too many.
+// Sampler of a run of unknown length: keeps every stride-th batch. When there are too many samples, it drops every
+// second one and doubles the stride.
 class Sampler {
  public:
   explicit Sampler(std::vector<Sample>& samples) : samples_(samples) {}
@@ -60,7 +61,7 @@ class Sampler {
   size_t stride_ = 1;
 };
 
-// Asks batches of one kind after the other until told to stop, one under way at a time.
+// Sends one batch of each kind in turn, waiting for each answer, until `done` is set.
 absl::Status ask(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                  const std::vector<DemoKind>& kinds, const std::atomic<bool>& done, LoadResult& result) {
   const std::unique_ptr<client::QueryStream> stream = client.query_stream(options.scene);
@@ -89,7 +90,7 @@ absl::Status check_ack(const v1::UpdateAck& ack) {
   return absl::InternalError(absl::StrCat(ack.refused(), " moves of a tick were refused"));
 }
 
-// One batch a tick, at the ticks' pace.
+// Sends one batch of moves each tick, at the tick rate, and waits for all acks.
 absl::Status write(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                    LoadResult& result) {
   const std::unique_ptr<client::UpdateStream> stream = client.update_stream(options.scene);

@@ -1,4 +1,4 @@
-// The busy part of `locus demo`: a writer that moves every object each tick, and clients that ask meanwhile.
+// Load generator of `locus demo`: a writer that moves every object each tick, and clients that query concurrently.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
 
@@ -24,12 +24,12 @@ struct Sample {
   v1::QueryResult result;
 };
 
-// What one kind of query, or the updates, came to.
+// Measurements of one kind of query, or of the updates.
 struct LoadFigures {
   uint64_t items = 0;  // queries asked or objects moved
   uint64_t found = 0;
-  std::vector<double> milliseconds;  // of each batch
-  std::vector<Sample> samples;       // spread over the whole run, a bounded number
+  std::vector<double> milliseconds;  // latency of each batch
+  std::vector<Sample> samples;       // bounded number of batches, spread evenly over the whole run
 
   double percentile(double fraction) const;
 };
@@ -42,7 +42,8 @@ struct LoadResult {
   uint64_t last_tick = 0;
 };
 
-// Runs until all ticks are acked. Uses three threads besides this one. The first error of any of them ends it.
+// Runs until all ticks are acked. The calling thread sends the moves; two more threads query. Returns the first error
+// of any of them.
 absl::StatusOr<LoadResult> run_load(const client::Client& client, const DemoWorld& world, const LoadOptions& options);
 
 }  // namespace locus::cli

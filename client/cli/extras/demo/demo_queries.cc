@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr uint32_t kMaxRows = 65536;  // a query; the reply's size cuts first
+constexpr uint32_t kMaxRows = 65536;  // rows a query; the maximum reply size truncates earlier
 
 client::Float3 float3(Vec3f v) { return {v.x, v.y, v.z}; }
 
@@ -75,7 +75,7 @@ uint64_t count_found(const v1::BlockResult& block) {
 }
 
 DemoChecker::Outcome DemoChecker::check(DemoKind kind, const v1::QueryBatch& batch, const v1::QueryResult& result,
-                                        int most) {
+                                        int max_queries) {
   if (tick_ != result.tick()) {
     objects_.clear();
     for (uint32_t i = 0; i < world_.size(); ++i) objects_.push_back({world_.id(i), world_.shape(i, result.tick())});
@@ -87,7 +87,7 @@ DemoChecker::Outcome DemoChecker::check(DemoKind kind, const v1::QueryBatch& bat
   Outcome outcome;
   const bool rays = asked.has_rays();
   const int queries = (rays ? asked.rays().origins_size() : got.counts_size() * 3) / 3;
-  for (int i = 0; i < std::min(most, queries); ++i) {
+  for (int i = 0; i < std::min(max_queries, queries); ++i) {
     bool same = false;
     if (rays)
       same = same_ray(kind, asked, got, i);
@@ -118,7 +118,7 @@ bool DemoChecker::same_rows(const std::vector<OverlapRow>& wanted, const v1::Blo
   const auto query = static_cast<size_t>(i);
   const absl::Span<const uint64_t> ids = overlaps->ids(query);
   const absl::Span<const uint32_t> triangles = overlaps->triangles(query);
-  // A reply that was cut for its size holds the first rows, and says so.
+  // A reply truncated for its size is marked as such, and holds the first rows.
   const bool cut = overlaps->rows().truncated(query);
   if (ids.size() != triangles.size() || ids.size() > wanted.size() || (!cut && ids.size() != wanted.size()))
     return false;

@@ -1,5 +1,5 @@
-// The questions of `locus demo`, and the check of the answers by brute force. Functions without state, but for the
-// checker, which is for one thread.
+// Query batches of `locus demo`, and the check of their answers by brute force. Functions without state, and a checker
+// that is not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
 
@@ -18,18 +18,18 @@ namespace locus::cli {
 enum class DemoKind { kFirst, kAny, kBalls, kBoxes };
 inline constexpr std::array<DemoKind, 4> kDemoKinds = {DemoKind::kFirst, DemoKind::kAny, DemoKind::kBalls,
                                                        DemoKind::kBoxes};
-// What the table calls it.
+// Returns the name of the kind in the printed table.
 std::string name_of(DemoKind kind);
 
-// One block of `count` random queries within the world.
+// Returns a batch of one block with `count` random queries within the world.
 v1::QueryBatch demo_batch(DemoKind kind, const DemoWorld& world, DemoRandom& random, int count);
 
-// Queries that found something.
+// Returns the number of queries that found at least one object or triangle.
 uint64_t count_found(const v1::BlockResult& block);
 
 class DemoChecker {
  public:
-  // Both are borrowed.
+  // Borrows both arguments.
   DemoChecker(const std::vector<CheckedInstance>& instances, const DemoWorld& world)
       : instances_(instances), world_(world) {}
 
@@ -37,9 +37,9 @@ class DemoChecker {
     uint64_t checked = 0;
     uint64_t differences = 0;
   };
-  // Checks the first `most` queries of a batch made by demo_batch() against the state at the answer's tick: every id,
-  // triangle and distance must be the same, bit for bit.
-  Outcome check(DemoKind kind, const v1::QueryBatch& batch, const v1::QueryResult& result, int most);
+  // Checks the first `max_queries` queries of a batch made by demo_batch() against the state at the answer's tick:
+  // every id, triangle and distance must be equal, bit for bit.
+  Outcome check(DemoKind kind, const v1::QueryBatch& batch, const v1::QueryResult& result, int max_queries);
 
  private:
   bool same_ray(DemoKind kind, const v1::QueryBlock& asked, const v1::BlockResult& got, int i) const;
@@ -48,7 +48,7 @@ class DemoChecker {
   const std::vector<CheckedInstance>& instances_;
   const DemoWorld& world_;
   std::vector<CheckedObject> objects_;
-  std::optional<uint64_t> tick_;  // of objects_
+  std::optional<uint64_t> tick_;  // tick of the state in objects_
 };
 
 }  // namespace locus::cli

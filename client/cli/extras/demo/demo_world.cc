@@ -9,7 +9,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr float kInset = 0.98f;  // objects keep a little off the level's outermost walls
+constexpr float kInset = 0.98f;  // share of the level's extent in which objects move, inside its outermost walls
 
 Quaternion random_rotation(DemoRandom& random) {
   for (;;) {
@@ -18,14 +18,15 @@ Quaternion random_rotation(DemoRandom& random) {
   }
 }
 
-// There and back between -half and half, by the number of ticks alone: never by adding up.
+// Returns the position at `tick` of a point that bounces between -half and half. It is computed from the tick directly,
+// so that rounding errors do not accumulate.
 float bounce(float start, float velocity, uint64_t tick, float half) {
   if (half <= 0) return 0;
   const double period = 4.0 * half;
-  double way = std::fmod(double{start} + half + double{velocity} * static_cast<double>(tick), period);
-  if (way < 0) way += period;
-  const double there = way <= 2.0 * half ? way : period - way;
-  return static_cast<float>(there - half);
+  double phase = std::fmod(double{start} + half + double{velocity} * static_cast<double>(tick), period);
+  if (phase < 0) phase += period;
+  const double distance = phase <= 2.0 * half ? phase : period - phase;
+  return static_cast<float>(distance - half);
 }
 
 }  // namespace
@@ -54,8 +55,8 @@ Vec3f DemoWorld::offset(const DemoObject& object, uint64_t tick) const {
           bounce(object.start.z, object.velocity.z, tick, half_.z)};
 }
 
-Shape DemoWorld::shape(uint32_t number, uint64_t tick) const {
-  const DemoObject& object = objects_[number];
+Shape DemoWorld::shape(uint32_t index, uint64_t tick) const {
+  const DemoObject& object = objects_[index];
   Shape shape;
   shape.kind = object.kind;
   shape.position = frame_ + to_double(offset(object, tick));

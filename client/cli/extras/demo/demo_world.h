@@ -1,5 +1,5 @@
-// The moving objects of `locus demo`: where each is at each tick is a pure function of its number, so that any answer
-// can be checked against the very state it was given for. Immutable after construction.
+// Moving objects of `locus demo`. The pose of an object is a pure function of its index and the tick, so that any
+// answer can be checked against the state at its tick. Immutable after construction.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_WORLD_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_WORLD_H_
 
@@ -17,27 +17,28 @@ class DemoWorld {
  public:
   static constexpr uint64_t kFirstObjectId = 1'000'000;
 
-  // `bounds`: world bounds of the level, within which the objects move.
+  // Creates `objects` objects that move within `bounds`, the world bounds of the level.
   DemoWorld(const Aabbd& bounds, uint32_t objects, uint64_t seed);
 
   const Aabbd& bounds() const { return bounds_; }
-  // Float positions in updates and queries are relative to it.
+  // Returns the origin of float positions in updates and queries.
   Vec3d frame() const { return frame_; }
   uint32_t size() const { return static_cast<uint32_t>(objects_.size()); }
-  uint64_t id(uint32_t number) const { return kFirstObjectId + number; }
+  uint64_t id(uint32_t index) const { return kFirstObjectId + index; }
 
-  // The object as the server stores it at `tick`.
-  Shape shape(uint32_t number, uint64_t tick) const;
+  // Returns the object as the server stores it at `tick`.
+  Shape shape(uint32_t index, uint64_t tick) const;
 
-  // All objects at tick 0, and the moves of all to `tick`.
+  // Returns the batch that clears the scene and inserts all objects at tick 0.
   v1::UpdateBatch inserts() const;
+  // Returns the batch that moves all objects to their positions at `tick`.
   v1::UpdateBatch moves(uint64_t tick) const;
 
  private:
   struct DemoObject {
     ShapeKind kind;
     Vec3f start;     // relative to the frame
-    Vec3f velocity;  // a tick
+    Vec3f velocity;  // distance a tick
     Vec3f size;
     float radius;
     Quaternion rotation;
@@ -47,7 +48,7 @@ class DemoWorld {
 
   Aabbd bounds_;
   Vec3d frame_;
-  Vec3f half_;  // of the bounds, around the frame
+  Vec3f half_;  // half extent of the region around frame_ in which objects move
   std::vector<DemoObject> objects_;
 };
 

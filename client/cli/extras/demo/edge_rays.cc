@@ -14,7 +14,7 @@ using Corner = std::array<float, 3>;
 
 Corner key_of(Vec3f v) { return {v.x, v.y, v.z}; }
 
-// An edge and the third vertices of the triangles on it.
+// Edge and the third vertices of its triangles.
 struct Edge {
   Vec3f from, to;
   std::vector<Vec3f> opposite;
@@ -38,15 +38,15 @@ std::vector<Edge> shared_edges(const std::vector<Triangle>& triangles) {
   return shared;
 }
 
-// The part of `point` that is across the edge, seen from its start: unit, or nothing for slivers.
+// Returns the unit direction from the edge towards `point`, perpendicular to the edge, or nullopt for slivers.
 std::optional<Vec3d> across(const Edge& edge, Vec3f point) {
   const Vec3d along = to_double(edge.to) - to_double(edge.from);
-  const Vec3d way = to_double(point) - to_double(edge.from);
+  const Vec3d to_point = to_double(point) - to_double(edge.from);
   const double length = std::sqrt(squared_length(along));
-  // Also edges so short that rounding of the ray is as long as they are.
+  // Refuse edges that are as short as the rounding error of the ray.
   if (length <= 1e-5 * max_component(abs(to_double(edge.from)))) return std::nullopt;
   const Vec3d unit = along * (1 / length);
-  const Vec3d rest = way - unit * dot(way, unit);
+  const Vec3d rest = to_point - unit * dot(to_point, unit);
   const double height = std::sqrt(squared_length(rest));
   if (height < 0.02 * length) return std::nullopt;
   return rest * (1 / height);
@@ -54,10 +54,11 @@ std::optional<Vec3d> across(const Edge& edge, Vec3f point) {
 
 struct Aim {
   Vec3d target;
-  Vec3d away;  // where to stand, from the target
+  Vec3d away;  // offset of the ray's origin from the target
 };
 
-// In front of both triangles, between their two sides: seen from there they lie on different sides of the edge.
+// Chooses a target on the edge and an origin in front of both triangles, from which they lie on different sides of the
+// edge. Returns nullopt if there is none.
 std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const std::optional<Vec3d> left = across(edge, edge.opposite[0]);
   const std::optional<Vec3d> right = across(edge, edge.opposite[1]);
@@ -67,14 +68,14 @@ std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const Vec3d side = cross(along * (1 / length), *left);
   const Vec3d other = cross(*right, along * (1 / length));
   Vec3d away = side + other;
-  if (squared_length(away) < 0.5) return std::nullopt;  // folded too sharply to stand in front of both
-  const Vec3d sway = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
-  away = normalized(away) + sway;
+  if (squared_length(away) < 0.5) return std::nullopt;  // too sharp a fold: no point is in front of both triangles
+  const Vec3d jitter = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
+  away = normalized(away) + jitter;
   if (random.unit() < 0.5f) away = -away;
-  // Both triangles must be seen clearly, on different sides.
+  // Require that the triangles lie on different sides of the edge in this view, neither of them nearly edge-on.
   const Vec3d front = cross(along * (1 / length), normalized(away));
   if (!(dot(front, *left) * dot(front, *right) < -0.05)) return std::nullopt;
-  const double weight = 0.02 + 0.96 * random.unit();  // not so near a corner that rounding passes it
+  const double weight = 0.02 + 0.96 * random.unit();  // keeps the target off the end points by more than rounding
   return Aim{to_double(edge.from) + along * weight, away * (length * (0.1 + 2 * random.unit()))};
 }
 
@@ -86,7 +87,7 @@ EdgeRays aim_at_edges(const std::vector<Triangle>& triangles, size_t count, uint
   EdgeRays rays;
   const std::vector<Edge> edges = shared_edges(triangles);
   DemoRandom random(seed);
-  // A mesh of slivers alone gives up after so many tries.
+  // Limits the loop for a mesh that has only slivers.
   const size_t tries = 20 * count;
   for (size_t i = 0; !edges.empty() && i < tries && rays.size() < count; ++i) {
     const std::optional<Aim> aimed = aim(edges[i % edges.size()], random);

@@ -1,5 +1,5 @@
-// Rays aimed at the edges that two triangles share, where fast intersectors leak: from in front of the edge, so that no
-// ray may pass it.
+// Test rays aimed at edges shared by two triangles, where fast intersectors can miss both. The origins lie in front of
+// the edge, so that every ray must hit one of its triangles.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 
@@ -10,7 +10,8 @@
 
 namespace locus::cli {
 
-// Interleaved x, y, z in mesh axes. The target is at t = 1: a hit with t <= 1 + kEdgeAllowance is wanted for every ray.
+// Rays as interleaved x, y, z in mesh axes. The target point on the edge is at t = 1: every ray must have a hit with t
+// <= 1 + kEdgeAllowance.
 struct EdgeRays {
   std::vector<float> origins;
   std::vector<float> directions;
@@ -18,11 +19,11 @@ struct EdgeRays {
   size_t size() const { return origins.size() / 3; }
 };
 
-// Covers rounding of the target to float, seen at the flattest angle that is aimed.
+// Tolerance in t for rounding of the target to float, at the flattest angle of incidence that aim_at_edges() uses.
 inline constexpr float kEdgeAllowance = 1e-3f;
 
-// `count` rays over all edges shared by exactly two triangles that are not slivers, in turn; fewer only if there is no
-// such edge.
+// Returns `count` rays, distributed in turn over all edges shared by exactly two triangles that are not slivers.
+// Returns fewer only if hardly any edge qualifies.
 EdgeRays aim_at_edges(const std::vector<Triangle>& triangles, size_t count, uint64_t seed);
 
 }  // namespace locus::cli

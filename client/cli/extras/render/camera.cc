@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kParallel = 1e-6;  // sine of the angle below which directions count as parallel
+constexpr double kParallel = 1e-6;  // sine of the angle below which directions are parallel
 
 bool is_direction(Vec3d v) { return is_finite(v) && max_component(abs(v)) > 0; }
 
@@ -29,16 +29,16 @@ absl::StatusOr<ViewAxes> view_axes(Vec3d forward, Vec3d up) {
 }
 
 double half_height_of(double degrees) {
-  // Libraries of mathematics differ in a tangent's last bit, which this rounding drops.
+  // Math libraries differ in the last bit of a tangent. Rounding to float hides the difference.
   return static_cast<float>(std::tan(degrees * (std::numbers::pi / 360)));
 }
 
 CameraRay ray_through(const Camera& camera, const ImageSize& size, uint32_t column, uint32_t row) {
   const double x = (2.0 * column + 1 - size.width) / size.height * camera.half_height;
   const double y = (size.height - 1 - 2.0 * row) / size.height * camera.half_height;
-  const Vec3d aside = camera.axes.right * x + camera.axes.up * y;
-  if (camera.projection == Projection::kOrthographic) return {to_float(aside), to_float(camera.axes.forward)};
-  return {{}, to_float(camera.axes.forward + aside)};
+  const Vec3d offset = camera.axes.right * x + camera.axes.up * y;
+  if (camera.projection == Projection::kOrthographic) return {to_float(offset), to_float(camera.axes.forward)};
+  return {{}, to_float(camera.axes.forward + offset)};
 }
 
 }  // namespace locus::cli

@@ -15,11 +15,11 @@ namespace locus::cli {
 namespace {
 
 constexpr double kSceneMargin = 1.04;
-constexpr double kThingMargin = 2;  // shows what a thing stands on and next to
+constexpr double kThingMargin = 2;  // wider than a scene's, to show the surroundings of one object
 
 Vec3d vector_of(const Triple& triple) { return {triple.x, triple.y, triple.z}; }
 
-// Without --up the z axis points up, and the y axis in a picture taken along z.
+// Returns the view axes. Without --up, the z axis points up, or the y axis if the view is along z.
 absl::StatusOr<ViewAxes> axes_of(const CameraOptions& options, Vec3d forward) {
   absl::StatusOr<ViewAxes> axes = view_axes(forward, options.up ? vector_of(*options.up) : Vec3d{0, 0, 1});
   if (!axes.ok() && !options.up) axes = view_axes(forward, {0, 1, 0});
@@ -87,8 +87,8 @@ absl::StatusOr<Camera> camera_of(const CameraOptions& options, const Aabbd& targ
   const Vec3d up = options.up ? vector_of(*options.up) : Vec3d{0, 0, 1};
   if (up == Vec3d{}) return usage_error("--up 0,0,0 is no direction");
   Vec3d forward = options.direction ? vector_of(*options.direction) : three_quarter_view(up);
-  const Vec3d middle = options.look_at ? vector_of(*options.look_at) : (target.min + target.max) * 0.5;
-  if (options.eye && !options.direction) forward = middle - vector_of(*options.eye);
+  const Vec3d centre = options.look_at ? vector_of(*options.look_at) : (target.min + target.max) * 0.5;
+  if (options.eye && !options.direction) forward = centre - vector_of(*options.eye);
   ASSIGN_OR_RETURN(const ViewAxes axes, axes_of(options, forward));
   Camera camera = frame_box(target, axes, lens_of(options, size));
   if (options.eye) camera.eye = vector_of(*options.eye);

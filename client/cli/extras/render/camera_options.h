@@ -1,4 +1,4 @@
-// The options of `locus render` that say where the picture is taken from, and the camera they mean.
+// Camera options of `locus render`, and the camera that they describe. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_OPTIONS_H_
 
@@ -20,21 +20,20 @@ struct CameraOptions {
   std::optional<Triple> direction = std::nullopt;
   std::optional<Triple> up = std::nullopt;
   double degrees = 45;
-  std::optional<double> orthographic =
-      std::nullopt;  // units from the lower to the upper edge; 0 = what the target takes
+  std::optional<double> orthographic = std::nullopt;  // units from the lower to the upper edge; 0 = as the target needs
   std::optional<Number64> at = std::nullopt;
 };
 
-// "640x360". Fails on anything else, and on a side of 0.
+// Reads a size such as "640x360". Sets failbit on any other form and on a side of 0.
 std::istream& operator>>(std::istream& in, ImageSize& size);
 
 void add_camera_options(CLI::App& command, CameraOptions& options);
 
-// Usage errors that need no server: options that contradict each other or give no direction.
+// Returns a usage error for options that contradict each other or give no direction. Needs no server.
 absl::Status check(const CameraOptions& options);
 
-// `target`: bounds of what the picture is of, not empty. Usage error if the view has no direction or --up is parallel
-// to it.
+// Returns the camera described by the options. `target` is the non-empty bounding box to be framed. Usage error if the
+// view has no direction or --up is parallel to it.
 absl::StatusOr<Camera> camera_of(const CameraOptions& options, const Aabbd& target, const ImageSize& size);
 
 }  // namespace locus::cli

@@ -17,11 +17,11 @@ namespace locus::cli {
 namespace {
 
 constexpr uint64_t kRaysPerBatch = 8192;
-constexpr uint64_t kReportedRaysPerBatch = 256;  // a block each: the most that a batch may have
+constexpr uint64_t kReportedRaysPerBatch = 256;  // one block a ray; the maximum number of blocks in a batch
 constexpr int kBatchesInFlight = 6;
 constexpr std::array<v1::Column, 4> kColumns = {v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_TRIANGLE, v1::COLUMN_NORMAL};
 
-// A run of pixels, in the order of the image.
+// Range of consecutive pixels, in the order of the image.
 struct PixelRange {
   uint64_t begin = 0;
   uint64_t end = 0;
@@ -49,7 +49,7 @@ class Caster {
       if (!sent.ok()) note(sent, {});
       if (progress) progress(done());
     }
-    // Also after a failure: the answers under way are written into this object.
+    // Wait even after a failure: pending answers are written into this object.
     const absl::Status flushed = stream->flush();
     if (absl::Status status = outcome(); !status.ok()) return in_words(status);
     if (!flushed.ok()) return flushed;
@@ -70,7 +70,8 @@ class Caster {
     return builder.build();
   }
 
-  // Relative to the eye, so that floats are at their finest where the picture is taken, however far out.
+  // Adds a block with the rays of `range`. Its frame is the eye, so that float precision does not depend on the eye's
+  // distance from the origin.
   void add_block(const PixelRange& range, client::QueryBuilder& builder) const {
     std::vector<float> origins;
     std::vector<float> directions;
@@ -89,7 +90,7 @@ class Caster {
     block.rays(origins, directions);
   }
 
-  // Ranges do not overlap, so only the counters need the lock.
+  // Copies an answer to the image. Ranges do not overlap, so only the counters need the lock.
   absl::Status take(const PixelRange& range, const v1::QueryResult& answer) {
     const bool reported = options_.work == WorkReport::kReported;
     const uint64_t rays_per_block = reported ? 1 : range.size();
@@ -153,7 +154,7 @@ class Caster {
   CastResult result_;  // its counters are guarded by mutex_
 
   std::mutex mutex_;
-  absl::Status outcome_;  // the first failure
+  absl::Status outcome_;  // first error
   uint64_t done_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// Asks a server for a picture: a ray a pixel, in batches over a query stream, a bounded number of them under way. For
+// Query of a picture's rays: one ray a pixel, sent in batches over a query stream with a bounded number in flight. For
 // `locus render`.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAST_RAYS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAST_RAYS_H_
@@ -15,13 +15,13 @@
 
 namespace locus::cli {
 
-// Whether all rays see one moment.
+// Choice of the revisions at which the rays are answered.
 enum class Moment {
-  kOne,   // all at the given revision; fails if the server drops it meanwhile
-  kLive,  // each batch at the latest one, the given one or newer
+  kOne,   // all rays at the given revision; fails if the server drops it meanwhile
+  kLive,  // each batch at the latest revision, which is the given one or newer
 };
 
-// Whether each ray's work is reported. kReported makes every ray a block of its own, which costs several times more.
+// Choice of reporting each ray's work. kReported makes every ray a block of its own, which costs several times more.
 enum class WorkReport { kNone, kReported };
 
 struct CastOptions {
@@ -36,18 +36,18 @@ struct CastOptions {
 
 struct CastResult {
   RayImage image;
-  // The oldest and newest revision that answered: the same for Moment::kOne. Ticks likewise.
+  // Oldest and newest revision of the answers (equal for Moment::kOne), and the latest tick.
   uint64_t first_revision = 0;
   uint64_t last_revision = 0;
   uint64_t tick = 0;
 };
 
-// Called in the caller's thread now and then with the rays answered so far.
+// Callback for progress, called from time to time in the caller's thread with the number of rays answered so far.
 using CastProgress = std::function<void(uint64_t done)>;
 
-// Blocks until every ray is answered. The server's refusal otherwise; OUT_OF_RANGE in words for a revision that the
-// server does not keep any more; DATA_LOSS for an answer that does not fit its question. Memory: 28 bytes a pixel, 52
-// with the work.
+// Casts all rays and blocks until every ray is answered. Errors: the server's; OUT_OF_RANGE, with an explanation, for a
+// revision that the server no longer keeps; DATA_LOSS for an answer whose columns do not match the request. Memory: 28
+// bytes a pixel, 52 with the work.
 absl::StatusOr<CastResult> cast_rays(const client::Client& client, const Camera& camera, const ImageSize& size,
                                      const CastOptions& options, const CastProgress& progress = {});
 

@@ -36,9 +36,9 @@ uint8_t byte_of(double value) { return static_cast<uint8_t>(std::clamp(value, 0.
 uint8_t between(uint8_t a, uint8_t b, double weight) { return byte_of(a + (b - a) * weight); }
 
 Colour interpolated(const std::array<Colour, kStops>& stops, double x) {
-  const double place = x > 0 ? std::min(x, 1.0) * (kStops - 1) : 0;
-  const size_t below = std::min(static_cast<size_t>(place), kStops - 2);
-  const double weight = place - static_cast<double>(below);
+  const double position = x > 0 ? std::min(x, 1.0) * (kStops - 1) : 0;
+  const size_t below = std::min(static_cast<size_t>(position), kStops - 2);
+  const double weight = position - static_cast<double>(below);
   const Colour a = stops[below], b = stops[below + 1];
   return {between(a.red, b.red, weight), between(a.green, b.green, weight), between(a.blue, b.blue, weight)};
 }
@@ -58,15 +58,15 @@ Colour viridis(double x) { return interpolated(kViridis, x); }
 Colour inferno(double x) { return interpolated(kInferno, x); }
 
 double hue_of(uint64_t id) {
-  constexpr uint64_t kInverseGoldenRatio = 0x9E3779B97F4A7C15u;  // of 2^64
+  constexpr uint64_t kInverseGoldenRatio = 0x9E3779B97F4A7C15u;  // scaled by 2^64
   return static_cast<double>((id * kInverseGoldenRatio) >> 40) * 0x1p-24;
 }
 
 Light light_of_hue(double hue, double saturation, double value) {
-  const double turn = 6 * hue;
-  const double red = std::clamp(std::abs(turn - 3) - 1, 0.0, 1.0);
-  const double green = std::clamp(2 - std::abs(turn - 2), 0.0, 1.0);
-  const double blue = std::clamp(2 - std::abs(turn - 4), 0.0, 1.0);
+  const double sector = 6 * hue;
+  const double red = std::clamp(std::abs(sector - 3) - 1, 0.0, 1.0);
+  const double green = std::clamp(2 - std::abs(sector - 2), 0.0, 1.0);
+  const double blue = std::clamp(2 - std::abs(sector - 4), 0.0, 1.0);
   const Light pure = {red, green, blue};
   return (Light{1, 1, 1} * (1 - saturation) + pure * saturation) * value;
 }

@@ -1,5 +1,5 @@
-// Colours for numbers and for names. For the painters. Functions without state; exact on every machine: no function of
-// libm but the square root.
+// Colours for values and for ids. For the painters. Functions without state; bit-identical on every machine: they use
+// no libm function but the square root.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_COLOURS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_COLOURS_H_
 
@@ -9,7 +9,7 @@
 
 namespace locus::cli {
 
-// Light, 0 .. 1 a component: what may be added and averaged.
+// Linear light, 0 .. 1 a component; it may be added and averaged.
 struct Light {
   double red = 0, green = 0, blue = 0;
 
@@ -17,21 +17,21 @@ struct Light {
   friend Light operator*(Light a, double s) { return {a.red * s, a.green * s, a.blue * s}; }
 };
 
-// Between light and stored colours, by a gamma of 2, close to sRGB's. Light beyond 0 .. 1 is cut.
+// Convert between light and stored colours with a gamma of 2, close to sRGB's. Light is clamped to 0 .. 1.
 Colour colour_of(Light light);
 Light light_of(Colour colour);
 
-// A map from dark to bright for 0 <= x <= 1 (cut to it; NaN is 0), even to the eye and readable by the colour-blind:
-// straight lines between ten points of viridis, for distances, or of inferno, for costs.
+// Return a colour from dark to bright for 0 <= x <= 1 (x is clamped; NaN is 0), from a perceptually uniform map that is
+// readable by the colour-blind: linear interpolation of ten points of viridis, for distances, or of inferno, for costs.
 // Source: Smith and van der Walt, the colour maps of matplotlib 2.0 (2015, CC0).
 Colour viridis(double x);
 Colour inferno(double x);
 
-// A hue that tells an id from its neighbours: the fraction of id / golden ratio (Knuth, The Art of Computer Programming
-// 3, 1998, 6.4), so that ids in a row lie far apart on the circle. 0 <= hue < 1.
+// Returns a hue for an id, 0 <= hue < 1: the fractional part of id / golden ratio (Knuth, The Art of Computer
+// Programming 3, 1998, 6.4), so that consecutive ids have clearly different hues.
 double hue_of(uint64_t id);
 
-// Smith, Color gamut transform pairs (1978): hue, saturation and value, each 0 .. 1, as light.
+// Converts hue, saturation and value, each 0 .. 1, to light. Source: Smith, Color gamut transform pairs, 1978.
 Light light_of_hue(double hue, double saturation, double value);
 
 }  // namespace locus::cli

@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kSmallestExtent = 1e-9;  // against the coordinates' own size: less than doubles tell apart
+constexpr double kSmallestExtent = 1e-9;  // relative to the magnitude of the coordinates
 
 std::array<Vec3d, 8> corners_of(const Aabbd& box) {
   std::array<Vec3d, 8> corners;
@@ -18,7 +18,8 @@ std::array<Vec3d, 8> corners_of(const Aabbd& box) {
   return corners;
 }
 
-// Over all corners the largest of each of these, in the view's axes around the box's centre.
+// Maxima over all corners of a box, in the view's axes relative to the box's centre: of x - w z (right) and -x - w z
+// (left), likewise for y (up, down), and of -z (near).
 struct Reach {
   double right = -std::numeric_limits<double>::infinity();
   double left = right, up = right, down = right, near = right;

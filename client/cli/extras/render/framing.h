@@ -1,4 +1,4 @@
-// Cameras that frame a box: where to stand so that all of it is in the picture, and no further away than that. For
+// Placement of a camera that frames a box: the nearest position from which all of the box is in the picture. For
 // `locus render` without --eye. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_FRAMING_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_FRAMING_H_
@@ -8,22 +8,22 @@
 
 namespace locus::cli {
 
-// How a camera projects, before it is known where it stands.
+// Projection of a camera, without its position.
 struct Lens {
   Projection projection = Projection::kPerspective;
-  double half_height = 1;  // as Camera::half_height; orthographic: 0 = what the box takes
+  double half_height = 1;  // as Camera::half_height; orthographic: 0 = as the box needs
   double aspect = 1;       // width / height of the image
-  double margin = 1.05;    // the box takes 1 / margin of the picture
+  double margin = 1.05;    // ratio of the picture's size to the box's
 };
 
-// The direction of a view from above and from a side, at about 35 degrees: unit, for an `up` that is not zero. With z
-// up it looks along +x, +y and down.
+// Returns the unit direction of a view obliquely from above, about 35 degrees downward. `up` must not be zero. With z
+// up, the view is towards +x, +y and -z.
 Vec3d three_quarter_view(Vec3d up);
 
-// The camera of these axes and this lens that shows all of `bounds`, which is not empty, nearest to it. A box without
-// extent is seen from 1 away.
-// Method: in the view's axes each corner (x, y, depth z) wants |x - ex| <= w (z - ez). The largest x - w z and -x - w z
-// of all corners bound the eye from both sides: halfway between them it may stand nearest.
+// Returns the camera with these axes and this lens that is nearest to `bounds` and shows all of it. `bounds` must not
+// be empty. A box without extent is treated as a box of side 1. Method: in the view's axes each corner (x, y, depth z)
+// requires |x - ex| <= w (z - ez) of the eye (ex, ey, ez). The maxima of x - w z and of -x - w z over all corners bound
+// the eye from both sides; it can be nearest halfway between these bounds.
 Camera frame_box(const Aabbd& bounds, const ViewAxes& axes, const Lens& lens);
 
 }  // namespace locus::cli

@@ -21,7 +21,7 @@ Picture paint_each(const ImageSize& size, const ColourOfPixel& colour) {
   return picture;
 }
 
-// What the colours of a thing are made of, before light falls on it.
+// Returns the base colour of the object or instance at a pixel, before shading.
 Light material_of(const RayImage& image, size_t pixel) {
   const double hue = hue_of(image.ids[pixel]);
   return image.hit_object(pixel) ? light_of_hue(hue, 0.9, 0.95) : light_of_hue(hue, 0.08, 0.6);
@@ -54,15 +54,15 @@ class Shader {
     return colour_of(Light{0.012, 0.020, 0.040} * (1 - down) + Light{0.055, 0.075, 0.110} * down);
   }
 
-  // Distance takes a part of the light, so that near and far tell apart where they overlap.
+  // Returns the light attenuated by distance, so that near and far surfaces differ where they overlap in the picture.
   Light hazy(Light light, float t) const {
     const double range = depths_.max - depths_.min;
     const double haze = range > 0 ? kMaxHaze * (double{t} - depths_.min) / range : 0;
     return light * (1 - haze) + kHaze * haze;
   }
 
-  // A highlight: the 32nd power of the cosine between the normal and what lies halfway between lamp and eye (Blinn
-  // 1977).
+  // Returns the strength of the highlight: the 32nd power of the cosine between the normal and the half vector of lamp
+  // and eye. Source: Blinn, Models of Light Reflection for Computer Synthesized Pictures, 1977.
   double gloss(Vec3d normal, Vec3d view) const {
     const double cosine = std::max(0.0, dot(normal, normalized(lamp_ - view)));
     double power = cosine;
@@ -70,15 +70,16 @@ class Shader {
     return power;
   }
 
-  // How much light edges leave: where another thing or a bend of the surface begins behind this pixel.
+  // Returns the factor that darkens edges: below 1 if a neighbouring pixel shows another object behind this one, or a
+  // sharp bend of the surface.
   double edge(size_t pixel, uint32_t column, uint32_t row) const {
-    double left = 1;
+    double factor = 1;
     const uint32_t width = image_.size.width;
-    if (column > 0) left = std::min(left, step_to(pixel, pixel - 1));
-    if (column + 1 < width) left = std::min(left, step_to(pixel, pixel + 1));
-    if (row > 0) left = std::min(left, step_to(pixel, pixel - width));
-    if (row + 1 < image_.size.height) left = std::min(left, step_to(pixel, pixel + width));
-    return left;
+    if (column > 0) factor = std::min(factor, step_to(pixel, pixel - 1));
+    if (column + 1 < width) factor = std::min(factor, step_to(pixel, pixel + 1));
+    if (row > 0) factor = std::min(factor, step_to(pixel, pixel - width));
+    if (row + 1 < image_.size.height) factor = std::min(factor, step_to(pixel, pixel + width));
+    return factor;
   }
 
   double step_to(size_t pixel, size_t neighbour) const {
@@ -90,13 +91,13 @@ class Shader {
   const RayImage& image_;
   const Camera& camera_;
   const ValueScale depths_;
-  const Vec3d lamp_;  // the direction to it, unit
+  const Vec3d lamp_;  // unit direction to the lamp
 };
 
 double value_at(std::vector<double>& values, double share) {
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
+  const auto position = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), position, values.end());
+  return *position;
 }
 
 uint8_t signed_byte(float component) { return static_cast<uint8_t>(std::clamp(127.5f * (component + 1), 0.f, 255.f)); }

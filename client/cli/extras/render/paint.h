@@ -1,4 +1,5 @@
-// From what rays hit to pixels. For `locus render`. Functions without state, exact on every machine.
+// Painters: convert the hits of rays to pixels. For `locus render`. Functions without state, bit-identical on every
+// machine.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_PAINT_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_PAINT_H_
 
@@ -11,7 +12,7 @@
 
 namespace locus::cli {
 
-// What a value of a picture's colours stands for.
+// Range of the values that a picture's colours represent.
 struct ValueScale {
   double min = 0;
   double median = 0;
@@ -19,30 +20,31 @@ struct ValueScale {
   double max = 0;
 };
 
-// Of the values in any order; all 0 if there are none. Linear in their number.
+// Returns the scale of values in any order, all 0 for an empty vector. Linear.
 ValueScale scale_of(std::vector<double> values);
 
-// The depths of the pixels that hit something.
+// Returns the depths of the pixels that have a hit.
 std::vector<double> depths_of(const RayImage& image);
 
-// Lit from over the photographer's left shoulder, with dark edges and, far off, some haze. Instances are pale and
-// objects coloured, both by their ids. Two-sided: a triangle's back is lit as its front would be. Source of the
-// falloff: Mitchell, McTaggart and Green, Shading in Valve's Source Engine (2006).
+// Paints hits shaded by a lamp behind the camera, above and to its left, with dark edges and haze at a distance.
+// Instances are pale and objects coloured; the hue depends on the id. Shading is two-sided: a triangle's back is lit as
+// its front would be. Source of the falloff: Mitchell, McTaggart and Green, Shading in Valve's Source Engine, 2006.
 Picture paint_shaded(const RayImage& image, const Camera& camera);
 
-// The nearest bright, the furthest dark, in viridis; black = nothing hit.
+// Paints depths in viridis, the nearest bright and the furthest dark; black = no hit.
 Picture paint_depth(const RayImage& image, const ValueScale& scale);
 
-// A normal's x, y, z as red, green, blue, from -1 dark to 1 bright; dark grey = nothing hit.
+// Paints a normal's x, y, z as red, green, blue, from -1 dark to 1 bright; dark grey = no hit.
 Picture paint_normals(const RayImage& image);
 
-// A colour an id: objects bright, instances darker; black = nothing hit.
+// Paints each id in its own colour, objects bright and instances darker; black = no hit.
 Picture paint_ids(const RayImage& image);
 
-// One value a pixel in inferno, from scale.min black to scale.high bright.
+// Paints one value a pixel in inferno, from scale.min black to scale.high bright.
 Picture paint_heat(const ImageSize& size, const std::vector<double>& values, const ValueScale& scale);
 
-// Each `factor` x `factor` pixels averaged to one, by light. Both sides are multiples of `factor`.
+// Returns the picture reduced by `factor`: each square of `factor` x `factor` pixels is averaged in linear light. Both
+// sides must be multiples of `factor`.
 Picture reduced(const Picture& picture, uint32_t factor);
 
 }  // namespace locus::cli

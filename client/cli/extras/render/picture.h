@@ -1,4 +1,4 @@
-// A picture in memory, as a PNG file holds it. Plain data.
+// Picture in memory, in the pixel layout of a PNG file. Plain data.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_PICTURE_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_PICTURE_H_
 
@@ -9,7 +9,7 @@
 
 namespace locus::cli {
 
-// sRGB.
+// Colour of a pixel in sRGB.
 struct Colour {
   uint8_t red = 0, green = 0, blue = 0;
 

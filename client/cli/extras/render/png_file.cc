@@ -18,7 +18,7 @@ absl::Status cannot_write(const std::string& path) {
   return absl::FailedPreconditionError(absl::StrCat("cannot write ", path, ": check its folder, its rights and space"));
 }
 
-// The simplified interface of libpng (1.6), which reports by return value instead of longjmp.
+// Encodes the picture with the simplified interface of libpng 1.6, which returns errors instead of calling longjmp().
 absl::StatusOr<std::vector<char>> encode(const Picture& picture) {
   png_image image = {};
   image.version = PNG_IMAGE_VERSION;

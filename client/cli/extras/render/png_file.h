@@ -1,4 +1,4 @@
-// Writes pictures as PNG files. For `locus render`. Functions without state.
+// Writing of pictures as PNG files. For `locus render`. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_PNG_FILE_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_PNG_FILE_H_
 
@@ -9,10 +9,11 @@
 
 namespace locus::cli {
 
-// FAILED_PRECONDITION, in words, where a file of this name cannot be: to be asked before work is put into a picture.
+// Returns FAILED_PRECONDITION if the path does not end in .png, its folder does not exist, or it is a folder. Call it
+// before computing a picture.
 absl::Status check_png_path(const std::string& path);
 
-// 8 bits a colour, sRGB, replacing a file of that name. FAILED_PRECONDITION where it cannot be written.
+// Writes a PNG with 8 bits a channel, sRGB, and replaces an existing file. FAILED_PRECONDITION if it cannot be written.
 absl::Status write_png(const std::string& path, const Picture& picture);
 
 }  // namespace locus::cli

@@ -27,8 +27,8 @@ class Sha256 {
     return *this;
   }
   Sha256& add(const ImageSize& size) {
-    const std::array<uint32_t, 2> numbers = {size.width, size.height};
-    return add(numbers.data(), numbers.size());
+    const std::array<uint32_t, 2> sides = {size.width, size.height};
+    return add(sides.data(), sides.size());
   }
   std::string hex() {
     std::array<unsigned char, 32> hash{};

@@ -1,4 +1,4 @@
-// What the rays of a picture hit, in columns, one entry a pixel, row by row from the upper left. For the painters, and
+// Hits of a picture's rays, in columns with one entry a pixel, row by row from the upper left. For the painters, and
 // for tests that compare pictures. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_RAY_IMAGE_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_RAY_IMAGE_H_
@@ -12,7 +12,7 @@
 
 namespace locus::cli {
 
-// Of one ray.
+// Work of one ray: nodes and cells visited, primitives tested.
 struct RayWork {
   uint64_t nodes = 0;
   uint64_t cells = 0;
@@ -21,11 +21,11 @@ struct RayWork {
 
 struct RayImage {
   ImageSize size;
-  std::vector<float> t;             // depth, in world units; +infinity = nothing hit
-  std::vector<uint64_t> ids;        // 0 = nothing hit
-  std::vector<uint32_t> triangles;  // client::kNoTriangle = an object, or nothing hit
-  std::vector<Vec3f> normals;       // unit, world axes, as the server gives them; 0 = nothing hit
-  std::vector<RayWork> work;        // empty unless it was asked for
+  std::vector<float> t;             // depth, in world units; +infinity = no hit
+  std::vector<uint64_t> ids;        // 0 = no hit
+  std::vector<uint32_t> triangles;  // client::kNoTriangle = an object, or no hit
+  std::vector<Vec3f> normals;       // unit, world axes, as the server returns them; 0 = no hit
+  std::vector<RayWork> work;        // empty unless requested
 
   explicit RayImage(const ImageSize& image_size);
 
@@ -34,9 +34,11 @@ struct RayImage {
   uint64_t hits() const;
 };
 
-// SHA-256 in hexadecimal over, all little-endian: width and height as uint32, then t as float32 of each pixel.
+// Returns the SHA-256 in hexadecimal of, all little-endian, width and height as uint32, then t as float32 of each
+// pixel.
 std::string depth_sha256(const RayImage& image);
-// The same with the ids as uint64 of each pixel, then the triangles as uint32 of each pixel.
+// Returns the SHA-256 in hexadecimal of width and height as above, then the ids as uint64 of each pixel, then the
+// triangles as uint32 of each pixel.
 std::string ids_sha256(const RayImage& image);
 
 }  // namespace locus::cli

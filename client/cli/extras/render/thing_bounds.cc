@@ -13,11 +13,11 @@ namespace locus::cli {
 namespace {
 
 constexpr int kSections = 16;
-constexpr int kCuts = kSections - 1;  // of each side
-constexpr int kSides = 6;             // lower and upper of each axis: side = 2 axis + (1 if upper)
-constexpr int kMaxRounds = 16;        // sixteen to this power is beyond what doubles tell apart
-constexpr double kFlat = 1e-4;        // against the longest side
-constexpr double kWidening = 1e-6;    // for slabs are rounded to floats when they are sent
+constexpr int kCuts = kSections - 1;  // cuts of each side
+constexpr int kSides = 6;             // lower and upper side of each axis: side = 2 axis + (1 if upper)
+constexpr int kMaxRounds = 16;        // 16 to this power exceeds the resolution of doubles
+constexpr double kFlat = 1e-4;        // extent relative to the longest side below which a box is flat
+constexpr double kWidening = 1e-6;    // covers the rounding of slabs to float when they are sent
 
 absl::Status not_found(const std::string& scene, uint64_t id, absl::string_view why) {
   return absl::NotFoundError(absl::StrCat("scene ", scene, " has no object or instance ", id, why));
@@ -32,7 +32,7 @@ absl::Status check_there(const client::Client& client, const std::string& scene,
   return result.blocks(0).ids(0) == id ? absl::OkStatus() : not_found(scene, id, "");
 }
 
-// What lies beyond a cut, seen from the inside of the box: cut c of a side is c + 1 sixteenths into the box from there.
+// Returns the slab of the box between a side and one of its cuts. Cut c is (c + 1) / 16 of the extent from the side.
 Aabbd slab_of(const Aabbd& box, int side, int cut) {
   const int axis = side / 2;
   Aabbd slab = box;
@@ -45,8 +45,8 @@ Aabbd slab_of(const Aabbd& box, int side, int cut) {
   return slab;
 }
 
-// Which of the slabs of `box` the thing reaches into, side by side, cut by cut. Relative to the box's centre, so that
-// floats get finer with the box.
+// Returns for each slab of `box`, ordered by side and cut, whether the thing overlaps it. Slabs are sent relative to
+// the box's centre, so that float precision increases as the box shrinks.
 absl::StatusOr<std::vector<bool>> ask_slabs(const client::Client& client, const std::string& scene,
                                             const client::Revision& revision, uint64_t id, const Aabbd& box) {
   const Vec3d frame = (box.min + box.max) * 0.5;
@@ -78,11 +78,11 @@ absl::StatusOr<std::vector<bool>> ask_slabs(const client::Client& client, const 
 }
 
 Aabbd widened(const Aabbd& box) {
-  const double by = max_component(box.extent()) * kWidening;
-  return {box.min - Vec3d{by, by, by}, box.max + Vec3d{by, by, by}};
+  const double epsilon = max_component(box.extent()) * kWidening;
+  return {box.min - Vec3d{epsilon, epsilon, epsilon}, box.max + Vec3d{epsilon, epsilon, epsilon}};
 }
 
-// Each side moves in by the slabs that the thing does not reach into.
+// Returns the box with each side moved inward past the slabs that the thing does not overlap.
 Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   Aabbd result = box;
   for (int side = 0; side < kSides; ++side) {
@@ -96,8 +96,8 @@ Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   return widened(result);
 }
 
-// Whether a side came in by a slab. Axes along which the box is all but flat do not count: widening undoes what they
-// do.
+// Returns whether some side moved inward by a slab. Axes along which the box is nearly flat are ignored, since widening
+// cancels their progress.
 bool moved(const Aabbd& before, const Aabbd& after) {
   const Vec3d old_extent = before.extent(), new_extent = after.extent();
   for (int axis = 0; axis < 3; ++axis) {

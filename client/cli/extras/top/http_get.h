@@ -1,5 +1,5 @@
-// One page of an HTTP port, fetched within bounds. The only place that knows libcurl. Functions without state, for one
-// thread at a time.
+// HTTP GET of one page with a maximum size and a timeout. The only user of libcurl. A function without state, to be
+// called by one thread at a time.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TOP_HTTP_GET_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_TOP_HTTP_GET_H_
 
@@ -13,9 +13,9 @@ namespace locus::cli {
 
 inline constexpr size_t kMaxPageBytes = 16u << 20;
 
-// The body of http://`address``path`, `address` as host:port. Follows no redirection and asks no proxy. UNAVAILABLE
-// where nobody answers within `timeout`, FAILED_PRECONDITION for an answer other than 200, RESOURCE_EXHAUSTED for one
-// beyond kMaxPageBytes, INVALID_ARGUMENT for an address that is none.
+// Returns the body of http://`address``path`, with `address` as host:port. Follows no redirection and uses no proxy.
+// UNAVAILABLE if there is no answer within `timeout`, FAILED_PRECONDITION for a status other than 200,
+// RESOURCE_EXHAUSTED for a body beyond kMaxPageBytes, INVALID_ARGUMENT for a malformed address.
 absl::StatusOr<std::string> http_get(const std::string& address, const std::string& path,
                                      std::chrono::milliseconds timeout);
 

@@ -12,7 +12,7 @@ bool is_name(char c, bool first) {
   return absl::ascii_isalpha(c) || c == '_' || c == ':' || (!first && absl::ascii_isdigit(c));
 }
 
-// Takes one line apart from its front; what could not be taken stays.
+// Reader of one line: each member consumes a token at the front of the line if it is present.
 class Line {
  public:
   explicit Line(absl::string_view text) : rest_(text) {}
@@ -33,7 +33,7 @@ class Line {
 
   void skip_spaces() { rest_ = absl::StripLeadingAsciiWhitespace(rest_); }
 
-  // Up to the closing quote, which is taken too.
+  // Consumes a quoted string including both quotes and appends its unescaped text to `value`.
   bool quoted(std::string* value) {
     if (!take('"')) return false;
     while (!rest_.empty()) {
@@ -69,7 +69,7 @@ bool read_labels(Line& line, MetricSample* sample) {
   return true;
 }
 
-// A value, and perhaps a time in milliseconds.
+// Reads a value, optionally followed by a timestamp in milliseconds.
 bool read_value(absl::string_view text, double* value) {
   const std::vector<absl::string_view> words = absl::StrSplit(text, absl::ByAnyChar(" \t"), absl::SkipEmpty());
   if (words.empty() || words.size() > 2 || !absl::SimpleAtod(words[0], value)) return false;
@@ -99,20 +99,20 @@ absl::string_view MetricSample::label(absl::string_view key) const {
 
 absl::StatusOr<std::vector<MetricSample>> parse_metrics(absl::string_view text) {
   std::vector<MetricSample> samples;
-  size_t number = 0;
+  size_t line_number = 0;
   for (absl::string_view line : absl::StrSplit(text, '\n')) {
-    ++number;
+    ++line_number;
     if (line.size() > kMaxMetricLineBytes)
       return absl::ResourceExhaustedError(
-          absl::StrCat("line ", number, " of the metrics is longer than ", kMaxMetricLineBytes, " bytes"));
+          absl::StrCat("line ", line_number, " of the metrics is longer than ", kMaxMetricLineBytes, " bytes"));
     line = absl::StripAsciiWhitespace(line);
     if (line.empty() || line.front() == '#') continue;
     if (samples.size() == kMaxMetricSamples)
       return absl::ResourceExhaustedError(absl::StrCat("more than ", kMaxMetricSamples, " metrics"));
     MetricSample sample;
     if (!read_sample(line, &sample))
-      return absl::InvalidArgumentError(
-          absl::StrCat("line ", number, " is no metric in Prometheus's text format; is it the HTTP port of locusd?"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "line ", line_number, " is no metric in Prometheus's text format; is it the HTTP port of locusd?"));
     samples.push_back(std::move(sample));
   }
   return samples;

@@ -1,4 +1,4 @@
-// Prometheus's text format as plain data. The text comes from whoever listens at an address, so everything is checked
+// Parser of Prometheus's text format into plain data. The text comes from an untrusted server, so everything is checked
 // and bounded. Functions without state.
 //
 // Source: Prometheus documentation, "Exposition formats", text-based format version 0.0.4.
@@ -17,19 +17,19 @@ namespace locus::cli {
 
 inline constexpr size_t kMaxMetricSamples = 200'000;
 inline constexpr size_t kMaxMetricLineBytes = 4096;
-inline constexpr size_t kMaxMetricLabels = 16;  // of one sample
+inline constexpr size_t kMaxMetricLabels = 16;  // labels of one sample
 
 struct MetricSample {
   std::string name;
   std::vector<std::pair<std::string, std::string>> labels;
   double value = 0;
 
-  // Empty where there is no such label.
+  // Returns the value of a label, or an empty string if the sample does not have it.
   absl::string_view label(absl::string_view key) const;
 };
 
-// Every sample, in order; comments and times are passed over. INVALID_ARGUMENT naming the line where one is not of the
-// format, RESOURCE_EXHAUSTED for more than the maxima above.
+// Returns every sample, in order; comments and timestamps are ignored. INVALID_ARGUMENT naming the line if the text is
+// not in the format, RESOURCE_EXHAUSTED if it exceeds the maxima above.
 absl::StatusOr<std::vector<MetricSample>> parse_metrics(absl::string_view text);
 
 }  // namespace locus::cli

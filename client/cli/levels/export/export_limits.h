@@ -1,4 +1,4 @@
-// The maxima of the exporter. Every refusal for size names one of them. Constants only.
+// Maxima of the exporter. Every error for size names one of them. Constants only.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_EXPORT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_EXPORT_LIMITS_H_
 
@@ -7,11 +7,11 @@
 
 namespace locus::cli {
 
-// A capsule takes four nodes, everything else one.
+// Maximum number of nodes in a file. A capsule needs four nodes, any other object or instance one.
 inline constexpr size_t kMaxExportNodes = size_t{1} << 20;
-// The format counts its bytes in 32 bits.
+// Maximum size of a file: the format stores sizes in 32 bits.
 inline constexpr uint64_t kMaxExportBytes = UINT32_MAX;
-// A mesh of more parts is written as one.
+// Maximum number of parts of a mesh. A mesh with more is written as a single part.
 inline constexpr size_t kMaxExportParts = 4096;
 
 }  // namespace locus::cli

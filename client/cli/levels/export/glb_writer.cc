@@ -16,7 +16,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "columns are written as they lie in memory");
 
-// Numbers of the specification.
+// Constants of the specification.
 constexpr uint32_t kMagic = 0x46546C67;
 constexpr uint32_t kVersion = 2;
 constexpr uint32_t kJsonChunk = 0x4E4F534A;
@@ -42,7 +42,8 @@ Json place_json(const std::string& name, const GlbPlace& place) {
   return node;
 }
 
-// Bright, and the same for the same name wherever it is written (Fowler, Noll, Vo: FNV-1a).
+// Returns a bright colour that depends only on `name`, so that a name has one colour in all files. Method: the bytes of
+// a Fowler, Noll, Vo hash (FNV-1a).
 Json colour_of(const std::string& name) {
   uint32_t hash = 2166136261u;
   for (const char byte : name) hash = (hash ^ static_cast<uint8_t>(byte)) * 16777619u;
@@ -52,12 +53,12 @@ Json colour_of(const std::string& name) {
   return colour;
 }
 
-void put(std::ostream& out, uint32_t number) { out.write(reinterpret_cast<const char*>(&number), sizeof number); }
+void put(std::ostream& out, uint32_t value) { out.write(reinterpret_cast<const char*>(&value), sizeof value); }
 
 }  // namespace
 
 GlbWriter::GlbWriter(const std::string& root_name, UpAxis up) : root_({{"name", root_name}}) {
-  // Column by column: x stays, y goes to -z, z goes to y.
+  // The matrix is stored by columns. It keeps x, turns y to -z and z to y.
   if (up == UpAxis::kZ) root_["matrix"] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
 }
 
@@ -94,9 +95,9 @@ Json GlbWriter::add_primitive(const ImportedMesh& mesh, size_t first_index, size
   low.fill(std::numeric_limits<float>::infinity());
   high.fill(-std::numeric_limits<float>::infinity());
   for (size_t i = first_index; i < end_index; ++i) {
-    uint32_t& number = renumbered_[mesh.indices[i]];
-    if (number == kNoVertex) {
-      number = static_cast<uint32_t>(used.size());
+    uint32_t& local_index = renumbered_[mesh.indices[i]];
+    if (local_index == kNoVertex) {
+      local_index = static_cast<uint32_t>(used.size());
       used.push_back(mesh.indices[i]);
       for (size_t axis = 0; axis < 3; ++axis) {
         const float coordinate = mesh.vertices[size_t{3} * mesh.indices[i] + axis];
@@ -105,7 +106,7 @@ Json GlbWriter::add_primitive(const ImportedMesh& mesh, size_t first_index, size
         high[axis] = std::max(high[axis], coordinate);
       }
     }
-    indices.push_back(number);
+    indices.push_back(local_index);
   }
   for (const uint32_t vertex : used) renumbered_[vertex] = kNoVertex;
   const size_t vertex_view = add_view(vertices.data(), vertices.size() * sizeof(float), kVertexTarget);
@@ -123,8 +124,8 @@ Json GlbWriter::add_primitive(const ImportedMesh& mesh, size_t first_index, size
           {"material", material(material_name)}};
 }
 
-absl::Status GlbWriter::set_mesh(size_t number, const ImportedMesh& mesh) {
-  // What it takes at least, before anything is copied; vertices that parts share come on top.
+absl::Status GlbWriter::set_mesh(size_t mesh_index, const ImportedMesh& mesh) {
+  // Lower bound of the file's size, checked before copying: vertices that several parts share are copied for each part.
   const uint64_t bytes = bytes_.size() + (mesh.vertices.size() + mesh.indices.size()) * sizeof(float) + kFrameBytes;
   if (bytes > kMaxExportBytes) return too_large(bytes);
   renumbered_.assign(mesh.vertices.size() / 3, kNoVertex);
@@ -136,7 +137,7 @@ absl::Status GlbWriter::set_mesh(size_t number, const ImportedMesh& mesh) {
     const size_t end = part + 1 < parts.size() ? size_t{3} * parts[part + 1].first_triangle : mesh.indices.size();
     primitives.push_back(add_primitive(mesh, first, end, parts[part].name));
   }
-  meshes_[number] = {{"name", mesh.name}, {"primitives", std::move(primitives)}};
+  meshes_[mesh_index] = {{"name", mesh.name}, {"primitives", std::move(primitives)}};
   if (bytes_.size() + kFrameBytes > kMaxExportBytes) return too_large(bytes_.size() + kFrameBytes);
   return absl::OkStatus();
 }
@@ -202,9 +203,9 @@ absl::StatusOr<uint64_t> GlbWriter::write(const std::string& path) const {
   if (bytes > kMaxExportBytes) return too_large(bytes);
   const std::string unfinished = path + ".unfinished";
   std::ofstream out(unfinished, std::ios::binary | std::ios::trunc);
-  for (const uint32_t number :
+  for (const uint32_t word :
        {kMagic, kVersion, static_cast<uint32_t>(bytes), static_cast<uint32_t>(text.size()), kJsonChunk})
-    put(out, number);
+    put(out, word);
   out << text;
   put(out, static_cast<uint32_t>(bytes_.size()));
   put(out, kBinaryChunk);

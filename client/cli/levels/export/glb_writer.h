@@ -1,8 +1,8 @@
-// A glTF 2.0 scene in its binary form (GLB), collected in memory and written at once. For the exporter. Source: Khronos
-// Group, glTF 2.0 Specification, 2021 (ISO/IEC 12113:2022). One writer, one file, one thread.
+// Writer of a glTF 2.0 scene in its binary form (GLB), collected in memory and written at once. For the exporter.
+// Source: Khronos Group, glTF 2.0 Specification, 2021 (ISO/IEC 12113:2022). One writer, one file, one thread.
 //
-// The library that reads such files for the importer also writes them, but not what it was given: it drops transforms
-// within 0.01 of the identity, merges vertices nearer than 1e-5, and takes 400 bytes a triangle (assimp 5.2.5).
+// assimp 5.2.5, which reads such files for the importer, can also write them, but it alters the scene: it drops
+// transforms within 0.01 of the identity and merges vertices nearer than 1e-5. It also needs 400 bytes a triangle.
 //
 // Invariants: every accessor lies within the one buffer; node 0 is the root and holds every other top-level node.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_GLB_WRITER_H_
@@ -22,41 +22,43 @@
 
 namespace locus::cli {
 
-// A node's place within its parent: scaled, then rotated, then moved.
+// Transform of a node relative to its parent: scale, then rotation (quaternion x, y, z, w), then translation.
 struct GlbPlace {
   std::array<float, 3> translation{};
   std::array<float, 4> rotation{0, 0, 0, 1};
   std::array<float, 3> scale{1, 1, 1};
 };
 
-// Which way is up in the coordinates that come in. The file's own is y.
+// Upward axis of the scene's coordinates. glTF files are y up.
 enum class UpAxis { kY, kZ };
 
 class GlbWriter {
  public:
   explicit GlbWriter(const std::string& root_name, UpAxis up);
 
-  // The number of a mesh that set_mesh() will fill.
+  // Returns the index of a new mesh. set_mesh() must fill it before write().
   size_t reserve_mesh();
-  // Copies the mesh, each part with its own vertices and a material of its name; unused vertices are left out.
-  // RESOURCE_EXHAUSTED if the file would pass kMaxExportBytes.
-  absl::Status set_mesh(size_t number, const ImportedMesh& mesh);
+  // Copies the mesh to a reserved index. Each part gets its own vertices and a material of the part's name; unused
+  // vertices are left out. RESOURCE_EXHAUSTED if the file would exceed kMaxExportBytes.
+  absl::Status set_mesh(size_t mesh_index, const ImportedMesh& mesh);
 
-  // A node that draws a mesh under the root. `extras` are facts that editors show beside it. RESOURCE_EXHAUSTED beyond
-  // kMaxExportNodes.
+  // Adds a node under the root that draws the mesh of index `mesh`. `extras` are properties that editors show with the
+  // node. RESOURCE_EXHAUSTED beyond kMaxExportNodes.
   absl::Status add_node(const std::string& name, const GlbPlace& place, size_t mesh, const Json& extras);
-  // A node that holds several drawings of meshes, placed within it.
+  // Mesh drawn within a group; `place` is relative to the group.
   struct Child {
     size_t mesh = 0;
     GlbPlace place;
   };
+  // Adds a node under the root with one child node for each of `children`. Errors as add_node().
   absl::Status add_group(const std::string& name, const GlbPlace& place, const std::vector<Child>& children,
                          const Json& extras);
 
   size_t node_count() const { return node_count_; }
 
-  // Writes beside the path and renames, so that a file of that name is whole. Every reserved mesh is set.
-  // FAILED_PRECONDITION if the path cannot be written, RESOURCE_EXHAUSTED as above. The file's size in bytes.
+  // Writes a temporary file next to `path` and renames it, so that `path` is never a partial file. Requires that every
+  // reserved mesh is set. Returns the file's size in bytes. FAILED_PRECONDITION if the path cannot be written,
+  // RESOURCE_EXHAUSTED as above.
   absl::StatusOr<uint64_t> write(const std::string& path) const;
 
  private:
@@ -68,16 +70,16 @@ class GlbWriter {
   std::string json() const;
 
   Json root_;
-  std::string nodes_;  // the texts of all nodes but the root, each after a comma
+  std::string nodes_;  // JSON of all nodes except the root, each preceded by a comma
   size_t node_count_ = 1;
-  std::vector<size_t> top_;  // numbers of the root's children
+  std::vector<size_t> top_;  // node indices of the root's children
   std::vector<Json> meshes_;
   Json accessors_ = Json::array();
   Json views_ = Json::array();
   Json materials_ = Json::array();
   std::map<std::string, size_t> material_numbers_;
-  std::string bytes_;                 // the buffer
-  std::vector<uint32_t> renumbered_;  // of the mesh in hand: a vertex's number within the part in hand
+  std::string bytes_;                 // binary buffer
+  std::vector<uint32_t> renumbered_;  // index within the current part of each vertex of the current mesh, or kNoVertex
 };
 
 }  // namespace locus::cli

@@ -23,13 +23,13 @@ Json facts_of(const SceneThing& thing) {
 
 std::string object_name(const SceneThing& thing) { return absl::StrCat("object ", thing.id); }
 
-// The shortest rotation that takes +z to `axis`, which is not zero.
+// Returns the shortest rotation from +z to `axis`, whose length is `length`, not 0.
 std::array<float, 4> rotation_to(const std::array<float, 3>& axis, double length) {
   const double x = axis[0] / length;
   const double y = axis[1] / length;
   const double w = 1 + axis[2] / length;
   const double norm = std::sqrt(x * x + y * y + w * w);
-  if (norm < 1e-6) return {1, 0, 0, 0};  // straight down: any half turn about a level axis
+  if (norm < 1e-6) return {1, 0, 0, 0};  // axis is -z: a half turn about any horizontal axis
   return {static_cast<float>(-y / norm), static_cast<float>(x / norm), 0, static_cast<float>(w / norm)};
 }
 
@@ -37,15 +37,15 @@ std::array<float, 4> rotation_to(const std::array<float, 3>& axis, double length
 
 std::array<double, 3> recentre_of(const std::array<double, 3>& min, const std::array<double, 3>& max) {
   constexpr double kFar = 8;
-  std::array<double, 3> middle{};
+  std::array<double, 3> centre{};
   double distance = 0;
   double longest = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
-    middle[axis] = std::round((min[axis] + max[axis]) / 2);
-    distance = std::max(distance, std::abs(middle[axis]));
+    centre[axis] = std::round((min[axis] + max[axis]) / 2);
+    distance = std::max(distance, std::abs(centre[axis]));
     longest = std::max(longest, max[axis] - min[axis]);
   }
-  return distance > kFar * longest ? middle : std::array<double, 3>{};
+  return distance > kFar * longest ? centre : std::array<double, 3>{};
 }
 
 GlbPlace SceneExport::place_of(const SceneThing& thing) const {
@@ -58,8 +58,8 @@ GlbPlace SceneExport::place_of(const SceneThing& thing) const {
 }
 
 absl::StatusOr<size_t> SceneExport::shape_mesh(Part part) {
-  std::optional<size_t>& number = shape_meshes_[static_cast<size_t>(part)];
-  if (number) return *number;
+  std::optional<size_t>& mesh_index = shape_meshes_[static_cast<size_t>(part)];
+  if (mesh_index) return *mesh_index;
   ImportedMesh mesh;
   switch (part) {
     case Part::kMarker:
@@ -80,9 +80,9 @@ absl::StatusOr<size_t> SceneExport::shape_mesh(Part part) {
       break;
   }
   mesh.parts = {{"objects", 0}};
-  number = writer_.reserve_mesh();
-  RETURN_IF_ERROR(writer_.set_mesh(*number, mesh));
-  return *number;
+  mesh_index = writer_.reserve_mesh();
+  RETURN_IF_ERROR(writer_.set_mesh(*mesh_index, mesh));
+  return *mesh_index;
 }
 
 absl::Status SceneExport::add_shape(const SceneThing& thing, Part part, const std::array<float, 3>& scale) {
@@ -92,7 +92,7 @@ absl::Status SceneExport::add_shape(const SceneThing& thing, Part part, const st
   return writer_.add_node(object_name(thing), place, mesh, facts_of(thing));
 }
 
-// A side and two ends, since no scale of one mesh fits capsules of all proportions.
+// Adds a tube and two domes, since scaling one mesh cannot give capsules of all proportions.
 absl::Status SceneExport::add_capsule(const SceneThing& thing) {
   const std::array<float, 3>& axis = thing.size;
   const double length = std::sqrt(double{axis[0]} * axis[0] + double{axis[1]} * axis[1] + double{axis[2]} * axis[2]);

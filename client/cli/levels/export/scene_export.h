@@ -1,8 +1,8 @@
-// From the things of a scene to the nodes and meshes of a GLB file. For the export command. One exporter, one file, one
-// thread.
+// Conversion of a scene's objects and instances ("things") to nodes and meshes of a GLB file. For the export command.
+// One exporter, one file, one thread.
 //
-// Instances draw their mesh, which is written once; objects draw the unit shape of their kind, scaled. A size of 0 is
-// drawn as kMinDrawnSize, since editors cannot work with things that have none.
+// An instance draws its mesh, which is written once. An object draws the unit shape of its kind, scaled. A size of 0 is
+// drawn as kMinDrawnSize, since editors cannot handle a scale of 0.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 
@@ -19,11 +19,12 @@
 namespace locus::cli {
 
 inline constexpr float kMinDrawnSize = 1e-6f;
-// Half the size of the mark that stands for a point.
+// Half extent of the marker that is drawn for a point.
 inline constexpr float kPointMarkSize = 0.05f;
 
-// The translation to take away from every position before it is rounded to float: the middle of the bounds in whole
-// units if that is further from the origin than 8 times their longest side, as for imports, else zero.
+// Returns the translation to subtract from every position before it is rounded to float. It is the centre of the
+// bounds, rounded to whole units, if the centre is further from the origin than 8 times the longest side (as for
+// imports), else zero.
 std::array<double, 3> recentre_of(const std::array<double, 3>& min, const std::array<double, 3>& max);
 
 class SceneExport {
@@ -31,13 +32,13 @@ class SceneExport {
   SceneExport(const std::string& name, UpAxis up, const std::array<double, 3>& recentre)
       : writer_(name, up), recentre_(recentre) {}
 
-  // Nodes are named `object 7` and `instance 3 (mesh)` and carry id, group, tag and layers. RESOURCE_EXHAUSTED beyond
-  // kMaxExportNodes.
+  // Adds the node of an object or instance, named `object 7` or `instance 3 (mesh)`, with its id, group, tag and layers
+  // as extras. RESOURCE_EXHAUSTED beyond kMaxExportNodes.
   absl::Status add(const SceneThing& thing);
 
-  // Names of the meshes that instances so far draw, in the order of their first use.
+  // Returns the names of the meshes that the added instances draw, in order of first use.
   const std::vector<std::string>& meshes() const { return mesh_names_; }
-  // Gives one of them its triangles. Errors as GlbWriter::set_mesh().
+  // Sets the triangles of a mesh in meshes(). Errors as GlbWriter::set_mesh().
   absl::Status set_mesh(const std::string& name, const ImportedMesh& mesh);
 
   size_t things() const { return things_; }

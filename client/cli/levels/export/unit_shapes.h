@@ -1,5 +1,5 @@
-// The shapes of objects at unit size, as meshes: written once and drawn by every object of the kind, scaled. Closed
-// together and counter-clockwise seen from outside. Functions without state.
+// Meshes of the object shapes at unit size. Each is written once and drawn, scaled, by every object of its kind. The
+// meshes of one shape together are closed; triangles are counter-clockwise seen from outside. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_UNIT_SHAPES_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_UNIT_SHAPES_H_
 
@@ -7,18 +7,18 @@
 
 namespace locus::cli {
 
-// Corners of a circle that a curved shape is cut into; all corners lie on the shape.
+// Number of vertices of the polygon that replaces a circle; all vertices lie on the shape.
 inline constexpr int kShapeSectors = 16;
 
-// Radius 1; poles on the z axis.
+// Returns a ball of radius 1 with its poles on the z axis.
 ImportedMesh unit_ball();
-// The half of the ball with z >= 0, open below.
+// Returns the half of the unit ball with z >= 0, open below.
 ImportedMesh unit_dome();
-// Radius 1, z from -1 to 1, open at both ends.
+// Returns a tube of radius 1 around the z axis, z from -1 to 1, open at both ends.
 ImportedMesh unit_tube();
-// Half extents 1.
+// Returns a box of half extents 1.
 ImportedMesh unit_box();
-// An octahedron of radius 1, for a thing without a size.
+// Returns an octahedron of radius 1, the marker of a point.
 ImportedMesh unit_marker();
 
 }  // namespace locus::cli

@@ -12,11 +12,12 @@ namespace {
 
 constexpr double kRadius = (kMinBlobRadius + kMaxBlobRadius) * 0.5;
 constexpr double kDent = (kMaxBlobRadius - kMinBlobRadius) * 0.5;
-constexpr double kDentDistance = 0.5;  // as a share of the radius
+constexpr double kDentDistance = 0.5;  // wavelength of the noise, relative to the radius
 constexpr int kOctaves = 4;
 
-// The octahedron's vertices are the whole points with |x| + |y| + |z| = f, numbered ring by ring from z = -f to z = f.
-// A ring at height z has 4 k points, k = f - |z|, counter-clockwise from +x; the two poles are rings of one.
+// Vertex numbering of a subdivided octahedron. Its vertices are the integer points with |x| + |y| + |z| = f, numbered
+// ring by ring from z = -f to z = f. The ring at height z has 4 k points, k = f - |z|, counter-clockwise from +x. The
+// two poles are rings of one point.
 class Octahedron {
  public:
   explicit Octahedron(int64_t frequency) : f_(frequency) {}
@@ -24,7 +25,8 @@ class Octahedron {
   int64_t frequency() const { return f_; }
   int64_t ring_size(int64_t z) const { return std::max<int64_t>(4 * (f_ - std::abs(z)), 1); }
 
-  // The vertex that stands `step` steps into side `side` of the ring at z; a side ends where the next begins.
+  // Returns the index of the vertex `step` steps along side `side` of the ring at z. The last vertex of a side is the
+  // first of the next side.
   uint32_t vertex(int64_t z, int64_t side, int64_t step) const {
     const int64_t k = f_ - std::abs(z);
     return static_cast<uint32_t>(first_of_ring(z) + (k == 0 ? 0 : (side * k + step) % (4 * k)));
@@ -64,7 +66,7 @@ void append_vertex(const std::array<double, 3>& lattice, uint64_t seed, Imported
   for (const double part : direction) mesh.vertices.push_back(static_cast<float>(part * radius));
 }
 
-// The strip of triangles between one side of the ring at z and the ring above it.
+// Appends the strip of triangles between one side of the ring at z and the ring above it.
 void append_strip(const Octahedron& octahedron, int64_t z, int64_t side, ImportedMesh& mesh) {
   const int64_t low = octahedron.frequency() - std::abs(z);
   const int64_t high = octahedron.frequency() - std::abs(z + 1);

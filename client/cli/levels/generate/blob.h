@@ -1,5 +1,5 @@
-// A made-up closed body, for trying the server with a thing that has an inside and for tests that look for leaks. A
-// function without state.
+// Generator of a closed body, for trying the server with a mesh that has an inside and for tests that rays do not leak
+// through edges. A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_BLOB_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_BLOB_H_
 
@@ -11,16 +11,17 @@ namespace locus::cli {
 
 inline constexpr uint64_t kMinBlobTriangles = 8;
 inline constexpr uint64_t kMaxBlobTriangles = uint64_t{1} << 27;
-// Every vertex is between these far from the origin.
+// Bounds of the distance of every vertex from the origin.
 inline constexpr double kMinBlobRadius = 6;
 inline constexpr double kMaxBlobRadius = 14;
 
-// An octahedron whose edges are cut into f pieces, blown up to a sphere and dented by fractal noise (gradient_noise.h):
-// 8 f^2 triangles over 4 f^2 + 2 vertices, f the largest that keeps to `triangles`. Closed without seams: every vertex
-// stands once, every edge belongs to two triangles and runs both ways. Counter-clockwise seen from outside, and star
-// shaped: each ray from the origin leaves through one place. Metres. None of the triangles is without area. Counts
-// outside the minimum and maximum are moved to them. One part: "blob". The same arguments give the same bytes on every
-// machine. Cost: linear, about a microsecond a vertex and 18 bytes a triangle.
+// Returns an octahedron whose edges are divided into f segments, projected to a sphere and displaced by fractal noise
+// (gradient_noise.h). It has 8 f^2 triangles and 4 f^2 + 2 vertices; f is the largest that gives at most `triangles`.
+// `triangles` is clamped to the minimum and maximum above. The mesh is closed without seams: no vertex is duplicated,
+// and every edge belongs to two triangles that traverse it in opposite directions. It is counter-clockwise seen from
+// outside and star-shaped: each ray from the origin crosses the surface once. Units are metres. No triangle has zero
+// area. One part: "blob". Equal arguments give equal bytes on every machine. Cost: linear, about a microsecond a vertex
+// and 18 bytes a triangle.
 ImportedMesh generate_blob(uint64_t triangles, uint64_t seed);
 
 }  // namespace locus::cli

@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint64_t kBoxTriangles = 12;
 
-// All lengths are counted in half metres, which keeps the city on its lattice by construction.
+// All lengths are integers in half metres, so that every coordinate lies on the lattice.
 constexpr int64_t kLotPitch = 48;      // lot and street together
 constexpr int64_t kMinWidth = 10;      // of a building
 constexpr int64_t kWidthChoices = 27;  // so the widest leaves a street of 12
@@ -25,7 +25,7 @@ struct Box {
 };
 
 void append_box(const Box& box, ImportedMesh& mesh) {
-  // Corner number: bit 0 chooses x, bit 1 y, bit 2 z.
+  // Bits of a corner's index: bit 0 selects the side in x, bit 1 in y, bit 2 in z.
   constexpr std::array<uint8_t, 36> kCorners = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
                                                 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
   const auto first = static_cast<uint32_t>(mesh.vertices.size() / 3);
@@ -38,7 +38,7 @@ void append_box(const Box& box, ImportedMesh& mesh) {
   for (uint8_t corner : kCorners) mesh.indices.push_back(first + corner);
 }
 
-// How many boxes stand on each lot, `boxes` in all.
+// Returns the number of boxes on each lot; their sum is `boxes`.
 std::vector<uint8_t> plan_lots(uint64_t boxes, SplitMix64& random) {
   std::vector<uint8_t> lots;
   while (boxes > 0) {
@@ -50,7 +50,8 @@ std::vector<uint8_t> plan_lots(uint64_t boxes, SplitMix64& random) {
   return lots;
 }
 
-// A building in the lot whose low corner is given; every step but the first is inset on all sides.
+// Appends a building of `steps` boxes to the lot with minimum corner `lot`. Each box but the first is inset on all
+// sides.
 void append_building(std::array<int64_t, 2> lot, uint8_t steps, SplitMix64& random, ImportedMesh& mesh) {
   Box box;
   for (size_t axis = 0; axis < 2; ++axis) {
@@ -95,8 +96,8 @@ ImportedMesh generate_city(uint64_t triangles, uint64_t seed) {
   append_box({{-half, -half, -kGroundDepth}, {half, half, 0}}, mesh);
   if (!lots.empty()) mesh.parts.push_back({"buildings", static_cast<uint32_t>(kBoxTriangles)});
   for (size_t i = 0; i < lots.size(); ++i) {
-    const auto number = static_cast<int64_t>(i);
-    append_building({number % side * kLotPitch - half, number / side * kLotPitch - half}, lots[i], random, mesh);
+    const auto index = static_cast<int64_t>(i);
+    append_building({index % side * kLotPitch - half, index / side * kLotPitch - half}, lots[i], random, mesh);
   }
   return mesh;
 }

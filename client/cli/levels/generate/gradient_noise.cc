@@ -15,7 +15,8 @@ uint64_t hash(const Cell& corner, uint64_t seed) {
   return value;
 }
 
-// One of the directions from a cube's centre to its twelve edges, times the offset.
+// Returns the dot product of `offset` and a gradient that `hash` selects among the directions from a cube's centre to
+// the midpoints of its twelve edges.
 double slope(uint64_t hash, const std::array<double, 3>& offset) {
   const uint64_t edge = (hash >> 32) * 12 >> 32;
   const uint64_t axis = edge / 4;

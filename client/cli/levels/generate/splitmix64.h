@@ -1,5 +1,5 @@
-// A small deterministic random number generator, the same on every machine. For generators and tests; not for secrets.
-// One object, one thread.
+// Small deterministic random number generator with equal results on every machine. For generators and tests; not
+// cryptographic. One object, one thread.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_SPLITMIX64_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_SPLITMIX64_H_
 
@@ -7,13 +7,13 @@
 
 namespace locus::cli {
 
-// Source: Steele, Lea, Flood, Fast Splittable Pseudorandom Number Generators, 2014 (the mixing of Java's
-// SplittableRandom). Every seed is good, and seeds that differ by one give unrelated streams.
+// SplitMix64 generator. Every seed is suitable; seeds that differ by one give unrelated streams. Source: Steele, Lea,
+// Flood, Fast Splittable Pseudorandom Number Generators, 2014 (the mixing of Java's SplittableRandom).
 class SplitMix64 {
  public:
   explicit constexpr SplitMix64(uint64_t seed) : state_(seed) {}
 
-  // Uniform over all 64-bit numbers.
+  // Returns a uniformly distributed 64-bit integer.
   constexpr uint64_t next() {
     state_ += 0x9E3779B97F4A7C15u;
     uint64_t z = state_;
@@ -22,10 +22,10 @@ class SplitMix64 {
     return z ^ (z >> 31);
   }
 
-  // Uniform over 0 ... bound - 1, up to a bias below bound / 2^32. bound must not be 0.
+  // Returns an integer uniform over 0 ... bound - 1, with a bias below bound / 2^32. `bound` must not be 0.
   constexpr uint32_t below(uint32_t bound) { return static_cast<uint32_t>(((next() >> 32) * bound) >> 32); }
 
-  // Uniform over 0 <= x < 1, in steps of 2^-53.
+  // Returns a number uniform over 0 <= x < 1, a multiple of 2^-53.
   constexpr double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
 
  private:

@@ -9,7 +9,7 @@ namespace locus::cli {
 namespace {
 
 constexpr double kHillDistance = 256;
-constexpr int kOctaves = 7;  // the finest is 4 m long
+constexpr int kOctaves = 7;  // the shortest wavelength is 4 m
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Square roots of whole numbers, for generators that turn a number of triangles into a number of rows. A function
-// without state.
+// Integer square root, for generators that derive a number of rows from a number of triangles. A function without
+// state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_WHOLE_ROOT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_WHOLE_ROOT_H_
 
@@ -7,7 +7,7 @@
 
 namespace locus::cli {
 
-// The largest r with r * r <= n, for n up to 2^62.
+// Returns the largest r with r * r <= n. n is at most 2^62.
 constexpr uint64_t whole_root(uint64_t n) {
   uint64_t root = 0;
   for (uint64_t bit = uint64_t{1} << 31; bit != 0; bit >>= 1)

@@ -1,5 +1,5 @@
-// The one door of this room: a path in, meshes ready for upload out. For the import command. Functions without state;
-// any number of threads may import at once.
+// Entry point of the importers: reads a file into meshes that are ready for upload. For the import command. Functions
+// without state; any number of threads may import at once.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
 
@@ -19,14 +19,14 @@ struct ImportOptions {
   double scale = 1;
 };
 
-// Reads OBJ, PLY, STL, glTF, GLB, BSP (Quake 3) or PK3, chosen by the file's extension in any case.
-// Node transforms and the scale are baked into the vertices, polygons are cut into triangles, equal vertices are
-// shared, axes are kept as the file has them. Triangles keep the file's order and zero-area ones stay. A file whose
-// bounding box is far from the origin (its centre further than 8 times its longest side) is recentred: every mesh is
-// moved by one shared translation in double before rounding to float, and `recentre` undoes it. Errors: NOT_FOUND (no
-// such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty file, bad option), RESOURCE_EXHAUSTED (a limit
-// of import_limits.h). Each says what to do next. Cost: the file is read once and held in memory, with about 60 bytes
-// for each vertex in it.
+// Reads OBJ, PLY, STL, glTF, GLB, BSP (Quake 3) or PK3, chosen by the file's extension (case-insensitive). Node
+// transforms and the scale are baked into the vertices, polygons are triangulated, equal vertices are merged, axes are
+// kept as in the file. Triangles keep the file's order, and zero-area triangles are kept. A file whose bounding box is
+// far from the origin (its centre further than 8 times its longest side) is recentred: every mesh is moved by one
+// shared translation in double before rounding to float, and `recentre` is the inverse translation. Errors: NOT_FOUND
+// (no such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty file, bad option), RESOURCE_EXHAUSTED (a
+// limit of import_limits.h). Each message suggests a remedy. Cost: the file is read once and held in memory, with about
+// 60 bytes for each of its vertices.
 absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportOptions& options);
 
 }  // namespace locus::cli

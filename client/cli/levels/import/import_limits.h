@@ -1,4 +1,4 @@
-// The maxima of the importers. Every refusal for size names one of them. Constants only.
+// Maxima of the importers. Every error for size states the limit. Constants only.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 
@@ -9,16 +9,16 @@ namespace locus::cli {
 
 inline constexpr uint64_t kMaxImportFileBytes = uint64_t{4} << 30;
 inline constexpr size_t kMaxImportTriangles = size_t{1} << 27;
-// Formats without shared vertices bring three for each triangle.
+// Maximum number of vertices: formats without shared vertices store three for each triangle.
 inline constexpr size_t kMaxImportVertices = 3 * kMaxImportTriangles;
 static_assert(kMaxImportVertices <= UINT32_MAX, "a vertex number must fit an index");
 
 inline constexpr size_t kMaxImportParts = 4096;
 inline constexpr size_t kMaxPartNameBytes = 128;
-// The same bound as the server's on frames and coordinates.
+// Maximum absolute coordinate, equal to the server's bound on frames and coordinates.
 inline constexpr double kMaxImportCoordinate = 1e9;
 
-// Thirty times the largest level that the Quake 3 compiler writes.
+// Maximum size of a level: thirty times the largest that the Quake 3 compiler writes.
 inline constexpr size_t kMaxBspBytes = size_t{256} << 20;
 inline constexpr size_t kMaxBspTriangles = size_t{1} << 24;
 inline constexpr int kMaxPatchSubdivisions = 64;

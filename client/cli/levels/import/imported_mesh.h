@@ -1,6 +1,6 @@
-// What every importer and generator hands to the commands: meshes in the exact layout that an upload sends. Plain data
-// without threads or handles. The writers of these structs keep: finite coordinates, every index below the vertex
-// count, parts in ascending order of their first triangle.
+// Result of every importer and generator: meshes in the exact layout of an upload. Plain data. Invariants, kept by the
+// importers and generators: finite coordinates, every index below the vertex count, parts in ascending order of their
+// first triangle.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORTED_MESH_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORTED_MESH_H_
 
@@ -11,7 +11,7 @@
 
 namespace locus::cli {
 
-// A named run of triangles: from first_triangle to the next part's first triangle, or to the end of the mesh.
+// Named range of triangles: from first_triangle up to the next part's first triangle, or to the end of the mesh.
 struct MeshPart {
   std::string name;
   uint32_t first_triangle = 0;
@@ -19,16 +19,16 @@ struct MeshPart {
 
 struct ImportedMesh {
   std::string name;
-  std::vector<float> vertices;    // x, y, z of each vertex, interleaved: 3 V numbers
-  std::vector<uint32_t> indices;  // three vertex numbers a triangle, counter-clockwise seen from outside: 3 T numbers
+  std::vector<float> vertices;    // interleaved x, y, z of each vertex: 3 V values
+  std::vector<uint32_t> indices;  // three vertex indices a triangle, counter-clockwise seen from outside: 3 T values
   std::vector<MeshPart> parts;
 };
 
 struct ImportedLevel {
   std::vector<ImportedMesh> meshes;
-  std::array<double, 3> recentre{};  // the translation to give every instance, so that the level stands where it was
+  std::array<double, 3> recentre{};  // translation of every instance that restores the file's coordinates
   std::string source_format;         // "OBJ", "PLY", "STL", "glTF", "GLB" or "Quake 3 BSP"
-  std::vector<std::string> notes;    // one sentence each, for the user: what was skipped, chosen or changed
+  std::vector<std::string> notes;    // one sentence each, for the user, about anything skipped, chosen or changed
 };
 
 }  // namespace locus::cli

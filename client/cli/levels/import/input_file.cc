@@ -44,7 +44,7 @@ absl::StatusOr<std::string> read_input_file(const std::string& path, uint64_t ma
   std::error_code error;
   std::string bytes(std::filesystem::file_size(path, error), '\0');
   std::ifstream file(path, std::ios::binary);
-  // A file that shrank since it was measured must not be read as zeros.
+  // If the file shrank after its size was read, the rest of `bytes` must not be returned as zeros.
   if (error || !file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) {
     return absl::InvalidArgumentError(absl::StrCat("cannot read ", path, " to its end: try again"));
   }

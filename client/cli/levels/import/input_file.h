@@ -1,5 +1,5 @@
-// Reading of whole input files under a size limit, and the parts of a file name that the importers look at.
-// Functions without state.
+// Reading of whole input files under a size limit, and the parts of a file name that the importers use. Functions
+// without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_INPUT_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_INPUT_FILE_H_
 
@@ -12,16 +12,17 @@
 
 namespace locus::cli {
 
-// "maps/Delta.BSP" gives ".bsp"; a name without an extension gives "".
+// Returns the extension in lower case: ".bsp" for "maps/Delta.BSP", "" for a name without an extension.
 std::string lower_extension(absl::string_view path);
 
-// "maps/Delta.BSP" gives "Delta".
+// Returns the file name without its folder and extension: "Delta" for "maps/Delta.BSP".
 std::string file_stem(absl::string_view path);
 
-// OK if the path is a readable regular file of 1 to max_bytes bytes. NOT_FOUND, INVALID_ARGUMENT, RESOURCE_EXHAUSTED.
+// Returns OK if the path is a readable regular file of 1 to max_bytes bytes, else NOT_FOUND, INVALID_ARGUMENT or
+// RESOURCE_EXHAUSTED.
 absl::Status check_input_file(const std::string& path, uint64_t max_bytes);
 
-// The bytes of the file, after check_input_file.
+// Calls check_input_file() and returns the bytes of the file.
 absl::StatusOr<std::string> read_input_file(const std::string& path, uint64_t max_bytes);
 
 }  // namespace locus::cli

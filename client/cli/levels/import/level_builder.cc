@@ -16,7 +16,8 @@
 namespace locus::cli {
 namespace {
 
-// Beyond this ratio of distance to size, floats measured from the origin would waste three of their 24 bits.
+// Ratio of distance to size above which a level is recentred: at 8, float coordinates from the origin lose three of
+// their 24 bits.
 constexpr double kFarRatio = 8;
 
 std::array<double, 3> choose_recentre(const std::array<double, 3>& min, const std::array<double, 3>& max) {
@@ -30,15 +31,15 @@ std::array<double, 3> choose_recentre(const std::array<double, 3>& min, const st
   return distance > kFarRatio * extent ? centre : std::array<double, 3>{};
 }
 
-// Gives each distinct position one number, in the order of first use.
+// Merger of equal vertices: gives each distinct position one index, in order of first use.
 class VertexWelder {
  public:
-  uint32_t number_of(const std::array<float, 3>& position) {
+  uint32_t index_of(const std::array<float, 3>& position) {
     std::array<uint32_t, 3> key;
     for (size_t axis = 0; axis < 3; ++axis) {
       key[axis] = std::bit_cast<uint32_t>(position[axis] + 0.0f);  // adding zero makes -0 equal to 0
     }
-    const auto [entry, is_new] = numbers_.try_emplace(key, static_cast<uint32_t>(numbers_.size()));
+    const auto [entry, is_new] = indices_.try_emplace(key, static_cast<uint32_t>(indices_.size()));
     if (is_new) {
       for (uint32_t bits : key) vertices_.push_back(std::bit_cast<float>(bits));
     }
@@ -48,7 +49,7 @@ class VertexWelder {
   std::vector<float> take_vertices() { return std::move(vertices_); }
 
  private:
-  absl::flat_hash_map<std::array<uint32_t, 3>, uint32_t> numbers_;
+  absl::flat_hash_map<std::array<uint32_t, 3>, uint32_t> indices_;
   std::vector<float> vertices_;
 };
 
@@ -91,7 +92,7 @@ absl::StatusOr<LevelBuilder::Box> LevelBuilder::bounds() const {
   for (uint32_t index : indices_) {
     const std::array<double, 3>& position = positions_[index];
     for (size_t axis = 0; axis < 3; ++axis) {
-      // Negated so that NaN is refused too.
+      // The comparison is negated so that NaN is refused too.
       if (!(std::abs(position[axis]) <= kMaxImportCoordinate)) {
         return absl::InvalidArgumentError(
             absl::StrCat("vertex ", index, " stands at (", position[0], ", ", position[1], ", ", position[2],
@@ -119,7 +120,7 @@ absl::StatusOr<ImportedLevel> LevelBuilder::finish(std::string name) && {
     for (size_t axis = 0; axis < 3; ++axis) {
       rounded[axis] = static_cast<float>(positions_[index][axis] - level.recentre[axis]);
     }
-    index = welder.number_of(rounded);
+    index = welder.index_of(rounded);
   }
   if (!parts_.empty() && parts_.back().first_triangle == triangle_count()) parts_.pop_back();
   level.meshes.push_back({std::move(name), welder.take_vertices(), std::move(indices_), std::move(parts_)});

@@ -1,5 +1,5 @@
-// Collects the triangles of one file in double and turns them into one upload-ready mesh. For the importers of this
-// room. One builder, one file, one thread. Keeps: every index added is below the number of vertices added.
+// Builder of one upload-ready mesh from the triangles of one file, collected in double. For the importers. One builder,
+// one file, one thread. Invariant: every index added is below the number of vertices added.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 
@@ -18,26 +18,27 @@ namespace locus::cli {
 
 class LevelBuilder {
  public:
-  // scale multiplies every coordinate added.
+  // Creates an empty builder. `scale` multiplies every added coordinate.
   explicit LevelBuilder(double scale) : scale_(scale) {}
 
-  // Triangles from here on belong to a part of this name. Asking for the name of the last part goes on with it, a part
-  // that got no triangle vanishes, and beyond kMaxImportParts all goes into the last.
+  // Begins a part: triangles added from now on belong to it. The name of the last part continues that part. Parts
+  // without triangles are dropped. After kMaxImportParts parts, all further triangles belong to the last one.
   void begin_part(absl::string_view name);
 
-  // RESOURCE_EXHAUSTED if so many more would pass a limit. Call it before adding.
+  // Returns RESOURCE_EXHAUSTED if adding this many vertices and triangles would exceed a limit. Call it before adding.
   absl::Status ensure_room(size_t vertices, size_t triangles) const;
 
-  // The new vertex's number.
+  // Adds a vertex and returns its index.
   uint32_t add_vertex(const std::array<double, 3>& position);
-  // Vertex numbers in counter-clockwise order seen from outside.
+  // Adds a triangle of three vertex indices, counter-clockwise seen from outside.
   void add_triangle(uint32_t a, uint32_t b, uint32_t c);
 
   size_t vertex_count() const { return positions_.size(); }
   size_t triangle_count() const { return indices_.size() / 3; }
 
-  // Recentres if the box is far from the origin, rounds once to float, shares equal vertices and drops unused ones.
-  // INVALID_ARGUMENT without a triangle, or if a used coordinate is not within kMaxImportCoordinate. Linear.
+  // Returns the level with one mesh. Recentres it if its bounds are far from the origin, rounds once to float, merges
+  // equal vertices and drops unused ones. INVALID_ARGUMENT if there is no triangle, or if a used coordinate is not
+  // finite and within kMaxImportCoordinate. Linear.
   absl::StatusOr<ImportedLevel> finish(std::string name) &&;
 
  private:

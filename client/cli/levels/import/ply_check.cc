@@ -21,7 +21,7 @@ enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 
 struct PlyProperty {
   size_t value_bytes = 0;
-  size_t count_bytes = 0;  // of a list's length; 0 if the property is no list
+  size_t count_bytes = 0;  // size of a list's length field; 0 if the property is not a list
   bool count_is_signed = false;
 };
 
@@ -34,14 +34,14 @@ struct PlyElement {
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::kAscii;
   std::vector<PlyElement> elements;
-  size_t body = 0;  // where it starts
+  size_t body = 0;  // offset of the first byte after the header
 };
 
 absl::Status damaged(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat("damaged PLY: ", what, "; export the mesh again"));
 }
 
-// 0 for an unknown type.
+// Returns the size of a scalar type, or 0 if the type is unknown.
 size_t type_bytes(absl::string_view type) {
   constexpr std::pair<absl::string_view, size_t> kTypes[] = {
       {"char", 1},  {"uchar", 1},   {"int8", 1},   {"uint8", 1},  {"short", 2}, {"ushort", 2},
@@ -128,14 +128,14 @@ uint64_t read_count(absl::string_view bytes, size_t width, PlyEncoding encoding)
   return count;
 }
 
-// Takes one row of the element from the front of the body; false if the body is too short.
+// Removes one row of the element from the front of the body. Returns false if the body is too short.
 bool skip_row(const PlyElement& element, PlyEncoding encoding, absl::string_view& body) {
   for (const PlyProperty& property : element.properties) {
     uint64_t count = 1;
     if (property.count_bytes > 0) {
       if (body.size() < property.count_bytes) return false;
       count = read_count(body, property.count_bytes, encoding);
-      // A negative length is no length; read as unsigned it would be beyond any body.
+      // A negative list length is invalid.
       if (property.count_is_signed && count >> (8 * property.count_bytes - 1) != 0) return false;
       body.remove_prefix(property.count_bytes);
     }
@@ -148,7 +148,7 @@ bool skip_row(const PlyElement& element, PlyEncoding encoding, absl::string_view
 absl::Status check_binary_body(const PlyHeader& header, absl::string_view body) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty()) continue;
-    // Every row takes at least a byte, so the loop ends with the body whatever count the header claims.
+    // Every row takes at least one byte, so the loop ends at the end of the body even if the declared count is larger.
     for (uint64_t row = 0; row < element.count; ++row) {
       if (!skip_row(element, header.encoding, body)) {
         return damaged(absl::StrCat("the file ends within ", element.name, "[", row, "] of ", element.count));
@@ -158,7 +158,7 @@ absl::Status check_binary_body(const PlyHeader& header, absl::string_view body) 
   return absl::OkStatus();
 }
 
-// Every element stands on a line of its own.
+// Checks that the body has a line for each element of each kind.
 absl::Status check_ascii_body(const PlyHeader& header, absl::string_view body) {
   uint64_t lines = 0;
   for (const absl::string_view line : absl::StrSplit(body, '\n')) {

@@ -1,5 +1,5 @@
-// Judges a PLY file before and after assimp reads it: assimp 5.2 takes triangle strips for single faces and fills up
-// truncated bodies with leftovers instead of refusing them. For the scene importer. Functions without state.
+// Check of a PLY file before assimp reads it. assimp 5.2 reads a triangle strip as a single face, and fills a truncated
+// body with stale data instead of refusing it. For the scene importer. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_PLY_CHECK_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_PLY_CHECK_H_
 
@@ -10,8 +10,9 @@
 
 namespace locus::cli {
 
-// The number of faces that the header of this PLY file declares, once its body is known to be whole. INVALID_ARGUMENT
-// for a damaged header, triangle strips or a body that ends early, naming the element. The bytes are untrusted. Linear.
+// Verifies that the body of the PLY file is complete, and returns the number of faces that its header declares, to be
+// compared with the number that assimp reads. INVALID_ARGUMENT for a damaged header, triangle strips or a body that
+// ends early, naming the element. The bytes are untrusted. Linear.
 absl::StatusOr<uint64_t> check_ply(absl::string_view bytes);
 
 }  // namespace locus::cli

@@ -25,7 +25,7 @@
 namespace locus::cli {
 namespace {
 
-// Rows of a 3 x 4 matrix; the fourth column is the translation.
+// Affine transform as a 3 x 4 matrix by rows; the fourth column is the translation.
 struct Affine {
   std::array<std::array<double, 4>, 3> rows{};
 
@@ -64,7 +64,7 @@ absl::Status refusal(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat(what, "; export the file again or convert it to GLB"));
 }
 
-// The parser throws on some damaged files and on exhausted memory; nothing of ours does, so it ends here.
+// Parses the file. The parser throws on some damaged files and on exhausted memory; its exceptions become errors here.
 absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const std::string& path) {
   const aiScene* scene = nullptr;
   try {
@@ -77,9 +77,10 @@ absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const std::stri
   return scene;
 }
 
-// Before triangulation, which trusts indices. The parser passes on indices of some formats unchecked.
-absl::Status check_mesh(const aiMesh& mesh, size_t number) {
-  const std::string name = absl::StrCat("mesh ", number, " (", mesh.mName.C_Str(), ")");
+// Checks that coordinates are finite and indices in range. Call it before triangulation, which does not check indices;
+// for some formats the parser does not check them either.
+absl::Status check_mesh(const aiMesh& mesh, size_t index) {
+  const std::string name = absl::StrCat("mesh ", index, " (", mesh.mName.C_Str(), ")");
   for (size_t v = 0; v < mesh.mNumVertices; ++v) {
     const aiVector3D& p = mesh.mVertices[v];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
@@ -100,7 +101,7 @@ absl::Status check_mesh(const aiMesh& mesh, size_t number) {
 struct FaceCounts {
   uint64_t faces = 0;
   uint64_t points_and_lines = 0;
-  uint64_t triangles = 0;  // after cutting every polygon of n corners into n - 2
+  uint64_t triangles = 0;  // after triangulation: n - 2 for a polygon of n corners
 };
 
 FaceCounts count_faces(const aiScene& scene) {
@@ -117,7 +118,7 @@ FaceCounts count_faces(const aiScene& scene) {
   return counts;
 }
 
-// What a PLY file declares; nothing for other formats, which say no number that could be compared.
+// Returns the number of faces that a PLY header declares, or nullopt for other formats, which declare none.
 absl::StatusOr<std::optional<uint64_t>> declared_faces(const std::string& path) {
   if (lower_extension(path) != ".ply") return std::nullopt;
   ASSIGN_OR_RETURN(const std::string bytes, read_input_file(path, kMaxImportFileBytes));
@@ -139,12 +140,12 @@ absl::Status add_mesh(const aiMesh& mesh, const Affine& to_world, LevelBuilder& 
   RETURN_IF_ERROR(builder.ensure_room(mesh.mNumVertices, mesh.mNumFaces));
   const auto first = static_cast<uint32_t>(builder.vertex_count());
   for (size_t v = 0; v < mesh.mNumVertices; ++v) builder.add_vertex(to_world.apply(mesh.mVertices[v]));
-  const bool turn = to_world.mirrors();
+  const bool mirrored = to_world.mirrors();
   for (size_t f = 0; f < mesh.mNumFaces; ++f) {
     const aiFace& face = mesh.mFaces[f];
     if (face.mNumIndices != 3) continue;
-    const uint32_t b = first + face.mIndices[turn ? 2 : 1];
-    const uint32_t c = first + face.mIndices[turn ? 1 : 2];
+    const uint32_t b = first + face.mIndices[mirrored ? 2 : 1];
+    const uint32_t c = first + face.mIndices[mirrored ? 1 : 2];
     builder.add_triangle(first + face.mIndices[0], b, c);
   }
   return absl::OkStatus();
@@ -158,7 +159,8 @@ std::string part_name(const aiNode& node, const aiMesh& mesh) {
   return absl::StrCat(node_name, "/", mesh_name);
 }
 
-// A stack of its own: the depth of the node tree is the file's choice.
+// Adds the meshes of all nodes in depth-first order. Uses an explicit stack, since the untrusted file decides the depth
+// of the tree.
 absl::Status add_nodes(const aiScene& scene, LevelBuilder& builder) {
   std::vector<std::pair<const aiNode*, Affine>> stack;
   stack.emplace_back(scene.mRootNode, Affine::from(scene.mRootNode->mTransformation));
@@ -208,7 +210,7 @@ void add_notes(const FaceCounts& found, uint64_t triangles_left, ImportedLevel& 
 }  // namespace
 
 absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const ImportOptions& options) {
-  // Before parsing: what this refuses makes the parser read beyond its data.
+  // Check before parsing: the parser reads out of bounds on some files that this check refuses.
   ASSIGN_OR_RETURN(const std::optional<uint64_t> declared, declared_faces(path));
   Assimp::Importer importer;
   ASSIGN_OR_RETURN(const aiScene* const parsed, parse(importer, path));

@@ -1,5 +1,5 @@
-// Turns OBJ, PLY, STL, glTF and GLB files into a mesh; assimp parses them, this bakes and checks what it found. For
-// import_file. A function without state. The only file that sees assimp is scene_import.cc.
+// Import of OBJ, PLY, STL, glTF and GLB files: assimp parses a file; this code checks the result and bakes the node
+// transforms. For import_file(). A function without state. Only scene_import.cc includes assimp.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_SCENE_IMPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_SCENE_IMPORT_H_
 
@@ -11,9 +11,9 @@
 
 namespace locus::cli {
 
-// One mesh named after the file, with a part for each mesh of each node in depth-first order. Node transforms are
-// multiplied in double; a mirroring one turns its triangles round, so that their outside stays outside. Points and
-// lines are dropped and counted in a note. INVALID_ARGUMENT carries the parser's own message.
+// Returns one mesh named after the file, with a part for each mesh of each node in depth-first order. Node transforms
+// are multiplied in double. Under a mirroring transform the triangles' vertex order is reversed, so that their outside
+// stays outside. Points and lines are dropped and counted in a note. INVALID_ARGUMENT includes the parser's message.
 absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const ImportOptions& options);
 
 }  // namespace locus::cli

@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// What the whole text is worth, or "error: " and why there is no value.
+// Returns the value of the whole text, or "error: " and the reason.
 std::string worth(const std::string& text) {
   static const auto& variables = *new Variables(testing::some_variables());
   Cursor cursor(text);

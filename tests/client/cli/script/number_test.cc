@@ -60,7 +60,7 @@ TEST(NumberTest, DivisionByZeroAndResultsThatAreNotFiniteAreRefused) {
 }
 
 TEST(NumberTest, AnIntegerAndADoubleCompareExactly) {
-  // As doubles all three would be equal.
+  // The three would be equal as doubles.
   EXPECT_GT(compare(number("9007199254740993"), Number(9007199254740992.0)), 0);
   EXPECT_EQ(compare(number("9007199254740992"), Number(9007199254740992.0)), 0);
   EXPECT_LT(compare(number("18446744073709551615"), Number(18446744073709551616.0)), 0);

@@ -1,4 +1,4 @@
-"""The game example: every tick one revision, seen by that tick's own questions."""
+"""Tests of the game example: every tick makes one revision, which that tick's queries see."""
 import importlib.util
 import math
 import os
@@ -30,13 +30,13 @@ class GameTickTest(DaemonTest):
         self.assertEqual([tick.revision for tick in ticks], list(range(2, TICKS + 2)))
         self.assertEqual(self.client.scene(self.scene).tick, TICKS)
 
-    def test_players_stand_where_the_last_tick_put_them(self):
+    def test_players_are_at_the_positions_of_the_last_tick(self):
         self.example.run(self.client, self.scene, PLAYERS, TICKS, RATE)
         ids = list(range(self.example.FIRST, self.example.FIRST + PLAYERS))
         (block,) = self.ask(locus.QueryBatch().lookup(ids))
         self.assertEqual(listed(block.positions), self.example.positions(PLAYERS, TICKS).tolist())
 
-    def test_a_tick_counts_neighbours_as_plain_geometry_does(self):
+    def test_neighbours_in_a_tick_equal_those_computed_directly(self):
         game = self.example.Game(self.client, self.scene, PLAYERS)
         tick = game.step(1)
         game.close()
@@ -48,7 +48,7 @@ class GameTickTest(DaemonTest):
         self.assertLessEqual(tick.seen, PLAYERS)
         self.assertGreater(tick.seen, 0)
 
-    def test_the_program_runs_bounded_and_cleans_up(self):
+    def test_the_program_ends_and_deletes_its_scene(self):
         command = [sys.executable, "-B", EXAMPLE, "--address", self.daemon.address, "--players", str(PLAYERS),
                    "--ticks", str(TICKS), "--rate", str(RATE)]
         done = subprocess.run(command, env=dict(os.environ, PYTHONPATH=os.environ["LOCUS_PACKAGE"]), capture_output=True,

@@ -1,4 +1,4 @@
-"""The lidar example: its answers against the command line's, and the program itself."""
+"""Tests of the lidar example: its answers equal those of the command line, and the program runs."""
 import array
 import importlib.util
 import math
@@ -37,7 +37,7 @@ class LidarSweepTest(DaemonTest):
         self.assertTrue(all(abs(math.hypot(*vector) - 1) < 1e-6 for vector in vectors))
         self.assertEqual({(x > 0, y > 0) for x, y, _ in vectors}, {(a, b) for a in (True, False) for b in (True, False)})
 
-    def test_a_sweep_answers_what_the_command_line_answers(self):
+    def test_answers_of_a_sweep_equal_those_of_the_command_line(self):
         scene = "street"
         built = self.example.build_street(self.client, scene)
         zeros, directed = array.array("f", bytes(12 * RAYS)), self.example.directions(RAYS)
@@ -53,7 +53,7 @@ class LidarSweepTest(DaemonTest):
         self.assertGreater(len(set(listed(hits.ids))), 10)
         self.assertIn(0, listed(hits.ids))
 
-    def test_the_program_prints_what_a_ray_costs_and_cleans_up(self):
+    def test_the_program_prints_the_cost_of_a_ray_and_deletes_its_scene(self):
         command = [sys.executable, "-B", EXAMPLE, "--address", self.daemon.address, "--rays", "256", "--sweeps", "3"]
         done = subprocess.run(command, env=dict(os.environ, PYTHONPATH=os.environ["LOCUS_PACKAGE"]), capture_output=True,
                               text=True, timeout=WAIT_SECONDS)
@@ -69,6 +69,6 @@ class LidarSweepTest(DaemonTest):
         self.assertEqual((lines["client time, ns a ray"], lines["wait, ns a ray"], lines["hits"]), ("50.00", "50.0", "42"))
         self.assertIn("sweeps", lines)
 
-    def test_columns_are_made_by_what_is_installed(self):
+    def test_columns_are_numpy_arrays_only_if_numpy_is_installed(self):
         lines = "\n".join(self.example.report([self.example.Cost(1, 1, 1)], 1, 0))
         self.assertIn("numpy" if locus.columns.numpy else "array.array", lines)

@@ -1,4 +1,4 @@
-"""The calls of a client: scenes, meshes, the server itself, and addresses where nothing answers."""
+"""Tests of a client's calls: scenes, the server's description, errors, and addresses without a server."""
 import concurrent.futures
 import os
 import socket
@@ -53,7 +53,7 @@ class ClientTest(DaemonTest):
         self.assertEqual([len(page.scenes) for page in pages], [7, 7, 7, 7, 2])
         self.assertEqual([scene.name for page in pages for scene in page.scenes], names)
 
-    def test_a_taken_name_is_refused_unless_that_will_do(self):
+    def test_an_existing_name_is_refused_without_if_absent(self):
         with self.assertRaises(locus.LocusError) as raised:
             self.client.create_scene(self.scene)
         self.assertRefused(raised.exception, "ALREADY_EXISTS", "ALREADY_EXISTS")
@@ -70,13 +70,13 @@ class ClientTest(DaemonTest):
         self.assertEqual(made.overload, locus.OverloadPolicy.LATEST_WINS)
         self.assertEqual(self.client.scene(self.scene).overload, locus.OverloadPolicy.EVERY_BATCH)
 
-    def test_a_name_that_is_no_header_is_refused_by_the_server(self):
+    def test_a_name_that_is_not_a_legal_header_is_refused_by_the_server(self):
         for name in ("Grüße", "two words", ""):
             with self.assertRaises(locus.LocusError) as raised:
                 self.client.query(name, QueryBatch())
             self.assertRefused(raised.exception, "INVALID_ARGUMENT", "MALFORMED", "scene")
 
-    def test_a_call_that_takes_too_long_is_a_deadline(self):
+    def test_a_call_beyond_its_timeout_fails_with_deadline_exceeded(self):
         built = self.apply(UpdateBatch().insert_points(1, [0, 0, 0]))
         later = locus.Revision(built.epoch, built.revision + 1)
         with locus.connect(self.daemon.address, timeout=0.2) as hasty:
@@ -92,7 +92,7 @@ class ClientTest(DaemonTest):
             self.apply(UpdateBatch().move(1, [8, 0, 0]))
             self.assertEqual(listed(waiting.result(WAIT_SECONDS).blocks[0].positions), [8, 0, 0])
 
-    def test_a_batch_larger_than_a_message_says_to_split_it(self):
+    def test_the_error_of_a_batch_beyond_the_message_size_suggests_splitting(self):
         with locus.connect(self.daemon.address, max_send_bytes=1000) as narrow:
             with self.assertRaises(locus.LocusError) as raised:
                 narrow.query(self.scene, QueryBatch().balls([0] * 3000, 1))
@@ -120,7 +120,7 @@ class ClientTest(DaemonTest):
 
 
 class ConnectTest(DaemonTest):
-    def test_nothing_that_answers_is_told_at_once_with_the_address(self):
+    def test_connecting_without_a_server_fails_at_once_naming_the_address(self):
         with socket.create_server(("127.0.0.1", 0)) as listener:
             port = listener.getsockname()[1]
         begin = time.monotonic()
@@ -129,7 +129,7 @@ class ConnectTest(DaemonTest):
         self.assertEqual(raised.exception.code, grpc.StatusCode.UNAVAILABLE)
         self.assertLess(time.monotonic() - begin, WAIT_SECONDS)
 
-    def test_a_server_that_is_just_starting_is_waited_for(self):
+    def test_connect_waits_for_a_starting_server(self):
         with tempfile.TemporaryDirectory() as folder:
             path = "unix:" + os.path.join(folder, "locus.sock")
             with self.assertRaises(locus.LocusError):
@@ -142,7 +142,7 @@ class ConnectTest(DaemonTest):
             starter.join()
             daemons[0].stop()
 
-    def test_something_that_is_no_locus_server_says_so(self):
+    def test_connecting_to_another_kind_of_server_is_an_error(self):
         with socket.create_server(("127.0.0.1", 0)) as listener:
             port = listener.getsockname()[1]
             with self.assertRaisesRegex(locus.LocusError, "nothing answers"):
@@ -186,7 +186,7 @@ class SideBySideTest(DaemonTest):
         self.assertEqual(request.SerializeToString(),
                          QueryBatch().rays([0, 0, 9], [0, 0, -1], mode=0, cull=0, inside=0).request_bytes(self.scene))
 
-    def test_a_script_that_forgets_to_close_its_stream_ends(self):
+    def test_a_script_that_does_not_close_its_stream_ends(self):
         script = (f"import sys; sys.path.insert(0, {os.environ['LOCUS_PACKAGE']!r}); import locus\n"
                   f"stream = locus.connect({self.daemon.address!r}).update_stream({self.scene!r})\n"
                   "print(stream.send(locus.UpdateBatch().insert_points(1, [0, 0, 0])).result().revision)")

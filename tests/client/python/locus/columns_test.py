@@ -1,4 +1,4 @@
-"""What goes in as a column, what comes out, and what is refused by name."""
+"""Tests of columns: conversion of arguments and results, and errors that name the column."""
 import array
 import struct
 import unittest
@@ -21,7 +21,7 @@ class EncodeTest(unittest.TestCase):
                       (number for number in range(1, 7)), range(1, 7)):
             self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
 
-    def test_buffers_of_the_right_type_are_taken_as_they_are(self):
+    def test_buffers_of_the_right_type_are_not_converted(self):
         numbers = array.array("f", range(1, 7))
         table = memoryview(numbers).cast("B").cast("f", [2, 3])
         for value in (numbers, memoryview(numbers), ONE_TO_SIX, bytearray(ONE_TO_SIX), table):
@@ -38,7 +38,7 @@ class EncodeTest(unittest.TestCase):
         numbers = array.array("f", range(12))
         self.assertEqual(columns.encode("c", memoryview(numbers)[::2], FLOAT32), struct.pack("<6f", 0, 2, 4, 6, 8, 10))
 
-    def test_unsigned_longs_pass_as_what_they_are_as_wide_as(self):
+    def test_unsigned_longs_are_accepted_for_the_type_of_their_width(self):
         kind = UINT64 if array.array("L").itemsize == 8 else UINT32
         self.assertEqual(columns.encode("c", array.array("L", [7]), kind), (7).to_bytes(kind.size, "little"))
 
@@ -48,7 +48,7 @@ class EncodeTest(unittest.TestCase):
                                array.array(code, [1, 2, 3]), FLOAT32, 3)
         self.assertRefused(TypeError, "holds int64, but uint64 is wanted", array.array("q", [1]), UINT64)
 
-    def test_what_holds_no_numbers_is_refused(self):
+    def test_values_without_numbers_are_refused(self):
         for value in ("abc", ["a"], [None], object(), [[1, 2], 3]):
             self.assertRefused(TypeError, "^a.column: .*give float32 numbers", value, FLOAT32)
         self.assertRefused(TypeError, "^a.column: .*give uint64 numbers", [1.5], UINT64)
@@ -57,11 +57,11 @@ class EncodeTest(unittest.TestCase):
         for value in (-1, 2**64):
             self.assertRefused(TypeError, "^a.column: .*give uint64 numbers", [value], UINT64)
 
-    def test_a_column_of_broken_vectors_is_refused(self):
+    def test_a_column_of_incomplete_vectors_is_refused(self):
         self.assertRefused(ValueError, "^a.column: has 4 numbers: give 3 float32 for each entry", [1, 2, 3, 4], FLOAT32, 3)
         self.assertRefused(ValueError, "^a.column: has 7 bytes: give 1 uint64 for each entry", b"1234567", UINT64)
 
-    def test_a_column_has_as_many_entries_as_things_or_one_or_none(self):
+    def test_a_column_has_one_entry_for_each_query_or_one_or_none(self):
         for count in (0, 1, 3):
             raw = columns.encode_for("c", [5] * count, UINT32, 3)
             self.assertEqual(columns.entries(raw, UINT32), count)
@@ -71,12 +71,12 @@ class EncodeTest(unittest.TestCase):
 
 @unittest.skipIf(without_numpy(), "what numpy arrays do is seen with numpy")
 class NumpyTest(unittest.TestCase):
-    def test_arrays_of_any_shape_and_order_go_in_row_by_row(self):
+    def test_arrays_of_any_shape_and_order_are_encoded_row_by_row(self):
         table = numpy.arange(1, 7, dtype="float32").reshape(2, 3)
         for value in (table, numpy.asfortranarray(table), numpy.repeat(table, 2, axis=1)[:, ::2], table.ravel()):
             self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
 
-    def test_read_only_arrays_and_scalars_go_in(self):
+    def test_read_only_arrays_and_scalars_are_accepted(self):
         frozen = numpy.arange(1, 7, dtype="float32")
         frozen.setflags(write=False)
         self.assertEqual(columns.encode("c", frozen, FLOAT32, 3), ONE_TO_SIX)
@@ -89,7 +89,7 @@ class NumpyTest(unittest.TestCase):
             with self.assertRaisesRegex(TypeError, f"^a.column: holds {found}.*but float32 is wanted"):
                 columns.encode("a.column", numpy.ones(3, dtype=kind), FLOAT32, 3)
 
-    def test_columns_come_out_as_views_of_the_bytes(self):
+    def test_received_columns_are_views_of_the_bytes(self):
         flat = columns.decode(ONE_TO_SIX, FLOAT32)
         table = columns.decode(ONE_TO_SIX, FLOAT32, 3)
         self.assertEqual((flat.shape, table.shape, flat.dtype), ((6,), (2, 3), numpy.float32))
@@ -101,7 +101,7 @@ class NumpyTest(unittest.TestCase):
 
 
 class DecodeTest(unittest.TestCase):
-    def test_every_kind_of_number_comes_out_as_it_went_in(self):
+    def test_every_number_type_survives_encoding_and_decoding(self):
         for kind, numbers in ((FLOAT32, [0.5, -1.0]), (FLOAT64, [0.1, 1e300]), (UINT32, [0, 2**32 - 1]),
                               (UINT64, [1, 2**64 - 1]), (UINT8, [0, 255])):
             self.assertEqual(columns.decode(columns.encode("c", numbers, kind), kind).tolist(), numbers)
@@ -116,6 +116,6 @@ class VectorTest(unittest.TestCase):
     def test_three_numbers_make_a_vector(self):
         self.assertEqual(columns.vector("frame", array.array("f", [1, 2, 3])), [1.0, 2.0, 3.0])
 
-    def test_another_number_of_them_is_refused(self):
+    def test_any_other_count_of_numbers_is_refused(self):
         with self.assertRaisesRegex(ValueError, "^frame: has 2 numbers: give x, y and z"):
             columns.vector("frame", [1, 2])

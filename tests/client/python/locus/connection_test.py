@@ -1,11 +1,11 @@
-"""Addresses and headers as they are given and as gRPC takes them."""
+"""Tests of the conversion of addresses and scene names for gRPC."""
 import unittest
 
 from locus import connection
 
 
 class ConnectionTest(unittest.TestCase):
-    def test_the_default_port_is_added_where_none_is_named(self):
+    def test_the_default_port_is_added_to_an_address_without_port(self):
         for address, target in (("localhost", "localhost:7575"), ("10.0.0.1:80", "10.0.0.1:80"), ("[::1]", "[::1]:7575"),
                                 ("[::1]:9", "[::1]:9"), ("unix:/run/locus.sock", "unix:/run/locus.sock")):
             self.assertEqual(connection.target_of(address), target)

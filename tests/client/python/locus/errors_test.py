@@ -1,4 +1,4 @@
-"""Failures as one exception: what the server said, what gRPC said, and what was unreadable."""
+"""Tests of LocusError: errors of the server, errors of gRPC, and responses that cannot be decoded."""
 import copy
 import pickle
 import unittest
@@ -8,7 +8,7 @@ from locus import LocusError, Reason, Retry, errors, schema
 
 
 class Call:
-    """A failed call, as far as from_call() looks at one."""
+    """Failed call, with the members that from_call() uses."""
 
     def __init__(self, code, details="", metadata=()):
         self.code = lambda: code
@@ -30,7 +30,7 @@ def sample(**fields):
 
 
 class ErrorsTest(unittest.TestCase):
-    def test_a_refusal_carries_all_the_server_said(self):
+    def test_a_refusal_carries_all_details_of_the_server(self):
         error = errors.from_call(Call(grpc.StatusCode.RESOURCE_EXHAUSTED, "too many", details_of(sample())))
         self.assertEqual((error.code, error.reason), (grpc.StatusCode.RESOURCE_EXHAUSTED, Reason.LIMIT))
         self.assertEqual((error.field, error.index), ("batch", 0))
@@ -38,7 +38,7 @@ class ErrorsTest(unittest.TestCase):
         self.assertTrue(error.refused and error.worth_repeating)
         self.assertEqual(str(error), "too many [RESOURCE_EXHAUSTED, LIMIT]")
 
-    def test_where_the_server_did_not_speak_a_hint_does(self):
+    def test_an_error_that_is_not_from_the_server_has_a_hint(self):
         error = errors.from_call(Call(grpc.StatusCode.UNAVAILABLE, "broken pipe"))
         self.assertEqual(str(error), "broken pipe [UNAVAILABLE] (try again when the server answers)")
         late = errors.from_call(Call(grpc.StatusCode.DEADLINE_EXCEEDED, "Deadline Exceeded"))
@@ -50,14 +50,14 @@ class ErrorsTest(unittest.TestCase):
         error = errors.from_call(Call(grpc.StatusCode.NOT_FOUND, "gone", (("grpc-status-details-bin", b"\xff\xff"),)))
         self.assertEqual((error.code, error.message, error.reason), (grpc.StatusCode.NOT_FOUND, "gone", Reason.UNSPECIFIED))
 
-    def test_a_refusal_never_turns_into_success(self):
+    def test_a_refusal_never_has_the_code_ok(self):
         for code in (0, 99, -1):
             self.assertEqual(errors.from_error(sample(code=code)).code, grpc.StatusCode.UNKNOWN)
 
     def test_a_reason_of_a_newer_server_is_unspecified(self):
         self.assertEqual(errors.reason_of(999), Reason.UNSPECIFIED)
 
-    def test_an_answer_that_is_no_message_is_data_loss(self):
+    def test_a_response_that_cannot_be_decoded_is_data_loss(self):
         with self.assertRaisesRegex(LocusError, "cannot be read.*DATA_LOSS"):
             errors.parsed(schema.message("QueryResponse"), b"\xff")
 
@@ -72,13 +72,13 @@ class ErrorsTest(unittest.TestCase):
 
 
 class RetryTest(unittest.TestCase):
-    def test_waits_double_up_to_the_longest_and_end(self):
+    def test_waits_double_up_to_the_maximum_until_attempts_run_out(self):
         retry = Retry(attempts=5, first_wait=1, max_wait=3)
         error = LocusError(grpc.StatusCode.UNAVAILABLE, "")
         for failures, wanted in ((1, 1), (2, 2), (3, 3), (4, 3)):
             self.assertTrue(0.8 * wanted <= retry.wait_after(failures, error) <= 1.2 * wanted)
         self.assertIsNone(retry.wait_after(5, error))
 
-    def test_the_servers_wait_is_the_least(self):
+    def test_the_servers_retry_hint_is_the_minimum_wait(self):
         error = LocusError(grpc.StatusCode.RESOURCE_EXHAUSTED, "", retry_after=9)
         self.assertEqual(Retry().wait_after(1, error), 9)

@@ -1,4 +1,4 @@
-"""Meshes and instances: uploaded in pieces, placed by columns, hit by rays."""
+"""Tests of meshes and instances: uploaded in chunks, placed by columns, hit by rays."""
 import array
 import hashlib
 import struct
@@ -11,7 +11,7 @@ SQUARE = ([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0], [0, 1, 2, 0, 2, 3])
 
 
 def strip(count):
-    """A strip of `count` squares along x, as columns."""
+    """Returns the columns of a strip of `count` squares along x."""
     vertices, indices = array.array("f"), array.array("I")
     for square in range(count):
         vertices.extend((square, 0, 0, square + 1, 0, 0, square + 1, 1, 0, square, 1, 0))
@@ -20,7 +20,7 @@ def strip(count):
 
 
 class MeshesTest(DaemonTest):
-    def test_a_mesh_comes_back_described_and_listed(self):
+    def test_an_uploaded_mesh_is_described_and_listed(self):
         parts = [MeshPart("floor", 0), MeshPart("wall", 1)]
         corners, indices = [0, 0, 5, 1, 0, 5, 1, 1, 5, 0, 1, 5], SQUARE[1]
         mesh = self.client.upload_mesh("parted", corners, indices, parts=parts)
@@ -30,7 +30,7 @@ class MeshesTest(DaemonTest):
         self.client.delete_mesh("parted")
         self.assertNotIn("parted", [mesh.name for mesh in self.client.meshes()])
 
-    def test_a_large_mesh_travels_in_pieces_and_only_once(self):
+    def test_a_large_mesh_is_sent_in_chunks_and_only_once(self):
         squares, steps = 60_000, []
         vertices, indices = strip(squares)
         mesh = self.client.upload_mesh("strip", vertices, indices, progress=lambda *step: steps.append(step))
@@ -43,8 +43,8 @@ class MeshesTest(DaemonTest):
         (block,) = self.ask(QueryBatch().rays([[0.75, 0.25, 1], [squares - 0.25, 0.25, 1]], [0, 0, -1]))
         self.assertEqual(listed(block.triangles), [0, 2 * squares - 2])
 
-    def test_a_mesh_comes_back_as_it_went(self):
-        vertices, indices = strip(60_000)
+    def test_a_downloaded_mesh_equals_the_uploaded_one(self):
+        vertices, indices = strip(59_999)  # content that no other test uploads
         mesh = self.client.upload_mesh("back", vertices, indices)
         found = self.client.download_mesh("back")
         self.assertEqual((found.mesh.sha256, found.mesh.triangles), (mesh.sha256, len(indices) // 3))
@@ -53,13 +53,13 @@ class MeshesTest(DaemonTest):
             self.client.download_mesh("nothing")
         self.assertRefused(raised.exception, "NOT_FOUND", "NOT_FOUND")
 
-    def test_a_mesh_with_a_piece_missing_is_data_loss(self):
+    def test_a_download_with_a_missing_chunk_is_data_loss(self):
         piece = locus.schema.message("DownloadMeshResponse")(vertices=bytes(36), indices=bytes(12))
         for pieces in ([], [piece]):
             with self.assertRaisesRegex(locus.LocusError, "the mesh is not whole.*DATA_LOSS"):
                 locus.MeshColumns.of(pieces)
 
-    def test_pieces_are_whole_triples_below_the_limit(self):
+    def test_chunks_are_whole_triples_below_the_limit(self):
         messages = list(meshes.upload_messages("strip", *strip(60_000), parts=(), progress=None))
         sizes = [len(message.vertices) + len(message.indices) for message in messages]
         self.assertTrue(all(size % 12 == 0 and size < 1 << 20 for size in sizes))
@@ -85,7 +85,7 @@ class MeshesTest(DaemonTest):
         (block,) = self.ask(QueryBatch().lookup([1, 2, 3]))
         self.assertEqual(listed(block.ids), [0, 2, 0])
 
-    def test_ids_are_chosen_by_the_server_where_none_are_given(self):
+    def test_the_server_chooses_ids_if_none_are_given(self):
         self.client.upload_mesh("square", *SQUARE)
         placed = self.client.change_instances(self.scene, InstanceChange().place("square", [[0, 0, 0], [5, 0, 0]]))
         self.assertTrue(all(one >= 2**63 for one in listed(placed.ids)))
@@ -118,7 +118,7 @@ class MeshesTest(DaemonTest):
             self.client.upload_mesh("bad", SQUARE[0], [0, 1, 9])
         self.assertRefused(raised.exception, "INVALID_ARGUMENT", "OUT_OF_RANGE", "indices")
 
-    def test_wrong_columns_of_a_placement_are_named_and_leave_no_trace(self):
+    def test_wrong_columns_of_a_placement_are_named_and_add_nothing(self):
         change = InstanceChange()
         with self.assertRaisesRegex(ValueError, r"^place\[0\].scales: has 2 entries: give 1"):
             change.place("square", scales=[1, 2])

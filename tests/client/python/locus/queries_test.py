@@ -1,4 +1,4 @@
-"""Answers in Python against those of the command line: equal to the last bit, for every kind of query."""
+"""Tests that answers in Python equal those of the command line to the last bit, for every kind of query."""
 import array
 import math
 import random
@@ -125,7 +125,7 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         centers = [(0, 0, height) for height in range(-5, 5)]
         self.check_overlaps("ball", options, QueryBatch().balls(centers, 6, detail=StaticDetail.TRIANGLES_SORTED))
 
-    def test_turned_boxes(self):
+    def test_rotated_boxes(self):
         centers = triples(self.cloud(20))
         options = [f"--at={text(center)}" for center in centers] + ["--half=3,2,1", "--rotation=0.6,0,0,0.8"]
         self.check_overlaps("box", options, QueryBatch().boxes(centers, (3, 2, 1), rotations=(0.6, 0, 0, 0.8)))
@@ -158,7 +158,7 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         (found,) = self.ask(QueryBatch().balls([-5, 5, 3], 20, block=block))
         self.assertEqual((listed(found.ids), listed(found.layers)), ([300], [6]))
 
-    def test_what_did_not_fit_is_listed_and_gone_on_with(self):
+    def test_truncated_queries_are_listed_and_continue_with_after_id(self):
         (first,) = self.ask(QueryBatch().balls([0, 0, 0], 30, block=Block(max_results=10)))
         self.assertEqual((listed(first.truncated), first.rows), ([0], 10))
         last = listed(first.ids)[-1]
@@ -166,19 +166,19 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         (whole,) = self.ask(QueryBatch().balls([0, 0, 0], 30))
         self.assertEqual(listed(first.ids) + listed(rest.ids), listed(whole.ids))
 
-    def test_ignored_groups_are_passed_over_query_by_query(self):
+    def test_each_query_ignores_its_own_group(self):
         passing = Block(ignore_groups=[9, 0], ignore_ids=range(100, 160))
         (block,) = self.ask(QueryBatch().rays([[0, 0, 30]] * 2, [0, 0, -1], block=passing))
         self.assertEqual(listed(block.ids), [1, 200])
 
-    def test_a_frame_moves_positions_and_answers(self):
+    def test_positions_and_answers_are_relative_to_the_frame(self):
         far = 1_000_000.25
         self.apply(locus.UpdateBatch(frame=(far, 0, 0)).insert_balls(5, [0, 0, 0], 0.5))
         (block,) = self.ask(QueryBatch().rays([0, 0, 10], [0, 0, -1], block=Block(frame=(far, 0, 0), columns=ALL_COLUMNS)))
         self.assertEqual((listed(block.ids), listed(block.t), listed(block.points)), ([5], [9.5], [0, 0, 0.5]))
         self.assertEqual(listed(block.positions), [far, 0, 0])
 
-    def test_numbers_of_every_form_ask_the_same(self):
+    def test_every_form_of_a_column_gives_the_same_answer(self):
         origins = self.cloud(50)
         forms = (origins, triples(origins), array.array("f", origins), array.array("f", origins).tobytes())
         answers = {tuple(listed(self.ask(QueryBatch().rays(form, [0, 0, -1]))[0].t)) for form in forms}
@@ -236,13 +236,13 @@ class RefusalTest(DaemonTest):
         with self.assertRaisesRegex(TypeError, r"^blocks\[0\].balls.radii: holds float64, but float32 is wanted"):
             QueryBatch().balls([0, 0, 0], array.array("d", [1]))
 
-    def test_a_refused_block_is_no_part_of_the_batch(self):
+    def test_a_refused_block_is_not_added_to_the_batch(self):
         batch = QueryBatch().lookup(1)
         with self.assertRaises(TypeError):
             batch.rays([0, 0, 0], "up")
         self.assertEqual(len(self.ask(batch)), 1)
 
-    def test_a_wrong_value_is_refused_by_the_server_with_its_place(self):
+    def test_a_wrong_value_is_refused_by_the_server_with_its_field_and_index(self):
         with self.assertRaises(locus.LocusError) as raised:
             self.ask(QueryBatch().lookup(1).rays([[0, 0, 0]] * 3, [[0, 0, 1], [0, 0, 1], [0, 0, 0]]))
         self.assertRefused(raised.exception, "INVALID_ARGUMENT", "OUT_OF_RANGE", "blocks[1].rays.directions")
@@ -250,9 +250,9 @@ class RefusalTest(DaemonTest):
 
 
 class RequestBytesTest(unittest.TestCase):
-    """Batches are framed by hand; protobuf says what they hold."""
+    """Tests of hand-written framing: protobuf decodes the batches to the expected fields."""
 
-    def test_every_field_stands_where_the_schema_puts_it(self):
+    def test_every_field_has_the_number_of_the_schema(self):
         settings = Block(frame=(1.5, 0, -2), source=locus.Source.STATIC, precision=locus.Precision.CONSERVATIVE,
                          columns=[Column.ID, Column.LAYERS], masks=[1, 2], ignore_groups=[3], ignore_ids=[4, 5], max_results=600,
                          after_id=2**63, as_of_ticks=[11, 12], as_of_fractions=0.5,
@@ -287,7 +287,7 @@ class RequestBytesTest(unittest.TestCase):
         self.assertEqual(found, wanted)
         self.assertEqual(schema.message("QueryBatch").FromString(batch.batch_bytes()), wanted.batch)
 
-    def test_a_block_of_no_queries_keeps_its_kind(self):
+    def test_an_empty_block_keeps_its_kind(self):
         found = schema.message("QueryRequest").FromString(QueryBatch().balls([], []).request_bytes("arena"))
         self.assertEqual(found.batch.blocks[0].WhichOneof("kind"), "balls")
 

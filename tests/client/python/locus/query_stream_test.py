@@ -1,4 +1,4 @@
-"""Query streams: every answer to its question, refusals one by one, broken connections unnoticed."""
+"""Tests of query streams: matching of answers to batches, errors of single batches, bounded waiting."""
 import random
 
 import grpc
@@ -13,10 +13,10 @@ class QueryStreamTest(DaemonTest):
         self.built = self.apply(UpdateBatch().insert_balls(range(1, 65), [[3 * number, 0, 0] for number in range(64)], 0.5))
 
     def asking(self, number):
-        """A ray down on object `number`."""
+        """Returns a batch with a ray downward at object `number`."""
         return QueryBatch(at_least=self.built).rays([3 * (number - 1), 0, 9], [0, 0, -1])
 
-    def test_every_answer_belongs_to_its_question(self):
+    def test_every_future_gets_the_answer_of_its_batch(self):
         numbers = [random.Random(3).randint(1, 64) for _ in range(200)]
         with self.client.query_stream(self.scene) as stream:
             futures = [stream.send(self.asking(number)) for number in numbers]
@@ -38,7 +38,7 @@ class QueryStreamTest(DaemonTest):
         self.assertRefused(wrong.exception(), "INVALID_ARGUMENT", "OUT_OF_RANGE", "blocks[0].rays.directions")
         self.assertEqual(listed(right.result().blocks[0].ids), [1])
 
-    def test_a_stream_goes_on_when_its_scene_is_deleted(self):
+    def test_a_stream_continues_after_its_scene_is_deleted(self):
         with self.client.query_stream(self.scene) as stream:
             stream.send(self.asking(1)).result(WAIT_SECONDS)
             self.client.delete_scene(self.scene)
@@ -48,7 +48,7 @@ class QueryStreamTest(DaemonTest):
             self.assertRefused(late, "FAILED_PRECONDITION", "SCENE_RESTARTED")
             self.assertEqual(stream.send(QueryBatch().lookup(1)).result(WAIT_SECONDS).revision, 0)
 
-    def test_a_revision_that_does_not_come_is_a_deadline_of_that_batch(self):
+    def test_a_batch_whose_revision_is_not_reached_fails_with_deadline_exceeded(self):
         future_revision = locus.Revision(self.built.epoch, self.built.revision + 100)
         with self.client.query_stream(self.scene) as stream:
             error = stream.send(QueryBatch(at_least=future_revision).lookup(1)).exception(WAIT_SECONDS)

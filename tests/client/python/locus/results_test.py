@@ -1,4 +1,4 @@
-"""Answers as columns: which rows belong to which query, and answers that contradict themselves."""
+"""Tests of results: the rows of each query, and inconsistent answers."""
 import struct
 import unittest
 
@@ -8,7 +8,7 @@ from support import listed
 
 
 def answer(**columns):
-    """A result of one block with these columns."""
+    """Returns a result of one block with these columns."""
     response = schema.message("QueryResponse")()
     response.result.epoch, response.result.revision, response.result.tick = 7, 8, 9
     response.result.blocks.add(**columns)
@@ -16,7 +16,7 @@ def answer(**columns):
 
 
 class ResultsTest(unittest.TestCase):
-    def test_rows_go_by_counts(self):
+    def test_counts_determine_the_rows_of_each_query(self):
         (block,) = answer(counts=struct.pack("<3I", 2, 0, 1), ids=struct.pack("<3Q", 5, 6, 7)).blocks
         self.assertEqual([block.ids[block.rows_of(query)].tolist() for query in range(3)], [[5, 6], [], [7]])
         self.assertEqual(block.rows, 3)
@@ -26,20 +26,20 @@ class ResultsTest(unittest.TestCase):
         self.assertEqual((block.rows, block.rows_of(1)), (2, slice(1, 2)))
         self.assertEqual(listed(block.normals), list(range(6)))
 
-    def test_any_column_tells_the_number_of_rows(self):
+    def test_any_column_determines_the_number_of_rows(self):
         for name, size in (("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
                            ("layers", 4), ("positions", 24)):
             (block,) = answer(**{name: bytes(3 * size)}).blocks
             self.assertEqual(block.rows, 3, name)
 
-    def test_columns_not_asked_for_are_empty(self):
+    def test_columns_not_requested_are_empty(self):
         (block,) = answer(ids=bytes(8)).blocks
         for name in ("t", "triangles", "uvs", "normals", "points", "groups", "tags", "layers", "positions", "rotations",
                      "counts", "truncated", "hits"):
             self.assertEqual(len(getattr(block, name)), 0, name)
         self.assertIsNone(block.work)
 
-    def test_an_answer_to_nothing_names_its_revision(self):
+    def test_the_answer_to_an_empty_batch_has_a_revision(self):
         result = QueryResult.from_bytes(b"")
         self.assertEqual((result.epoch, result.revision, result.tick, result.blocks, result.work), (0, 0, 0, (), None))
         self.assertEqual((answer().epoch, answer().revision, answer().tick), (7, 8, 9))

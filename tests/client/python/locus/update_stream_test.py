@@ -1,4 +1,4 @@
-"""Update streams: in order, exactly once, across refusals and broken connections."""
+"""Tests that update streams apply batches in order and exactly once, across refusals and broken connections."""
 import socket
 import threading
 
@@ -10,7 +10,7 @@ from support import WAIT_SECONDS, Daemon, DaemonTest, listed
 
 
 class Relay:
-    """A port that passes bytes on to a server, until cut() breaks every connection through it."""
+    """TCP proxy in front of a server; cut() breaks every connection through it."""
 
     def __init__(self, address):
         host, port = address.rsplit(":", 1)
@@ -51,7 +51,7 @@ class Relay:
             self.sockets.clear()
 
     def close(self):
-        self.listener.shutdown(socket.SHUT_RDWR)  # wakes accept(), which close() would not
+        self.listener.shutdown(socket.SHUT_RDWR)  # wakes accept(); close() alone does not
         self.listener.close()
         self.cut()
 
@@ -81,7 +81,7 @@ class UpdateStreamTest(DaemonTest):
             second = stream.send(batch)
         self.assertEqual((first.result().applied, second.result().applied), (1, 2))
 
-    def test_a_refused_batch_does_not_stop_those_behind_it(self):
+    def test_a_refused_batch_does_not_stop_later_ones(self):
         with self.client.update_stream(self.scene) as stream:
             futures = []
             for number in range(1, 41):
@@ -107,7 +107,7 @@ class UpdateStreamTest(DaemonTest):
                     if number in (20, 50, 51, 90):
                         relay.cut()
                 stream.sync(WAIT_SECONDS)
-        # Each batch makes one revision, so the last one tells how many were applied.
+        # Each batch makes one revision, so the last revision gives the number of applied batches.
         self.assertEqual(futures[-1].result().revision, batches)
         self.assertEqual(self.client.scene(self.scene).revision, batches)
         self.assertEqual(self.client.scene(self.scene).objects, batches + 1)
@@ -133,7 +133,7 @@ class UpdateStreamTest(DaemonTest):
         except locus.LocusError as error:
             return error
 
-    def test_a_scene_that_is_deleted_refuses_batch_by_batch(self):
+    def test_each_batch_to_a_deleted_scene_is_refused_individually(self):
         with self.client.update_stream(self.scene) as stream:
             stream.send(self.moved(1)).result(WAIT_SECONDS)
             self.client.delete_scene(self.scene)
@@ -159,7 +159,7 @@ class UpdateStreamTest(DaemonTest):
         with self.assertRaises(locus.LocusError):
             stream.close(WAIT_SECONDS)
 
-    def test_a_server_that_is_gone_ends_the_stream_when_the_tries_are_used_up(self):
+    def test_a_stopped_server_ends_the_stream_after_the_last_attempt(self):
         daemon = Daemon()
         client = locus.connect(daemon.address)
         client.create_scene("arena")
@@ -170,7 +170,7 @@ class UpdateStreamTest(DaemonTest):
         self.assertEqual((error.code, error.refused), (grpc.StatusCode.UNAVAILABLE, False))
         client.close()
 
-    def test_a_closed_stream_takes_no_more(self):
+    def test_a_closed_stream_accepts_no_batch(self):
         stream = self.client.update_stream(self.scene)
         stream.send(self.moved(1))
         stream.close(WAIT_SECONDS)
@@ -185,13 +185,13 @@ class UpdateStreamTest(DaemonTest):
         error = stream.send(self.moved(2)).exception(WAIT_SECONDS)
         self.assertIn("the client was closed", str(error))
 
-    def test_an_exception_inside_breaks_the_stream_off(self):
+    def test_an_exception_in_the_context_cancels_the_stream(self):
         with self.assertRaises(ZeroDivisionError):
             with self.client.update_stream(self.scene) as stream:
                 raise ZeroDivisionError
         with self.assertRaisesRegex(locus.LocusError, "broken off|closed"):
             stream.send(self.moved(1))
 
-    def test_no_room_at_all_is_refused(self):
+    def test_a_max_in_flight_of_zero_is_refused(self):
         with self.assertRaisesRegex(ValueError, "max_in_flight is 0: give 1 or more"):
             self.client.update_stream(self.scene, max_in_flight=0)

@@ -1,4 +1,4 @@
-"""Update batches: every change by columns, seen by lookups; refused items and refused batches."""
+"""Tests of update batches: changes by columns, checked by lookups; refused items and refused batches."""
 import array
 import unittest
 
@@ -11,10 +11,10 @@ EVERYTHING = Block(columns=[Column.ID, Column.POSE, Column.GROUP, Column.TAG, Co
 
 class UpdatesTest(DaemonTest):
     def found(self, *ids):
-        """The rows of a lookup."""
+        """Returns the rows of a lookup."""
         return self.ask(QueryBatch().lookup(list(ids), block=EVERYTHING))[0]
 
-    def test_every_shape_goes_in_with_all_its_columns(self):
+    def test_every_shape_is_inserted_with_all_its_columns(self):
         labels = dict(layers=[1, 2], groups=[5, 6], tags=[2**64 - 1, 8], rotations=[0, 0, 0.6, 0.8])
         batch = UpdateBatch()
         batch.insert_points([1, 2], [[0, 0, 0], [1, 0, 0]], **labels)
@@ -38,14 +38,14 @@ class UpdatesTest(DaemonTest):
         self.apply(batch)
         self.assertEqual(listed(self.found(1, 2).positions), [1000.5, 0, 0, *exact])
 
-    def test_moves_keep_rotations_unless_they_bring_them(self):
+    def test_moves_without_rotations_keep_them(self):
         self.apply(UpdateBatch().insert_boxes([1, 2], [0] * 6, [1, 1, 1], rotations=[0, 0, 0.6, 0.8]))
         self.apply(UpdateBatch().move(1, [1, 2, 3]).move(2, positions_f64=[4, 5, 6], rotations=[0, 0, 0, 1], teleport=True))
         rows = self.found(1, 2)
         self.assertEqual(listed(rows.positions), [1, 2, 3, 4, 5, 6])
         self.assertEqual(listed(rows.rotations), floats([0, 0, 0.6, 0.8]) + [0, 0, 0, 1])
 
-    def test_relabels_change_only_what_they_bring(self):
+    def test_relabels_change_only_the_given_labels(self):
         self.apply(UpdateBatch().insert_points(1, [0, 0, 0], layers=3, groups=4, tags=5))
         self.apply(UpdateBatch().relabel(1, tags=6))
         rows = self.found(1)
@@ -85,7 +85,7 @@ class UpdatesTest(DaemonTest):
         first, again = self.apply(batch), self.apply(batch)
         self.assertEqual((first.duplicate, again.duplicate, again.revision), (False, True, first.revision))
 
-    def test_a_gap_in_the_numbers_is_refused_with_the_next_one(self):
+    def test_a_gap_in_the_batch_numbers_is_refused(self):
         with self.assertRaises(locus.LocusError) as raised:
             self.apply(UpdateBatch(writer=78, number=5).insert_points(1, [0, 0, 0]))
         self.assertRefused(raised.exception, "FAILED_PRECONDITION", "BATCH_GAP")
@@ -113,7 +113,7 @@ class ColumnsOfBatchesTest(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "^frame: has 2 numbers"):
             UpdateBatch(frame=(1, 2))
 
-    def test_a_refused_entry_is_no_part_of_the_batch(self):
+    def test_a_refused_entry_is_not_added_to_the_batch(self):
         batch = UpdateBatch().move(1, [0, 0, 0])
         before = batch.request_bytes("arena")
         for call in (lambda: batch.move("x", [0] * 3), lambda: batch.insert_boxes(1, [0] * 3, array.array("d", [1, 1, 1])),

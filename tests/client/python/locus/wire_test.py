@@ -1,4 +1,4 @@
-"""Answers read without protobuf: whatever protobuf may write is read, and nothing else."""
+"""Tests of decoding without protobuf: all that protobuf may write is decoded, everything else is refused."""
 import random
 import unittest
 
@@ -15,7 +15,7 @@ class WireTest(unittest.TestCase):
             wire.fields(memoryview(data))
         self.assertEqual(raised.exception.code, grpc.StatusCode.DATA_LOSS)
 
-    def test_fields_are_those_that_protobuf_wrote(self):
+    def test_decoded_fields_equal_those_that_protobuf_wrote(self):
         message = schema.message("BlockResult")(t=b"1234", ids=b"x" * 1000, counts=b"")
         message.work.tests = 2**63
         found = wire.fields(memoryview(message.SerializeToString()))
@@ -36,14 +36,14 @@ class WireTest(unittest.TestCase):
         raw = memoryview(schema.message("BlockResult")(t=b"12345678").SerializeToString())
         self.assertIs(wire.column(wire.fields(raw), 4).obj, raw.obj)
 
-    def test_a_column_in_pieces_is_joined_as_protobuf_would(self):
+    def test_a_column_in_chunks_is_joined_as_by_protobuf(self):
         one, two = (schema.message("BlockResult")(ids=number.to_bytes(8, "little")).SerializeToString() for number in (5, 6))
         result = wire.head(4, len(one + two)) + one + two
         response = wire.head(1, len(result)) + result
         (block,) = QueryResult.from_bytes(response).blocks
         self.assertEqual(listed(block.ids), [5, 6])
 
-    def test_a_field_framed_by_hand_is_what_protobuf_writes(self):
+    def test_an_encoded_field_equals_what_protobuf_writes(self):
         for size in (0, 1, 127, 128, 16383, 16384, 3_000_000):
             content = bytes(size)
             block = schema.message("QueryBlock").FromString(wire.head(5, size) + content)
@@ -51,12 +51,12 @@ class WireTest(unittest.TestCase):
             in_high_number = wire.head(3000, size) + content
             self.assertEqual(wire.fields(memoryview(in_high_number)), {3000: [content]})
 
-    def test_cut_bytes_are_refused(self):
+    def test_truncated_bytes_are_refused(self):
         whole = schema.message("BlockResult")(t=b"12345678").SerializeToString()
         for cut in range(1, len(whole)):
             self.assertUnreadable(whole[:cut], "cannot be read")
 
-    def test_groups_and_endless_numbers_are_refused(self):
+    def test_groups_and_overlong_varints_are_refused(self):
         self.assertUnreadable(b"\x0b", "wire type 3")
         self.assertUnreadable(b"\x08" + b"\xff" * 11, "too many bytes")
         self.assertUnreadable(b"\x22\xff\xff\xff\xff\x0f", "has more bytes than the message")
@@ -67,7 +67,7 @@ class WireTest(unittest.TestCase):
                 (block,) = QueryResult.from_bytes(data).blocks
                 block.ids
 
-    def test_random_bytes_are_read_or_refused_but_nothing_else(self):
+    def test_random_bytes_are_decoded_or_refused_with_locus_error(self):
         random_numbers = random.Random(SEED)
         refused = 0
         for _ in range(3000):
@@ -76,6 +76,6 @@ class WireTest(unittest.TestCase):
                 QueryResult.from_bytes(data)
             except LocusError:
                 refused += 1
-            except Exception as error:  # noqa: BLE001  says which bytes of which seed
+            except Exception as error:  # noqa: BLE001  the failure names the bytes and the seed
                 self.fail(f"{data!r} of seed {SEED}: {error!r}")
         self.assertGreater(refused, 1000)

@@ -3,18 +3,18 @@
 namespace locus::cli {
 
 PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const PatchPoint& c, int step, int steps) {
-  // The ends are returned as stored: a curve across the patch then adds no rounding on its border.
+  // The end points are returned unchanged, so that evaluating across the patch adds no rounding on its border.
   if (step == 0) return a;
   if (step == steps) return c;
   const double rest = steps - step;
   const double weight_a = rest * rest;
   const double weight_b = 2.0 * rest * step;
   const double weight_c = static_cast<double>(step) * step;
-  const double whole = static_cast<double>(steps) * steps;
+  const double weight_sum = static_cast<double>(steps) * steps;
   PatchPoint point;
   for (size_t axis = 0; axis < 3; ++axis) {
-    // The ends are added first: their sum commutes, so the reversed curve rounds the same way.
-    point[axis] = ((a[axis] * weight_a + c[axis] * weight_c) + b[axis] * weight_b) / whole;
+    // The terms of the end points are added first: that sum commutes, so the reversed curve rounds identically.
+    point[axis] = ((a[axis] * weight_a + c[axis] * weight_c) + b[axis] * weight_b) / weight_sum;
   }
   return point;
 }
@@ -26,7 +26,7 @@ PatchGrid tessellate_patch(std::span<const PatchPoint> controls, size_t width, s
   grid.height = (height - 1) / 2 * steps + 1;
   grid.points.reserve(grid.width * grid.height);
   for (size_t y = 0; y < grid.height; ++y) {
-    // The last row belongs to the patch before it, as its step `steps`.
+    // A row shared by two patches is evaluated in the first, at step `steps`.
     const size_t patch_y = y == 0 ? 0 : (y - 1) / steps;
     const int step_y = static_cast<int>(y - patch_y * steps);
     for (size_t x = 0; x < grid.width; ++x) {

@@ -1,5 +1,5 @@
-// Biquadratic Bezier patches of Quake 3 levels, evaluated so that neighbours meet without cracks. Functions without
-// state.
+// Tessellation of the biquadratic Bezier patches of Quake 3 levels, such that neighbouring patches meet without cracks.
+// Functions without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BEZIER_PATCH_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BEZIER_PATCH_H_
 
@@ -12,22 +12,23 @@ namespace locus::cli {
 
 using PatchPoint = std::array<double, 3>;
 
-// A grid of width x height points, row by row.
+// Grid of width x height points, row by row.
 struct PatchGrid {
   size_t width = 0;
   size_t height = 0;
   std::vector<PatchPoint> points;
 };
 
-// The point at step/steps, 0 <= step <= steps, of the quadratic Bezier curve with these three control points.
-// Depends on the points and the fraction only, and equals bit for bit what the reversed curve gives at steps - step, if
-// the control points are floats: then the products are exact and only the symmetric sum rounds.
+// Returns the point at parameter step / steps, 0 <= step <= steps, of the quadratic Bezier curve with control points a,
+// b, c. If the control points are floats, the result is bit for bit equal to the point of the reversed curve at steps -
+// step: the products are exact, and only the symmetric sum rounds.
 PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const PatchPoint& c, int step, int steps);
 
 // Tessellates a grid of width x height control points (both odd, at least 3, row by row; neighbouring 3 x 3 patches
 // share a row or column) with subdivisions^2 quads for each 3 x 3 patch. A point on the border of a 3 x 3 patch is
-// computed from that border's three control points alone, so two patches with equal border points meet exactly,
-// whichever way each runs. Source of the method: Farin, Curves and Surfaces for CAGD, 2002 (tensor product patches).
+// computed from that border's three control points only. So two patches with equal border control points meet exactly,
+// even if one stores them in reverse order. Source of the method: Farin, Curves and Surfaces for CAGD, 2002 (tensor
+// product patches).
 PatchGrid tessellate_patch(std::span<const PatchPoint> controls, size_t width, size_t height, int subdivisions);
 
 }  // namespace locus::cli

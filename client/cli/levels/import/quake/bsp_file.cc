@@ -26,7 +26,7 @@ constexpr size_t kTextureNameBytes = 64;
 constexpr size_t kVertexBytes = 44;
 constexpr size_t kFaceBytes = 104;
 
-// The file is little-endian whatever the machine is.
+// Reads a little-endian integer, independent of the machine's byte order.
 uint32_t read_u32(absl::string_view bytes, size_t at) {
   uint32_t value = 0;
   for (size_t i = 0; i < 4; ++i) value |= uint32_t{static_cast<uint8_t>(bytes[at + i])} << (8 * i);
@@ -34,10 +34,9 @@ uint32_t read_u32(absl::string_view bytes, size_t at) {
 }
 
 absl::Status damaged(size_t lump, std::optional<size_t> element, absl::string_view what) {
-  const std::string place =
-      element ? absl::StrCat(kLumpNames[lump], "[", *element, "]") : std::string(kLumpNames[lump]);
+  const std::string path = element ? absl::StrCat(kLumpNames[lump], "[", *element, "]") : std::string(kLumpNames[lump]);
   return absl::InvalidArgumentError(
-      absl::StrCat("damaged BSP, lump ", lump, " ", place, ": ", what, "; copy or compile the level again"));
+      absl::StrCat("damaged BSP, lump ", lump, " ", path, ": ", what, "; copy or compile the level again"));
 }
 
 using Lumps = std::array<absl::string_view, kLumpNames.size()>;
@@ -101,51 +100,52 @@ absl::Status read_meshverts(const Lumps& lumps, BspFile& file) {
   return absl::OkStatus();
 }
 
-// first + count may pass 2^32, and a negative number of the file arrives here as a huge one.
+// Returns whether first + count <= size. The sum is computed in 64 bits, since it may exceed 2^32: a negative integer
+// in the file is read as a large unsigned one.
 bool is_range(uint32_t first, uint32_t count, size_t size) { return uint64_t{first} + count <= size; }
 
-absl::Status check_patch(size_t number, const BspFace& face) {
+absl::Status check_patch(size_t face_index, const BspFace& face) {
   const uint64_t width = face.patch_width;
   const uint64_t height = face.patch_height;
   if (width < 3 || height < 3 || width % 2 == 0 || height % 2 == 0 || width * height != face.vertex_count) {
-    return damaged(kFacesLump, number,
+    return damaged(kFacesLump, face_index,
                    absl::StrCat("a patch of ", width, " x ", height, " control points with ", face.vertex_count,
                                 " vertices; sides must be odd, at least 3, and multiply to the vertices"));
   }
   return absl::OkStatus();
 }
 
-absl::Status check_meshverts(size_t number, const BspFace& face, const BspFile& file) {
+absl::Status check_meshverts(size_t face_index, const BspFace& face, const BspFile& file) {
   if (!is_range(face.first_meshvert, face.meshvert_count, file.meshverts.size())) {
     return damaged(
-        kFacesLump, number,
+        kFacesLump, face_index,
         absl::StrCat("meshverts ", face.first_meshvert, " + ", face.meshvert_count, " of ", file.meshverts.size()));
   }
   if (face.meshvert_count % 3 != 0) {
-    return damaged(kFacesLump, number, absl::StrCat(face.meshvert_count, " meshverts are no whole triangles"));
+    return damaged(kFacesLump, face_index, absl::StrCat(face.meshvert_count, " meshverts are no whole triangles"));
   }
   for (size_t i = face.first_meshvert; i < size_t{face.first_meshvert} + face.meshvert_count; ++i) {
     if (file.meshverts[i] >= face.vertex_count) {
       return damaged(
           kMeshvertsLump, i,
-          absl::StrCat("vertex ", file.meshverts[i], " of the ", face.vertex_count, " of faces[", number, "]"));
+          absl::StrCat("vertex ", file.meshverts[i], " of the ", face.vertex_count, " of faces[", face_index, "]"));
     }
   }
   return absl::OkStatus();
 }
 
-absl::Status check_face(size_t number, const BspFace& face, const BspFile& file) {
+absl::Status check_face(size_t face_index, const BspFace& face, const BspFile& file) {
   if (face.texture >= file.textures.size()) {
-    return damaged(kFacesLump, number, absl::StrCat("texture ", face.texture, " of ", file.textures.size()));
+    return damaged(kFacesLump, face_index, absl::StrCat("texture ", face.texture, " of ", file.textures.size()));
   }
   // A billboard's geometry is never read.
   if (face.type == BspFaceType::kBillboard) return absl::OkStatus();
   if (!is_range(face.first_vertex, face.vertex_count, file.vertices.size())) {
     return damaged(
-        kFacesLump, number,
+        kFacesLump, face_index,
         absl::StrCat("vertices ", face.first_vertex, " + ", face.vertex_count, " of ", file.vertices.size()));
   }
-  return face.type == BspFaceType::kPatch ? check_patch(number, face) : check_meshverts(number, face, file);
+  return face.type == BspFaceType::kPatch ? check_patch(face_index, face) : check_meshverts(face_index, face, file);
 }
 
 absl::Status read_faces(const Lumps& lumps, BspFile& file) {

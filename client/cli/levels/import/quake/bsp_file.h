@@ -1,6 +1,6 @@
-// The parts of a Quake 3 level file (IBSP version 46) that carry its drawn surfaces, decoded and checked. For the BSP
-// importer. Plain data and one function without state. Invariant of what parse_bsp returns: every texture, vertex and
-// meshvert that a face names exists, every float is finite.
+// Decoder of the drawn surfaces in a Quake 3 level file (IBSP version 46). For the BSP importer. Plain data and one
+// function without state. Invariants of a BspFile from parse_bsp(): every texture, vertex and meshvert index of a face
+// is in range, and every float is finite.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 
@@ -30,12 +30,12 @@ struct BspFace {
 struct BspFile {
   std::vector<std::string> textures;
   std::vector<std::array<float, 3>> vertices;
-  std::vector<uint32_t> meshverts;  // each is relative to its face's first vertex
+  std::vector<uint32_t> meshverts;  // vertex indices, relative to the face's first vertex
   std::vector<BspFace> faces;
 };
 
-// Decodes a whole file held in memory; the bytes are untrusted. INVALID_ARGUMENT names the lump and the element at
-// fault. Cost: linear in the file's size.
+// Decodes the bytes of a whole file; they are untrusted. INVALID_ARGUMENT names the damaged lump and element. Cost:
+// linear in the file's size.
 absl::StatusOr<BspFile> parse_bsp(absl::string_view bytes);
 
 }  // namespace locus::cli

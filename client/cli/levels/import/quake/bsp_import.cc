@@ -30,7 +30,8 @@ uint64_t triangles_of(const BspFace& face, int subdivisions) {
   return 0;
 }
 
-// Small files can name the same vertices and meshverts many times, so the sum is judged before anything is built.
+// Checks the total number of triangles before any is built: the faces of a small file can share the same meshverts many
+// times.
 absl::Status check_triangles(const BspFile& file, int subdivisions) {
   uint64_t total = 0;
   for (size_t i = 0; i < file.faces.size(); ++i) {
@@ -44,7 +45,7 @@ absl::Status check_triangles(const BspFile& file, int subdivisions) {
 }
 
 void add_listed_triangles(const BspFile& file, const BspFace& face, LevelBuilder& builder) {
-  // The level's vertices were added first, in their order, so their numbers serve as they are.
+  // The builder's first vertices are the level's, in the same order, so the level's vertex indices are valid there.
   for (size_t i = 0; i < face.meshvert_count; i += 3) {
     const uint32_t* corner = &file.meshverts[face.first_meshvert + i];
     builder.add_triangle(face.first_vertex + corner[0], face.first_vertex + corner[2], face.first_vertex + corner[1]);

@@ -1,4 +1,4 @@
-// Turns a Quake 3 level into a mesh. For import_file. A function without state.
+// Conversion of a Quake 3 level to a mesh. For import_file(). A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_IMPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_IMPORT_H_
 
@@ -11,9 +11,10 @@
 
 namespace locus::cli {
 
-// All drawn faces of the level, doors and other brush models included, as one mesh of that name in the file's order.
-// Polygons and meshes come as they are, patches tessellated, billboards are skipped and counted in a note. A part is a
-// run of faces with the same texture. The file stores front faces clockwise; they are turned to counter-clockwise.
+// Returns all drawn faces of the level, including doors and other brush models, as one mesh called `name`, in the
+// file's order. Polygons and meshes keep their triangles, patches are tessellated, billboards are skipped and counted
+// in a note. A part is a run of faces with the same texture. Front faces are clockwise in the file; their vertex order
+// is reversed.
 // INVALID_ARGUMENT for damaged bytes, RESOURCE_EXHAUSTED beyond kMaxBspTriangles.
 absl::StatusOr<ImportedLevel> import_bsp(absl::string_view bytes, const std::string& name,
                                          const ImportOptions& options);

@@ -30,7 +30,7 @@ struct CloseEntry {
 
 struct LevelEntry {
   std::string name;
-  zip_uint64_t number = 0;
+  zip_uint64_t index = 0;
 };
 
 absl::Status unreadable(const std::string& path, absl::string_view why) {
@@ -61,7 +61,7 @@ absl::StatusOr<std::vector<LevelEntry>> list_levels(zip_t* archive, const std::s
     return absl::NotFoundError(absl::StrCat(path, " holds no .bsp level: give an archive with maps"));
   }
   std::sort(levels.begin(), levels.end(), [](const LevelEntry& a, const LevelEntry& b) {
-    return std::pair(a.name, a.number) < std::pair(b.name, b.number);
+    return std::pair(a.name, a.index) < std::pair(b.name, b.index);
   });
   return levels;
 }
@@ -97,9 +97,9 @@ absl::StatusOr<size_t> choose_level(const std::vector<LevelEntry>& levels, const
 }
 
 absl::StatusOr<std::string> unpack(zip_t* archive, const LevelEntry& level, const std::string& path) {
-  const std::unique_ptr<zip_file_t, CloseEntry> file(zip_fopen_index(archive, level.number, 0));
+  const std::unique_ptr<zip_file_t, CloseEntry> file(zip_fopen_index(archive, level.index, 0));
   if (file == nullptr) return unreadable(path, absl::StrCat(level.name, ": ", zip_strerror(archive)));
-  // The declared size is the archive's word only: what comes out is counted instead.
+  // The declared size is untrusted, so the unpacked bytes are counted.
   std::string bytes;
   std::array<char, 1 << 16> chunk;
   while (true) {

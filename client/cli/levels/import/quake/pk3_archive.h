@@ -1,4 +1,4 @@
-// Finds and unpacks one level inside a .pk3, which is a zip archive. For import_file. A function without state.
+// Extraction of one level from a .pk3, which is a zip archive. For import_file(). A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_PK3_ARCHIVE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_PK3_ARCHIVE_H_
 
@@ -10,14 +10,15 @@
 namespace locus::cli {
 
 struct Pk3Level {
-  std::string entry;                // its path inside the archive
+  std::string entry;                // path inside the archive
   std::string bytes;                // at most kMaxBspBytes
   std::vector<std::string> others;  // the other levels, sorted
 };
 
-// The level that `entry` names: the whole path, or its file name with or without ".bsp", in any case. Empty takes the
-// first in alphabetical order. NOT_FOUND lists what is there; INVALID_ARGUMENT for an archive that cannot be read;
-// RESOURCE_EXHAUSTED for a level beyond kMaxBspBytes, whatever size the archive declares.
+// Returns the level named `entry`: its full path, or its file name with or without ".bsp", case-insensitive. An empty
+// `entry` selects the first level in alphabetical order. NOT_FOUND lists the archive's levels; INVALID_ARGUMENT for an
+// archive that cannot be read; RESOURCE_EXHAUSTED if the unpacked level exceeds kMaxBspBytes; the size that the archive
+// declares is not trusted.
 absl::StatusOr<Pk3Level> read_pk3_level(const std::string& path, const std::string& entry);
 
 }  // namespace locus::cli

@@ -21,7 +21,7 @@ CommandWords program() {
   return tool;
 }
 
-TEST(CompletionTableTest, ACommandListsWhatIsBelowIt) {
+TEST(CompletionTableTest, ACommandListsItsSubcommandsAndOptions) {
   const std::vector<TableEntry> table = completion_table(program());
   ASSERT_THAT(table, SizeIs(2));
   EXPECT_EQ(table[0].path, "tool");
@@ -29,7 +29,7 @@ TEST(CompletionTableTest, ACommandListsWhatIsBelowIt) {
               ElementsAre("command\tdraw\t-\tDraw something", "option\t--help\t-\tHelp", "option\t-v\tany\tMore"));
 }
 
-TEST(CompletionTableTest, OptionsFromAboveComeLastAndGiveWayToTheCommandsOwn) {
+TEST(CompletionTableTest, InheritedOptionsComeLastUnlessTheCommandRedefinesThem) {
   EXPECT_THAT(completion_table(program())[1].lines,
               ElementsAre("positional\tSHAPE\tchoice ball box\tWhat", "option\t--help\t-\tHelp of draw",
                           "option\t-o\tfile\tWhere to", "option\t--out\tfile\tWhere to", "option\t-v\tany\tMore"));

@@ -1,4 +1,4 @@
-// The demo's checks can fail: answers made by brute force pass, and each kind of damage to them is noticed.
+// Tests that the demo's checks can fail: answers computed by brute force pass, and each kind of damage is detected.
 #include "client/cli/extras/demo/demo_queries.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ constexpr uint64_t kSeed = 7;
 constexpr uint64_t kTick = 13;
 constexpr int kQueries = 40;
 
-// A small city with objects, and the right answers to a batch of each kind at kTick.
+// Small city with objects, and the correct answers to a batch of each kind at kTick.
 class DemoQueriesTest : public testing::Test {
  protected:
   DemoQueriesTest() : level_(make_level()), world_(level_.bounds, 5000, kSeed), checker_(level_.instances, world_) {
@@ -72,7 +72,7 @@ class DemoQueriesTest : public testing::Test {
   DemoChecker checker_;
 };
 
-TEST_F(DemoQueriesTest, RightRaysPassAndOneLostHitIsNoticed) {
+TEST_F(DemoQueriesTest, CorrectRaysPassAndOneLostHitIsDetected) {
   DemoRandom random(kSeed);
   const v1::QueryBatch batch = demo_batch(DemoKind::kFirst, world_, random, kQueries);
   v1::QueryResult result = answer(batch);
@@ -85,7 +85,7 @@ TEST_F(DemoQueriesTest, RightRaysPassAndOneLostHitIsNoticed) {
   EXPECT_EQ(differences(DemoKind::kFirst, batch, result), 1u) << "seed " << kSeed;
 }
 
-TEST_F(DemoQueriesTest, AnAnyHitThatIsLostIsNoticed) {
+TEST_F(DemoQueriesTest, ALostAnyHitIsDetected) {
   DemoRandom random(kSeed);
   const v1::QueryBatch batch = demo_batch(DemoKind::kAny, world_, random, kQueries);
   v1::QueryResult result = answer(batch);
@@ -97,7 +97,7 @@ TEST_F(DemoQueriesTest, AnAnyHitThatIsLostIsNoticed) {
   EXPECT_EQ(differences(DemoKind::kAny, batch, result), 1u) << "seed " << kSeed;
 }
 
-TEST_F(DemoQueriesTest, AnOverlapRowThatIsLostIsNoticed) {
+TEST_F(DemoQueriesTest, ALostOverlapRowIsDetected) {
   DemoRandom random(kSeed);
   const v1::QueryBatch batch = demo_batch(DemoKind::kBalls, world_, random, kQueries);
   v1::QueryResult result = answer(batch);
@@ -112,7 +112,7 @@ TEST_F(DemoQueriesTest, AnOverlapRowThatIsLostIsNoticed) {
   EXPECT_EQ(differences(DemoKind::kBalls, batch, result), 1u) << "seed " << kSeed;
 }
 
-TEST_F(DemoQueriesTest, AnswersOfAnotherTickAreNoticed) {
+TEST_F(DemoQueriesTest, AnswersOfAnotherTickAreDetected) {
   DemoRandom random(kSeed);
   const v1::QueryBatch batch = demo_batch(DemoKind::kFirst, world_, random, kQueries);
   v1::QueryResult result = answer(batch);

@@ -36,7 +36,7 @@ TEST(DemoWorldTest, MovesCarryThePositionsOfTheTick) {
   }
 }
 
-TEST(DemoWorldTest, InsertsNameEveryObjectOnce) {
+TEST(DemoWorldTest, InsertsHoldEveryObjectOnce) {
   const DemoWorld world(kBounds, 20, 3);
   std::vector<uint64_t> ids;
   const v1::UpdateBatch batch = world.inserts();

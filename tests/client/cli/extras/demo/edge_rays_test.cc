@@ -15,7 +15,7 @@ std::vector<Triangle> city() {
   return place_level(level).instances.front().triangles;
 }
 
-// Rays that reach no triangle by the target.
+// Returns the number of rays without a hit up to the target.
 size_t count_passed(const EdgeRays& rays, const std::vector<Triangle>& triangles) {
   size_t passed = 0;
   for (size_t i = 0; i < rays.size(); ++i) {
@@ -31,14 +31,14 @@ size_t count_passed(const EdgeRays& rays, const std::vector<Triangle>& triangles
   return passed;
 }
 
-TEST(EdgeRaysTest, GivesAsManyRaysAsAsked) { EXPECT_EQ(aim_at_edges(city(), 1000, 1).size(), 1000u); }
+TEST(EdgeRaysTest, GivesTheRequestedNumberOfRays) { EXPECT_EQ(aim_at_edges(city(), 1000, 1).size(), 1000u); }
 
-TEST(EdgeRaysTest, NoRayPassesTheWholeMesh) {
+TEST(EdgeRaysTest, NoRayMissesAnIntactMesh) {
   const std::vector<Triangle> triangles = city();
   EXPECT_EQ(count_passed(aim_at_edges(triangles, 2000, 1), triangles), 0u);
 }
 
-// About half the rays of an edge go through each of its triangles: a mesh with holes must leak.
+// About half the rays of an edge hit each of its triangles, so rays must pass through a mesh with holes.
 TEST(EdgeRaysTest, RaysPassWhereTrianglesAreMissing) {
   const std::vector<Triangle> triangles = city();
   std::vector<Triangle> holed;

@@ -38,14 +38,14 @@ TEST(ImageSizeTest, AnythingElseIsRefused) {
   }
 }
 
-TEST(CameraOptionsTest, WithoutAnyTheTargetIsSeenFromAbove) {
+TEST(CameraOptionsTest, WithoutOptionsTheTargetIsSeenFromAbove) {
   const Camera camera = *camera_of({}, kBox, kSize);
   EXPECT_GT(camera.eye.z, kBox.max.z);
   EXPECT_LT(camera.axes.forward.z, -0.4);
   EXPECT_NEAR(camera.half_height, 0.41421356, 1e-7);
 }
 
-TEST(CameraOptionsTest, AnEyeStaysWhereItIsPutAndLooksAtTheTargetsMiddle) {
+TEST(CameraOptionsTest, AnEyeKeepsItsPositionAndLooksAtTheTargetsCentre) {
   const Camera camera = *camera_of({.eye = Triple{5, 10, 115}}, kBox, kSize);
   EXPECT_EQ(camera.eye, (Vec3d{5, 10, 115}));
   EXPECT_EQ(camera.axes.forward, (Vec3d{0, 0, -1}));
@@ -66,7 +66,7 @@ TEST(CameraOptionsTest, ADirectionAloneFramesTheTargetFromThere) {
   EXPECT_NEAR(camera.eye.x, 5, 1e-9);
 }
 
-TEST(CameraOptionsTest, OneThingIsShownWithMoreAroundItThanTheScene) {
+TEST(CameraOptionsTest, AnObjectIsFramedWithAWiderMarginThanTheScene) {
   const Camera scene = *camera_of({}, kBox, kSize), thing = *camera_of({.at = Number64{7}}, kBox, kSize);
   EXPECT_GT(thing.eye.z, scene.eye.z);
 }
@@ -91,7 +91,7 @@ TEST(CameraOptionsTest, WithoutPerspectiveTheHeightIsInUnits) {
   EXPECT_NEAR(fitted.half_height, 15, 1);
 }
 
-TEST(CameraOptionsTest, WhatGivesNoDirectionIsAUsageError) {
+TEST(CameraOptionsTest, OptionsThatGiveNoDirectionAreUsageErrors) {
   expect_usage(check({.eye = Triple{1, 2, 3}, .look_at = Triple{1, 2, 3}}), "--eye and --look-at are the same point");
   expect_usage(check({.direction = Triple{0, 0, 0}}), "--dir 0,0,0 is no direction");
   expect_usage(camera_of({.up = Triple{0, 0, 0}}, kBox, kSize).status(), "--up 0,0,0 is no direction");

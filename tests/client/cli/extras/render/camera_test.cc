@@ -30,7 +30,7 @@ TEST(ViewAxesTest, AreUnitPerpendicularAndHaveUpUpward) {
   EXPECT_NEAR(dot(cross(axes.right, axes.up), axes.forward), -1, kNear);
 }
 
-TEST(ViewAxesTest, OfAViewNorthWithZUpHaveEastToTheRight) {
+TEST(ViewAxesTest, AViewNorthWithZUpHasEastToTheRight) {
   const ViewAxes axes = *view_axes({0, 1, 0}, {0, 0, 1});
   EXPECT_EQ(axes.right, (Vec3d{1, 0, 0}));
   EXPECT_EQ(axes.up, (Vec3d{0, 0, 1}));
@@ -58,7 +58,7 @@ TEST(RayThroughTest, TheMiddlePixelLooksStraightAhead) {
 }
 
 TEST(RayThroughTest, RowsGoDownAndColumnsGoRightByTheSameAngleOfView) {
-  // 4 x 2 pixels over 2 x 1 units at distance 1: centres are at 0.75 and 0.25 aside, 0.25 up and down.
+  // 4 x 2 pixels cover 2 x 1 units at distance 1: pixel centres are at +-0.75 and +-0.25 across, +-0.25 vertically.
   const Camera camera = looking_along_y(Projection::kPerspective);
   EXPECT_EQ(ray_through(camera, {4, 2}, 0, 0).direction, (Vec3f{-0.75f, 1, 0.25f}));
   EXPECT_EQ(ray_through(camera, {4, 2}, 3, 0).direction, (Vec3f{0.75f, 1, 0.25f}));
@@ -74,7 +74,7 @@ TEST(RayThroughTest, AHitsTIsItsDepthAlongTheView) {
   }
 }
 
-TEST(RayThroughTest, WithoutPerspectiveRaysArePartsOfAPlaneApart) {
+TEST(RayThroughTest, AnOrthographicRayPointsAlongTheViewFromItsPixel) {
   const Camera camera = looking_along_y(Projection::kOrthographic);
   const CameraRay ray = ray_through(camera, {4, 2}, 0, 1);
   EXPECT_EQ(ray.origin, (Vec3f{-0.75f, 0, -0.25f}));
@@ -86,7 +86,7 @@ TEST(HalfHeightTest, IsTheTangentOfHalfTheAngle) {
   EXPECT_NEAR(half_height_of(60), 1 / std::sqrt(3), 1e-7);
 }
 
-TEST(HalfHeightTest, DoesNotShowTheLastBitsOfALibrarysTangent) {
+TEST(HalfHeightTest, DoesNotDependOnTheLastBitsOfTheLibrarysTangent) {
   for (const double degrees : {30.0, 45.0, 50.0, 60.0, 70.0, 75.0, 90.0}) {
     const double tangent = std::tan(degrees * (std::numbers::pi / 360));
     for (const double other : {tangent * (1 + 4e-16), tangent * (1 - 4e-16)}) {

@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 
 constexpr ImageSize kSize = {120, 100};  // more than one batch
 
-// A ball in front of a city's ground, seen from far above by an eye far out.
+// Scene of a ball above a city's ground, seen from far above, at a large distance from the origin.
 class CastRaysTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -48,7 +48,7 @@ class CastRaysTest : public ::testing::Test {
   CastOptions options_;
 };
 
-TEST_F(CastRaysTest, EveryPixelHasWhatItsRayHits) {
+TEST_F(CastRaysTest, EveryPixelHoldsTheHitOfItsRay) {
   const CastResult result = cast();
   EXPECT_NEAR(result.image.t[middle()], 28, 0.1);
   EXPECT_EQ(result.image.ids[middle()], 7u);
@@ -61,7 +61,7 @@ TEST_F(CastRaysTest, EveryPixelHasWhatItsRayHits) {
   EXPECT_TRUE(result.image.work.empty());
 }
 
-TEST_F(CastRaysTest, AllRaysSeeTheGivenRevisionThoughTheSceneHasMovedOn) {
+TEST_F(CastRaysTest, AllRaysSeeTheGivenRevisionAfterTheSceneHasChanged) {
   const RayImage before = cast().image;
   move_ball(20);
   const CastResult after = cast();
@@ -78,7 +78,7 @@ TEST_F(CastRaysTest, LivePicturesSeeTheLatestRevision) {
   EXPECT_NEAR(live.image.t[middle()], 18, 0.1);
 }
 
-TEST_F(CastRaysTest, ARevisionThatIsGoneIsExplained) {
+TEST_F(CastRaysTest, ADroppedRevisionIsExplained) {
   for (int i = 0; i < 70; ++i) move_ball(10 + 0.1 * i);
   const absl::Status status = cast_rays(server_.client(), camera_, kSize, options_).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kOutOfRange);
@@ -86,7 +86,7 @@ TEST_F(CastRaysTest, ARevisionThatIsGoneIsExplained) {
   EXPECT_THAT(status.message(), HasSubstr("--live"));
 }
 
-TEST_F(CastRaysTest, RefusalsOfTheServerAreHandedOn) {
+TEST_F(CastRaysTest, ErrorsOfTheServerAreReturned) {
   options_.scene = "nowhere";
   EXPECT_EQ(cast_rays(server_.client(), camera_, kSize, options_).status().code(), absl::StatusCode::kNotFound);
   options_.scene = "arena";
@@ -94,7 +94,7 @@ TEST_F(CastRaysTest, RefusalsOfTheServerAreHandedOn) {
   EXPECT_EQ(cast_rays(server_.client(), camera_, kSize, options_).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
-TEST_F(CastRaysTest, SourceMaskAndCullChooseWhatIsSeen) {
+TEST_F(CastRaysTest, SourceMaskAndCullSelectTheHits) {
   options_.source = v1::SOURCE_STATIC;
   EXPECT_THAT(cast().image.ids, Each(1u));
   options_.source = v1::SOURCE_UNSPECIFIED;
@@ -103,11 +103,11 @@ TEST_F(CastRaysTest, SourceMaskAndCullChooseWhatIsSeen) {
   EXPECT_TRUE(std::isinf(cast().image.t[0]));
   options_.mask = 1;
   options_.cull = v1::CULL_BACK;
-  camera_.eye.z = -0.25;  // within the slab, whose lower side shows its back
+  camera_.eye.z = -0.25;  // inside the ground slab, whose bottom shows its back
   EXPECT_THAT(cast().image.ids, Each(0u));
 }
 
-TEST_F(CastRaysTest, ReportedWorkIsThatOfEachRayAndChangesNoAnswer) {
+TEST_F(CastRaysTest, WorkIsReportedForEachRayAndChangesNoAnswer) {
   const RayImage without = cast().image;
   options_.work = WorkReport::kReported;
   const RayImage with = cast().image;
@@ -118,19 +118,19 @@ TEST_F(CastRaysTest, ReportedWorkIsThatOfEachRayAndChangesNoAnswer) {
   EXPECT_GT(with.work[middle()].cells, 0u);
 }
 
-TEST_F(CastRaysTest, WithoutPerspectiveRaysStartAPlaneApart) {
+TEST_F(CastRaysTest, OrthographicRaysStartInAPlane) {
   camera_.projection = Projection::kOrthographic;
   camera_.half_height = 4;
   const RayImage image = cast().image;
   EXPECT_NEAR(image.t[0], 40, 1e-5);
   EXPECT_EQ(image.ids[middle()], 7u);
-  // The ball, 4 units wide, takes pi 2^2 of the picture's 8 x 9.6 units.
+  // The ball, 4 units wide, covers pi 2^2 of the picture's 8 x 9.6 square units.
   uint64_t ball = 0;
   for (const uint64_t id : image.ids) ball += id == 7;
   EXPECT_NEAR(static_cast<double>(ball) / static_cast<double>(kSize.pixels()), 4 * M_PI / (8 * 9.6), 0.005);
 }
 
-TEST_F(CastRaysTest, ProgressNeverGoesBackNorBeyondTheEnd) {
+TEST_F(CastRaysTest, ProgressNeverDecreasesOrExceedsTheTotal) {
   uint64_t last = 0;
   int calls = 0;
   const auto progress = [&](uint64_t done) {

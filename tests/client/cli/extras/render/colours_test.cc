@@ -15,7 +15,7 @@ double luminance(Colour colour) {
   return 0.2126 * light.red + 0.7152 * light.green + 0.0722 * light.blue;
 }
 
-TEST(ColourTest, EveryStoredColourSurvivesTheWayOverLight) {
+TEST(ColourTest, EveryStoredColourSurvivesConversionToLightAndBack) {
   for (int value = 0; value < 256; ++value) {
     const auto byte = static_cast<uint8_t>(value);
     const Colour colour = {byte, static_cast<uint8_t>(255 - byte), 7};
@@ -40,7 +40,7 @@ TEST(ColourMapTest, GetsBrighterAllTheWay) {
   }
 }
 
-TEST(ColourMapTest, WhatIsOutsideTheRangeTakesTheNearerEndAndNanTheLower) {
+TEST(ColourMapTest, ValuesOutsideTheRangeAreClampedAndNanIsZero) {
   const double kInfinity = std::numeric_limits<double>::infinity();
   for (const auto map : {viridis, inferno}) {
     EXPECT_EQ(map(-3), map(0));
@@ -51,7 +51,7 @@ TEST(ColourMapTest, WhatIsOutsideTheRangeTakesTheNearerEndAndNanTheLower) {
   }
 }
 
-TEST(HueTest, IdsInARowLieFarApart) {
+TEST(HueTest, ConsecutiveIdsHaveDistantHues) {
   for (uint64_t first : {uint64_t{1}, uint64_t{1'000'000}, uint64_t{1} << 63}) {
     std::vector<double> hues;
     for (uint64_t id = first; id < first + 8; ++id) hues.push_back(hue_of(id));
@@ -62,7 +62,7 @@ TEST(HueTest, IdsInARowLieFarApart) {
   }
 }
 
-TEST(HueTest, ColoursOfTheCircle) {
+TEST(HueTest, PureHuesHaveTheExpectedColours) {
   EXPECT_EQ(colour_of(light_of_hue(0, 1, 1)), (Colour{255, 0, 0}));
   EXPECT_EQ(colour_of(light_of_hue(1.0 / 3, 1, 1)), (Colour{0, 255, 0}));
   EXPECT_EQ(colour_of(light_of_hue(2.0 / 3, 1, 1)), (Colour{0, 0, 255}));

@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-// How far the box's corners reach in the picture: 1 is the edge.
+// Extent of a box in the picture: 1 is the edge.
 struct Shown {
   double left = 0, right = 0, down = 0, up = 0;
   double nearest = HUGE_VAL;
@@ -37,7 +37,7 @@ const Aabbd kLongBox = {{-30, 5, 0}, {50, 12, 9}};
 const Aabbd kFarBox = {{4e8, -7e8, 1e3}, {4e8 + 3, -7e8 + 3, 1e3 + 3}};
 const Vec3d kUps[] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}, {0, 0, -2}, {0.3, -0.9, 0.2}};
 
-TEST(ThreeQuarterViewTest, LooksDownAndAsideWhateverIsUp) {
+TEST(ThreeQuarterViewTest, LooksObliquelyDownForEveryUp) {
   for (const Vec3d up : kUps) {
     const Vec3d view = three_quarter_view(up);
     EXPECT_NEAR(squared_length(view), 1, 1e-12);
@@ -62,7 +62,7 @@ TEST(FrameBoxTest, AllOfTheBoxIsInThePictureAndFillsItInOneDirection) {
   }
 }
 
-TEST(FrameBoxTest, TheBoxIsInTheMiddleOfTheDirectionItFills) {
+TEST(FrameBoxTest, TheBoxIsCentredInTheDirectionItFills) {
   const Lens lens = {.half_height = 0.4, .aspect = 0.25, .margin = 1};
   const Shown shown = show(frame_box(kLongBox, *view_axes({1, 2, -1}, {0, 0, 1}), lens), kLongBox, lens.aspect);
   EXPECT_NEAR(shown.left, shown.right, 1e-9);
@@ -74,7 +74,7 @@ TEST(FrameBoxTest, AMarginOfTwoShowsTheBoxAboutHalfAsLarge) {
   EXPECT_NEAR(shown.widest(), 0.5, 0.02);
 }
 
-TEST(FrameBoxTest, WithoutPerspectiveTheHeightIsWhatTheBoxTakes) {
+TEST(FrameBoxTest, TheOrthographicHeightFitsTheBox) {
   for (const double aspect : {16.0 / 9, 0.25}) {
     const Lens lens = {.projection = Projection::kOrthographic, .half_height = 0, .aspect = aspect, .margin = 1};
     const Shown shown = show(frame_box(kLongBox, *view_axes({1, 2, -1}, {0, 0, 1}), lens), kLongBox, aspect);
@@ -83,12 +83,12 @@ TEST(FrameBoxTest, WithoutPerspectiveTheHeightIsWhatTheBoxTakes) {
   }
 }
 
-TEST(FrameBoxTest, WithoutPerspectiveAGivenHeightIsKept) {
+TEST(FrameBoxTest, AGivenOrthographicHeightIsKept) {
   const Lens lens = {.projection = Projection::kOrthographic, .half_height = 12};
   EXPECT_EQ(frame_box(kLongBox, *view_axes({0, 1, 0}, {0, 0, 1}), lens).half_height, 12);
 }
 
-TEST(FrameBoxTest, ASinglePointIsSeenFromSomeWayOff) {
+TEST(FrameBoxTest, ASinglePointIsSeenFromADistance) {
   const Aabbd point = {{5, 5, 5}, {5, 5, 5}};
   const Camera camera = frame_box(point, *view_axes({0, 1, 0}, {0, 0, 1}), Lens{.half_height = 1});
   EXPECT_NEAR(camera.eye.x, 5, 1e-9);

@@ -18,7 +18,7 @@ int spread(Colour colour) {
 
 Camera looking_along_y() { return {.eye = {}, .axes = *view_axes({0, 1, 0}, {0, 0, 1}), .half_height = 0.1}; }
 
-// Pixels that all hit the front of one thing.
+// Returns an image whose pixels all hit the front of one object or instance.
 RayImage wall(const ImageSize& size, uint64_t id, uint32_t triangle) {
   RayImage image(size);
   for (size_t pixel = 0; pixel < size.pixels(); ++pixel) {
@@ -30,7 +30,7 @@ RayImage wall(const ImageSize& size, uint64_t id, uint32_t triangle) {
   return image;
 }
 
-TEST(ScaleTest, NamesTheEndsTheMiddleAndTheNinetyNinthPercentile) {
+TEST(ScaleTest, HoldsMinimumMaximumMedianAndNinetyNinthPercentile) {
   std::vector<double> values;
   for (int i = 100; i >= 0; --i) values.push_back(i);
   values.back() = 0;
@@ -41,9 +41,9 @@ TEST(ScaleTest, NamesTheEndsTheMiddleAndTheNinetyNinthPercentile) {
   EXPECT_EQ(scale.max, 100);
 }
 
-TEST(ScaleTest, OfNothingIsZero) { EXPECT_EQ(scale_of({}).max, 0); }
+TEST(ScaleTest, OfNoValuesIsZero) { EXPECT_EQ(scale_of({}).max, 0); }
 
-TEST(ScaleTest, DepthsAreThoseOfHits) {
+TEST(ScaleTest, DepthsHoldHitsOnly) {
   RayImage image = wall({2, 1}, 3, 0);
   image.ids[0] = 0;
   EXPECT_EQ(depths_of(image), std::vector<double>{5});
@@ -57,7 +57,7 @@ TEST(ShadedTest, ObjectsAreColouredAndInstancesPale) {
   EXPECT_LT(spread(instance), 30);
 }
 
-TEST(ShadedTest, WhatFacesTheLampIsBrighterThanWhatFacesAway) {
+TEST(ShadedTest, SurfacesFacingTheLampAreBrighterThanThoseFacingAway) {
   const Camera camera = looking_along_y();
   RayImage image = wall({2, 1}, 3, 0);
   image.normals = {{-0.5f, -0.5f, 0.7f}, {0.5f, -0.5f, -0.7f}};
@@ -83,12 +83,12 @@ TEST(ShadedTest, TheNearerOfTwoThingsHasADarkEdge) {
   EXPECT_NEAR(brightness(picture.pixels[2]), brightness(picture.pixels[3]), 12);
 }
 
-TEST(ShadedTest, NothingHitShowsADarkBackground) {
+TEST(ShadedTest, AMissShowsADarkBackground) {
   const Picture picture = paint_shaded(RayImage({2, 2}), looking_along_y());
   for (const Colour colour : picture.pixels) EXPECT_LT(brightness(colour), 250);
 }
 
-TEST(DepthTest, NearIsBrightFarIsDarkAndNothingIsBlack) {
+TEST(DepthTest, NearIsBrightFarIsDarkAndAMissIsBlack) {
   RayImage image = wall({3, 1}, 3, 0);
   image.t = {2, 10, 5};
   image.ids[2] = 0;
@@ -98,7 +98,7 @@ TEST(DepthTest, NearIsBrightFarIsDarkAndNothingIsBlack) {
   EXPECT_EQ(picture.pixels[2], Colour{});
 }
 
-TEST(DepthTest, OneDepthAloneHasAColour) {
+TEST(DepthTest, ASingleDepthHasAColour) {
   const RayImage image = wall({1, 1}, 3, 0);
   EXPECT_EQ(paint_depth(image, scale_of(depths_of(image))).pixels[0], viridis(0));
 }

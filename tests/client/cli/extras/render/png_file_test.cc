@@ -22,7 +22,7 @@ Picture gradient(const ImageSize& size) {
   return picture;
 }
 
-// By libpng, which reads what it has not seen before.
+// Reads a PNG file back with libpng.
 Picture read_png(const std::string& path) {
   png_image image = {};
   image.version = PNG_IMAGE_VERSION;
@@ -50,7 +50,7 @@ TEST(PngFileTest, APictureIsReadBackAsItWasWritten) {
   std::filesystem::remove(path);
 }
 
-TEST(PngFileTest, WhereNoFileCanBeTheErrorNamesThePath) {
+TEST(PngFileTest, AnUnwritablePathIsNamed) {
   const absl::Status status = write_png("/nonexistent/folder/x.png", gradient({2, 2}));
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(status.message(), HasSubstr("cannot write /nonexistent/folder/x.png"));
@@ -61,7 +61,7 @@ TEST(PngFileTest, AFullDiskIsAnError) {
   EXPECT_THAT(write_png("/dev/full", gradient({64, 64})).message(), HasSubstr("cannot write /dev/full"));
 }
 
-TEST(PngPathTest, NamesInFoldersThatExistWillDo) {
+TEST(PngPathTest, PathsInExistingFoldersAreAccepted) {
   EXPECT_TRUE(check_png_path("here.png").ok());
   EXPECT_TRUE(check_png_path(path_of("there.PNG")).ok());
 }
@@ -70,11 +70,11 @@ TEST(PngPathTest, AnotherEndingIsRefused) {
   EXPECT_THAT(check_png_path("picture.jpg").message(), HasSubstr("picture.jpg does not end in .png"));
 }
 
-TEST(PngPathTest, AFolderThatIsNotThereIsNamed) {
+TEST(PngPathTest, AMissingFolderIsNamed) {
   EXPECT_THAT(check_png_path("/nonexistent/x.png").message(), HasSubstr("there is no folder /nonexistent"));
 }
 
-TEST(PngPathTest, AFolderIsNoPicture) {
+TEST(PngPathTest, AFolderIsRefused) {
   const std::string folder = path_of("folder.png");
   std::filesystem::create_directory(folder);
   EXPECT_THAT(check_png_path(folder).message(), HasSubstr("it is a folder"));

@@ -10,7 +10,7 @@
 namespace locus::cli {
 namespace {
 
-// One object and one triangle hit, one pixel empty.
+// Returns an image of three pixels: one hits an object, one a triangle, one nothing.
 RayImage three_pixels() {
   RayImage image({3, 1});
   image.t = {2.5f, 8, INFINITY};
@@ -19,7 +19,7 @@ RayImage three_pixels() {
   return image;
 }
 
-TEST(RayImageTest, BeginsWithNothingHit) {
+TEST(RayImageTest, ANewImageHasNoHits) {
   const RayImage image({4, 2});
   EXPECT_EQ(image.t.size(), 8u);
   EXPECT_EQ(image.normals.size(), 8u);
@@ -27,7 +27,7 @@ TEST(RayImageTest, BeginsWithNothingHit) {
   EXPECT_TRUE(std::isinf(image.t[7]));
 }
 
-TEST(RayImageTest, TellsObjectsFromInstancesAndBothFromNothing) {
+TEST(RayImageTest, DistinguishesObjectsInstancesAndMisses) {
   const RayImage image = three_pixels();
   EXPECT_EQ(image.hits(), 2u);
   EXPECT_TRUE(image.hit_object(0));
@@ -37,8 +37,8 @@ TEST(RayImageTest, TellsObjectsFromInstancesAndBothFromNothing) {
   EXPECT_FALSE(image.hit_object(2));
 }
 
-// The bytes as documented, hashed by another program: struct.pack of Python, sha256sum.
-TEST(RayImageTest, HashesAreThoseOfTheDocumentedBytes) {
+// The expected hashes were computed from the documented bytes with Python's struct.pack and sha256sum.
+TEST(RayImageTest, HashesMatchTheDocumentedBytes) {
   EXPECT_EQ(depth_sha256(three_pixels()), "cc134b257578272337ded246e45388511a2ac43191eb8237e2b5f9fcf595a74b");
   EXPECT_EQ(ids_sha256(three_pixels()), "4eb9782aba84a9b1b77a55a148b49ad4f21cef90757e89db4917a31a1bd8ea0c");
 }
@@ -59,7 +59,7 @@ TEST(RayImageTest, TheIdsHashChangesWithOneIdAndWithOneTriangle) {
   EXPECT_EQ(depth_sha256(id), depth_sha256(three_pixels()));
 }
 
-TEST(RayImageTest, TheShapeOfTheImageIsPartOfItsHashes) {
+TEST(RayImageTest, HashesIncludeTheSizeOfTheImage) {
   RayImage tall = three_pixels();
   std::swap(tall.size.width, tall.size.height);
   EXPECT_NE(depth_sha256(tall), depth_sha256(three_pixels()));

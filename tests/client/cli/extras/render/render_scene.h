@@ -1,4 +1,4 @@
-// Scenes on a real server inside the test's process, small and the same every time, for tests of `locus render`.
+// Small deterministic scenes on a real server inside the test's process, for tests of `locus render`.
 #ifndef LOCUS_TESTS_CLIENT_CLI_EXTRAS_RENDER_RENDER_SCENE_H_
 #define LOCUS_TESTS_CLIENT_CLI_EXTRAS_RENDER_RENDER_SCENE_H_
 
@@ -54,7 +54,7 @@ class RenderServer {
     EXPECT_EQ(ack->refused(), 0u);
   }
 
-  // A city of about so many triangles, named by that number.
+  // Uploads a city of about this many triangles, named by the number.
   std::string upload_city(uint64_t triangles) {
     const ImportedMesh city = generate_city(triangles, 7);
     const std::string name = "city-" + std::to_string(triangles);

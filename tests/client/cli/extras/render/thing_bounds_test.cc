@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 constexpr client::Rotation kQuarterAboutZ = {0, 0, 0.70710678f, 0.70710678f};
 
-// A city far out among objects whose bounds are known.
+// Scene of a city, far from the origin, and objects of known bounds.
 class ThingBoundsTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -35,7 +35,7 @@ class ThingBoundsTest : public ::testing::Test {
     return thing_bounds(server_.client(), "arena", server_.revision("arena"), id, bounds);
   }
 
-  // Never too narrow, and too wide by no more than promised.
+  // Expects bounds that enclose the given ones and are too wide by no more than documented.
   void expect_bounds(uint64_t id, const Vec3d& centre, const Vec3d& half) {
     const absl::StatusOr<Aabbd> found = find(id);
     ASSERT_TRUE(found.ok()) << found.status();
@@ -51,20 +51,20 @@ class ThingBoundsTest : public ::testing::Test {
   RenderServer server_;
 };
 
-TEST_F(ThingBoundsTest, OfObjectsAreOuterBoundsAndClose) {
+TEST_F(ThingBoundsTest, BoundsOfObjectsEncloseThemClosely) {
   expect_bounds(7, {kOut.x + 3, kOut.y, 50}, {0.5, 0.5, 0.5});
   expect_bounds(8, {kOut.x, kOut.y, 60}, {1, 4, 2});
   expect_bounds(9, {kOut.x, kOut.y, 70}, {1, 1, 4});
   expect_bounds(12, {kOut.x + 2000, kOut.y, 0}, {1, 1, 1});
 }
 
-TEST_F(ThingBoundsTest, OfAnInstanceAreThoseOfItsPlacedTriangles) {
+TEST_F(ThingBoundsTest, BoundsOfAnInstanceEncloseItsPlacedTriangles) {
   const ImportedMesh city = generate_city(600, 7);
   Aabbd mesh;
   for (size_t i = 0; i < city.vertices.size(); i += 3) {
     mesh = merge(mesh, Vec3d{city.vertices[i], city.vertices[i + 1], city.vertices[i + 2]});
   }
-  // A quarter turn about z: (x, y) goes to (-y, x).
+  // The rotation is 90 degrees about z: (x, y) goes to (-y, x).
   const Aabbd placed = {{kOut.x - 0.5 * mesh.max.y, kOut.y + 0.5 * mesh.min.x, 0.5 * mesh.min.z},
                         {kOut.x - 0.5 * mesh.min.y, kOut.y + 0.5 * mesh.max.x, 0.5 * mesh.max.z}};
   const absl::StatusOr<Aabbd> found = find(1);
@@ -76,7 +76,7 @@ TEST_F(ThingBoundsTest, OfAnInstanceAreThoseOfItsPlacedTriangles) {
   }
 }
 
-TEST_F(ThingBoundsTest, APointIsFoundWhereItIs) {
+TEST_F(ThingBoundsTest, BoundsOfAPointEncloseItsPosition) {
   const absl::StatusOr<Aabbd> found = find(10);
   ASSERT_TRUE(found.ok()) << found.status();
   EXPECT_LT(max_component(found->extent()), 1e-3);
@@ -90,7 +90,7 @@ TEST_F(ThingBoundsTest, AnUnknownIdIsNotFound) {
   EXPECT_THAT(status.message(), HasSubstr("scene arena has no object or instance 99"));
 }
 
-TEST_F(ThingBoundsTest, AHiddenThingIsNotFoundAndTheErrorSaysWhy) {
+TEST_F(ThingBoundsTest, AHiddenObjectIsNotFoundAndTheErrorSaysWhy) {
   const absl::Status status = find(11).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(status.message(), HasSubstr("it is hidden (layers 0)"));

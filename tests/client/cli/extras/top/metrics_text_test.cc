@@ -37,7 +37,7 @@ TEST(MetricsTextTest, EscapesAndSpecialNumbersAreRead) {
   EXPECT_TRUE(std::isnan((*samples)[1].value));
 }
 
-TEST(MetricsTextTest, AnythingElseIsRefusedByItsLine) {
+TEST(MetricsTextTest, MalformedTextIsRefusedNamingTheLine) {
   for (const char* line :
        {"<html>", "name", "name x", "name{a=\"1\" 2", "name{a=1} 2", "name{=\"1\"} 2", "name{a=\"1} 2", "name{a=\"\\",
         "1name 2", "name 1 2 3", "name 1 soon", "{} 1", "name{a \"1\"} 2"}) {
@@ -47,7 +47,7 @@ TEST(MetricsTextTest, AnythingElseIsRefusedByItsLine) {
   }
 }
 
-TEST(MetricsTextTest, WhatIsTooLongOrTooManyIsRefused) {
+TEST(MetricsTextTest, TextBeyondTheMaximaIsRefused) {
   EXPECT_EQ(parse_metrics(std::string(kMaxMetricLineBytes + 1, 'a')).status().code(),
             absl::StatusCode::kResourceExhausted);
   std::string labels;

@@ -29,7 +29,7 @@ TEST(TopFiguresTest, CountersBecomeRates) {
   EXPECT_EQ(figures.server["ready"], true);
 }
 
-TEST(TopFiguresTest, QuantilesAreThoseOfTheIntervalWithinTheirBucket) {
+TEST(TopFiguresTest, QuantilesOfTheIntervalAreInterpolatedWithinTheirBucket) {
   const TopFigures figures = top_figures(
       samples("locus_calls_total{rpc=\"Query\",code=\"OK\"} 100\n"
               "locus_call_seconds_bucket{rpc=\"Query\",le=\"0.001\"} 100\n"
@@ -46,7 +46,7 @@ TEST(TopFiguresTest, QuantilesAreThoseOfTheIntervalWithinTheirBucket) {
   EXPECT_EQ(figures.rpcs[0], (Json{{"rpc", "Query"}, {"per_s", 100}, {"p50_ms", 1.5}, {"p99_ms", 1.99}}));
 }
 
-TEST(TopFiguresTest, BeyondTheHighestBoundTheBoundIsAllThatIsKnown) {
+TEST(TopFiguresTest, AQuantileInTheLastBucketIsItsLowerBound) {
   const TopFigures figures = top_figures({},
                                          samples("locus_calls_total{rpc=\"Query\",code=\"OK\"} 1\n"
                                                  "locus_call_seconds_bucket{rpc=\"Query\",le=\"2\"} 0\n"
@@ -62,11 +62,11 @@ TEST(TopFiguresTest, ACounterThatFellHasNoRate) {
   EXPECT_EQ(figures.queries[0]["us_each"], nullptr);
 }
 
-TEST(TopFiguresTest, ASceneThatIsNewHasNotMovedYet) {
+TEST(TopFiguresTest, ANewSceneHasARevisionRateOfZero) {
   EXPECT_EQ(top_figures({}, samples("locus_scene_revision{scene=\"arena\"} 70\n"), 1).scenes[0]["revisions_per_s"], 0);
 }
 
-TEST(TopFiguresTest, AnEmptyPageIsAServerWithoutAnything) {
+TEST(TopFiguresTest, AnEmptyPageGivesNoRows) {
   const TopFigures figures = top_figures({}, {}, 1);
   EXPECT_TRUE(figures.rpcs.empty() && figures.queries.empty() && figures.scenes.empty());
   EXPECT_EQ(figures.server["ready"], false);

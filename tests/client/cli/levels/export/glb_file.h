@@ -1,4 +1,4 @@
-// Reads a GLB file back and checks its structure: for tests of the exporter. Functions without state.
+// Reader of GLB files that checks their structure, for tests of the exporter. Functions without state.
 #ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_EXPORT_GLB_FILE_H_
 #define LOCUS_TESTS_CLIENT_CLI_LEVELS_EXPORT_GLB_FILE_H_
 
@@ -17,23 +17,23 @@
 namespace locus::cli::testing {
 
 inline uint32_t number_at(const std::string& bytes, size_t offset) {
-  uint32_t number = 0;
-  std::memcpy(&number, bytes.data() + offset, sizeof number);
-  return number;
+  uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
 }
 
 struct GlbFile {
   Json json;
   std::string binary;
 
-  // Three numbers a row for positions, one for indices.
+  // Returns the values of an accessor: three a row for positions, one for indices.
   template <class T>
   std::vector<T> column(size_t accessor) const {
     const Json& entry = json["accessors"][accessor];
     const Json& view = json["bufferViews"][entry["bufferView"].get<size_t>()];
-    std::vector<T> numbers(entry["count"].get<size_t>() * (entry["type"] == "VEC3" ? 3 : 1));
-    std::memcpy(numbers.data(), binary.data() + view["byteOffset"].get<size_t>(), numbers.size() * sizeof(T));
-    return numbers;
+    std::vector<T> values(entry["count"].get<size_t>() * (entry["type"] == "VEC3" ? 3 : 1));
+    std::memcpy(values.data(), binary.data() + view["byteOffset"].get<size_t>(), values.size() * sizeof(T));
+    return values;
   }
   size_t triangles(size_t mesh) const {
     size_t indices = 0;
@@ -67,7 +67,8 @@ inline void expect_accessor_true(const GlbFile& file, const Json& primitive) {
   EXPECT_EQ(indices.size() % 3, 0u);
 }
 
-// Header, chunks, views within the buffer, accessors within their views, true bounds, every node under the root.
+// Expects one buffer, views within the buffer, accessors within their views, exact bounds, and every node under the
+// root.
 inline void expect_valid(const GlbFile& file) {
   EXPECT_EQ(file.json["asset"]["version"], "2.0");
   ASSERT_EQ(file.json["buffers"].size(), 1u);

@@ -31,7 +31,7 @@ class GlbWriterTest : public ::testing::Test {
     return file;
   }
 
-  // By the library that reads such files for the importer.
+  // Reads the file back with the importer.
   ImportedLevel imported() {
     absl::StatusOr<ImportedLevel> level = import_file(path_, {});
     EXPECT_TRUE(level.ok()) << level.status();
@@ -41,7 +41,7 @@ class GlbWriterTest : public ::testing::Test {
   const std::string path_ = ::testing::TempDir() + "glb_writer_test_" + std::to_string(getpid()) + ".glb";
 };
 
-// Two triangles with an edge in common, in two parts; one vertex is used by none.
+// Returns two triangles with a common edge, in two parts, and one unused vertex.
 ImportedMesh two_parts() {
   ImportedMesh mesh;
   mesh.name = "walls";
@@ -51,7 +51,7 @@ ImportedMesh two_parts() {
   return mesh;
 }
 
-TEST_F(GlbWriterTest, AMeshIsWrittenOnceHoweverOftenItIsDrawn) {
+TEST_F(GlbWriterTest, AMeshDrawnByTwoNodesIsWrittenOnce) {
   GlbWriter writer("arena", UpAxis::kY);
   const size_t mesh = writer.reserve_mesh();
   for (int i = 0; i < 3; ++i) {
@@ -103,7 +103,7 @@ TEST_F(GlbWriterTest, AMeshOfTooManyPartsIsWrittenAsOne) {
   EXPECT_EQ(file.triangles(0), kMaxExportParts + 1);
 }
 
-// What assimp 5.2.5 would leave out: transforms within 0.01 of the identity, and vertices nearer than 1e-5.
+// assimp 5.2.5 would drop these differences: transforms within 0.01 of the identity, and vertices nearer than 1e-5.
 TEST_F(GlbWriterTest, SmallDifferencesAreKept) {
   ImportedMesh tiny = unit_box();
   for (float& coordinate : tiny.vertices) coordinate *= 1e-7f;
@@ -139,9 +139,9 @@ TEST_F(GlbWriterTest, IndicesBeyondSixteenBitsAreKept) {
   EXPECT_EQ(level.meshes[0].indices, strip.indices);
 }
 
-TEST_F(GlbWriterTest, ZUpIsTurnedSoThatHeightIsY) {
+TEST_F(GlbWriterTest, AZUpSceneIsRotatedToYUp) {
   ImportedMesh mesh = two_parts();
-  mesh.vertices[2] = 5;  // the first vertex stands 5 high
+  mesh.vertices[2] = 5;  // height of the first vertex
   mesh.vertices[1] = 7;
   GlbWriter writer("arena", UpAxis::kZ);
   const size_t number = writer.reserve_mesh();
@@ -154,7 +154,7 @@ TEST_F(GlbWriterTest, ZUpIsTurnedSoThatHeightIsY) {
             (std::vector<float>{0, 5, -7}));
 }
 
-TEST_F(GlbWriterTest, NamesOfAnyBytesMakeGoodJson) {
+TEST_F(GlbWriterTest, NamesOfArbitraryBytesGiveValidJson) {
   ImportedMesh mesh = two_parts();
   mesh.parts = {{"quote\" \\ \n \xff\xfe", 0}, {"\xc3\xa9", 1}};
   GlbWriter writer("arena", UpAxis::kY);
@@ -167,10 +167,10 @@ TEST_F(GlbWriterTest, NamesOfAnyBytesMakeGoodJson) {
   EXPECT_EQ(imported().meshes[0].indices.size(), 12u);
 }
 
-TEST_F(GlbWriterTest, TooManyNodesAreRefusedByTheLimitsName) {
+TEST_F(GlbWriterTest, TooManyNodesAreRefusedNamingTheLimit) {
   GlbWriter writer("arena", UpAxis::kY);
   const size_t mesh = writer.reserve_mesh();
-  // The root and the group itself are nodes too.
+  // The root and the group are nodes too.
   const std::vector<GlbWriter::Child> children(kMaxExportNodes - 1, {mesh, {}});
   const absl::Status status = writer.add_group("", {}, children, Json::object());
   EXPECT_TRUE(absl::IsResourceExhausted(status));
@@ -179,7 +179,7 @@ TEST_F(GlbWriterTest, TooManyNodesAreRefusedByTheLimitsName) {
   EXPECT_TRUE(writer.add_node("", {}, mesh, Json::object()).ok());
 }
 
-TEST_F(GlbWriterTest, APathThatCannotBeWrittenIsNamedAndLeavesNothing) {
+TEST_F(GlbWriterTest, AFailedWriteNamesThePathAndLeavesNoFile) {
   GlbWriter writer("arena", UpAxis::kY);
   const size_t mesh = writer.reserve_mesh();
   ASSERT_TRUE(writer.set_mesh(mesh, unit_box()).ok());

@@ -43,7 +43,7 @@ class SceneExportTest : public ::testing::Test {
     return file;
   }
 
-  // The file's triangles where its nodes place them.
+  // Returns the triangles of the written file in world coordinates.
   ImportedMesh placed() {
     absl::StatusOr<ImportedLevel> level = import_file(path_, {});
     EXPECT_TRUE(level.ok()) << level.status();
@@ -70,7 +70,7 @@ class SceneExportTest : public ::testing::Test {
   const std::string path_ = ::testing::TempDir() + "scene_export_test_" + std::to_string(getpid()) + ".glb";
 };
 
-TEST_F(SceneExportTest, ABallStandsWhereItIsWithItsRadius) {
+TEST_F(SceneExportTest, ABallKeepsItsPositionAndRadius) {
   SceneExport scene("arena", UpAxis::kY, {});
   ASSERT_TRUE(scene.add(ball(7, {1, 2, 3}, 0.5f)).ok());
   const GlbFile file = written(scene);
@@ -79,19 +79,19 @@ TEST_F(SceneExportTest, ABallStandsWhereItIsWithItsRadius) {
   expect_bounds({0.5, 1.5, 2.5}, {1.5, 2.5, 3.5});
 }
 
-TEST_F(SceneExportTest, ABoxIsTurnedAndStretched) {
+TEST_F(SceneExportTest, ABoxIsRotatedAndScaled) {
   SceneExport scene("arena", UpAxis::kY, {});
   SceneThing box = thing(ThingKind::kBox, 9, {4, 0, 0});
   box.size = {1, 2, 3};
   const auto half = static_cast<float>(std::sqrt(0.5));
-  box.rotation = {0, 0, half, half};  // a quarter turn about z: x becomes y
+  box.rotation = {0, 0, half, half};  // 90 degrees about z: x becomes y
   ASSERT_TRUE(scene.add(box).ok());
   written(scene);
   expect_bounds({2, -1, -3}, {6, 1, 3});
   EXPECT_EQ(placed().indices.size(), 36u);
 }
 
-TEST_F(SceneExportTest, ACapsuleIsASideAndTwoEndsAlongItsAxis) {
+TEST_F(SceneExportTest, ACapsuleIsATubeAndTwoDomesAlongItsAxis) {
   SceneExport scene("arena", UpAxis::kY, {});
   SceneThing capsule = thing(ThingKind::kCapsule, 10, {0, 3, 0});
   capsule.radius = 0.25f;
@@ -172,7 +172,7 @@ TEST_F(SceneExportTest, FarScenesAreMovedBeforeRounding) {
   EXPECT_EQ(file.node("object 1")["translation"][0], 0.125);
 }
 
-TEST(RecentreTest, OnlyWhatIsFurtherThanEightTimesItsSizeIsMoved) {
+TEST(RecentreTest, OnlyBoundsFurtherThanEightTimesTheirSizeAreMoved) {
   EXPECT_EQ(recentre_of({-10, -10, 0}, {10, 10, 5}), (Corner{0, 0, 0}));
   EXPECT_EQ(recentre_of({79, 0, 0}, {89, 10, 5}), (Corner{84, 5, 3}));
   EXPECT_EQ(recentre_of({70, 0, 0}, {80, 10, 5}), (Corner{0, 0, 0}));

@@ -35,7 +35,7 @@ TEST(UnitShapesTest, EveryTriangleFacesOut) {
   }
 }
 
-TEST(UnitShapesTest, EachReachesOneInEveryDirection) {
+TEST(UnitShapesTest, EachExtendsToOneAlongEveryAxis) {
   for (const ImportedMesh& mesh : {unit_ball(), unit_box(), unit_marker(), unit_tube()}) {
     for (size_t axis = 0; axis < 3; ++axis) {
       float low = 0;
@@ -50,7 +50,7 @@ TEST(UnitShapesTest, EachReachesOneInEveryDirection) {
   }
 }
 
-TEST(UnitShapesTest, CornersOfRoundShapesLieOnThem) {
+TEST(UnitShapesTest, VerticesOfRoundShapesLieOnTheShape) {
   for (const ImportedMesh& mesh : {unit_ball(), unit_dome()}) {
     for (uint32_t i = 0; i < mesh.vertices.size() / 3; ++i)
       EXPECT_NEAR(dot(vertex(mesh, i), vertex(mesh, i)), 1, 1e-6) << mesh.name;

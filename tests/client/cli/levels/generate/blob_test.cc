@@ -17,7 +17,7 @@ using testing::normal;
 using testing::Point;
 using testing::vertex;
 
-TEST(BlobTest, TheCountIsTheLargestEightTimesASquareNotAboveTheAsked) {
+TEST(BlobTest, TheCountIsTheLargestEightTimesASquareWithinTheRequest) {
   for (const uint64_t asked : {8, 9, 31, 32, 71, 72, 5000, 99'999, 1'000'000}) {
     const ImportedMesh mesh = generate_blob(asked, 5);
     const size_t count = mesh.indices.size() / 3;
@@ -30,7 +30,7 @@ TEST(BlobTest, TheCountIsTheLargestEightTimesASquareNotAboveTheAsked) {
   for (const uint64_t asked : {0, 1, 7}) EXPECT_EQ(generate_blob(asked, 5).indices.size() / 3, 8u) << asked;
 }
 
-TEST(BlobTest, EveryEdgeBelongsToTwoTrianglesAndRunsBothWays) {
+TEST(BlobTest, EveryEdgeIsSharedByTwoTrianglesInOppositeDirections) {
   for (const uint64_t asked : {8, 32, 72, 128, 5000, 1'000'000}) {
     const ImportedMesh mesh = generate_blob(asked, 3);
     std::unordered_set<uint64_t> edges;
@@ -40,7 +40,7 @@ TEST(BlobTest, EveryEdgeBelongsToTwoTrianglesAndRunsBothWays) {
   }
 }
 
-TEST(BlobTest, NoVertexStandsTwiceAndNoneIsUnused) {
+TEST(BlobTest, NoVertexIsDuplicatedOrUnused) {
   const ImportedMesh mesh = generate_blob(200'000, 9);
   std::set<Point> points;
   for (uint32_t i = 0; i < mesh.vertices.size() / 3; ++i) points.insert(vertex(mesh, i));
@@ -57,7 +57,7 @@ TEST(BlobTest, EveryTriangleFacesAwayFromTheOriginAndHasArea) {
   }
 }
 
-TEST(BlobTest, EveryVertexKeepsToTheRadiiAndTheSurfaceIsBumpy) {
+TEST(BlobTest, EveryVertexIsWithinTheRadiiAndTheSurfaceIsBumpy) {
   const ImportedMesh mesh = generate_blob(100'000, 4);
   double least = kMaxBlobRadius;
   double most = kMinBlobRadius;
@@ -71,7 +71,7 @@ TEST(BlobTest, EveryVertexKeepsToTheRadiiAndTheSurfaceIsBumpy) {
   EXPECT_GT(most - least, 2);
 }
 
-// From places near the origin through every vertex and past it, by the server's own path of queries.
+// Casts rays from points near the origin at every vertex and close past it, with the server's query code.
 TEST(BlobTest, NoRayFromInsideLeaks) {
   constexpr uint64_t kSeed = 21;
   SCOPED_TRACE(kSeed);
@@ -108,7 +108,7 @@ TEST(BlobTest, EqualSeedsGiveEqualBytesAndOthersDiffer) {
   EXPECT_NE(generate_blob(5000, 1).vertices, generate_blob(5000, 2).vertices);
 }
 
-// Golden: a difference means that machines, or versions, no longer make the same level.
+// Golden hash: a difference means that the generated level depends on the machine or changed between versions.
 TEST(BlobTest, ItsBytesAreTheSameOnEveryMachine) {
   EXPECT_EQ(testing::bytes_hash(generate_blob(8, 1)),
             "8bbf9c998bc8ea682d60eb4a9ed4cfdcb64594875c32ad6585f28daaa7ddec7e");

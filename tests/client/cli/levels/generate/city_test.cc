@@ -30,7 +30,7 @@ Bounds box_bounds(const ImportedMesh& mesh, size_t box) {
   return bounds;
 }
 
-// Six times the volume enclosed by the triangles of the box: positive if they face out.
+// Returns six times the volume enclosed by the triangles of the box: positive if they face outward.
 double six_volumes(const ImportedMesh& mesh, size_t box) {
   double sum = 0;
   for (size_t i = box * kBoxIndices; i < (box + 1) * kBoxIndices; i += 3) {
@@ -44,7 +44,7 @@ double six_volumes(const ImportedMesh& mesh, size_t box) {
   return sum;
 }
 
-TEST(CityTest, TheCountIsAtMostTheAskedAndWithinOneBox) {
+TEST(CityTest, TheCountIsAtMostTheRequestedAndLessThanOneBoxBelow) {
   for (uint64_t asked : {12, 13, 23, 24, 25, 100, 999, 12'000, 100'003}) {
     const size_t count = generate_city(asked, 5).indices.size() / 3;
     EXPECT_LE(count, asked);

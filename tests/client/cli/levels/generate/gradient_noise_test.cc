@@ -16,7 +16,7 @@ std::array<double, 3> any_point(SplitMix64& random, double range) {
   return point;
 }
 
-TEST(GradientNoiseTest, ItStaysWithinOneAndUsesMostOfIt) {
+TEST(GradientNoiseTest, ItStaysWithinMinusOneToOneAndUsesMostOfTheRange) {
   SplitMix64 random(1);
   double low = 0;
   double high = 0;
@@ -31,12 +31,12 @@ TEST(GradientNoiseTest, ItStaysWithinOneAndUsesMostOfIt) {
   EXPECT_GT(high, 0.7);
 }
 
-TEST(GradientNoiseTest, ItIsZeroAtWholeCoordinates) {
+TEST(GradientNoiseTest, ItIsZeroAtIntegerCoordinates) {
   for (int x = -3; x <= 3; ++x)
     for (int y = -3; y <= 3; ++y) EXPECT_EQ(gradient_noise({x * 1.0, y * 1.0, 7}, 9), 0);
 }
 
-TEST(GradientNoiseTest, ItHasNoStepWhereCellsMeet) {
+TEST(GradientNoiseTest, ItIsContinuousAcrossCellBorders) {
   SplitMix64 random(2);
   constexpr double kStep = 0x1p-40;
   for (int i = 0; i < 10'000; ++i) {
@@ -48,7 +48,7 @@ TEST(GradientNoiseTest, ItHasNoStepWhereCellsMeet) {
   }
 }
 
-TEST(GradientNoiseTest, SeedsAreDifferentFields) {
+TEST(GradientNoiseTest, DifferentSeedsGiveDifferentFields) {
   EXPECT_NE(gradient_noise({0.3, 0.4, 0.5}, 1), gradient_noise({0.3, 0.4, 0.5}, 2));
 }
 

@@ -1,4 +1,4 @@
-// What tests of generated meshes ask of any of them. Functions without state.
+// Properties of meshes that the tests of all generators check. Functions without state.
 #ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_GENERATE_MESH_FACTS_H_
 #define LOCUS_TESTS_CLIENT_CLI_LEVELS_GENERATE_MESH_FACTS_H_
 
@@ -17,8 +17,8 @@ namespace locus::cli::testing {
 
 using Point = std::array<double, 3>;
 
-inline Point vertex(const ImportedMesh& mesh, uint32_t number) {
-  return {mesh.vertices[3 * number], mesh.vertices[3 * number + 1], mesh.vertices[3 * number + 2]};
+inline Point vertex(const ImportedMesh& mesh, uint32_t index) {
+  return {mesh.vertices[3 * index], mesh.vertices[3 * index + 1], mesh.vertices[3 * index + 2]};
 }
 
 inline Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -27,14 +27,15 @@ inline Point cross(const Point& a, const Point& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-// Its length is twice the area.
+// Returns the normal of a triangle; its length is twice the area.
 inline Point normal(const ImportedMesh& mesh, size_t triangle) {
   const Point a = vertex(mesh, mesh.indices[3 * triangle]);
   return cross(minus(vertex(mesh, mesh.indices[3 * triangle + 1]), a),
                minus(vertex(mesh, mesh.indices[3 * triangle + 2]), a));
 }
 
-// Directed edges that occur twice: none in a mesh whose triangles agree about their outside.
+// Inserts the directed edges of the mesh into `edges` and returns the number of duplicates: 0 if the triangles are
+// consistently oriented.
 inline size_t repeated_edges(const ImportedMesh& mesh, std::unordered_set<uint64_t>& edges) {
   size_t repeated = 0;
   for (size_t i = 0; i < mesh.indices.size(); ++i) {
@@ -44,14 +45,14 @@ inline size_t repeated_edges(const ImportedMesh& mesh, std::unordered_set<uint64
   return repeated;
 }
 
-// Directed edges without their opposite: the border.
+// Returns the number of directed edges without their opposite: the length of the border.
 inline size_t open_edges(const std::unordered_set<uint64_t>& edges) {
   size_t open = 0;
   for (const uint64_t edge : edges) open += edges.count(edge << 32 | edge >> 32) == 0 ? 1 : 0;
   return open;
 }
 
-// SHA-256 of the vertices' and the indices' bytes, in hexadecimal.
+// Returns the SHA-256 in hexadecimal of the bytes of the vertices and the indices.
 inline std::string bytes_hash(const ImportedMesh& mesh) {
   std::string bytes(mesh.vertices.size() * sizeof(float) + mesh.indices.size() * sizeof(uint32_t), 0);
   std::memcpy(bytes.data(), mesh.vertices.data(), mesh.vertices.size() * sizeof(float));

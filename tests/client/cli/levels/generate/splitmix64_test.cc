@@ -7,7 +7,7 @@
 namespace locus::cli {
 namespace {
 
-// The published first outputs for seed 1234567.
+// Checks the published first outputs for seed 1234567.
 TEST(SplitMix64Test, GivesTheReferenceSequence) {
   SplitMix64 random(1234567);
   for (uint64_t expected : {6457827717110365317u, 3203168211198807973u, 9817491932198370423u, 4593380528125082431u,

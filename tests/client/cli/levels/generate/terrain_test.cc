@@ -12,7 +12,7 @@ namespace {
 
 using testing::normal;
 
-TEST(TerrainTest, TheCountIsTheLargestThatItsColumnsAllowNotAboveTheAsked) {
+TEST(TerrainTest, TheCountIsTheLargestThatItsColumnsAllowWithinTheRequest) {
   for (const uint64_t asked : {2, 3, 4, 5, 7, 8, 18, 5000, 99'999, 1'000'000}) {
     const size_t count = generate_terrain(asked, 5).indices.size() / 3;
     EXPECT_LE(count, asked);
@@ -35,7 +35,7 @@ TEST(TerrainTest, EveryTriangleFacesUpAndCoversHalfASquareMetre) {
     ASSERT_EQ(normal(mesh, triangle)[2], 1) << triangle;
 }
 
-TEST(TerrainTest, ItStandsAroundTheOriginWithinItsHeights) {
+TEST(TerrainTest, ItIsCentredOnTheOriginWithinItsHeights) {
   const ImportedMesh mesh = generate_terrain(500'000, 6);
   float low = 0;
   float high = 0;
@@ -54,7 +54,7 @@ TEST(TerrainTest, ItStandsAroundTheOriginWithinItsHeights) {
   EXPECT_GT(high - low, 10) << "hardly any hills";
 }
 
-TEST(TerrainTest, NeighboursDifferLessThanACliffWould) {
+TEST(TerrainTest, NeighbouringHeightsDifferLessThanAtACliff) {
   const ImportedMesh mesh = generate_terrain(200'000, 6);
   for (size_t i = 3; i < mesh.vertices.size(); i += 3) {
     if (mesh.vertices[i] < mesh.vertices[i - 3]) continue;  // the next row begins
@@ -68,7 +68,7 @@ TEST(TerrainTest, EqualSeedsGiveEqualBytesAndOthersDiffer) {
   EXPECT_NE(generate_terrain(5000, 1).vertices, generate_terrain(5000, 2).vertices);
 }
 
-// Golden: a difference means that machines, or versions, no longer make the same level.
+// Golden hash: a difference means that the generated level depends on the machine or changed between versions.
 TEST(TerrainTest, ItsBytesAreTheSameOnEveryMachine) {
   EXPECT_EQ(testing::bytes_hash(generate_terrain(2, 1)),
             "ce1734c424bfe1a00b762526b5b63066a0f18949885dffaf0838e6327ba22199");

@@ -5,7 +5,7 @@
 namespace locus::cli {
 namespace {
 
-TEST(WholeRootTest, SquaresHaveTheirRootAndOneLessTheOneBelow) {
+TEST(WholeRootTest, ASquareGivesItsRootAndOneLessGivesTheRootMinusOne) {
   for (const uint64_t root : {1u, 2u, 3u, 1000u, 8192u, 65536u, 0x7FFFFFFFu}) {
     EXPECT_EQ(whole_root(root * root), root);
     EXPECT_EQ(whole_root(root * root - 1), root - 1);

@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 
 std::string message(const absl::StatusOr<ImportedLevel>& level) { return std::string(level.status().message()); }
 
-TEST(ImportFileTest, UnknownTypeNamesItAndListsWhatIsRead) {
+TEST(ImportFileTest, AnUnknownTypeIsNamedWithAListOfTheSupportedTypes) {
   const TempFolder folder;
   const auto level = import_file(folder.write("model.FBX", "x"), {});
   EXPECT_EQ(level.status().code(), absl::StatusCode::kInvalidArgument);

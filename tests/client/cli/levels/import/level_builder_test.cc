@@ -32,7 +32,7 @@ TEST(LevelBuilderTest, EqualVerticesAreSharedAndUnusedOnesDropped) {
   EXPECT_THAT(level->meshes.at(0).indices, ElementsAre(0, 1, 2, 0, 1, 2));
 }
 
-TEST(LevelBuilderTest, NeighbouringFloatsStayApart) {
+TEST(LevelBuilderTest, VerticesAtAdjacentFloatsAreNotMerged) {
   LevelBuilder builder(1);
   add_corner_triangle(builder, 1, 0, 0, 1);
   add_corner_triangle(builder, std::nextafter(1.0f, 2.0f), 0, 0, 1);
@@ -41,7 +41,7 @@ TEST(LevelBuilderTest, NeighbouringFloatsStayApart) {
   EXPECT_THAT(level->meshes.at(0).indices, ElementsAre(0, 1, 2, 3, 1, 4));
 }
 
-TEST(LevelBuilderTest, ZeroAreaTrianglesKeepTheirNumbers) {
+TEST(LevelBuilderTest, ZeroAreaTrianglesKeepTheirIndices) {
   LevelBuilder builder(1);
   const uint32_t a = builder.add_vertex({0, 0, 0});
   builder.add_triangle(a, a, a);
@@ -73,7 +73,7 @@ TEST(LevelBuilderTest, AFarFileIsMovedInDoubleSoThatNoDetailIsLost) {
   EXPECT_THAT(level->notes[0], HasSubstr("4500000.3125"));
 }
 
-TEST(LevelBuilderTest, ScaleIsBakedBeforeTheBoundsAreJudged) {
+TEST(LevelBuilderTest, ScaleIsAppliedBeforeTheBoundsAreChecked) {
   LevelBuilder builder(1e-3);
   add_corner_triangle(builder, 2e9, 0, 0, 4e9);
   const auto level = std::move(builder).finish("m");

@@ -30,7 +30,7 @@ TEST(PartNameTest, BrokenUtf8LosesItsHighBytes) {
 
 TEST(PartNameTest, ControlCharactersAreReplaced) { EXPECT_EQ(clean_part_name("a\nb\x1B[31m\x7F"), "a_b_[31m_"); }
 
-TEST(PartNameTest, LongNamesAreCutAtACharacterBorder) {
+TEST(PartNameTest, LongNamesAreTruncatedAtACharacterBoundary) {
   const std::string ascii(kMaxPartNameBytes - 1, 'a');
   EXPECT_EQ(clean_part_name(ascii + "bcd"), ascii + "b");
   EXPECT_EQ(clean_part_name(ascii + "\xC3\xBC"), ascii);

@@ -38,7 +38,7 @@ TEST(PlyCheckTest, AnAsciiBodyThatEndsEarlyNamesTheElement) {
   EXPECT_THAT(message(cut), HasSubstr("face[1] of 2"));
 }
 
-TEST(PlyCheckTest, ABinaryBodyIsMeasuredInBothByteOrders) {
+TEST(PlyCheckTest, ABinaryBodyIsCheckedInBothByteOrders) {
   const std::string vertex(10, '\1');
   const std::string face(6, '\0');
   const std::string little = binary_header("binary_little_endian", "ushort") + vertex + std::string("\3\0", 2) + face;
@@ -61,14 +61,14 @@ TEST(PlyCheckTest, ANegativeListLengthIsRefused) {
   EXPECT_EQ(check_ply(binary_header("binary_little_endian", "uchar") + body).value(), 1u);
 }
 
-TEST(PlyCheckTest, HugeCountsEndWithTheBody) {
+TEST(PlyCheckTest, HugeDeclaredCountsStopAtTheEndOfTheBody) {
   const std::string header =
       "ply\nformat binary_little_endian 1.0\nelement face 18446744073709551615\n"
       "property list uint double vertex_indices\nend_header\n";
   EXPECT_THAT(message(header + std::string(8, '\xFF')), HasSubstr("face[0]"));
 }
 
-TEST(PlyCheckTest, TriangleStripsAreRefusedWithAWayOut) {
+TEST(PlyCheckTest, TriangleStripsAreRefusedWithARemedy) {
   std::string strips = kTwoTriangles;
   strips.replace(strips.find("face"), 4, "tristrips");
   EXPECT_THAT(message(strips), HasSubstr("save it with faces"));

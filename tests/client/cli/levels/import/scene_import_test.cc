@@ -30,7 +30,7 @@ std::array<float, 3> corner(const ImportedMesh& mesh, size_t triangle, size_t nu
   return {mesh.vertices.at(at), mesh.vertices.at(at + 1), mesh.vertices.at(at + 2)};
 }
 
-// A binary glTF of one triangle (0,0,0) (1,0,0) (0,1,0) with these nodes, in JSON, all of them in the scene.
+// Returns a binary glTF with one triangle (0,0,0) (1,0,0) (0,1,0) and these nodes, given in JSON, all in the scene.
 std::string glb(const std::string& nodes, const std::string& scene_nodes) {
   std::string data;
   for (float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) append_f32(data, value);
@@ -170,7 +170,7 @@ TEST(SceneImportTest, NodeTransformsAreBakedDownTheTree) {
   EXPECT_THAT(corner(mesh, 0, 2), ElementsAre(10, 2, 6));
 }
 
-TEST(SceneImportTest, AMirroringNodeTurnsItsTrianglesRound) {
+TEST(SceneImportTest, AMirroringNodeReversesItsTriangles) {
   const auto level = import_text("m.glb", glb(R"({"name":"mirror","scale":[-1,1,1],"mesh":0})", "0"));
   ASSERT_TRUE(level.ok()) << level.status();
   const ImportedMesh& mesh = level->meshes.at(0);

@@ -1,4 +1,4 @@
-// Files for the import tests: a temporary folder that goes with its test, and little-endian bytes. One test, one
+// Files for the import tests: a temporary folder that is deleted with its test, and little-endian bytes. One test, one
 // thread.
 #ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_TEST_FILES_H_
 #define LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_TEST_FILES_H_

@@ -22,7 +22,7 @@ std::vector<PatchPoint> random_points(size_t count, SplitMix64& random) {
   return points;
 }
 
-TEST(BezierPatchTest, CurvePassesItsEndsAndTheKnownMiddle) {
+TEST(BezierPatchTest, CurvePassesThroughItsEndsAndTheKnownMiddle) {
   const PatchPoint a{0, 0, 0}, b{2, 4, 0}, c{4, 0, 8};
   EXPECT_EQ(bezier_curve_point(a, b, c, 0, 6), a);
   EXPECT_EQ(bezier_curve_point(a, b, c, 6, 6), c);
@@ -42,7 +42,7 @@ TEST(BezierPatchTest, ReversedCurvesGiveTheSameBits) {
   }
 }
 
-TEST(BezierPatchTest, GridHasTheAskedSizeAndItsCornersAreControlPoints) {
+TEST(BezierPatchTest, GridHasTheRequestedSizeAndItsCornersAreControlPoints) {
   constexpr uint64_t kSeed = 4;
   SplitMix64 random(kSeed);
   const std::vector<PatchPoint> controls = random_points(5 * 3, random);
@@ -70,11 +70,11 @@ TEST(BezierPatchTest, AFlatRegularPatchIsARegularGrid) {
   }
 }
 
-// Each of the four borders of one patch against each of another that runs along it forwards or backwards.
+// Compares each of the four borders of one patch with each border of another, in both directions.
 TEST(BezierPatchTest, PatchesWithEqualBordersMeetWithoutACrack) {
   constexpr uint64_t kSeed = 5;
   SplitMix64 random(kSeed);
-  // Where the control points of border k are in a 3 x 3 patch, and those of the tessellated n x n points.
+  // Positions of the points of border k in a 3 x 3 grid of control points, and in the tessellated n x n grid.
   const auto border = [](int k, size_t n) {
     std::vector<size_t> at;
     for (size_t i = 0; i < n; ++i) at.push_back(k == 0 ? i : k == 1 ? (n - 1) * n + i : k == 2 ? i * n : i * n + n - 1);
@@ -100,7 +100,7 @@ TEST(BezierPatchTest, PatchesWithEqualBordersMeetWithoutACrack) {
   }
 }
 
-TEST(BezierPatchTest, AWideGridEqualsItsPatchesApart) {
+TEST(BezierPatchTest, AWideGridEqualsItsPatchesTessellatedSeparately) {
   constexpr uint64_t kSeed = 6;
   SplitMix64 random(kSeed);
   const std::vector<PatchPoint> controls = random_points(5 * 3, random);

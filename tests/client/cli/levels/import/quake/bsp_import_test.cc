@@ -21,7 +21,7 @@ std::string message(const BspWriter& level) {
   return std::string(import_bsp(level.bytes(), "level", {}).status().message());
 }
 
-// Twice the area of triangle t seen from +z: positive if it is counter-clockwise.
+// Returns twice the area of triangle t seen from +z: positive if it is counter-clockwise.
 double area_from_above(const ImportedMesh& mesh, size_t t) {
   const auto at = [&](size_t corner, size_t axis) -> double {
     return mesh.vertices[3 * mesh.indices[3 * t + corner] + axis];
@@ -66,7 +66,7 @@ TEST(BspImportTest, BillboardsAreSkippedAndNoted) {
   EXPECT_THAT(level->notes, Contains("1 billboards were skipped."));
 }
 
-TEST(BspImportTest, SubdivisionsAndScaleAreObeyed) {
+TEST(BspImportTest, SubdivisionsAndScaleAreApplied) {
   const auto level = import_bsp(small_level().bytes(), "level", {.entry = "", .patch_subdivisions = 1, .scale = 0.5});
   ASSERT_TRUE(level.ok()) << level.status();
   const ImportedMesh& mesh = level->meshes.at(0);
@@ -81,7 +81,7 @@ TEST(BspImportTest, AnotherFormatOrVersionIsNamed) {
   EXPECT_THAT(message(level), HasSubstr("IBSP version 38"));
 }
 
-TEST(BspImportTest, EveryTruncationIsRefusedOrSound) {
+TEST(BspImportTest, EveryTruncationIsRefusedOrGivesAValidMesh) {
   const std::string whole = small_level().bytes();
   for (size_t size = 0; size < whole.size(); ++size) {
     ASSERT_EQ(import_bsp(whole.substr(0, size), "level", {}).status().code(), absl::StatusCode::kInvalidArgument)
@@ -162,7 +162,7 @@ TEST(BspImportTest, FacesThatRepeatTheSameTrianglesTooOftenAreRefused) {
   EXPECT_EQ(result.status().code(), absl::StatusCode::kResourceExhausted) << result.status();
 }
 
-TEST(BspImportTest, RandomMutationsAreRefusedOrSound) {
+TEST(BspImportTest, RandomMutationsAreRefusedOrGiveAValidMesh) {
   constexpr uint64_t kSeed = 7;
   SplitMix64 random(kSeed);
   const std::string whole = small_level().bytes();
@@ -173,7 +173,7 @@ TEST(BspImportTest, RandomMutationsAreRefusedOrSound) {
     const uint32_t changes = 1 + random.below(4);
     for (uint32_t i = 0; i < changes; ++i) {
       const size_t at = random.below(static_cast<uint32_t>(bytes.size()));
-      // Small numbers pass more checks than random ones and so reach deeper.
+      // Small values pass more checks than random ones, so that later checks are tested too.
       bytes[at] = static_cast<char>(random.below(2) == 0 ? random.next() : random.below(20));
     }
     const auto level = import_bsp(bytes, "level", {});

@@ -1,4 +1,5 @@
-// Writes small Quake 3 levels byte by byte for the tests, right or wrong in any field. One test, one thread.
+// Writer of small Quake 3 levels for the tests, with arbitrary valid or invalid values in any field. One test, one
+// thread.
 #ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_WRITER_H_
 #define LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_WRITER_H_
 
@@ -68,8 +69,8 @@ struct BspWriter {
   }
 };
 
-// One polygon (2 triangles, texture floor), one mesh face (1 triangle, texture crate), one flat 3 x 3 patch (texture
-// floor) and one billboard. All lie in z = 0, 1 and 2 with the front towards +z.
+// Returns a level of one polygon (2 triangles, texture floor), one mesh face (1 triangle, texture crate), one flat 3 x
+// 3 patch (texture floor) and one billboard. They lie in the planes z = 0, 1 and 2 and face +z.
 inline BspWriter small_level() {
   BspWriter level;
   level.textures = {"textures/floor", "models/crate"};

@@ -29,7 +29,7 @@ std::string write_archive(const TempFolder& folder, const Entries& entries) {
     zip_source_t* source = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
     const zip_int64_t number = zip_file_add(archive, name.c_str(), source, 0);
     EXPECT_GE(number, 0) << name;
-    // The fastest level: one test packs more than the limit.
+    // Uses the fastest compression level, since one test packs more than the limit.
     EXPECT_EQ(zip_set_file_compression(archive, static_cast<zip_uint64_t>(number), ZIP_CM_DEFLATE, 1), 0) << name;
   }
   EXPECT_EQ(zip_close(archive), 0);
@@ -105,7 +105,7 @@ TEST(Pk3ArchiveTest, ALevelThatUnpacksBeyondTheLimitIsRefused) {
   EXPECT_EQ(level.status().code(), absl::StatusCode::kResourceExhausted) << level.status();
 }
 
-TEST(Pk3ArchiveTest, RandomMutationsAreRefusedOrSound) {
+TEST(Pk3ArchiveTest, RandomMutationsAreRefusedOrGiveAValidMesh) {
   constexpr uint64_t kSeed = 9;
   SplitMix64 random(kSeed);
   const TempFolder folder;
