@@ -51,7 +51,7 @@ std::string hint_of_code(absl::StatusCode code) {
       return "`locus health` says whether the server answers; try again when it does";
     case absl::StatusCode::kUnauthenticated:
     case absl::StatusCode::kPermissionDenied:
-      return "ask whoever runs the server for the right to do this";
+      return "ask the operator of the server for the right to do this";
     default:
       return "";
   }

@@ -19,8 +19,8 @@ _HINTS = {
     grpc.StatusCode.RESOURCE_EXHAUSTED: "a message is larger than its receiver takes: split the batch, or raise "
                                         "max_receive_bytes",
     grpc.StatusCode.UNIMPLEMENTED: "is this a locus server, and new enough? Client.server() says which",
-    grpc.StatusCode.UNAUTHENTICATED: "ask whoever runs the server for the right to do this",
-    grpc.StatusCode.PERMISSION_DENIED: "ask whoever runs the server for the right to do this",
+    grpc.StatusCode.UNAUTHENTICATED: "ask the operator of the server for the right to do this",
+    grpc.StatusCode.PERMISSION_DENIED: "ask the operator of the server for the right to do this",
 }
 
 
