@@ -236,5 +236,29 @@ TEST(RunBatchTest, WorkOfABatchIsTheSumOfItsBlocks) {
   EXPECT_EQ(result.work.cells, sum.cells);
 }
 
+// Grids of 250,000 values and more are walked for several balls or boxes at once, by a function that outlives the call
+// that sets it up; AddressSanitizer sees a reference in it that does not.
+TEST(RunBatchTest, ManyBallsAndBoxesInAGridLargerThanTheCachesAnswerLikeBruteForce) {
+  QueryWorld world;
+  for (Id id = 1; id <= 250'000; ++id)
+    world.objects.push_back(
+        ball_object(id, {static_cast<double>(id % 500), static_cast<double>(id / 500), static_cast<double>(id % 3)}));
+  const SnapshotPtr snapshot = snapshot_of(world);
+  OwnedBlock balls = one_ball({0, 0, 0}, 2), boxes = one_box({0, 0, 0}, {2, 2, 2});
+  for (OwnedBlock* block : {&balls, &boxes}) {
+    block->points.clear();
+    for (int i = 0; i < 32; ++i)
+      block->points.insert(block->points.end(), {static_cast<float>(15 * i), static_cast<float>(14 * i), 0});
+  }
+  RunOptions brute_force;
+  brute_force.brute_force = true;
+  for (const OwnedBlock& block : {balls, boxes}) {
+    const std::vector<OwnedBlock> blocks = {block};
+    const BatchResult walked = run(*snapshot, batch_of(blocks)), listed = run(*snapshot, batch_of(blocks), brute_force);
+    EXPECT_EQ(difference(walked.blocks[0], listed.blocks[0]), "");
+    EXPECT_GT(walked.blocks[0].ids.size(), 32u);
+  }
+}
+
 }  // namespace
 }  // namespace locus::test
