@@ -126,7 +126,7 @@ class Caster {
     return absl::OkStatus();
   }
 
-  static absl::Status misfit() { return absl::DataLossError("an answer does not hold one row a ray"); }
+  static absl::Status misfit() { return absl::DataLossError("the answer does not have one row for each ray"); }
 
   absl::Status in_words(const absl::Status& status) const {
     if (!absl::IsOutOfRange(status) || options_.moment == Moment::kLive) return status;

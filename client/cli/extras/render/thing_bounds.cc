@@ -28,7 +28,8 @@ absl::Status check_there(const client::Client& client, const std::string& scene,
   client::QueryBuilder builder;
   builder.exactly(revision).lookup().id(id);
   ASSIGN_OR_RETURN(const v1::QueryResult result, client.query(scene, builder.build()));
-  if (result.blocks_size() != 1 || result.blocks(0).ids_size() != 1) return absl::DataLossError("no row for an id");
+  if (result.blocks_size() != 1 || result.blocks(0).ids_size() != 1)
+    return absl::DataLossError("the answer to a lookup does not have one row for its id");
   return result.blocks(0).ids(0) == id ? absl::OkStatus() : not_found(scene, id, "");
 }
 
@@ -67,9 +68,10 @@ absl::StatusOr<std::vector<bool>> ask_slabs(const client::Client& client, const 
   block.frame({frame.x, frame.y, frame.z}).precision(v1::PRECISION_CONSERVATIVE).after_id(id - 1).max_results(1);
   block.boxes(centres, half_extents);
   ASSIGN_OR_RETURN(const v1::QueryResult result, client.query(scene, builder.build()));
-  if (result.blocks_size() != 1) return absl::DataLossError("one block was asked and another number answered");
+  if (result.blocks_size() != 1) return absl::DataLossError("the answer does not have one result block");
   ASSIGN_OR_RETURN(const client::Overlaps found, client::Overlaps::of(result.blocks(0)));
-  if (found.size() != size_t{kSides} * kCuts) return absl::DataLossError("not one answer a box");
+  if (found.size() != size_t{kSides} * kCuts)
+    return absl::DataLossError("the answer does not have one result for each box");
   std::vector<bool> reached;
   for (size_t i = 0; i < found.size(); ++i) {
     reached.push_back(!found.ids(i).empty() && found.ids(i).front() == id);

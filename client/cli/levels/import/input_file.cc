@@ -22,12 +22,12 @@ absl::Status check_input_file(const std::string& path, uint64_t max_bytes) {
   if (status.type() == std::filesystem::file_type::not_found) {
     return absl::NotFoundError(absl::StrCat("no file ", path, ": check the path"));
   }
-  if (error) return absl::InvalidArgumentError(absl::StrCat("cannot look at ", path, ": ", error.message()));
+  if (error) return absl::InvalidArgumentError(absl::StrCat("cannot access ", path, ": ", error.message()));
   if (status.type() != std::filesystem::file_type::regular) {
     return absl::InvalidArgumentError(absl::StrCat(path, " is not a file: give the path of one mesh or level file"));
   }
   const uint64_t size = std::filesystem::file_size(path, error);
-  if (error) return absl::InvalidArgumentError(absl::StrCat("cannot look at ", path, ": ", error.message()));
+  if (error) return absl::InvalidArgumentError(absl::StrCat("cannot access ", path, ": ", error.message()));
   if (size == 0) return absl::InvalidArgumentError(absl::StrCat(path, " is empty: export or copy it again"));
   if (size > max_bytes) {
     return absl::ResourceExhaustedError(

@@ -95,7 +95,7 @@ absl::StatusOr<LevelBuilder::Box> LevelBuilder::bounds() const {
       // The comparison is negated so that NaN is refused too.
       if (!(std::abs(position[axis]) <= kMaxImportCoordinate)) {
         return absl::InvalidArgumentError(
-            absl::StrCat("vertex ", index, " stands at (", position[0], ", ", position[1], ", ", position[2],
+            absl::StrCat("vertex ", index, " is at (", position[0], ", ", position[1], ", ", position[2],
                          ") after scaling, coordinates must be finite and within ", kMaxImportCoordinate,
                          ": repair the file or give another scale"));
       }
