@@ -8,11 +8,13 @@
 #define LOCUS_CORE_QUERY_QUERY_BATCH_H_
 
 #include <initializer_list>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/types/span.h"
+#include "core/base/block_kind.h"
 #include "core/base/ids.h"
 #include "core/base/limits.h"
 #include "core/geometry/ray.h"
@@ -105,6 +107,17 @@ struct QueryBlock {
   OutsideHistory outside = OutsideHistory::kReject;
   std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns> kind;
 };
+
+// Returns the kind of the block. The numbers of BlockKind are the indices of the alternatives:
+constexpr BlockKind block_kind(const QueryBlock& block) { return static_cast<BlockKind>(block.kind.index()); }
+template <BlockKind kKind>
+using ColumnsOf = std::variant_alternative_t<static_cast<size_t>(kKind), decltype(QueryBlock::kind)>;
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kRay>, RayColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kBall>, BallColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kBox>, BoxColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kLookup>, LookupColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kNearest>, NearestColumns>);
+static_assert(std::variant_size_v<decltype(QueryBlock::kind)> == kBlockKinds);
 
 struct QueryBatch {
   std::vector<QueryBlock> blocks;

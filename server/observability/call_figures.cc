@@ -7,7 +7,7 @@ namespace {
 
 std::string name_of(size_t rpc) { return std::string(rpc_name(static_cast<Rpc>(rpc))); }
 
-std::string kind_of(size_t kind) { return std::string(query_kind_name(static_cast<QueryKind>(kind))); }
+std::string kind_of(size_t kind) { return std::string(block_kind_name(static_cast<BlockKind>(kind))); }
 
 void add_calls(const MetricCounts& counts, MetricPage& page) {
   page.begin("locus_calls_total",
@@ -34,12 +34,12 @@ void add_calls(const MetricCounts& counts, MetricPage& page) {
 
 void add_queries(const MetricCounts& counts, MetricPage& page) {
   page.begin("locus_queries_total", "Queries answered, by kind.", MetricKind::kCounter);
-  for (size_t kind = 0; kind < kQueryKinds; ++kind)
+  for (size_t kind = 0; kind < kBlockKinds; ++kind)
     page.add({{"kind", kind_of(kind)}}, static_cast<double>(counts.queries[kind].queries));
   page.begin("locus_query_work_total",
              "What queries did, by kind: tree nodes opened, grid cells looked into, triangles and objects tested.",
              MetricKind::kCounter);
-  for (size_t kind = 0; kind < kQueryKinds; ++kind) {
+  for (size_t kind = 0; kind < kBlockKinds; ++kind) {
     const Work& work = counts.queries[kind].work;
     page.add({{"kind", kind_of(kind)}, {"unit", "nodes"}}, static_cast<double>(work.nodes));
     page.add({{"kind", kind_of(kind)}, {"unit", "cells"}}, static_cast<double>(work.cells));
@@ -48,7 +48,7 @@ void add_queries(const MetricCounts& counts, MetricPage& page) {
   page.begin("locus_query_block_seconds",
              "Time that answering a block of queries of one kind took, all threads together, in seconds.",
              MetricKind::kHistogram);
-  for (size_t kind = 0; kind < kQueryKinds; ++kind)
+  for (size_t kind = 0; kind < kBlockKinds; ++kind)
     if (counts.queries[kind].latency.count() > 0) page.add({{"kind", kind_of(kind)}}, counts.queries[kind].latency);
 }
 

@@ -29,12 +29,6 @@ absl::string_view rpc_name(Rpc rpc) {
   return kNames[static_cast<size_t>(rpc)];
 }
 
-absl::string_view query_kind_name(QueryKind kind) {
-  static constexpr std::array<absl::string_view, kQueryKinds> kNames = {"ray", "ball", "box", "lookup", "nearest"};
-  LOCUS_DCHECK_LT(static_cast<size_t>(kind), kQueryKinds);
-  return kNames[static_cast<size_t>(kind)];
-}
-
 CallMetrics::Stripe& CallMetrics::stripe() {
   static std::atomic<size_t> threads{0};
   thread_local const size_t kMine = threads.fetch_add(1, kRelaxed) % kStripes;
@@ -51,8 +45,8 @@ void CallMetrics::record_call(Rpc rpc, absl::StatusCode code, uint64_t nanosecon
   mine.calls[static_cast<size_t>(rpc)].record(nanoseconds);
 }
 
-void CallMetrics::record_block(QueryKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work) {
-  LOCUS_DCHECK_LT(static_cast<size_t>(kind), kQueryKinds);
+void CallMetrics::record_block(BlockKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work) {
+  LOCUS_DCHECK_LT(static_cast<size_t>(kind), kBlockKinds);
   QueryStripe& mine = stripe().queries[static_cast<size_t>(kind)];
   mine.queries.fetch_add(queries, kRelaxed);
   mine.nodes.fetch_add(work.nodes, kRelaxed);
@@ -98,7 +92,7 @@ void CallMetrics::read(const Stripe& stripe, MetricCounts& counts) const {
       counts.rpcs[i].codes[code] += stripe.codes[i][code].load(kRelaxed);
     stripe.calls[i].add_to(counts.rpcs[i].latency);
   }
-  for (size_t i = 0; i < kQueryKinds; ++i) {
+  for (size_t i = 0; i < kBlockKinds; ++i) {
     const QueryStripe& from = stripe.queries[i];
     QueryCounts& to = counts.queries[i];
     to.queries += from.queries.load(kRelaxed);

@@ -23,6 +23,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
+#include "core/base/block_kind.h"
 #include "core/base/mutex.h"
 #include "core/index/work.h"
 #include "server/observability/latency_histogram.h"
@@ -51,12 +52,6 @@ inline constexpr size_t kRpcs = 16;
 // Returns the rpc's name in the protocol, such as "StreamQueries".
 absl::string_view rpc_name(Rpc rpc);
 
-// Kinds of queries, in the order of the alternatives of QueryBlock::kind: static_cast<QueryKind>(block.kind.index()).
-enum class QueryKind : uint8_t { kRay, kBall, kBox, kLookup, kNearest };
-inline constexpr size_t kQueryKinds = 5;
-// Returns the kind's name: "ray", "ball", ...
-absl::string_view query_kind_name(QueryKind kind);
-
 inline constexpr size_t kStatusCodes = 17;  // OK to UNAUTHENTICATED
 
 struct RpcCounts {
@@ -76,7 +71,7 @@ using RefusalName = std::pair<std::string, std::string>;
 
 struct MetricCounts {
   std::array<RpcCounts, kRpcs> rpcs;
-  std::array<QueryCounts, kQueryKinds> queries;
+  std::array<QueryCounts, kBlockKinds> queries;
   uint64_t update_items = 0;
   LatencyCounts update_lag;
   LatencyCounts mesh_builds;
@@ -89,7 +84,7 @@ class CallMetrics {
   // Records a call or message. `nanoseconds` are from its arrival to its answer.
   void record_call(Rpc rpc, absl::StatusCode code, uint64_t nanoseconds);
   // Records a block of queries. `nanoseconds` are processor time of all threads together.
-  void record_block(QueryKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work);
+  void record_block(BlockKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work);
   // Records a batch of updates. `nanoseconds` are from its arrival to the publication of its revision.
   void record_update(uint64_t items, uint64_t nanoseconds);
   // Records how long building a mesh's tree took.
@@ -116,7 +111,7 @@ class CallMetrics {
   struct alignas(64) Stripe {
     std::array<std::array<Counter, kStatusCodes>, kRpcs> codes{};
     std::array<LatencyHistogram, kRpcs> calls;
-    std::array<QueryStripe, kQueryKinds> queries;
+    std::array<QueryStripe, kBlockKinds> queries;
     Counter update_items{0};
     LatencyHistogram update_lag;
   };

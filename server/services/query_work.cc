@@ -146,8 +146,7 @@ void QueryWork::finished(bool) {
 
 void QueryWork::learn(const QueryBlock& block, const QueryCost& cost) {
   slot_.host().costs.learn((*pin_)->epoch, block, cost.nanoseconds);
-  slot_.host().metrics.record_block(static_cast<QueryKind>(block.kind.index()), query_count(block), cost.nanoseconds,
-                                    cost.work);
+  slot_.host().metrics.record_block(block_kind(block), query_count(block), cost.nanoseconds, cost.work);
 }
 
 void QueryWork::explain() {
@@ -173,7 +172,7 @@ void QueryWork::note_if_slow() {
   std::set<absl::string_view> kinds;
   for (const QueryBlock& block : batch_.blocks) {
     query.queries += query_count(block);
-    kinds.insert(query_kind_name(static_cast<QueryKind>(block.kind.index())));
+    kinds.insert(block_kind_name(block_kind(block)));
   }
   query.kinds = absl::StrJoin(kinds, ",");
   const LogScope scope(slot_.caller().trace());

@@ -87,6 +87,8 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   // The log is kept after reading it, because flushing it into tables would double the time to the first query
   // (open_directory() has synced it). Only a damaged log is flushed, so that its unreadable rest can be deleted.
   found.avoid_flush_during_recovery = mode != OpenMode::kLenient;
+  // A second net: RocksDB's own list of files says how far each log was synced.
+  found.track_and_verify_wals_in_manifest = !lenient(mode);
   found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
   found.max_manifest_file_size = kManifestBytes;
   found.info_log_level = rocksdb::InfoLogLevel::WARN_LEVEL;

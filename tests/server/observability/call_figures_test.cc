@@ -21,7 +21,7 @@ TEST(CallFiguresTest, CountersAreLabelledByRpcKindAndReason) {
   CallMetrics metrics;
   metrics.record_call(Rpc::kQuery, absl::StatusCode::kOk, 1500);
   metrics.record_call(Rpc::kQuery, absl::StatusCode::kResourceExhausted, 1500);
-  metrics.record_block(QueryKind::kBall, 64, 2000, {.nodes = 1, .cells = 2, .tests = 3});
+  metrics.record_block(BlockKind::kBall, 64, 2000, {.nodes = 1, .cells = 2, .tests = 3});
   metrics.record_update(12, 5000);
   metrics.record_mesh_build(1'000'000);
   metrics.record_instance_change(1'000'000);

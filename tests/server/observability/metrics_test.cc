@@ -42,18 +42,18 @@ TEST(MetricsTest, AnUnknownCodeCountsAsUnknown) {
 
 TEST(MetricsTest, QueriesAndTheirWorkAreCountedByKind) {
   CallMetrics metrics;
-  metrics.record_block(QueryKind::kRay, 1024, 50'000, {.nodes = 10, .cells = 20, .tests = 30});
-  metrics.record_block(QueryKind::kRay, 1, 5'000, {.nodes = 1, .cells = 2, .tests = 3});
-  metrics.record_block(QueryKind::kNearest, 7, 1, {});
+  metrics.record_block(BlockKind::kRay, 1024, 50'000, {.nodes = 10, .cells = 20, .tests = 30});
+  metrics.record_block(BlockKind::kRay, 1, 5'000, {.nodes = 1, .cells = 2, .tests = 3});
+  metrics.record_block(BlockKind::kNearest, 7, 1, {});
   const MetricCounts counts = metrics.read();
-  const QueryCounts& rays = counts.queries[static_cast<size_t>(QueryKind::kRay)];
+  const QueryCounts& rays = counts.queries[static_cast<size_t>(BlockKind::kRay)];
   EXPECT_EQ(rays.queries, 1025u);
   EXPECT_EQ(rays.work.nodes, 11u);
   EXPECT_EQ(rays.work.cells, 22u);
   EXPECT_EQ(rays.work.tests, 33u);
   EXPECT_EQ(rays.latency.count(), 2u);
   EXPECT_EQ(rays.latency.nanoseconds, 55'000u);
-  EXPECT_EQ(counts.queries[static_cast<size_t>(QueryKind::kNearest)].queries, 7u);
+  EXPECT_EQ(counts.queries[static_cast<size_t>(BlockKind::kNearest)].queries, 7u);
 }
 
 TEST(MetricsTest, CountsOfConcurrentThreadsAddUp) {
@@ -111,8 +111,8 @@ TEST(MetricsTest, AStreamCountsAsOpenDuringItsLifetime) {
 TEST(MetricsTest, EveryRpcAndKindHasAUniqueName) {
   std::map<absl::string_view, int> names;
   for (size_t i = 0; i < kRpcs; ++i) ++names[rpc_name(static_cast<Rpc>(i))];
-  for (size_t i = 0; i < kQueryKinds; ++i) ++names[query_kind_name(static_cast<QueryKind>(i))];
-  EXPECT_EQ(names.size(), kRpcs + kQueryKinds);
+  for (size_t i = 0; i < kBlockKinds; ++i) ++names[block_kind_name(static_cast<BlockKind>(i))];
+  EXPECT_EQ(names.size(), kRpcs + kBlockKinds);
   EXPECT_FALSE(names.contains(""));
 }
 
