@@ -97,7 +97,7 @@ TEST(BlobTest, NoRayFromInsideLeaks) {
   placed.mesh = *StaticMesh::build("blob", Sha256{}, *std::move(mesh));
   test::QueryWorld world;
   world.instances = {placed};
-  const BlockResult result = test::run_block(*test::snapshot_of(world), block);
+  const test::BlockResult result = test::run_block(*test::snapshot_of(world), block);
   ASSERT_EQ(result.ids.size(), block.points.size() / 3);
   EXPECT_EQ(std::count(result.ids.begin(), result.ids.end(), kNoId), 0);
 }
