@@ -87,8 +87,9 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   // The log is kept after reading it, because flushing it into tables would double the time to the first query
   // (open_directory() has synced it). Only a damaged log is flushed, so that its unreadable rest can be deleted.
   found.avoid_flush_during_recovery = mode != OpenMode::kLenient;
-  // A second net: RocksDB's own list of files says how far each log was synced.
-  found.track_and_verify_wals_in_manifest = !lenient(mode);
+  // RocksDB 7.8 could record in its manifest how far each log was synced (track_and_verify_wals_in_manifest). It stays
+  // off: a read-only open without that check, which is how a damaged directory is read, then ends the process by an
+  // assertion. The durable marker detects the same damage.
   found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
   found.max_manifest_file_size = kManifestBytes;
   found.info_log_level = rocksdb::InfoLogLevel::WARN_LEVEL;
