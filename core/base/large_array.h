@@ -1,6 +1,7 @@
-// Fixed-length arrays of trivially copyable values that may be very large. From kLargeArray bytes on they ask for pages
-// of 2 MiB: in a tree larger than the caches, page table misses otherwise cost as much time as the misses of the tree
-// itself (measured: a ray takes a fifth to a third less time at 4.3 million triangles).
+// Fixed-length arrays of trivially copyable values that may be very large. Arrays of at least kLargeArray bytes request
+// pages of 2 MiB: with small pages, the traversal of a tree that is larger than the caches spends as much time on page
+// table (TLB) misses as on cache misses. Measured at 4.3 million triangles: with large pages a ray takes a fifth to a
+// third less time.
 //
 // Threads: like a plain array.
 #ifndef LOCUS_CORE_BASE_LARGE_ARRAY_H_
@@ -33,8 +34,8 @@ struct FreeLargeArray {
 template <class T>
 using LargeArray = std::unique_ptr<T[], FreeLargeArray>;
 
-// Returns `count` uninitialised values. Only full large pages are requested: the remainder at the end lies in small
-// pages, so that no memory is wasted.
+// Returns an array of `count` uninitialised values. Large pages are requested only for the part that fills them: the
+// remainder at the end of the array uses small pages, so that no memory is wasted.
 template <class T>
 LargeArray<T> make_large_array(size_t count) {
   static_assert(std::is_trivially_destructible_v<T> && std::is_trivially_copyable_v<T>);
