@@ -5,7 +5,7 @@
 namespace locus {
 namespace {
 
-// Point of the triangle and its squared distance.
+// Point of the triangle and its squared distance from the query point.
 struct Candidate {
   double squared_distance = std::numeric_limits<double>::infinity();
   Vec3d point;
@@ -34,8 +34,9 @@ Candidate on_face(Vec3d point, Vec3d a, Vec3d b, Vec3d c) {
   const double sum = weight_a + weight_b + weight_c;
   if (!(weight_a >= 0 && weight_b >= 0 && weight_c >= 0 && sum > 0)) return {};
   const Vec3d inward = ab * (weight_b / sum) + ac * (weight_c / sum);
-  // The plane of a sliver is too imprecise for a height; the distance to a point of the triangle is never too small.
-  constexpr double kSliver = 0x1p-40;  // square of the sine at vertex a
+  // The normal of a sliver is too imprecise for a height above its plane. So use the distance to the projected point:
+  // it is a point of the triangle, so the result is never too small.
+  constexpr double kSliver = 0x1p-40;  // squared sine of the angle at vertex a
   if (nn < kSliver * squared_length(ab) * squared_length(ac)) return {squared_length(offset - inward), a + inward};
   const double height = dot(offset, normal);
   return {height * height / nn, a + inward};

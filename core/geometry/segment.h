@@ -18,8 +18,9 @@ double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
 // axis test over six axes, without division.
 bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
-// Returns the squared distance between that segment and that box, 0 if they meet. As a function of s, the squared
-// distance is convex and consists of at most seven parabolas; the minimum of each is computed in closed form.
+// Returns the squared distance between the segment around `center` and the box around the origin, as in
+// segment_meets_box(); 0 if they meet. As a function of s, the squared distance is convex and consists of at most seven
+// parabolas; the minimum of each is computed in closed form.
 double squared_distance_segment_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
 }  // namespace locus
