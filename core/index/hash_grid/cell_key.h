@@ -121,7 +121,7 @@ inline KeyRange cells_within(const Aabbd& box, double per_unit) {
   return range;
 }
 
-// Returns the bricks of a range of cells, or of the positions within a box.
+// Return the bricks that contain the cells of a range (bricks_of) or the positions within a box (bricks_within).
 inline KeyRange bricks_of(const KeyRange& cells) { return {brick_of(cells.lo), brick_of(cells.hi)}; }
 inline KeyRange bricks_within(const Aabbd& box, double per_unit) { return bricks_of(cells_within(box, per_unit)); }
 

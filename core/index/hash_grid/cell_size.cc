@@ -18,8 +18,8 @@ double median_diameter(absl::Span<const SampledValue> sample) {
   return *middle;
 }
 
-// Returns the largest useful exponent: still wider cells separate no values, and their float columns lose all
-// precision.
+// Returns the largest useful exponent: wider cells would separate no values, and the float columns of their bricks
+// would lose all precision.
 int exponent_of_all(absl::Span<const SampledValue> sample) {
   Vec3d low = sample[0].position, high = low;
   for (const SampledValue& value : sample) {
@@ -27,8 +27,8 @@ int exponent_of_all(absl::Span<const SampledValue> sample) {
     high = max(high, value.position);
   }
   const double width = max_component(high - low), magnitude = max_component(max(abs(low), abs(high)));
-  // The term with the magnitude keeps cells above zero width if all values coincide: they would leave such cells with
-  // every move.
+  // If all values coincide, `width` is zero. The term with the magnitude then prevents tiny cells, which the values
+  // would leave with every move.
   return exponent_covering(std::max(4 * width, 0x1p-16 * magnitude), kMinCellExponent, kMaxBaseExponent);
 }
 

@@ -95,7 +95,7 @@ inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slot
 #endif
 }
 
-// List of the vectors of all rows: one loop over the list is faster than a loop of unknown length for each row.
+// List of the vectors of all rows. One loop over this list is faster than a loop of unknown length for each row.
 struct RowVectors {
   static constexpr uint32_t kUsual = 4;  // vectors of a row that are written without a loop of unknown length
   static constexpr uint32_t kMax = GridRows::kMaxValues / kLanes + GridRows::kMax + kUsual;
@@ -118,7 +118,8 @@ struct RowVectors {
   uint32_t lanes[kMax];
 };
 
-// Writes the slots of all live values of the rows for which the mask keep(slot) has a bit. Returns their number.
+// Writes the slots of all live values of the rows that keep(slot) accepts. keep(slot) returns a mask with one bit for
+// each of the eight values from `slot` on. Returns the number of written slots.
 template <class Keep>
 inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep) {
   uint32_t count = 0;
