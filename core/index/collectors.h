@@ -1,6 +1,6 @@
-// Collectors: visitors that decide about the candidates of a structure and keep the results: the nearest hit, any hit,
-// the nearest k hits of a ray, or the values whose bounds meet a ray or a region. They are separate from traversal, so
-// that every structure serves every kind of query. One object per query and thread; each borrows the query.
+// Collectors: visitors that test the candidates of a structure and store the results: the nearest hit, any hit, the
+// nearest k hits of a ray, or the values whose bounds meet a ray or a region. They are separate from traversal, so that
+// every structure serves every kind of query. One object per query and thread; each borrows the query.
 #ifndef LOCUS_CORE_INDEX_COLLECTORS_H_
 #define LOCUS_CORE_INDEX_COLLECTORS_H_
 
@@ -169,9 +169,9 @@ class BoundsOnRayVisitor {
   std::vector<V>& result_;
 };
 
-// Collector of the values whose bounds overlap a region and that pass `test`. Appends to `result`. The test of the
-// bounds is part of the decision, so exact results are a subset of the conservative ones, and both are the same for
-// every structure.
+// Collector of the values whose bounds overlap a region and for which test(value) returns true. Appends to `result`.
+// Because exact queries also require that the bounds overlap the region, their results are a subset of the conservative
+// ones, and both are the same for every structure.
 template <Bounded V, class Region, class Test>
 class RegionCollector {
   using Traits = PrimitiveTraits<V>;

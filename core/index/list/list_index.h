@@ -70,7 +70,8 @@ class ListIndex {
   }
 
  private:
-  // Checks the sizes and, if it exists, the entry of `slot`, which has changed. O(1).
+  // Checks that the array and the map have the same size and, if `slot` exists, that the map has its entry. Call it
+  // with the slot that has changed. O(1).
   void check_invariants(size_t slot) const {
     if constexpr (kDebugChecks) {
       LOCUS_DCHECK_EQ(values_.size(), slots_.size());
