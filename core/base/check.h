@@ -9,7 +9,7 @@
 
 namespace locus::internal {
 
-// Prints the failed check to stderr and aborts. `operands` may be empty.
+// Prints the location, the failed condition and `operands` (may be empty) to stderr and aborts.
 [[noreturn]] void check_failed(const char* file, int line, const char* condition, const std::string& operands);
 
 template <class A, class B>
@@ -46,7 +46,7 @@ inline constexpr bool kDebugChecks = true;
 #endif
 }  // namespace locus
 
-// Type-checked in every build, evaluated only where kDebugChecks is true.
+// Macros that are type-checked in every build but evaluated only if kDebugChecks is true.
 #define LOCUS_DCHECK(condition)                                  \
   do {                                                           \
     if constexpr (::locus::kDebugChecks) LOCUS_CHECK(condition); \

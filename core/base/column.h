@@ -23,7 +23,7 @@ class ColumnReader {
   }
 
   bool given() const { return !values_.empty(); }
-  // Returns the first value of item i's entry. Precondition: given().
+  // Returns a pointer to the first value of the entry that applies to item `i`. Precondition: given().
   const T* entry(size_t i) const {
     LOCUS_DCHECK(given());
     LOCUS_DCHECK(values_.size() == width_ || i < values_.size() / width_);

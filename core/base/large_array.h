@@ -25,7 +25,7 @@ namespace locus {
 inline constexpr size_t kLargePage = size_t{1} << 21;
 inline constexpr size_t kLargeArray = 4 * kLargePage;  // smallest array, in bytes, that uses large pages
 
-// Deleter of a LargeArray: frees memory of the given alignment.
+// Deleter of a LargeArray; `alignment` is that of the allocation.
 struct FreeLargeArray {
   std::align_val_t alignment{1};
   void operator()(void* memory) const { ::operator delete(memory, alignment); }
@@ -44,7 +44,7 @@ LargeArray<T> make_large_array(size_t count) {
   const std::align_val_t alignment{bytes < kLargeArray ? std::max(alignof(T), alignof(std::max_align_t)) : kLargePage};
   void* const memory = ::operator new(bytes, alignment);
 #ifdef MADV_HUGEPAGE
-  // Only a hint: without large pages the array is correct but slower.
+  // madvise() is only a hint: without large pages the array is correct but slower.
   if (bytes >= kLargeArray) madvise(memory, bytes / kLargePage * kLargePage, MADV_HUGEPAGE);
 #endif
   return LargeArray<T>(static_cast<T*>(memory), FreeLargeArray{alignment});

@@ -6,10 +6,10 @@
 // Threads: each array object is like a standard container. Arrays that share leaves are independent: a thread may
 // write, copy or destroy its own array while other threads read theirs.
 //
-// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner, a number that its
-// creator had. An array draws a new owner at its first write after snapshot(), and changes in place only leaves and a
-// List that store its current owner; so it never reads reference counts. The number of leaves is the smallest that
-// holds size() values. Source of the owners: Clojure's transient collections (Hickey).
+// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner: the number that
+// its creator then had as its owner_. An array draws a new owner at its first write after snapshot(), and changes in
+// place only leaves and a List that store its current owner; so it never reads reference counts. The number of leaves
+// is the smallest that holds size() values. Source of the owners: Clojure's transient collections (Hickey).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
@@ -58,7 +58,7 @@ class PersistentArray {
 
   // Returns one more than the highest index that was ever set; 0 if none was.
   size_t size() const { return list_->size; }
-  // Returns the value at `index` < size(): T() if it was never set.
+  // Returns the value at `index`, or T() if it was never set. Precondition: index < size().
   const T& operator[](size_t index) const {
     LOCUS_DCHECK_LT(index, size());
     return list_->leaves[index / kLeafSize]->values[index % kLeafSize];

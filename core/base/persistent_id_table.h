@@ -31,7 +31,7 @@
 
 namespace locus {
 
-// Hash()(id) returns 64 bits, of which the upper ones choose the home bucket.
+// Persistent table of ids. `Hash()(id)` must return 64 bits; the upper ones choose the home bucket.
 template <class Hash = SeededHash>
 class PersistentIdTable {
  public:
@@ -53,8 +53,8 @@ class PersistentIdTable {
   // Writes the value of ids[i], or kNone if that id is absent, to values[i]. Precondition: values.size() >= ids.size().
   // Faster than single calls, since it prefetches the buckets.
   void find(absl::Span<const Id> ids, absl::Span<uint32_t> values) const;
-  // Prefetches the bucket that find(id) reads first. Must be inlined early: GCC drops calls of a function that only
-  // prefetches, since it sees no effect.
+  // Prefetches the bucket that find(id) reads first. Always inlined, since GCC otherwise drops calls of functions that
+  // only prefetch.
   [[gnu::always_inline]] void prefetch(Id id) const {
     if (bucket_count_ != 0) __builtin_prefetch(&bucket(home(id)));
   }

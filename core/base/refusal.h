@@ -62,8 +62,8 @@ absl::Status refuse_argument(Reason reason, absl::string_view field, std::option
 // its own, whatever the load: repeating it cannot succeed.
 absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked);
 
-// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value. For a server or scene that is full
-// now: the same request may succeed later. `retry_after_ms` is 0 if waiting alone frees nothing.
+// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value. For a server or scene that is full at
+// present: the same request may succeed later. `retry_after_ms` is 0 if waiting alone does not help.
 absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
                          uint32_t retry_after_ms);
 

@@ -32,7 +32,7 @@ class SeededHash {
     const absl::uint128 product = absl::uint128(a) * b;
     return absl::Uint128Low64(product) ^ absl::Uint128High64(product);
   }
-  // Returns a random seed, which stays the same until the process ends.
+  // Returns the random seed of this process.
   static const Seed& process_seed();
 
   // Odd constant without a regular bit pattern (fractional part of the golden ratio). Separates keys that an unlucky
