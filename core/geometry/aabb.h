@@ -62,14 +62,14 @@ constexpr S half_area(const Aabb<S>& box) {
   return e.x * e.y + e.y * e.z + e.z * e.x;
 }
 
-// Returns the largest |coordinate| of any point of the box. A superset of the box never has a smaller one.
+// Returns the largest |coordinate| of any point of the box. A superset of the box never has a smaller magnitude.
 template <class S>
 S magnitude(const Aabb<S>& box) {
   return std::max(max_component(abs(box.min)), max_component(abs(box.max)));
 }
 
 // Returns the squared distance from `point` to the box, 0 inside. Each step rounds monotonically, so a superset of the
-// box never has a larger one.
+// box never has a larger squared distance.
 template <class S>
 constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
   const Vec3<S> gap = max(max(box.min - point, point - box.max), Vec3<S>{});

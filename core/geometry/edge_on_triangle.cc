@@ -69,7 +69,7 @@ DoubleDouble edge_function(const Corner& from, const Corner& to) { return from.x
 
 bool culled(Cull cull, int side) { return (cull == Cull::kBack && side <= 0) || (cull == Cull::kFront && side >= 0); }
 
-// Point of an edge: `fraction` of the edge from its first corner.
+// Point of an edge; `fraction` is 0 at the edge's first corner and 1 at the second.
 struct EdgePoint {
   double squared_distance;  // from the ray
   double t;

@@ -21,7 +21,8 @@ Candidate on_edge(Vec3d point, Vec3d from, Vec3d to) {
   return {squared_length(cross(offset, edge)) / length, from + edge * (along / length)};
 }
 
-// Returns the projection of `point` on the plane if it lies within the triangle, else an infinite distance.
+// Returns the projection of `point` on the triangle's plane if it lies within the triangle, else a candidate at
+// infinite distance.
 Candidate on_face(Vec3d point, Vec3d a, Vec3d b, Vec3d c) {
   const Vec3d ab = b - a, ac = c - a;
   const Vec3d offset = point - a;
@@ -42,7 +43,7 @@ Candidate on_face(Vec3d point, Vec3d a, Vec3d b, Vec3d c) {
   return {height * height / nn, a + inward};
 }
 
-// Returns the nearest candidate, the first one among equal distances.
+// Returns the candidate with the smallest distance; among equal distances, the first.
 Candidate nearest(Vec3d point, Vec3d a, Vec3d b, Vec3d c) {
   Candidate best = on_edge(point, a, b);
   for (const Candidate& other : {on_edge(point, b, c), on_edge(point, c, a), on_face(point, a, b, c)})

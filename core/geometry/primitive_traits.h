@@ -6,7 +6,7 @@
 //   RayQuery   a preprocessed ray: slabs() for culling, to_scaled(t) from distances to the slabs' unit, rounded up
 //   BallQuery, BoxQuery   query types of ball() and box()
 //   id         unique within one index; the lower id wins a tie, and remove() searches by id
-//   bounds     axis-aligned bounds; each test below includes them, so culling by any superset loses no result
+//   bounds     axis-aligned bounds; every test below requires the query to meet them, so any superset can cull
 //   position   point that selects the grid cell: any point within the bounds, fixed for the value
 //   ray        distance >= 0 of the first hit, also beyond the ray's t_max
 //   ball, box  whether the closed solids share a point

@@ -74,7 +74,7 @@ class SlabRay {
   const Vec3<S>& origin() const { return origin_; }
   const Vec3<S>& direction() const { return direction_; }
 
-  // Returns the distance by which the test widens a box of the given magnitude.
+  // Returns the distance by which the slab test widens a box of magnitude `box_magnitude`.
   S margin(S box_magnitude) const { return pad_ * (magnitude_ + box_magnitude); }
 
   // Returns the interval of the ray in the padded box.

@@ -69,7 +69,7 @@ struct TriangleRay::Projected {
   bool is_outside() const { return min_weight < 0 && max_weight > 0; }
   // Returns a bound of the rounding error of a corner, which is below 2^-44.8 R in each coordinate.
   double corner_error() const { return 0x1p-43 * magnitude; }
-  // Returns whether the ray passes outside by more than the error bounds.
+  // Returns whether the ray passes outside the triangle by more than the error bounds above.
   bool is_clearly_outside() const {
     const double weight_error = 0x1p-42 * magnitude * (size + 0x1p-44 * magnitude);
     if (min_weight < -weight_error && max_weight > weight_error) return true;
@@ -119,8 +119,9 @@ float TriangleRay::to_scaled(float t) const {
   return next_above(static_cast<float>(scaled));
 }
 
-// Returns an error bound of `depth` in edge_test(): less than 264 roundings of 2^-53 distance^3 in the computation from
-// the vertices, and 72 of 2^-51 |origin| distance^2 in the transform of the origin to mesh axes.
+// Returns a bound of the error of `depth` in edge_test(). It covers two sums of rounding errors: below 264 * 2^-53 *
+// distance^3 from the computation with the vertices, and below 72 * 2^-51 * |origin| * distance^2 from the transform of
+// the origin to mesh axes.
 double TriangleRay::depth_error(const Triangle& triangle) const {
   double distance = 0;
   for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
@@ -184,7 +185,7 @@ std::optional<TriangleHit> TriangleRay::edge_test(const Triangle& triangle) cons
       projected.weight_a * projected.a.z + projected.weight_b * projected.b.z + projected.weight_c * projected.c.z;
   double t = depth / (projected.determinant * direction_[axis_z_]);
   if (!(t >= 0)) {
-    // A depth within its error bound counts as 0: the ray starts on the triangle.
+    // The ray starts on the triangle if the depth is within its error bound.
     if (!(std::abs(depth) <= depth_error(triangle))) return std::nullopt;
     t = 0;
   }

@@ -32,8 +32,8 @@ class TriangleRay {
   // Takes `origin` and `direction` in mesh axes. The slab test rounds each component to float once; the padding of the
   // slab test covers this error.
   TriangleRay(Vec3d origin, Vec3d direction, Cull cull = Cull::kNone);
-  // Takes `origin` and `direction` in world axes, for a mesh placed by `transform`. The ray is rounded to mesh axes;
-  // nearly edge-on triangles are tested with the unrounded ray.
+  // Takes `origin` and `direction` in world axes, for a mesh placed by `transform`. The ray is transformed to mesh
+  // axes, which rounds it; nearly edge-on triangles are tested with the unrounded ray.
   TriangleRay(const Transform& transform, Vec3d origin, Vec3d direction, Cull cull = Cull::kNone);
 
   const SlabRay<float>& slabs() const { return slabs_; }

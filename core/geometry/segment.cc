@@ -6,7 +6,7 @@
 namespace locus {
 namespace {
 
-// Returns the signed distance of each coordinate from the box; 0 inside.
+// Returns, for each coordinate of `point`, its signed distance from the box; 0 if it is within the box.
 Vec3d gap_to_box(Vec3d point, Vec3d half) {
   Vec3d gap;
   for (int axis = 0; axis < 3; ++axis)
@@ -14,7 +14,8 @@ Vec3d gap_to_box(Vec3d point, Vec3d half) {
   return gap;
 }
 
-// Returns the values of s at which a coordinate enters or leaves the box, and both ends of the segment, ascending.
+// Returns, ascending, the values of s at which a coordinate of the segment enters or leaves the box, and those of both
+// ends of the segment. Unused entries are 1, the second end.
 std::array<double, 8> breakpoints_of(Vec3d center, Vec3d half_axis, Vec3d half) {
   std::array<double, 8> breakpoints;
   breakpoints.fill(1);

@@ -10,8 +10,9 @@ namespace locus {
 // Returns the point of the segment nearest to `point`.
 Vec3d nearest_on_segment(Vec3d point, Vec3d half_axis);
 
-// Returns the squared distance from `point` to the segment. Between the ends it is computed by a cross product and one
-// division: exact if the result is a small integer, otherwise with an error of a few roundings of |point|.
+// Returns the squared distance from `point` to the segment. If the nearest point is not an end of the segment, the
+// distance is computed by a cross product and one division: exact if the result is a small integer, otherwise with an
+// error of a few roundings of |point|.
 double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
 
 // Returns whether the segment around `center` meets the closed box of half extents `half` around the origin: separating

@@ -72,7 +72,7 @@ ShapeHit hit_at(const LocalRay& local, double t, Vec3d normal) {
   return {std::ldexp(std::max(t, 0.0), -local.exponent), normalized(local.rotation.to_world(normal))};
 }
 
-// Returns the hit on the solid, without the test of its bounds.
+// Returns the hit on the solid; ray_hit() adds the test of the solid's bounds.
 std::optional<ShapeHit> solid_hit(const ObjectRay& ray, const Shape& shape) {
   const LocalRay local = local_ray(ray.ray(), shape);
   const bool inside = contains(shape, local.line.origin);
