@@ -25,7 +25,7 @@ class PackedIndices {
    public:
     explicit Reader(const PackedIndices& packed) : next_(packed.bytes_.data()) {}
 
-    // Returns the next index. Call at most once per index of the list.
+    // Returns the next index. Precondition: the list has an index that next() has not returned yet.
     uint32_t next();
 
    private:
