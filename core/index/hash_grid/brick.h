@@ -32,13 +32,14 @@ struct BrickGeometry {
   int exponent = 0;  // cell edge = 2^exponent
 
   static BrickGeometry of(const GridKey& key, int exponent);
-  // Returns the cell of a position in the brick: 0 to 63, z most significant.
+  // Returns the index of the cell that contains a position in the brick: 0 to 63; z is the most significant part.
   int cell_of(Vec3d position) const {
     return cell_along(position.x - low.x) | cell_along(position.y - low.y) << kBrickBits |
            cell_along(position.z - low.z) << (2 * kBrickBits);
   }
-  // Returns the cell of a position, or a negative value if the position is not in the brick. Combines holds() and
-  // cell_of(), but within rounding of a border of the brick the result may differ from holds().
+  // Returns the index of the cell that contains the position, or a negative value if the position is not in the brick.
+  // Replaces holds() and cell_of() in one step, but if the position is within rounding of a border of the brick, the
+  // result may differ from that of holds().
   int cell_if_here(Vec3d position) const {
     // Adds 1 before the cast, which rounds toward zero: positions just below the brick must not become cell 0.
     const int64_t x = static_cast<int64_t>((position.x - low.x) * cells_per_unit + 1) - 1;

@@ -104,7 +104,7 @@ void BrickBuilder::check_sorted(const Brick& brick) const {
   }
 }
 
-// Checks a version whose log has new values from slot `begin` on. O(new values), and O(words of dead bits).
+// Checks a version whose log has new values from slot `begin` on. O(new values + words of dead bits).
 void BrickBuilder::check_recent(const Brick& brick, uint32_t begin) const {
   if constexpr (kDebugChecks) {
     brick.check_invariants();
@@ -243,8 +243,8 @@ BrickPtr BrickBuilder::sort_anew(const Brick* old, absl::Span<const BrickChange>
   return sorted_by_cell(old, sources_);
 }
 
-// Returns a version whose sorted block holds all sources and whose log is empty; null if there are none. Counting sort
-// by cell.
+// Returns a version whose sorted block holds all sources, ordered by a counting sort by cell, and whose log is empty.
+// Returns null if there are no sources.
 BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSource> sources) {
   if (sources.empty()) return nullptr;
   const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources.size()), any_form(old, sources));

@@ -29,8 +29,8 @@ struct BatchParts {
 
 class BrickBuilder {
  public:
-  // Begins a batch. `slots`, indexed by handle, receives the new slot of each value that changes its slot. Both
-  // arguments are borrowed until end().
+  // Begins a batch. `slots`, indexed by handle, receives the new slot of each value that changes its slot. The arrays
+  // of `parts` and `slots` are borrowed until end().
   void begin(const BatchParts& parts, std::vector<GridSlot>& slots);
   // Ends the batch and frees large buffers.
   void end() { clear_scratch(sources_); }

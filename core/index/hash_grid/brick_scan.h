@@ -98,8 +98,8 @@ inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
   return cull;
 }
 
-// Ray relative to a brick, as input of float culling: a line through its point nearest to the centre of the brick,
-// which keeps the coordinates small.
+// Ray relative to a brick, as input of float culling: a line, given by its point nearest to the centre of the brick and
+// its direction. Starting from that point keeps the float coordinates small.
 class CullRay {
  public:
   // `ray_radius`: displacement bound of the values plus the padding of the slab test.
@@ -117,8 +117,8 @@ class CullRay {
       line_.point[axis] = static_cast<float>(point[axis]);
       line_.direction[axis] = static_cast<float>(toward[axis]);
     }
-    // Within the brick the error of the line's direction and point is a few 2^-24 of the lengths, plus 2^-50 of the
-    // distance to the origin of the ray.
+    // Within the brick, the errors of the line's direction and point displace it by a few 2^-24 of the lengths
+    // involved, plus 2^-50 of the distance to the origin of the ray.
     line_.radius =
         static_cast<float>((cull_epsilon(brick) + ray_radius + 0x1p-46 * far +
                             4 * double{kCullEpsilon} * (max_component(abs(point)) + 2 * brick.geometry.edge)) *
@@ -168,8 +168,8 @@ class BallCull {
   const Balld* ball_;
 };
 
-// Returns the slots of `cells`, which are relative to the brick, in its sorted block, as rows of consecutive slots.
-// Empty rows are left out, and adjacent ones are joined.
+// Returns the rows of consecutive slots that hold the values of `cells` in the sorted block; `cells` is relative to the
+// brick. Leaves out empty rows and joins adjacent ones.
 inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   static_assert(GridRows::kMax == 1 << (2 * kBrickBits));
   const GridBlock& sorted = *brick.sorted;

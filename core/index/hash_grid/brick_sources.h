@@ -49,7 +49,7 @@ struct BrickSource {
   uint32_t cell;    // new cell; unused for values that go to the log
 };
 
-// Lookup of the move of a handle. Precondition: the batch has moves, and by_handle is given.
+// Lookup of moves by handle. Precondition: the batch has moves, and GridMoves::by_handle is given.
 class MoveFinder {
  public:
   explicit MoveFinder(const GridMoves& moves) : moves_(moves.moves), index_by_handle_(moves.by_handle) {

@@ -20,7 +20,8 @@ class BrickTable {
   static constexpr uint32_t kNone = ~0u;
 
   size_t size() const { return size_; }
-  // Returns the brick for which has_key(brick) holds, among those with the hash of `key`; kNone if there is none.
+  // Returns the brick for which has_key(brick) is true, kNone if there is none. Calls has_key() only for bricks with
+  // the hash of `key`.
   template <class HasKey>
   uint32_t find(const GridKey& key, const HasKey& has_key) const {
     const uint32_t hash = hash_of(key);
@@ -34,7 +35,7 @@ class BrickTable {
   void insert(const GridKey& key, uint32_t brick);
   // Removes an entry. Precondition: `brick` was inserted under `key`.
   void erase(const GridKey& key, uint32_t brick);
-  // Calls fn(brick) for each brick until it returns false. Returns false if a call did.
+  // Calls fn(brick) for each brick. Stops and returns false if fn() returns false.
   template <class Fn>
   bool for_each(const Fn& fn) const {
     for (const Slot& slot : slots_)

@@ -76,7 +76,7 @@ inline GridKey brick_of(const GridKey& cell) {
   return {cell.x >> kBrickBits, cell.y >> kBrickBits, cell.z >> kBrickBits};
 }
 
-// Returns the index of a cell within its brick, 0 to 63, z most significant.
+// Returns the index of a cell within its brick: 0 to 63; z is the most significant part.
 inline int index_in_brick(const GridKey& cell) {
   constexpr int64_t kMask = (int64_t{1} << kBrickBits) - 1;
   return static_cast<int>((cell.x & kMask) | (cell.y & kMask) << kBrickBits | (cell.z & kMask) << (2 * kBrickBits));

@@ -32,8 +32,8 @@ int exponent_of_all(absl::Span<const SampledValue> sample) {
   return exponent_covering(std::max(4 * width, 0x1p-16 * magnitude), kMinCellExponent, kMaxBaseExponent);
 }
 
-// Returns the expected number of other values in the cell of a random value. The share of sample pairs in one cell
-// estimates the share of pairs of the population, so the sample size does not bias the estimate.
+// Returns the expected number of other values in the cell of a random value. The fraction of the sample's pairs of
+// values that share a cell estimates this fraction for the population, so the sample size does not bias the estimate.
 double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
   if (sample.size() < 2) return 0;
   std::vector<GridKey> cells;

@@ -40,8 +40,8 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
 // choose_cell_exponent().
 bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
-// Even selection among `population` values, which are offered one by one: all of them if they are fewer than
-// kCellSizeSample, else kCellSizeSample to twice as many.
+// Even selection among `population` values, which are offered one by one. Selects all of them if they are fewer than
+// kCellSizeSample, else kCellSizeSample to 2 * kCellSizeSample of them.
 class EvenSample {
  public:
   explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}

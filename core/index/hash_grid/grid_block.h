@@ -70,7 +70,7 @@ class GridBlock {
     LOCUS_DCHECK(0 <= index && index < 4);
     return floats_ + size_t{stride_} * static_cast<size_t>(index);
   }
-  // Return the parts of a value. Precondition: slot < count().
+  // Return one part of the value in `slot`. Precondition: slot < count().
   const GridEntry& entry(uint32_t slot) const {
     LOCUS_DCHECK_LT(slot, count_);
     return entries_[slot];

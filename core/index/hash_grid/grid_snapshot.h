@@ -99,7 +99,7 @@ class GridSnapshot {
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 
-  // Calls visit(GridRef) for each value until it returns false. Returns false if a call did.
+  // Calls visit(GridRef) for each value. Stops and returns false if visit() returns false.
   template <class Visit>
   bool for_each(const Visit& visit) const;
   // Continues an iteration over all values at `cursor`: calls visit(GridRef) for each further value until visit()
@@ -141,7 +141,7 @@ class GridSnapshot {
   template <class Limit, class Visit>
   bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double ray_radius,
              const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
-  // Returns the estimated number of values per cell near `point`.
+  // Returns the estimated number of values per cell of `level` near `point`.
   double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
   // Visits the values of the present shell and all later ones brick by brick, from near to far. Used if the range of a
   // shell has more keys than the level has bricks. Returns false if visit() did.

@@ -49,7 +49,8 @@ void HashGrid::check_in_use(uint32_t handle) const {
   }
 }
 
-// Checks the invariants of the class for the bricks and values that the batch has changed. O(changes + levels).
+// Checks the invariants of the class for the levels and for the bricks and values that the batch has changed. O(changes
+// + levels).
 void HashGrid::check_invariants(const GridBatch& batch) const {
   if constexpr (kDebugChecks) {
     size_t values = 0, bricks = 0;
@@ -68,7 +69,8 @@ void HashGrid::check_invariants(const GridBatch& batch) const {
   }
 }
 
-// Checks that a brick agrees with its entry in brick_info_ and with its level; a dropped brick passes. O(1).
+// Checks that the version of a brick agrees with its entry in brick_info_ and with its level. Skips a dropped brick,
+// which has no version. O(1).
 void HashGrid::check_brick(uint32_t brick) const {
   if (bricks_[brick] == nullptr) return;
   const internal::Brick& version = *bricks_[brick];
@@ -386,8 +388,8 @@ void HashGrid::choose_cell_size() {
   if (exponent != base_exponent_) start_refiling(exponent);
 }
 
-// Lists all bricks as stale. Neighbours follow each other in stale_bricks_, since their values go to the same new
-// bricks; refile() takes bricks from the end.
+// Adds all bricks to stale_bricks_, sorted so that neighbours follow each other, since their values move to the same
+// new bricks. The order is reversed, since refile() takes bricks from the end.
 void HashGrid::start_refiling(int base_exponent) {
   base_exponent_ = base_exponent;
   for (uint32_t brick = 0; brick < brick_info_.size(); ++brick)

@@ -58,8 +58,8 @@ class HashGrid {
   // brick).
   size_t apply(const GridBatch& batch);
 
-  // Fills an empty grid with `items`, using the cell_size() of another grid that held the same values. The cell size is
-  // not chosen again until the rules above require it.
+  // Fills an empty grid with `items`. `cell_size` is the cell_size() of another grid that held the same values, so it
+  // is not chosen again until the rules above require it.
   void fill(absl::Span<const GridItem> items, double cell_size);
 
   // Calls visit(GridRef) for each value, until it returns false. O(size).
@@ -158,7 +158,7 @@ class HashGrid {
   std::vector<internal::BrickChange> grouped_;  // changes in the order of touched_
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
-  // Values that stay in a brick, gathered by a batch that moves nearly all values.
+  // Values that stay in a brick, collected by gather_all().
   struct GatheredBrick {
     bool is_gathered = false;  // false: the next version of the brick follows from its changes alone
     absl::Span<const internal::BrickSource> sources;

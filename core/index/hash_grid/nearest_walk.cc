@@ -153,8 +153,8 @@ void NearCandidates::sort() {
     std::sort(candidates_.begin(), candidates_.end(), before);
     return;
   }
-  // Sorts integers: the bits of a key, which is not negative, are ordered like the key. Their lowest bits are replaced
-  // by the index of the candidate.
+  // Sorts integers instead of floats: keys are not negative, so their bits have the same order. The lowest bits of each
+  // key are replaced by the index of its candidate.
   int32_t packed[kMaxSorted];
   Candidate given[kMaxSorted];
   for (uint32_t i = 0; i < count; ++i) {

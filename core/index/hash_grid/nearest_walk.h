@@ -18,7 +18,7 @@
 
 namespace locus::internal {
 
-// Returns an upper bound of the keys of all values within the squared distance `limit`.
+// Returns an upper bound of the keys of all values whose squared distance is at most `limit`.
 float key_limit(double limit);
 
 // Returns the estimated number of values per cell near `point`, which lies in the brick; 0 if the brick has too few
@@ -34,13 +34,13 @@ class NearestShells {
   NearestShells(const Vec3d& point, const LevelGeometry& level, double per_cell);
   NearestShells(const Vec3d& point, const LevelGeometry&& level, double per_cell) = delete;
 
-  // Advances to the next shell. Returns false if no key within the squared distance `limit` remains.
+  // Advances to the next shell. Returns false if no further key belongs to a squared distance of at most `limit`.
   bool next(double limit);
   float above() const { return above_; }
   float up_to() const { return up_to_; }
   // Returns a box that overlaps the bounds of every value of this shell.
   const Aabbd& region() const { return region_; }
-  // Returns a box that overlaps the bounds of every value within the squared distance `limit`.
+  // Returns a box that overlaps the bounds of every value whose squared distance is at most `limit`.
   Aabbd region_within(double limit) const;
 
  private:

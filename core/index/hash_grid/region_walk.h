@@ -19,7 +19,7 @@
 
 namespace locus {
 
-// Region of a grid query: the values in `ball` if it is given, with `bounds` as its bounds; else the values in
+// Region of a query on one grid: the ball if it is given, with `bounds` as the bounds of the ball; else the box
 // `bounds`.
 struct GridRegion {
   const GridSnapshot* grid = nullptr;
@@ -46,7 +46,7 @@ class RegionSteps {
   void find_rows();
   void find_values();
 
-  // Calls visit(GridRef) for each value until it returns false.
+  // Calls visit(GridRef) for each value near the region until visit() returns false.
   template <class Visit>
   void visit(Work& work, const Visit& visit) const;
 
@@ -105,8 +105,8 @@ class RegionWalk {
   // regions before the region is visited.
   RegionWalk(size_t begin, size_t end, std::function<GridRegion(size_t)> region_of);
 
-  // Calls visit(GridRef) for the values of the next region until it returns false. Precondition: not all regions have
-  // been visited.
+  // Calls visit(GridRef) for the values near the next region until visit() returns false. Precondition: not all regions
+  // have been visited.
   template <class Visit>
   void visit(Work& work, const Visit& visit) {
     LOCUS_DCHECK_LT(next_, end_);

@@ -28,7 +28,7 @@ class SlabMarch {
     KeyRange bricks;  // may be empty
   };
 
-  // Prepares a march along the part of the ray up to `limit`, in the unit of the slab test.
+  // Prepares a march along the part of the ray up to `limit`, which is in units of the slab test.
   SlabMarch(const SlabRay<double>& ray, const LevelGeometry& level, double limit);
 
   // Returns the number of slabs; 0 if the ray misses the level.

@@ -42,7 +42,7 @@ inline uint32_t bits_of(Lanes lanes) {
 #endif
 }
 
-// Returns a mask of the dead values among `slot` to slot + 7.
+// Returns a mask with one bit for each of the values `slot` to slot + 7, set if the value is dead.
 inline uint32_t dead_bits(const uint64_t* dead, uint32_t slot) {
   uint16_t bits;
   std::memcpy(&bits, reinterpret_cast<const char*>(dead) + slot / 8, sizeof(bits));
@@ -50,7 +50,7 @@ inline uint32_t dead_bits(const uint64_t* dead, uint32_t slot) {
 }
 
 #ifdef __AVX2__
-// Table from a mask of lanes to the indices of its lanes in order, one byte each.
+// Table that maps a mask of lanes to the indices of the lanes in the mask, ascending, one byte each.
 struct LanesOfMasks {
   constexpr LanesOfMasks() {
     for (uint32_t mask = 0; mask < 256; ++mask) {
@@ -76,7 +76,7 @@ inline void write_slots(uint32_t kept, uint32_t slot, uint32_t* slots) {
 #endif
 }
 
-// Writes the slots and keys of the lanes in the mask `kept`, like write_slots().
+// Writes the slots and the keys of the lanes in the mask `kept`, in the same way as write_slots().
 inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slots, float* keys) {
 #ifdef __AVX2__
   const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfMasks.lanes[kept])));
