@@ -35,9 +35,9 @@ class NearestVisitor {
     return true;
   }
 
-  // Returns the nearest hit value, or no value if there was no hit before the limit.
+  // Returns the nearest value that was hit, or nullopt if there was no hit before the limit.
   const std::optional<V>& best() const { return best_; }
-  // Returns the distance of best(), or the given limit if there was no hit.
+  // Returns the distance of best(), or the limit given to the constructor if there was no hit.
   S distance() const { return distance_; }
 
  private:
@@ -85,7 +85,7 @@ struct RayHit {
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
-// Returns true if hit `a` precedes `b`: by distance, then by id.
+// Returns true if hit `a` precedes hit `b` in the order by distance, then by id.
 template <Bounded V>
 bool comes_before(const RayHit<V>& a, const RayHit<V>& b) {
   if (a.distance != b.distance) return a.distance < b.distance;
