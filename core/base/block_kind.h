@@ -1,5 +1,5 @@
-// Kinds of queries that a block of a batch has, for all rooms: what the core answers, the server counts and logs. Plain
-// data.
+// Kinds of queries: each block of a query batch holds queries of one kind. The core answers by kind; the server counts
+// and logs by kind. Plain data.
 #ifndef LOCUS_CORE_BASE_BLOCK_KIND_H_
 #define LOCUS_CORE_BASE_BLOCK_KIND_H_
 
@@ -11,10 +11,11 @@
 
 namespace locus {
 
-// In the order of the alternatives of QueryBlock::kind, which core/query/query_batch.h asserts.
+// Kind of the queries of a block, in the order of the alternatives of QueryBlock::kind; core/query/query_batch.h
+// asserts this order.
 enum class BlockKind : uint8_t { kRay, kBall, kBox, kLookup, kNearest };
 
-// Names by number, as metrics and logs spell them.
+// Names of the kinds, indexed by BlockKind, as they appear in metrics and logs.
 inline constexpr std::array<absl::string_view, 5> kBlockKindNames = {"ray", "ball", "box", "lookup", "nearest"};
 inline constexpr size_t kBlockKinds = kBlockKindNames.size();
 static_assert(kBlockKinds == static_cast<size_t>(BlockKind::kNearest) + 1);

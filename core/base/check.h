@@ -1,6 +1,6 @@
 // Assertions of invariants and preconditions. A failed check is a bug in locus, never a user's mistake: it prints the
-// condition, both operands, file and line, and aborts. Operating errors are absl::Status instead. LOCUS_DCHECK* cost
-// nothing in release builds. Any thread.
+// condition, the operands of a comparison, file and line, and aborts the process. Errors of users and of the system are
+// absl::Status instead. LOCUS_DCHECK* cost nothing in release builds. Any thread.
 #ifndef LOCUS_CORE_BASE_CHECK_H_
 #define LOCUS_CORE_BASE_CHECK_H_
 
@@ -9,7 +9,7 @@
 
 namespace locus::internal {
 
-// Prints the failed check to stderr and aborts. `operands` may be empty.
+// Prints the location, the failed condition and `operands` (may be empty) to stderr and aborts.
 [[noreturn]] void check_failed(const char* file, int line, const char* condition, const std::string& operands);
 
 template <class A, class B>
@@ -36,8 +36,8 @@ template <class A, class B>
 #define LOCUS_CHECK_LT(a, b) LOCUS_CHECK_OP_(a, <, b)
 
 // True in debug and sanitizer builds, where LOCUS_DCHECK* and check_invariants() are evaluated. A class whose comment
-// names an invariant has a member check_invariants(), called at the end of each mutating public member. Its body is
-// inside `if constexpr (kDebugChecks)`, and its cost is at most that of the change before it.
+// names an invariant has a member check_invariants(), called at the end of each mutating public member. The body of
+// check_invariants() is inside `if constexpr (kDebugChecks)`, and its cost is at most that of the mutation.
 namespace locus {
 #ifdef NDEBUG
 inline constexpr bool kDebugChecks = false;
@@ -46,7 +46,7 @@ inline constexpr bool kDebugChecks = true;
 #endif
 }  // namespace locus
 
-// Type-checked in every build, evaluated only where kDebugChecks is true.
+// Macros that are type-checked in every build but evaluated only if kDebugChecks is true.
 #define LOCUS_DCHECK(condition)                                  \
   do {                                                           \
     if constexpr (::locus::kDebugChecks) LOCUS_CHECK(condition); \

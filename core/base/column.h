@@ -1,5 +1,5 @@
-// Readers and length checks of packed columns: scalars or points stored one after the other, with one entry per item,
-// one entry for all items, or none. Const access; any thread.
+// Reader and length check of packed columns. A column is an array of entries of equal width, such as scalars or points.
+// It has one entry per item, one entry that applies to all items, or none. Const access; any thread.
 #ifndef LOCUS_CORE_BASE_COLUMN_H_
 #define LOCUS_CORE_BASE_COLUMN_H_
 
@@ -12,7 +12,8 @@
 
 namespace locus {
 
-// Borrowed column whose length check_column() has accepted. An entry consists of `width` values.
+// View of a column whose length check_column() has accepted; does not own the values. An entry consists of `width`
+// values.
 template <class T>
 class ColumnReader {
  public:
@@ -22,7 +23,7 @@ class ColumnReader {
   }
 
   bool given() const { return !values_.empty(); }
-  // Returns the first value of item i's entry. Precondition: given().
+  // Returns a pointer to the first value of the entry that applies to item `i`. Precondition: given().
   const T* entry(size_t i) const {
     LOCUS_DCHECK(given());
     LOCUS_DCHECK(values_.size() == width_ || i < values_.size() / width_);
@@ -35,12 +36,13 @@ class ColumnReader {
   size_t width_;
 };
 
-// Numbers of entries that a column may have: one per item; or one for all items as well; or none as well.
+// Accepted numbers of entries of a column. kEach: one per item. kEachOrOne: one per item, or one for all items.
+// kOptional: one per item, one for all items, or none.
 enum class ColumnNeed { kEach, kEachOrOne, kOptional };
 
-// Returns OK if a column of `value_count` values holds `items` entries of `width` values (kEach), or one entry
-// (kEachOrOne, kOptional), or none (kOptional). Otherwise INVALID_ARGUMENT COLUMN_LENGTH, naming `field`, the count and
-// the accepted counts.
+// Checks the length of a column that has `value_count` values, `width` per entry. Returns OK if it holds `items`
+// entries, one entry (kEachOrOne, kOptional) or none (kOptional). Otherwise returns INVALID_ARGUMENT with the reason
+// COLUMN_LENGTH, naming `field`, the count and the accepted counts.
 absl::Status check_column(size_t value_count, size_t width, size_t items, ColumnNeed need, absl::string_view field);
 
 }  // namespace locus

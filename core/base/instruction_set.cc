@@ -19,7 +19,7 @@ std::vector<InstructionSet> available() {
   return sets;
 }
 
-// Returns the instruction set in use. Written only by use_instruction_set().
+// Returns a reference to the instruction set in use. Only use_instruction_set() writes to it.
 InstructionSet& active() {
   static InstructionSet set = available().front();
   return set;

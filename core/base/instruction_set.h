@@ -1,5 +1,5 @@
-// Instruction set of the vector code of this process: the widest that the processor supports, unless the configuration
-// names one. It is chosen once at the start; answers do not depend on it.
+// Instruction set that the vector code of this process uses: the widest that the processor supports, unless the
+// configuration names another. It is chosen once at the start; query results do not depend on it.
 #ifndef LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 #define LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 
@@ -23,8 +23,9 @@ absl::string_view instruction_set_name(InstructionSet set);
 // Thread-safe.
 std::vector<std::string> instruction_sets();
 
-// Selects the instruction set `name`, or the widest one if `name` is empty. INVALID_ARGUMENT, listing the supported
-// ones, if the processor does not support it. Call at the start of a program or in tests, never while queries run.
+// Selects the instruction set `name`, or the widest supported one if `name` is empty. Returns INVALID_ARGUMENT, listing
+// the supported ones, if the processor does not support `name`. Call at the start of a program or in tests, never while
+// queries run.
 absl::Status use_instruction_set(absl::string_view name);
 
 // Returns the instruction set in use. Thread-safe.

@@ -10,7 +10,8 @@ namespace locus::limits {
 
 inline constexpr double kMaxCoordinate = 1e9;            // largest |x| of any position, frame or extent
 inline constexpr double kMaxQuaternionDeviation = 1e-3;  // largest accepted | |q| - 1 |
-inline constexpr float kMinScale = 1e-12f;               // scale of an instance: the world in mesh axes must fit floats
+// Range of the scale of an instance: chosen so that the world, transformed to mesh axes, fits floats.
+inline constexpr float kMinScale = 1e-12f;
 inline constexpr float kMaxScale = 1e12f;
 
 inline constexpr uint32_t kMaxScenes = 1024;
@@ -26,7 +27,7 @@ inline constexpr uint32_t kMaxObjects = 1u << 24;    // per scene
 inline constexpr uint32_t kMaxPendingChanges = 64;   // queued static changes per scene
 
 inline constexpr uint32_t kMaxBvhValues = kMaxMeshTriangles;
-inline constexpr uint32_t kMaxBvhDepth = 64;  // levels of nodes for any input; sizes the traversal stack
+inline constexpr uint32_t kMaxBvhDepth = 64;  // max levels of nodes for any input; sets the size of the traversal stack
 inline constexpr uint32_t kMaxBvhBins = 64;
 
 inline constexpr uint32_t kMaxUpdateItems = 1u << 20;   // per batch
@@ -43,11 +44,14 @@ inline constexpr uint32_t kMaxNearest = 65536;             // k of a nearest que
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;  // clients refuse 4 MiB by default
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
-inline constexpr uint32_t kRecentRevisions = 64;    // revisions kept for `exactly` views ...
-inline constexpr uint64_t kRecentBytes = 2u << 20;  // ... while the data they replaced takes at most so many bytes
-inline constexpr uint64_t kPinnedBytes = uint64_t{256}
-                                         << 20;  // bytes that readers may keep from being freed, per scene: this ...
-inline constexpr uint32_t kPinnedShare = 4;      // ... or this factor times the bytes of the scene, if larger
+// Revisions that stay available to `exactly` views: at most so many, and only while the data that later revisions
+// replaced takes at most so many bytes.
+inline constexpr uint32_t kRecentRevisions = 64;
+inline constexpr uint64_t kRecentBytes = 2u << 20;
+// Bytes of replaced data that readers of old revisions may keep from being freed, per scene: kPinnedBytes or, if
+// larger, kPinnedShare times the memory of the scene.
+inline constexpr uint64_t kPinnedBytes = uint64_t{256} << 20;
+inline constexpr uint32_t kPinnedShare = 4;
 inline constexpr uint64_t kMinPinnedBytes = 1u << 20;         // smallest configurable value
 inline constexpr uint64_t kSnapshotAfterBytes = 64u << 20;    // bytes of a scene's log after which it is snapshotted
 inline constexpr uint64_t kMinSnapshotAfterBytes = 1u << 16;  // smallest configurable value
@@ -65,7 +69,7 @@ inline constexpr uint32_t kMaxThreads = 256;          // worker threads
 inline constexpr uint32_t kMaxWaitingBatches = 1024;  // batches waiting for helper threads; others run on one thread
 inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;  // smallest configurable memory limit, in bytes
 inline constexpr uint64_t kMaxMemory = uint64_t{1} << 50;   // largest configurable memory limit, in bytes
-inline constexpr uint32_t kMaxDrainGraceS = 3600;           // for active calls when the server shuts down
+inline constexpr uint32_t kMaxDrainGraceS = 3600;           // max seconds for active calls to finish at shutdown
 inline constexpr uint32_t kMaxListenAddresses = 16;
 inline constexpr uint32_t kMaxPageSize = 1000;  // scenes or meshes per page
 

@@ -47,7 +47,7 @@ class LOCUS_SCOPED_CAPABILITY MutexLock {
 class ConditionVariable {
  public:
   void wait(Mutex& mutex) LOCUS_REQUIRES(mutex) { condition_.wait(mutex); }
-  // Returns false if the deadline has passed.
+  // Waits until a notification or `deadline`. Returns false if the deadline has passed.
   bool wait_until(Mutex& mutex, std::chrono::steady_clock::time_point deadline) LOCUS_REQUIRES(mutex) {
     return condition_.wait_until(mutex, deadline) == std::cv_status::no_timeout;
   }

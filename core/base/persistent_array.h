@@ -1,14 +1,15 @@
-// Persistent array: a snapshot costs O(1), since snapshots share their leaves. A write copies only the leaf that
-// contains the index and, once after each snapshot, the list of leaves. Used by the only writer of a scene, whose
-// readers keep snapshots of earlier revisions.
+// Persistent array of fixed-size leaves. A snapshot costs O(1), since it shares the leaves and the array of leaf
+// pointers (struct List) with its source. After a snapshot, the first write copies the array of leaf pointers, and the
+// first write to each leaf copies that leaf. Used by the single writer of a scene, whose readers hold snapshots of
+// earlier revisions.
 //
 // Threads: each array object is like a standard container. Arrays that share leaves are independent: a thread may
 // write, copy or destroy its own array while other threads read theirs.
 //
-// Invariants: a leaf or list that two arrays share is immutable. Each leaf and list stores the owner that created it.
-// An array changes in place only the leaves and the list of its current owner, and snapshot() resets that owner, so
-// reference counts are never read. There are just enough leaves for size(). Source of owners: Clojure's transient
-// collections (Hickey).
+// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner: the number that
+// its creator then had as its owner_. An array draws a new owner at its first write after snapshot(), and changes in
+// place only leaves and a List that store its current owner; so it never reads reference counts. The number of leaves
+// is the smallest that holds size() values. Source of the owners: Clojure's transient collections (Hickey).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
@@ -26,7 +27,7 @@
 namespace locus {
 
 namespace internal {
-// "No owner": such leaves and lists are never changed in place.
+// Owner of leaves and lists that must never be changed in place.
 inline constexpr uint64_t kNoOwner = 0;
 // Returns a new owner, unique in the process and never kNoOwner. Thread-safe.
 inline uint64_t new_owner() {
@@ -41,7 +42,8 @@ class PersistentArray {
   PersistentArray() : list_(std::make_shared<List>()) {}
   PersistentArray(PersistentArray&&) noexcept = default;
   PersistentArray& operator=(PersistentArray&&) noexcept = default;
-  // Copies a snapshot that was never written to. A written array is copied by snapshot() instead.
+  // Copies an array that has not been written to since its creation or its last snapshot(). Copy any other array by
+  // snapshot().
   PersistentArray(const PersistentArray& other) : list_(other.list_) {
     LOCUS_CHECK_EQ(other.owner_, internal::kNoOwner);
   }
@@ -54,21 +56,22 @@ class PersistentArray {
     return PersistentArray(list_);
   }
 
-  // Returns one more than the highest index that was ever set.
+  // Returns one more than the highest index that was ever set; 0 if none was.
   size_t size() const { return list_->size; }
-  // Returns the value at `index` < size(): T() if it was never set.
+  // Returns the value at `index`, or T() if it was never set. Precondition: index < size().
   const T& operator[](size_t index) const {
     LOCUS_DCHECK_LT(index, size());
     return list_->leaves[index / kLeafSize]->values[index % kLeafSize];
   }
-  // Sets the value at `index` and extends the array if necessary. O(1); after a snapshot also a copy of the leaf and,
-  // once, of the list of leaves.
+  // Sets the value at `index`. If index >= size(), extends the array to index + 1 values, of which those in between are
+  // T(). O(1 + new leaves), plus the copies after a snapshot that are described above.
   void set(size_t index, T value);
 
-  // Returns the bytes of the leaves and of the list that `other` does not share. O(leaves).
+  // Returns the size in bytes of the leaves, and of the array of leaf pointers, that this array does not share with
+  // `other`. O(leaves).
   size_t unshared_bytes(const PersistentArray& other) const;
-  // Calls fn(value, pointer to other's value) for each index whose leaf `other` does not share; the pointer is null
-  // from other.size() on. O(leaves + calls).
+  // Calls fn(value, other_value) for each index whose leaf is not shared with `other`. `other_value` points to the
+  // value of `other` at the same index; it is null if index >= other.size(). O(leaves + calls).
   template <class Fn>
   void for_each_apart_from(const PersistentArray& other, const Fn& fn) const;
 
@@ -84,16 +87,16 @@ class PersistentArray {
   };
 
   explicit PersistentArray(std::shared_ptr<List> list) : list_(std::move(list)) {}
-  // Checks the leaf count and the owner of the list. O(1).
+  // Checks the number of leaves and the owner of list_. O(1).
   void check_invariants() const {
     if constexpr (kDebugChecks) {
       LOCUS_CHECK_EQ(list_->leaves.size(), (list_->size + kLeafSize - 1) / kLeafSize);
       LOCUS_CHECK(owner_ == internal::kNoOwner || list_->owner == owner_);
     }
   }
-  // Chooses an owner if there is none, and copies the list if another owner created it.
+  // Draws a new owner if this array has none, and copies list_ if it stores another owner.
   void make_list_writable();
-  // Returns whether both arrays share leaf `leaf`.
+  // Returns whether both arrays have the same leaf at leaf index `leaf`.
   bool shares_leaf(const PersistentArray& other, size_t leaf) const {
     return leaf < other.list_->leaves.size() && list_->leaves[leaf] == other.list_->leaves[leaf];
   }

@@ -31,7 +31,7 @@
 
 namespace locus {
 
-// Hash()(id) returns 64 bits, of which the upper ones choose the home bucket.
+// Persistent table of ids. `Hash()(id)` must return 64 bits; the upper ones choose the home bucket.
 template <class Hash = SeededHash>
 class PersistentIdTable {
  public:
@@ -50,29 +50,31 @@ class PersistentIdTable {
   size_t size() const { return size_; }
   // Returns the value of `id`, or kNone if `id` is absent or kNoId. O(1).
   uint32_t find(Id id) const { return bucket_count_ == 0 ? kNone : find_from(bucket(home(id)), id); }
-  // Writes the value of ids[i] to values[i]; `values` must be at least as long. Faster than single calls, since it
-  // prefetches the buckets.
+  // Writes the value of ids[i], or kNone if that id is absent, to values[i]. Precondition: values.size() >= ids.size().
+  // Faster than single calls, since it prefetches the buckets.
   void find(absl::Span<const Id> ids, absl::Span<uint32_t> values) const;
-  // Prefetches the bucket that find(id) reads first. Must be inlined early: GCC drops calls of a function that only
-  // prefetches, since it sees no effect.
+  // Prefetches the bucket that find(id) reads first. Always inlined, since GCC otherwise drops calls of functions that
+  // only prefetch.
   [[gnu::always_inline]] void prefetch(Id id) const {
     if (bucket_count_ != 0) __builtin_prefetch(&bucket(home(id)));
   }
 
-  // Inserts or replaces the value of `id`; returns true if the id is new. `id` must not be kNoId nor `value` kNone.
-  // O(1), with copies of a few leaves at most; O(size) when the table is full and grows.
+  // Inserts or replaces the value of `id`; returns true if the id is new. Preconditions: `id` is not kNoId, `value` is
+  // not kNone. O(1), plus copies of at most a few leaves after a snapshot; O(size) when the table is full and grows.
   bool set(Id id, uint32_t value);
-  // Removes `id`; returns false if it is absent. O(1), with copies like set(). Only fit() frees memory.
+  // Removes `id`; returns false if it is absent. O(1), plus copies of leaves as in set(). The table keeps its memory
+  // until fit() shrinks it.
   bool erase(Id id);
-  // Resizes the table for `ids` ids, at least size(): grows if they do not fit, shrinks if they leave most of the table
-  // unused. O(size) if it resizes, else O(1).
+  // Resizes the table for `ids` ids: grows if they do not fit; shrinks if they would fill at most a quarter of the
+  // capacity. Precondition: ids >= size(). O(size) if it resizes, else O(1).
   void fit(size_t ids);
 
-  // Returns the bytes of the leaves that were replaced since the last call, which only snapshots still hold; resets the
-  // count.
+  // Returns the size in bytes of the leaves that this table has replaced since the last call, and resets the count.
+  // Only snapshots still hold these leaves.
   size_t take_replaced_bytes() { return std::exchange(replaced_bytes_, 0); }
   size_t bytes() const { return unshared_bytes(PersistentIdTable()); }
-  // Returns the bytes that `other` does not share. O(leaves).
+  // Returns the size in bytes of the leaves, and of the array of leaf pointers, that this table does not share with
+  // `other`. O(leaves).
   size_t unshared_bytes(const PersistentIdTable& other) const;
 
  private:
@@ -83,12 +85,12 @@ class PersistentIdTable {
   static constexpr size_t kLeavesPerPage = 64;
   static constexpr size_t kFindBatch = 64;
 
-  // Slots of a cache line. An empty slot holds kNoId and kNone.
+  // Bucket of kSlots slots in one cache line. An empty slot holds kNoId and kNone.
   struct alignas(64) Bucket {
     Bucket() { values.fill(kNone); }
     std::array<Id, kSlots> ids{};
     std::array<uint32_t, kSlots> values;
-    uint32_t overflow = 0;  // ids in later buckets that skipped this one when they were inserted
+    uint32_t overflow = 0;  // number of ids in later buckets whose insertion skipped this full bucket
   };
   static_assert(sizeof(Bucket) == 64);
   struct Leaf {
@@ -110,44 +112,45 @@ class PersistentIdTable {
   size_t leaf_count() const { return bucket_count_ / kBucketsPerLeaf; }
   size_t capacity() const { return leaf_count() * kIdsPerLeaf; }
 
-  // Returns the home bucket: the hash as a fraction of all buckets, so that the order of homes is the same for any
-  // bucket count.
+  // Returns the index of the home bucket: the hash, as a fraction of 2^64, times the number of buckets. So the order of
+  // ids by home bucket is the same for any number of buckets.
   size_t home(Id id) const { return absl::Uint128High64(absl::uint128(hash_(id)) * bucket_count_); }
   size_t next(size_t bucket) const { return bucket + 1 == bucket_count_ ? 0 : bucket + 1; }
   const Bucket& bucket(size_t index) const {
     LOCUS_DCHECK_LT(index, bucket_count_);
     return leaves_[index / kBucketsPerLeaf]->buckets[index % kBucketsPerLeaf];
   }
-  // Returns the slot of `id` in `bucket`, or -1. Branch-free, since the slot is unpredictable.
+  // Returns the slot of `id` in `bucket`, or -1. Branch-free, since the processor cannot predict the slot.
   static int slot_of(const Bucket& bucket, Id id) {
     uint32_t matches = 0;
     for (size_t slot = 0; slot < kSlots; ++slot) matches |= (bucket.ids[slot] == id ? 1u : 0u) << slot;
     return matches == 0 ? -1 : std::countr_zero(matches);
   }
-  // Returns the value of `id`, whose home bucket is `first`.
+  // Returns the value of `id`, whose home bucket is `first`; kNone if the id is absent.
   uint32_t find_from(const Bucket& first, Id id) const {
     if (const int slot = slot_of(first, id); slot >= 0) return first.values[static_cast<size_t>(slot)];
     if (first.overflow == 0) return kNone;
     const Position found = search(id);
     return found.slot < 0 ? kNone : bucket(found.bucket).values[static_cast<size_t>(found.slot)];
   }
-  // Probes from the home bucket of `id` on.
+  // Searches for `id` in the buckets from its home bucket on. Returns slot -1 if the id is absent.
   Position search(Id id) const;
 
   void claim_owner() {
     if (owner_ == internal::kNoOwner) owner_ = internal::new_owner();
   }
-  // Returns a bucket of a leaf of the current owner; copies the leaf if another owner created it.
+  // Returns bucket `index` for writing; first copies its leaf if another owner created the leaf.
   Bucket& writable_bucket(size_t index);
   // Inserts an absent id. Precondition: size() < capacity().
   void put(Id id, uint32_t value);
-  // Inserts all ids into a new table of `leaf_count` leaves.
+  // Replaces the table by one of `leaf_count` leaves with the same ids and values.
   void rebuild(size_t leaf_count);
-  // Checks the sizes. O(1).
+  // Checks that the numbers of ids, buckets and leaves agree. O(1).
   void check_invariants() const;
   // Checks a bucket: each slot is empty or full, and each id is reachable from its home bucket.
   void check_bucket(size_t index) const;
-  // Checks all buckets and that they contain size() ids. O(size), so only after a rebuild.
+  // Checks each bucket, and that all buckets together contain size() ids. O(size), so it is called only after a
+  // rebuild.
   void check_all_buckets() const;
 
   LeafArray leaves_;
@@ -176,7 +179,8 @@ void PersistentIdTable<Hash>::find(absl::Span<const Id> ids, absl::Span<uint32_t
 template <class Hash>
 typename PersistentIdTable<Hash>::Position PersistentIdTable<Hash>::search(Id id) const {
   size_t index = bucket_count_ == 0 ? 0 : home(id);
-  // After erasures the overflow counts of all buckets may be positive: probe each bucket once at most.
+  // After erasures the overflow counts of all buckets may be positive, so the search also ends after one probe of each
+  // bucket.
   for (size_t probes = 0; probes < bucket_count_; ++probes, index = next(index)) {
     const Bucket& current = bucket(index);
     if (const int slot = slot_of(current, id); slot >= 0) return {index, slot};

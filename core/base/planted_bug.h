@@ -21,7 +21,7 @@ enum class PlantedBug {
   kNearestLimit,       // a nearest query prunes boxes exactly as far as its farthest result
   kNearestTreePad,     // distances to boxes of triangles are compared in float without the pad
   kWidePlacedBounds,   // bounds of placed triangles are grown by the rounding of float
-  kPlacedBoundsAlone,  // conservative balls and boxes meet placed bounds alone, without the exact results beside them
+  kPlacedBoundsAlone,  // conservative ball and box queries test only placed bounds and lose exact hits outside these
   // The ray kernels:
   kKernelEdgeBound,         // edge functions are decided in float without the error bound
   kKernelTBound,            // t is decided in float without the error bound

@@ -24,7 +24,7 @@ constexpr std::array<absl::string_view, 18> kReasonNames = {
     "MALFORMED",    "BATCH_GAP",       "IN_USE",     "HASH_MISMATCH", "RECOVERING",     "DAMAGED"};
 static_assert(kReasonNames.size() == static_cast<size_t>(kLastReason) + 1 && !kReasonNames.back().empty());
 
-// Formats a value, integers without an exponent.
+// Formats a value. Integers of up to 2^53 are written without an exponent.
 std::string formatted(double value) {
   constexpr double kExactIntegers = 9007199254740992.0;
   if (value >= -kExactIntegers && value <= kExactIntegers && value == static_cast<double>(static_cast<int64_t>(value)))

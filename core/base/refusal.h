@@ -13,7 +13,7 @@
 
 namespace locus {
 
-// Values equal those of the protocol's Reason.
+// Reason of a refusal. The numeric values equal those of the protocol's Reason.
 enum class Reason : uint8_t {
   kUnspecified = 0,
   kNotFinite = 1,
@@ -42,8 +42,8 @@ absl::string_view reason_name(Reason reason);
 // Details of a refused request.
 struct Refusal {
   Reason reason = Reason::kUnspecified;
-  std::string field;              // path, such as blocks[2].rays.directions; empty = the request as a whole
-  std::optional<uint32_t> index;  // item of the field
+  std::string field;  // path of the field, such as blocks[2].rays.directions; empty = the request as a whole
+  std::optional<uint32_t> index;  // index of the item in the field
   std::string limit;              // name of the exceeded limit; empty = none
   double limit_value = 0;
   double asked = 0;             // requested value
@@ -54,20 +54,20 @@ struct Refusal {
 // `field[index]: `.
 absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal);
 
-// Returns INVALID_ARGUMENT for a field, or for one item of it if `index` is given.
+// Returns INVALID_ARGUMENT for `field`, or for its item `index` if one is given.
 absl::Status refuse_argument(Reason reason, absl::string_view field, std::optional<uint32_t> index,
                              absl::string_view message);
 
-// Returns INVALID_ARGUMENT naming the limit, its value and the requested value. For a request that exceeds a limit by
-// itself, whatever the load.
+// Returns INVALID_ARGUMENT naming the limit, its value and the requested value. For a request that exceeds the limit on
+// its own, whatever the load: repeating it cannot succeed.
 absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked);
 
-// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value. For a server or scene that is full
-// now: the same request may succeed later. `retry_after_ms` is 0 if waiting alone frees nothing.
+// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value. For a server or scene that is full at
+// present: the same request may succeed later. `retry_after_ms` is 0 if waiting alone does not help.
 absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
                          uint32_t retry_after_ms);
 
-// Returns the refusal that refuse() attached; nullopt if there is none.
+// Returns the refusal that refuse() attached to `status`; nullopt if there is none.
 std::optional<Refusal> refusal_of(const absl::Status& status);
 
 }  // namespace locus

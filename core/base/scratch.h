@@ -1,5 +1,5 @@
 // Reusable buffers: a writer keeps them between batches, so that small batches allocate nothing. A buffer that grew
-// above kKeptScratch bytes is freed, so that an idle scene keeps no memory of its largest batch. Any thread.
+// above kKeptScratch bytes is freed, so that an idle scene does not retain the memory of its largest batch. Any thread.
 #ifndef LOCUS_CORE_BASE_SCRATCH_H_
 #define LOCUS_CORE_BASE_SCRATCH_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus {
 
-inline constexpr size_t kKeptScratch = size_t{1} << 18;  // largest capacity that is kept, in bytes
+inline constexpr size_t kKeptScratch = size_t{1} << 18;  // largest capacity, in bytes, that is not freed
 
 // Clears `scratch`; frees its memory if its capacity is more than kKeptScratch bytes.
 template <class T>

@@ -1,5 +1,5 @@
 // Fast hash of ids that clients choose. It is seeded at random in every process, so that clients cannot choose ids that
-// collide in a table. No answer may depend on it. A value type; any thread.
+// collide in a table. It differs between processes, so no query result may depend on it. A value type; any thread.
 //
 // The upper bits are distributed as well as the lower ones. Source: products folded into 64 bits as in Yi, wyhash; the
 // secret multiplier as in Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997.
@@ -26,17 +26,17 @@ class SeededHash {
   uint64_t operator()(uint64_t key) const { return folded_product(folded_product(key ^ mask_, multiplier_), kMixer); }
 
  private:
-  // Returns the exclusive or of both halves of a * b: the upper half contains the upper bits of keys that the lower one
-  // loses.
+  // Returns the exclusive or of the two 64-bit halves of a * b. The lower half loses the upper bits of the keys; the
+  // upper half preserves them.
   static uint64_t folded_product(uint64_t a, uint64_t b) {
     const absl::uint128 product = absl::uint128(a) * b;
     return absl::Uint128Low64(product) ^ absl::Uint128High64(product);
   }
-  // Returns a random seed, which stays the same until the process ends.
+  // Returns the random seed of this process.
   static const Seed& process_seed();
 
-  // Odd number without a regular bit pattern (fraction of the golden ratio): mixes keys that a bad random multiplier
-  // left close to each other.
+  // Odd constant without a regular bit pattern (fractional part of the golden ratio). Separates keys that an unlucky
+  // random multiplier left close to each other.
   static constexpr uint64_t kMixer = 0x9E3779B97F4A7C15;
 
   uint64_t mask_;

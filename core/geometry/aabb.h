@@ -62,22 +62,22 @@ constexpr S half_area(const Aabb<S>& box) {
   return e.x * e.y + e.y * e.z + e.z * e.x;
 }
 
-// Returns the largest |coordinate| of any point of the box. It is never smaller for a superset of the box.
+// Returns the largest |coordinate| of any point of the box. A superset of the box never has a smaller magnitude.
 template <class S>
 S magnitude(const Aabb<S>& box) {
   return std::max(max_component(abs(box.min)), max_component(abs(box.max)));
 }
 
-// Returns the squared distance from `point` to the box, 0 inside. Each step rounds monotonically, so the result is
-// never larger for a superset of the box.
+// Returns the squared distance from `point` to the box, 0 inside. Each step rounds monotonically, so a superset of the
+// box never has a larger squared distance.
 template <class S>
 constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
   const Vec3<S> gap = max(max(box.min - point, point - box.max), Vec3<S>{});
   return squared_length(gap);
 }
 
-// Returns the largest squared_distance() whose rounded square root can be at most `distance`, rounded up: boxes beyond
-// it can be pruned.
+// Returns an upper bound of the squared_distance() values whose rounded square root is at most `distance`. Boxes at a
+// larger squared distance can be pruned.
 inline double squared_limit(double distance) {
   LOCUS_DCHECK_GE(distance, 0.0);
   if (planted(PlantedBug::kNearestLimit)) return distance * distance * (1 - 0x1p-50);

@@ -1,5 +1,5 @@
-// Chord of a line: its part within a convex solid, in the solid's own axes. The ray predicates of all solids compute
-// the chord first and then apply the rules for rays that start inside. Plain data.
+// Chord of a line: the part of the line within a convex solid, in the solid's own axes. The ray predicates of all
+// solids compute the chord first and then apply the rules for rays that start inside. Plain data.
 #ifndef LOCUS_CORE_GEOMETRY_CHORD_H_
 #define LOCUS_CORE_GEOMETRY_CHORD_H_
 
@@ -14,11 +14,11 @@ struct Line {
   Vec3d direction;
 };
 
-// Interval of t and the normals at its ends.
+// Interval of t in which the line is within the solid, and the normals of the surface at both ends.
 struct Chord {
   double near, far;  // near <= far, in units of the line's direction
-  // Outward normals at both ends, of any positive length. If the solid has no thickness there: minus the direction and
-  // the direction.
+  // Outward normals at both ends, of any positive length. A ball or capsule of radius 0 has no normals: near_normal is
+  // then minus the line's direction, and far_normal is the direction.
   Vec3d near_normal, far_normal;
 };
 

@@ -1,5 +1,5 @@
 // Extended precision: a number of about 106 bits, stored as the sum of two doubles. Results are equal on all processors
-// with IEEE doubles, unlike those of long double. Used for the few verdicts for which double is not precise enough.
+// with IEEE doubles, unlike those of long double. Used for the few decisions for which double is not precise enough.
 // Plain value; any thread; no overflow below 2^990.
 //
 // Sources: Dekker, A Floating-Point Technique for Extending the Available Precision, 1971 (product and split); Knuth,
@@ -12,7 +12,7 @@
 
 namespace locus {
 
-// Invariant: |low_| is at most half a unit in the last place of high_.
+// Number high_ + low_. Invariant: |low_| is at most half a unit in the last place of high_.
 class DoubleDouble {
  public:
   constexpr DoubleDouble() = default;
@@ -20,10 +20,10 @@ class DoubleDouble {
 
   // Returns the nearest double.
   constexpr double rounded() const { return high_; }
-  // Returns -1, 0 or 1.
+  // Returns the sign of the number: -1, 0 or 1.
   constexpr int sign() const { return (high_ > 0) - (high_ < 0); }
 
-  // Returns the sum with a relative error below 2^-102; it is exact if 106 bits suffice.
+  // Returns the sum with a relative error below 2^-102; the sum is exact if it fits 106 bits.
   friend constexpr DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
     const DoubleDouble high = sum(a.high_, b.high_), low = sum(a.low_, b.low_);
     const DoubleDouble first = ordered_sum(high.high_, high.low_ + low.high_);
@@ -51,7 +51,7 @@ class DoubleDouble {
     const double s = a + b;
     return {s, b - (s - a)};
   }
-  // Returns the upper 26 bits of `a`; the remainder fits 26 bits too.
+  // Returns `a` rounded to 26 significant bits; the difference from `a` fits 26 bits too.
   static constexpr double upper_half(double a) {
     const double c = 0x8000001p0 * a;
     return c - (c - a);

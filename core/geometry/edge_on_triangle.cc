@@ -34,8 +34,8 @@ struct Corner {
   double depth;
 };
 
-// Projection along the ray. Lengths are multiplied by unit(), so that no quotient is needed; x and y of a corner also
-// by the direction's largest component.
+// Projection of corners along the ray. Lengths are multiplied by unit(), so that no quotient is needed; x and y of a
+// corner are also multiplied by the direction's largest component.
 class Projection {
  public:
   explicit Projection(const StoredRay& ray)
@@ -69,14 +69,14 @@ DoubleDouble edge_function(const Corner& from, const Corner& to) { return from.x
 
 bool culled(Cull cull, int side) { return (cull == Cull::kBack && side <= 0) || (cull == Cull::kFront && side >= 0); }
 
-// Point of an edge: `fraction` of the edge from its first corner.
+// Point of an edge; `fraction` is 0 at the edge's first corner and 1 at the second.
 struct EdgePoint {
   double squared_distance;  // from the ray
   double t;
   double fraction;
 };
 
-// Returns the point of the edge nearest to the ray among those with t >= 0.
+// Returns the point of the edge nearest to the ray among those with t >= 0; nullopt if there is none.
 std::optional<EdgePoint> nearest_edge_point(const Corner& from, const Corner& to, double along) {
   const double x = from.x.rounded(), y = from.y.rounded();
   const double edge_x = (to.x - from.x).rounded(), edge_y = (to.y - from.y).rounded();
@@ -90,7 +90,7 @@ std::optional<EdgePoint> nearest_edge_point(const Corner& from, const Corner& to
   return EdgePoint{distance_x * distance_x + distance_y * distance_y, std::max(t + fraction * edge_t, 0.0), fraction};
 }
 
-// Returns the nearest point of the border, if its squared distance is at most `limit`.
+// Returns the point of the triangle's border nearest to the ray; nullopt if its squared distance exceeds `limit`.
 std::optional<EdgeOnHit> hit_at_border(const Corner& a, const Corner& b, const Corner& c, double along, double limit) {
   std::optional<EdgeOnHit> hit;
   const auto offer = [&](const std::optional<EdgePoint>& point, auto weights_at) {

@@ -12,13 +12,14 @@ template <class S>
 struct Obb {
   Vec3<S> center;
   Vec3<S> half;       // >= 0
-  Rotation rotation;  // box axes to the axes of `center`
+  Rotation rotation;  // rotates the box's own axes to the axes in which `center` is given
 };
 
 using Obbf = Obb<float>;
 using Obbd = Obb<double>;
 
-// Returns axis-aligned bounds in double, grown by 2^-40 of the magnitudes if the box is rotated.
+// Returns axis-aligned bounds in double. If the box is rotated, they are grown by 2^-40 of the magnitudes of centre and
+// extent.
 template <class S>
 Aabbd bounds_of(const Obb<S>& box);
 

@@ -3,12 +3,12 @@
 namespace locus {
 namespace {
 
-// Pair of boxes in the axes of the first.
+// Pair of boxes, relative to the axes of the first.
 struct Pair {
   Vec3d offset;  // from the first centre to the second
   Vec3d half_a, half_b;
   Vec3d axes_b[3];
-  double tolerance;  // for a projection on an axis of length 1
+  double tolerance;  // allowed rounding error of a projection on an axis of length 1
 };
 
 double manhattan(Vec3d v) {

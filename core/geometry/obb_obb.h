@@ -8,9 +8,10 @@ namespace locus {
 
 // Returns whether the boxes share a point: separating axis test over 15 axes. Two axis-aligned boxes are compared
 // without tolerance, so that touching is exact if the sums are exact; otherwise boxes closer than 2^-49 of the
-// magnitudes count as touching. Both boxes are projected on each axis as rounded, so the rounding error of an axis (of
-// nearly parallel edges) can only make the axis useless; it never separates boxes that overlap. Source: Gottschalk,
-// Lin, Manocha, OBBTree: A Hierarchical Structure for Rapid Interference Detection, 1996.
+// magnitudes count as touching. Both boxes are projected on the same rounded axis. So the rounding error of an axis,
+// which is large for nearly parallel edges, can only make that axis fail to separate the boxes; it never separates
+// boxes that overlap. Source: Gottschalk, Lin, Manocha, OBBTree: A Hierarchical Structure for Rapid Interference
+// Detection, 1996.
 bool boxes_overlap(const Obbd& a, const Obbd& b);
 
 }  // namespace locus

@@ -21,7 +21,7 @@ Vec3d nearest_in_core(Vec3d local, const Shape& shape) {
   return {};
 }
 
-// Returns max(a, sqrt(b)), in most cases without a square root.
+// Returns max(a, sqrt(b)). Avoids the square root if `a` is clearly the larger one.
 double max_with_root(double a, double b) { return a > 0 && a * a > b * (1 + 0x1p-50) ? a : std::max(a, std::sqrt(b)); }
 
 }  // namespace

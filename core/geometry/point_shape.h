@@ -7,14 +7,14 @@
 
 namespace locus {
 
-// Returns the radius around a shape's core: a ball is its centre grown by the radius, a capsule its inner segment grown
-// by the radius; a box or a point is its own core, and the radius is 0.
+// Returns the radius by which a shape extends beyond its core. The core of a ball is its centre, the core of a capsule
+// its inner segment. A box or a point is its own core, with a radius of 0.
 double core_radius(const Shape& shape);
-// Returns the squared distance from `point` to the core; 0 inside a box.
+// Returns the squared distance from `point` to the core of the shape; 0 inside a box.
 double squared_distance_to_core(Vec3d point, const Shape& shape);
 
-// Returns the distance to the surface, 0 inside. It is never less than the distance to the shape's own bounds, so a
-// shape may be culled by any box that contains them.
+// Returns the distance from `point` to the shape, 0 inside. It is never less than the distance to the shape's own
+// bounds, so a shape may be culled by any box that contains these bounds.
 double distance(Vec3d point, const Shape& shape);
 
 // Returns the point of the solid nearest to `point`, up to rounding: `point` itself if it is inside.

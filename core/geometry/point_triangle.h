@@ -8,9 +8,9 @@
 
 namespace locus {
 
-// Returns the minimum of the squared distances to the three edges and, if the projection of `point` lies inside the
-// triangle, to its plane. Each takes cross products and one division, so results that are small integers are exact.
-// Sliver triangles are not lost by cancellation.
+// Returns the squared distance from `point` to the triangle: the minimum of the squared distances to the three edges
+// and, if the projection of `point` lies inside the triangle, to its plane. Each is computed by cross products and one
+// division, so a result that is a small integer is exact. Cancellation does not spoil the result for sliver triangles.
 double squared_distance(Vec3d point, Vec3d a, Vec3d b, Vec3d c);
 double squared_distance(Vec3d point, const Triangle& triangle);
 
@@ -19,8 +19,8 @@ double squared_distance(Vec3d point, const Triangle& triangle);
 // without area.
 Vec3d nearest_on_triangle(Vec3d point, Vec3d a, Vec3d b, Vec3d c);
 
-// Returns the distance, never less than that to the triangle's own bounds, so a triangle may be culled by any box that
-// contains them.
+// Returns the distance from `point` to the triangle. It is never less than the distance to the triangle's own bounds,
+// so a triangle may be culled by any box that contains these bounds.
 double distance(Vec3d point, const Triangle& triangle);
 
 }  // namespace locus

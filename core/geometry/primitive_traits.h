@@ -5,8 +5,8 @@
 //   Scalar     float or double: the type of bounds and distances
 //   RayQuery   a preprocessed ray: slabs() for culling, to_scaled(t) from distances to the slabs' unit, rounded up
 //   BallQuery, BoxQuery   query types of ball() and box()
-//   id         identity: the lower one wins a tie, remove() searches for it; unique within one index
-//   bounds     axis-aligned bounds; every test below includes them, so culling by any superset never changes a verdict
+//   id         unique within one index; the lower id wins a tie, and remove() searches by id
+//   bounds     axis-aligned bounds; every test below requires the query to meet them, so any superset can cull
 //   position   point that selects the grid cell: any point within the bounds, fixed for the value
 //   ray        distance >= 0 of the first hit, also beyond the ray's t_max
 //   ball, box  whether the closed solids share a point

@@ -4,12 +4,12 @@
 //   near = max over axes of  lo * rd - (o * rd + p)      far = min over axes of  hi * rd - (o * rd - p)
 //   p = pad * (max |o| + max |box|) * |rd|               (lo and hi swapped where d is negative)
 //
-// Every rounding step is monotone in the box, so a superset of a box never has a larger near or a smaller far. A
-// verdict includes the slab test of the primitive's own box, so culling by any superset of that box never changes it.
-// The pads cover the rounding errors of the slab test itself, of the conversion of a ray to float, and of the transform
-// to mesh axes. A direction component of zero is replaced by 1e-18 of the largest one; within the world the resulting
-// displacement is smaller than the pad. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs); Ize, Robust
-// BVH Ray Traversal, 2013 (padding).
+// Every rounding step is monotone in the box, so a superset of a box never has a larger near or a smaller far. A hit
+// requires that the slab test accepts the primitive's own box, so culling by any superset of that box never loses a
+// hit. The pads cover the rounding errors of the slab test itself, of the conversion of a ray to float, and of the
+// transform to mesh axes. A direction component of zero is replaced by 1e-18 of the largest one; within the world the
+// resulting displacement is smaller than the pad. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs);
+// Ize, Robust BVH Ray Traversal, 2013 (padding).
 #ifndef LOCUS_CORE_GEOMETRY_RAY_H_
 #define LOCUS_CORE_GEOMETRY_RAY_H_
 
@@ -24,11 +24,12 @@ namespace locus {
 
 // Side of a triangle that rays ignore. The vertices of a front face are counter-clockwise, in the uploaded winding.
 enum class Cull : uint8_t { kNone, kBack, kFront };
-// Hit of a ray that starts inside a closed solid: at t = 0 (kSolid), at its exit (kHollow), or none (kSkip).
+// Treatment of a ray that starts inside a closed solid: it hits at t = 0 (kSolid), at its exit (kHollow) or not at all
+// (kSkip).
 enum class Inside : uint8_t { kSolid, kHollow, kSkip };
 
 // Ray: the points origin + t * direction for 0 <= t <= t_max, both included. t is in units of the direction as given,
-// which is neither normalised nor zero.
+// which need not have length 1 but must not be zero.
 template <class S>
 struct Ray {
   Vec3<S> origin;
@@ -39,14 +40,14 @@ struct Ray {
 using Rayf = Ray<float>;
 using Rayd = Ray<double>;
 
-// Part of a line within a box, possibly outside [0, t_max]. Empty if near > far.
+// Range of t in which a line is within a box; it may lie outside [0, t_max]. Empty if near > far.
 template <class S>
 struct Interval {
   S near;
   S far;
 };
 
-// Pads of the slab test, relative to the magnitudes of origin and box.
+// Values of `pad` in the slab test, each with the rounding errors that it covers.
 inline constexpr double kTrianglePad = 0x1p-21;  // slab test in float: about eight roundings of 2^-24
 inline constexpr double kInstancePad = 0x1p-20;  // transform to mesh axes and one rounding to float, any rotation
 inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects in double
@@ -73,14 +74,14 @@ class SlabRay {
   const Vec3<S>& origin() const { return origin_; }
   const Vec3<S>& direction() const { return direction_; }
 
-  // Returns the distance by which the test widens a box of the given magnitude.
+  // Returns the distance by which the slab test widens a box of magnitude `box_magnitude`.
   S margin(S box_magnitude) const { return pad_ * (magnitude_ + box_magnitude); }
 
   // Returns the interval of the ray in the padded box.
   Interval<S> interval(const Aabb<S>& box) const { return interval(box, locus::magnitude(box)); }
 
-  // Returns the interval for a magnitude of at least that of the box, such as one for all boxes of a tree. A larger
-  // magnitude never makes the interval smaller.
+  // Returns the interval for a `box_magnitude` of at least magnitude(box), such as one value for all boxes of a tree. A
+  // larger magnitude never makes the interval smaller.
   Interval<S> interval(const Aabb<S>& box, S box_magnitude) const {
     const S margin = this->margin(box_magnitude);
     Interval<S> result{-std::numeric_limits<S>::infinity(), std::numeric_limits<S>::infinity()};

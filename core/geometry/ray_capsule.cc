@@ -19,8 +19,8 @@ Range line_between_ends(const Line& line, Vec3d half_axis) {
   return d > 0 ? Range({(-aa - o) / d, (aa - o) / d}) : Range({(aa - o) / d, (-aa - o) / d});
 }
 
-// Returns the interval of the line in the cylinder. The length of a vector's cross product with the axis is its
-// distance from the axis times the axis length, so the cylinder becomes a ball and no division is needed.
+// Returns the interval of the line in the cylinder. |p x half_axis| is the distance of p from the axis times
+// |half_axis|, so the test is that of a line against a ball and needs no division.
 Range line_in_cylinder(const Line& line, Vec3d half_axis, double radius) {
   const Line across = {cross(line.origin, half_axis), cross(line.direction, half_axis)};
   const Range round = line_in_ball(across, radius * radius * squared_length(half_axis));
@@ -30,7 +30,7 @@ Range line_in_cylinder(const Line& line, Vec3d half_axis, double radius) {
   return both.near <= both.far ? Range(both) : std::nullopt;
 }
 
-// Returns the smallest interval that contains both.
+// Returns the smallest interval that contains both; nullopt counts as empty.
 Range merge(const Range& a, const Range& b) {
   if (!a || !b) return a ? a : b;
   return Range({std::min(a->near, b->near), std::max(a->far, b->far)});

@@ -9,9 +9,10 @@
 
 namespace locus {
 
-// Returns the chord of the line in the box of half extents `half` >= 0. Planes that are crossed at the same real t give
-// the same rounded quotient, so touching a corner or an edge is exact if the differences to the planes are exact. If
-// several faces are crossed at the same t, the normal is that of the lowest axis.
+// Returns the chord of the line in the box of half extents `half` >= 0; nullopt if the line misses. Planes that are
+// crossed at the same real t give the same rounded quotient, so touching a corner or an edge is exact if the
+// differences to the planes are exact. If several faces are crossed at the same t, the normal is that of the first axis
+// in the order x, y, z.
 std::optional<Chord> chord_of_box(const Line& line, Vec3d half);
 
 bool box_contains(Vec3d half, Vec3d point);

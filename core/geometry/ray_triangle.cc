@@ -27,8 +27,8 @@ bool culled(Cull cull, double determinant) {
   return cull == Cull::kBack ? !front : front;
 }
 
-// Corner of a triangle relative to the ray's origin. x and y are sheared along the ray and multiplied by the
-// direction's z; z is the depth.
+// Corner of a triangle relative to the ray's origin, sheared so that the ray becomes the z axis. x and y are also
+// multiplied by the z component of the direction; z is the depth.
 struct Corner {
   double x, y, z;
 };
@@ -56,19 +56,20 @@ struct TriangleRay::Projected {
   double weight_a, weight_b, weight_c;  // the edge functions
   double min_weight, max_weight;
   double determinant;
-  double size;        // S
+  double size;        // S: largest |x| or |y| of a corner
   double depth_span;  // largest minus smallest depth
   double magnitude;   // upper bound of R: no vertex is farther from the origin than 2 S + max |depth|
 
-  // Returns whether double is not precise enough. For all other triangles the error of the hit is below 2^-23 R.
+  // Returns whether the triangle is so nearly edge-on that double is not precise enough. For all other triangles the
+  // error of the hit is below 2^-23 R.
   bool is_nearly_edge_on() const {
     return std::abs(determinant) <= (size + 0x1p-44 * magnitude) * (0x1p-16 * depth_span + 0x1p-39 * magnitude);
   }
   // Returns whether the ray passes outside the triangle.
   bool is_outside() const { return min_weight < 0 && max_weight > 0; }
-  // Returns an error bound of a corner; the error is below 2^-44.8 R in each coordinate.
+  // Returns a bound of the rounding error of a corner, which is below 2^-44.8 R in each coordinate.
   double corner_error() const { return 0x1p-43 * magnitude; }
-  // Returns whether the ray passes outside by more than the error bounds.
+  // Returns whether the ray passes outside the triangle by more than the error bounds above.
   bool is_clearly_outside() const {
     const double weight_error = 0x1p-42 * magnitude * (size + 0x1p-44 * magnitude);
     if (min_weight < -weight_error && max_weight > weight_error) return true;
@@ -118,8 +119,9 @@ float TriangleRay::to_scaled(float t) const {
   return next_above(static_cast<float>(scaled));
 }
 
-// Returns an error bound of `depth` in edge_test(): less than 264 roundings of 2^-53 distance^3 in the computation from
-// the vertices, and 72 of 2^-51 |origin| distance^2 in the transform of the origin to mesh axes.
+// Returns a bound of the error of `depth` in edge_test(). It covers two sums of rounding errors: below 264 * 2^-53 *
+// distance^3 from the computation with the vertices, and below 72 * 2^-51 * |origin| * distance^2 from the transform of
+// the origin to mesh axes.
 double TriangleRay::depth_error(const Triangle& triangle) const {
   double distance = 0;
   for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
@@ -150,8 +152,9 @@ TriangleRay::Projected TriangleRay::project(const Triangle& triangle) const {
   return projected;
 }
 
-// Returns whether triangle and ray lie in planes perpendicular to the same axis. Only for meshes that are not rotated,
-// whose rays have exact zero components.
+// Returns true if, on one of the axes, the direction is 0 and all vertices have the same coordinate: the ray is then
+// exactly parallel to the triangle's plane. Tested only for meshes without rotation, since a rotation would round the
+// zero component of the direction.
 bool TriangleRay::is_exactly_edge_on(const Triangle& triangle) const {
   if (!stored_.quaternion.is_identity()) return false;
   for (int axis = 0; axis < 3; ++axis) {
@@ -161,10 +164,10 @@ bool TriangleRay::is_exactly_edge_on(const Triangle& triangle) const {
   return false;
 }
 
-// Returns the verdict in extended precision, for triangles that are nearly edge-on.
+// Returns the hit on a nearly edge-on triangle, decided in extended precision.
 std::optional<TriangleHit> TriangleRay::edge_on_test(const Triangle& triangle, const Projected& projected) const {
   if (is_exactly_edge_on(triangle) || projected.is_clearly_outside()) return std::nullopt;
-  // Rounding errors of the projection may give a triangle without area a nonzero one.
+  // A triangle without area is never hit, but rounding errors of the projection may give it a nonzero determinant.
   if (area_normal(triangle) == Vec3d{}) return std::nullopt;
   StoredRay ray = stored_;
   ray.direction = scaled(ray.direction, exponent_);
@@ -182,7 +185,7 @@ std::optional<TriangleHit> TriangleRay::edge_test(const Triangle& triangle) cons
       projected.weight_a * projected.a.z + projected.weight_b * projected.b.z + projected.weight_c * projected.c.z;
   double t = depth / (projected.determinant * direction_[axis_z_]);
   if (!(t >= 0)) {
-    // A depth within its error bound counts as 0: the ray starts on the triangle.
+    // The ray starts on the triangle if the depth is within its error bound.
     if (!(std::abs(depth) <= depth_error(triangle))) return std::nullopt;
     t = 0;
   }

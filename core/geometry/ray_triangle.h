@@ -1,10 +1,11 @@
 // Watertight intersection of a ray and a triangle: a ray from inside a closed mesh always hits. The triangle is
 // projected along the ray; each of the three edge functions, two products and one difference, is then exactly
-// antisymmetric in its two vertices, so a shared edge has no gap whatever the rounding. Culling is in float. The
-// verdict is in double, because the error of t in float is its rounding error divided by the sine of the grazing angle
-// (measured: for 0.7 % of random rays more than the product allows, including misses). If a triangle is so nearly
-// edge-on that double is not precise enough either, edge_on_triangle.h decides. Source: Woop, Benthin, Wald, Watertight
-// Ray/Triangle Intersection, 2013; here without its divisions, so that verdicts on small integers are exact.
+// antisymmetric in its two vertices, so a shared edge has no gap whatever the rounding. Boxes are culled in float, but
+// a hit is decided in double: in float the error of t would be the rounding error divided by the sine of the angle
+// between ray and plane (measured: for 0.7 % of random rays the result is wrong by more than hit() allows, or a hit is
+// lost). If a triangle is so nearly edge-on that double is not precise enough either, edge_on_triangle.h decides.
+// Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013; here without its divisions, so that results
+// on small integers are exact.
 #ifndef LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 
@@ -28,27 +29,27 @@ struct TriangleHit {
 // of the scaled direction. Immutable; cheap to copy.
 class TriangleRay {
  public:
-  // Takes `origin` and `direction` in mesh axes. The slab test rounds each component to float once, which its pad
-  // covers.
+  // Takes `origin` and `direction` in mesh axes. The slab test rounds each component to float once; the padding of the
+  // slab test covers this error.
   TriangleRay(Vec3d origin, Vec3d direction, Cull cull = Cull::kNone);
-  // Takes `origin` and `direction` in world axes, for a mesh placed by `transform`. The ray is rounded to mesh axes;
-  // nearly edge-on triangles are tested with the unrounded ray.
+  // Takes `origin` and `direction` in world axes, for a mesh placed by `transform`. The ray is transformed to mesh
+  // axes, which rounds it; nearly edge-on triangles are tested with the unrounded ray.
   TriangleRay(const Transform& transform, Vec3d origin, Vec3d direction, Cull cull = Cull::kNone);
 
   const SlabRay<float>& slabs() const { return slabs_; }
   Cull cull() const { return cull_; }
 
-  // Converts t from units of the scaled direction to units of the given direction, and back. Both round monotonically.
+  // Convert t from units of the scaled direction to units of the given direction, and back. Both round monotonically.
   // from_scaled() returns at most the largest finite float for a finite t. to_scaled() rounds up, so that a limit in a
   // culling test never excludes a hit that from_scaled() rounds down to the limit.
   float from_scaled(float t) const;
   float to_scaled(float t) const;
 
-  // Returns the hit, a pure function of ray and triangle. It requires that the watertight test accepts with t >= 0 (t
-  // is 0 if the origin lies on the triangle within the rounding error of the test) and that the slab test of the
-  // triangle's own box accepts. t is clamped to the box's interval, so no tree can prune a hit that a list reports.
-  // Triangles that are exactly edge-on or have no area are never hit. The error of a hit is at most 2^-21 of the
-  // magnitudes of hit and origin.
+  // Returns the hit, a pure function of ray and triangle, or nullopt. A hit requires that the watertight test accepts
+  // with t >= 0 (t is 0 if the origin lies on the triangle within the rounding error of the test) and that the slab
+  // test of the triangle's own box accepts. t is clamped to the interval of that slab test, so a tree, which culls by
+  // boxes, reports the same hits as a list. Triangles that are exactly edge-on or have no area are never hit. The error
+  // of a hit is at most 2^-21 of the magnitudes of hit and origin.
   std::optional<TriangleHit> hit(const Triangle& triangle) const;
 
  private:

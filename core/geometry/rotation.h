@@ -11,7 +11,7 @@ namespace locus {
 struct Quaternion {
   float x = 0, y = 0, z = 0, w = 1;
 
-  // Returns whether the rotation is the identity; w may be negative.
+  // Returns whether the rotation is the identity, which w = 1 and w = -1 both represent.
   constexpr bool is_identity() const { return x == 0 && y == 0 && z == 0; }
   friend constexpr bool operator==(const Quaternion&, const Quaternion&) = default;
 };

@@ -6,7 +6,7 @@
 namespace locus {
 namespace {
 
-// Returns the signed distance of each coordinate from the box; 0 inside.
+// Returns, for each coordinate of `point`, its signed distance from the box; 0 if it is within the box.
 Vec3d gap_to_box(Vec3d point, Vec3d half) {
   Vec3d gap;
   for (int axis = 0; axis < 3; ++axis)
@@ -14,7 +14,8 @@ Vec3d gap_to_box(Vec3d point, Vec3d half) {
   return gap;
 }
 
-// Returns the values of s at which a coordinate enters or leaves the box, and both ends of the segment, ascending.
+// Returns, ascending, the values of s at which a coordinate of the segment enters or leaves the box, and those of both
+// ends of the segment. Unused entries are 1, the second end.
 std::array<double, 8> breakpoints_of(Vec3d center, Vec3d half_axis, Vec3d half) {
   std::array<double, 8> breakpoints;
   breakpoints.fill(1);
@@ -29,9 +30,9 @@ std::array<double, 8> breakpoints_of(Vec3d center, Vec3d half_axis, Vec3d half) 
   return breakpoints;
 }
 
-// Returns the minimum of the parabola between two breakpoints if it lies between them, else infinity. It is the squared
-// distance of a line from a corner, edge or face, computed by a cross product and one division: exact if the result is
-// a small integer.
+// Returns the minimum of the squared distance between the breakpoints `from` and `to` if it lies between them, else
+// infinity. Between two breakpoints the squared distance is a parabola in s: that of a line from a corner, edge or face
+// of the box. It is computed by a cross product and one division: exact if the result is a small integer.
 double min_between(double from, double to, Vec3d center, Vec3d half_axis, Vec3d half) {
   const Vec3d gap = gap_to_box(center + half_axis * (0.5 * (from + to)), half);
   Vec3d base, along;  // line in the coordinates that are outside the box
@@ -42,7 +43,7 @@ double min_between(double from, double to, Vec3d center, Vec3d half_axis, Vec3d 
   }
   const double aa = squared_length(along);
   if (aa == 0) return squared_length(base);
-  constexpr double kRounding = 1e-14;  // so that a minimum at a breakpoint belongs to a parabola
+  constexpr double kRounding = 1e-14;  // tolerance: rounding must not exclude a minimum at a breakpoint
   const double s = -dot(base, along) / aa;
   if (s < from - kRounding || s > to + kRounding) return std::numeric_limits<double>::infinity();
   return squared_length(cross(base, along)) / aa;

@@ -10,16 +10,18 @@ namespace locus {
 // Returns the point of the segment nearest to `point`.
 Vec3d nearest_on_segment(Vec3d point, Vec3d half_axis);
 
-// Returns the squared distance from `point` to the segment. Between the ends it is computed by a cross product and one
-// division: exact if the result is a small integer, otherwise with an error of a few roundings of |point|.
+// Returns the squared distance from `point` to the segment. If the nearest point is not an end of the segment, the
+// distance is computed by a cross product and one division: exact if the result is a small integer, otherwise with an
+// error of a few roundings of |point|.
 double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
 
 // Returns whether the segment around `center` meets the closed box of half extents `half` around the origin: separating
 // axis test over six axes, without division.
 bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
-// Returns the squared distance between that segment and that box, 0 if they meet. As a function of s, the squared
-// distance is convex and consists of at most seven parabolas; the minimum of each is computed in closed form.
+// Returns the squared distance between the segment around `center` and the box around the origin, as in
+// segment_meets_box(); 0 if they meet. As a function of s, the squared distance is convex and consists of at most seven
+// parabolas; the minimum of each is computed in closed form.
 double squared_distance_segment_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
 }  // namespace locus

@@ -72,14 +72,14 @@ ShapeHit hit_at(const LocalRay& local, double t, Vec3d normal) {
   return {std::ldexp(std::max(t, 0.0), -local.exponent), normalized(local.rotation.to_world(normal))};
 }
 
-// Returns the hit on the solid, without the test of its bounds.
+// Returns the hit on the solid; ray_hit() adds the test of the solid's bounds.
 std::optional<ShapeHit> solid_hit(const ObjectRay& ray, const Shape& shape) {
   const LocalRay local = local_ray(ray.ray(), shape);
   const bool inside = contains(shape, local.line.origin);
   if (inside && ray.inside() == Inside::kSkip) return std::nullopt;
   if (inside && ray.inside() == Inside::kSolid) return ShapeHit{0, Vec3d{} - normalized(ray.ray().direction)};
   const std::optional<Chord> chord = chord_of(shape, local.line);
-  // Within rounding of the surface a line may have no chord: such a ray exits at t = 0.
+  // A ray that starts inside, but within rounding of the surface, may have no chord: it exits at t = 0.
   if (inside) return chord ? hit_at(local, chord->far, chord->far_normal) : hit_at(local, 0, local.line.origin);
   if (!chord || chord->far < 0) return std::nullopt;
   return hit_at(local, chord->near, chord->near_normal);
@@ -116,7 +116,8 @@ bool ball_overlaps(const Balld& ball, const Shape& shape) {
   const bool meets =
       planted(PlantedBug::kStrictTie) ? distance < radius_sum * radius_sum : distance <= radius_sum * radius_sum;
   if (!meets) return false;
-  // Fast path: except for rounding, the bounds of a ball are never farther than the ball.
+  // Fast path: a ball or point that is nearer than the radius sum by more than rounding errors needs no reaches() test,
+  // since its bounds are never farther than the shape itself.
   const bool is_round = shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kPoint;
   if (is_round && distance < radius_sum * radius_sum * (1 - 0x1p-38) && radius_sum > 0x1p-256) return true;
   return reaches(ball, bounds_of(shape));

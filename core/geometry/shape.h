@@ -35,7 +35,7 @@ class ObjectRay {
   const Rayd& ray() const { return ray_; }
   const SlabRay<double>& slabs() const { return slabs_; }
   Inside inside() const { return inside_; }
-  // Returns t: slab tests and hits have the same unit here.
+  // Returns `t` unchanged: slab tests and hits have the same unit here.
   double to_scaled(double t) const { return t; }
 
  private:
@@ -50,17 +50,18 @@ struct ShapeHit {
   Vec3d normal;  // unit, outward, world axes; minus the ray's unit direction if the ray starts inside (kSolid)
 };
 
-// Returns axis-aligned bounds in world axes, grown by 2^-40 of the magnitudes if rounding could exclude a part of the
-// shape.
+// Returns axis-aligned bounds in world axes. If rounding could exclude a part of the shape, they are grown by 2^-40 of
+// the magnitudes.
 Aabbd bounds_of(const Shape& shape);
 
-// Returns the first point of the closed solid on the ray with t >= 0, also beyond ray.t_max. Points are never hit. The
-// verdict includes the slab test of the shape's own bounds, and t is clamped to their interval, so no structure can
-// prune a hit that a list reports.
+// Returns the hit of the ray on the closed solid with the smallest t >= 0, or as ray.inside() says if the ray starts
+// inside. Ignores t_max, so the caller must compare t with its limit. Points are never hit. A hit also requires that
+// the slab test accepts the shape's own bounds, and t is clamped to the interval of that test. So an index, which culls
+// by boxes, reports the same hits as a list.
 std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape);
 
-// Return whether the closed solids share a point; touching counts. Both verdicts include the test of the shape's own
-// bounds against the query.
+// Return whether the shape and the query share a point; touching counts. Both also require that the shape's own bounds
+// meet the ball, or the bounds of the box. So culling by any superset of the shape's bounds never changes the result.
 bool ball_overlaps(const Balld& ball, const Shape& shape);
 bool box_overlaps(const Obbd& box, const Shape& shape);
 

@@ -7,7 +7,7 @@
 
 namespace locus {
 
-// Transform of the mesh: world = translation + scale * (rotation * mesh), with the rotation of quaternion /
+// Ray and transform of the mesh: world = translation + scale * (rotation * mesh), with the rotation of quaternion /
 // |quaternion|.
 struct StoredRay {
   Vec3d origin, direction;  // in world axes

@@ -1,5 +1,5 @@
 // Transform of an instance: world = translation + scale * (rotation * mesh). Queries are transformed to mesh axes in
-// double; kernels then round once. Immutable after construction; any thread.
+// double; kernels then round the result to float once. Immutable after construction; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_TRANSFORM_H_
 #define LOCUS_CORE_GEOMETRY_TRANSFORM_H_
 
@@ -12,18 +12,19 @@ struct Transform {
   Vec3d translation;
   Quaternion quaternion;  // unit
   float scale = 1;        // > 0
-  Rotation rotation;      // of quaternion
+  Rotation rotation;      // matrix of `quaternion`
 
   Vec3d point_to_mesh(Vec3d world) const { return direction_to_mesh(world - translation); }
   Vec3d direction_to_mesh(Vec3d world) const { return rotation.to_local(world) * (1.0 / scale); }
   Vec3d point_to_world(Vec3d mesh) const { return translation + rotation.to_world(mesh) * double{scale}; }
 };
 
-// Returns the transform. `quaternion` must have unit length up to limits::kMaxQuaternionDeviation, `scale` be positive.
+// Returns the transform, including the rotation matrix. Preconditions: `quaternion` has unit length up to
+// limits::kMaxQuaternionDeviation; scale > 0.
 Transform make_transform(Vec3d translation, const Quaternion& quaternion, float scale);
 
-// Returns world bounds of a box in mesh axes, grown by 2^-40 of the magnitudes. This covers the rounding of this
-// function: the bounds of a part lie within those of the mesh up to that error.
+// Returns the world bounds of a box in mesh axes, grown by 2^-40 of the magnitudes to cover the rounding errors of this
+// function. So the result for a part of a mesh may exceed the result for the mesh only by these errors.
 Aabbd bounds_to_world(const Transform& transform, const Aabbf& mesh_box);
 
 }  // namespace locus

@@ -12,8 +12,8 @@ struct Range {
 Range range_of(double a, double b, double c) { return {std::min(a, std::min(b, c)), std::max(a, std::max(b, c))}; }
 
 // Returns whether the projections of triangle and box on `axis` are disjoint. The box has half extents `half` around
-// the origin. All three vertices are projected on the axis as rounded, so an axis with cancellation errors can only be
-// useless; it never separates a triangle from a box that it meets.
+// the origin. All three vertices are projected on the same rounded axis, so an axis with cancellation errors can only
+// fail to separate; it never separates a triangle from a box that it meets.
 bool separated_along(Vec3d axis, const Vec3d (&vertices)[3], Vec3d half) {
   const Range range = range_of(dot(vertices[0], axis), dot(vertices[1], axis), dot(vertices[2], axis));
   const double extent = dot(abs(axis), half);

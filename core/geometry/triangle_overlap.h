@@ -9,7 +9,8 @@
 
 namespace locus {
 
-// Returns whether squared_distance() <= radius^2 and the ball reaches() the triangle's own bounds.
+// Returns whether the triangle's squared_distance() from the ball's centre is at most radius^2 and the ball reaches()
+// the triangle's own bounds.
 bool ball_overlaps(const Ballf& ball, const Triangle& triangle);
 
 // Returns whether the triangle's own bounds overlap those of `box` and no axis separates triangle and box: separating

@@ -1,6 +1,6 @@
-// Collectors: visitors that decide about the candidates of a structure and keep the results: the nearest hit, any hit,
-// the nearest k hits of a ray, or the values whose bounds meet a ray or a region. They are separate from traversal, so
-// that every structure serves every kind of query. One object per query and thread; each borrows the query.
+// Collectors: visitors that test the candidates of a structure and store the results: the nearest hit, any hit, the
+// nearest k hits of a ray, or the values whose bounds meet a ray or a region. They are separate from traversal, so that
+// every structure serves every kind of query. One object per query and thread; each borrows the query.
 #ifndef LOCUS_CORE_INDEX_COLLECTORS_H_
 #define LOCUS_CORE_INDEX_COLLECTORS_H_
 
@@ -35,9 +35,9 @@ class NearestVisitor {
     return true;
   }
 
-  // Returns the nearest hit value, or no value if there was no hit before the limit.
+  // Returns the nearest value that was hit, or nullopt if there was no hit before the limit.
   const std::optional<V>& best() const { return best_; }
-  // Returns the distance of best(), or the given limit if there was no hit.
+  // Returns the distance of best(), or the limit given to the constructor if there was no hit.
   S distance() const { return distance_; }
 
  private:
@@ -85,7 +85,7 @@ struct RayHit {
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
-// Returns true if hit `a` precedes `b`: by distance, then by id.
+// Returns true if hit `a` precedes hit `b` in the order by distance, then by id.
 template <Bounded V>
 bool comes_before(const RayHit<V>& a, const RayHit<V>& b) {
   if (a.distance != b.distance) return a.distance < b.distance;
@@ -169,9 +169,9 @@ class BoundsOnRayVisitor {
   std::vector<V>& result_;
 };
 
-// Collector of the values whose bounds overlap a region and that pass `test`. Appends to `result`. The test of the
-// bounds is part of the decision, so exact results are a subset of the conservative ones, and both are the same for
-// every structure.
+// Collector of the values whose bounds overlap a region and for which test(value) returns true. Appends to `result`.
+// Because exact queries also require that the bounds overlap the region, their results are a subset of the conservative
+// ones, and both are the same for every structure.
 template <Bounded V, class Region, class Test>
 class RegionCollector {
   using Traits = PrimitiveTraits<V>;

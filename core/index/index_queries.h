@@ -24,7 +24,7 @@ template <class Index>
 using BoxQueryOf = typename PrimitiveTraits<typename Index::Value>::BoxQuery;
 
 namespace internal {
-// Counter of the cost of a query: the caller's counter or, if that is null, one of its own.
+// Reference to the counter of a query's cost: the caller's counter or, if the caller passed null, an internal one.
 class CostCounter {
  public:
   explicit CostCounter(Work* work) : work_(work != nullptr ? *work : own_) {}
@@ -45,10 +45,11 @@ void collect_region(const Index& index, const Region& region, Test test, std::ve
 inline constexpr auto kBoundsDecide = [](const auto&) { return true; };
 }  // namespace internal
 
-// Finds the first hit among several indices of one value type. A hit at r < distance (strictly) sets `value` and
-// `distance` and returns true; otherwise both are unchanged and the result is false. Every index is queried, with the
-// distance found in the earlier indices as its limit; at equal r the lower id wins, also across indices. (Two calls of
-// first_ray() joined by || would skip the second index, which may hold the nearer hit.)
+// Finds the first hit among several indices of one value type. If there is a hit at a distance strictly less than
+// `distance`, sets `value` and `distance` to those of the nearest hit and returns true; otherwise leaves both unchanged
+// and returns false. Each index is queried with the distance found in the earlier indices as its limit. At equal
+// distance the lower id wins, also across indices. (Two calls of first_ray() joined by || would skip the second index,
+// which may hold the nearer hit.)
 template <class V, SpatialIndex... Indices>
 bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, ScalarOf<V>& distance, Work* work,
                   const Indices&... indices) {
@@ -61,14 +62,14 @@ bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, Sc
   return true;
 }
 
-// Finds the first hit in one index; see first_ray_of().
+// Finds the first hit in one index, as first_ray_of() does.
 template <SpatialIndex Index>
 bool first_ray(const Index& index, const RayQueryOf<Index>& ray, typename Index::Value& value,
                ScalarOf<typename Index::Value>& distance, Work* work = nullptr) {
   return first_ray_of(ray, value, distance, work, index);
 }
 
-// Returns true if there is a hit at r < distance.
+// Returns true if the ray hits any value at a distance strictly less than `distance`.
 template <SpatialIndex Index>
 bool any_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
              Work* work = nullptr) {
@@ -78,7 +79,7 @@ bool any_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename
   return any.found();
 }
 
-// Appends the first `max_hits` hits at r < distance, sorted by (r, id).
+// Appends the nearest `max_hits` hits at distances strictly less than `distance`, sorted by distance, then by id.
 template <SpatialIndex Index>
 void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
               size_t max_hits, std::vector<RayHit<typename Index::Value>>& result, Work* work = nullptr) {
@@ -88,7 +89,8 @@ void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typenam
   few.finish();
 }
 
-// Appends the values whose bounds the ray meets at r <= distance: a superset of the hits of all_rays().
+// Appends the values whose bounds the ray meets at a distance of at most `distance`: a superset of the values that
+// all_rays() finds.
 template <SpatialIndex Index>
 void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
                       std::vector<typename Index::Value>& result, Work* work = nullptr) {

@@ -35,8 +35,8 @@ template <std::floating_point S>
 class BallRegion {
  public:
   explicit BallRegion(const Ball<S>& ball)
-      // Squares of gaps below 2^-537 underflow to zero, so reaches() holds even for a ball of radius zero at such a
-      // gap.
+      // bounds() must overlap every box that reaches() accepts. The squares of gaps below 2^-537 underflow to zero, so
+      // reaches() accepts boxes at such a gap even for a radius of zero: grow the bounds by more than such a gap.
       : ball_(ball), bounds_(internal::rounded_outward<S>(grown(to_double(bounds_of(ball)), 0x1p-530))) {}
 
   const Aabb<S>& bounds() const { return bounds_; }

@@ -14,17 +14,19 @@
 
 namespace locus {
 
-// Visitor of the candidates of a ray. limit(): boxes whose near value exceeds it may be skipped, but not boxes whose
-// near value equals it, which may hold a lower id; it may fall during the visit. visit(): false ends the visit. The
-// reference passed to visit() is valid only during the call, unless the structure documents a longer lifetime.
+// Visitor of the candidates of a ray. limit() returns the largest near value of interest, in units of the slab test,
+// and may fall during the visit. Boxes whose near value exceeds it may be skipped; boxes whose near value equals it may
+// not, since they may hold a value with a lower id. visit() returns false to end the visit. The reference passed to
+// visit() is valid only during the call, unless the structure documents a longer lifetime.
 template <class Visitor, class Value>
 concept RayVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<ScalarOf<Value>>;
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Visitor of the candidates of a region. overlaps(box): false if no value within the box can be a result; monotone:
-// true for every superset of a box for which it is true. bounds(): a box that overlaps the bounds of every result.
+// Visitor of the candidates of a region. overlaps(box) returns false only if no value within the box can be a result;
+// it is monotone: if it returns true for a box, it does so for every superset. bounds() returns a box that overlaps the
+// bounds of every result. visit() returns false to end the visit.
 template <class Visitor, class Value>
 concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aabb<ScalarOf<Value>>& box) {
   { std::as_const(visitor).bounds() } -> std::same_as<Aabb<ScalarOf<Value>>>;
@@ -32,9 +34,9 @@ concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aab
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Visitor of the candidates around a point. limit(): values whose bounds have a squared_distance() from the point that
-// exceeds it may be skipped, but not values at equal distance; it may fall during the visit. visit(): false ends the
-// visit.
+// Visitor of the candidates around a point. limit() returns the largest squared distance of interest and may fall
+// during the visit. Values whose bounds have a larger squared_distance() from the point may be skipped; values at a
+// squared distance equal to limit() may not. visit() returns false to end the visit.
 template <class Visitor, class Value>
 concept PointVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<double>;
@@ -56,10 +58,11 @@ struct AnyPointVisitor {
 };
 }  // namespace internal
 
-// Structure that can be queried. visit_ray passes each value exactly once whose bounds have an interval on the ray with
-// near <= far, far >= 0 and near <= limit(), roughly from near to far, and may pass further values, each at most once.
-// visit_region does the same for values with overlaps(bounds of the value), and visit_nearest for values with
-// squared_distance(point, bounds of the value) <= limit(), roughly from near to far.
+// Structure that can be queried. visit_ray() passes to the visitor, exactly once each, all values whose bounds have an
+// interval on the ray with near <= far, far >= 0 and near <= limit(), roughly from near to far. It may pass further
+// values, at most once each. visit_region() does the same for all values with overlaps(bounds of the value), and
+// visit_nearest() for all values with squared_distance(point, bounds of the value) <= limit(), roughly from near to
+// far.
 template <class Index>
 concept SpatialIndex = Bounded<typename Index::Value> &&
     requires(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs,
@@ -72,8 +75,9 @@ concept SpatialIndex = Bounded<typename Index::Value> &&
   { index.visit_nearest(point, visitor, work) } -> std::same_as<void>;
 };
 
-// Structure that can be changed. Precondition of insert(): the id is not in the index. remove() and contains() compare
-// ids, but take the value as it was inserted, since a grid finds it by its position.
+// Structure that can be changed. Precondition of insert(): no value in the index has the same id. remove() and
+// contains() compare only ids, but the caller must pass the value with the position at which it was inserted, since a
+// grid searches for it at that position.
 template <class Index>
 concept MutableSpatialIndex = SpatialIndex<Index> &&
     requires(Index& index, const Index& const_index, const typename Index::Value& value) {

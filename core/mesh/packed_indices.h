@@ -1,6 +1,6 @@
-// Compressed index list, without loss. Each index is stored as its difference from one more than the largest index so
-// far, in one or two bytes if triangles close in the list use vertices close in the mesh. Immutable after creation; any
-// thread. A Reader belongs to one thread.
+// Lossless compressed list of vertex indices. Each index is stored as its difference from one more than the largest
+// index so far. Most differences take one or two bytes if triangles that are close in the list use vertices that are
+// close in the vertex array. Immutable after creation; any thread. A Reader belongs to one thread.
 #ifndef LOCUS_CORE_MESH_PACKED_INDICES_H_
 #define LOCUS_CORE_MESH_PACKED_INDICES_H_
 
@@ -19,12 +19,13 @@ class PackedIndices {
 
   size_t bytes() const { return bytes_.capacity(); }
 
-  // Sequential reader, from the start of the list. The list must outlive the reader and must not move.
+  // Sequential reader of the list, from its start. The PackedIndices object must outlive the reader and must not be
+  // moved.
   class Reader {
    public:
     explicit Reader(const PackedIndices& packed) : next_(packed.bytes_.data()) {}
 
-    // Returns the next index. Call at most once per index of the list.
+    // Returns the next index. Precondition: the list has an index that next() has not returned yet.
     uint32_t next();
 
    private:

@@ -14,11 +14,11 @@ namespace locus {
 class PackedNumbers {
  public:
   PackedNumbers() = default;
-  // Creates `count` zeros; each element can hold 0 to `largest`.
+  // Creates `count` elements of value 0; each can be set to 0 to `largest`.
   PackedNumbers(size_t count, uint32_t largest)
       : width_((static_cast<size_t>(std::bit_width(largest)) + 7) / 8), bytes_(count * width_) {}
 
-  // Sets an element; `value` must fit the bytes of the largest one.
+  // Sets an element. Precondition: `value` fits the bytes of `largest`.
   void set(size_t index, uint32_t value) {
     LOCUS_DCHECK_LE((index + 1) * width_, bytes_.size());
     LOCUS_DCHECK_LE(static_cast<size_t>(std::bit_width(value)), 8 * width_);

@@ -20,20 +20,21 @@ struct MeshPart {
   bool operator==(const MeshPart&) const = default;
 };
 
-// Checks the parts of a mesh of `triangles` triangles: their number and names, and that the first begins at 0 and all
-// ascend within the mesh. Refuses as TriangleMesh::create() does.
+// Checks the parts of a mesh of `triangles` triangles: their number, the lengths of their names, and that their first
+// triangles begin at 0, ascend and lie within the mesh. Returns INVALID_ARGUMENT naming the part or the exceeded limit.
 absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles);
 
 class TriangleMesh {
  public:
-  // Creates a mesh of 3V coordinates and 3T vertex indices. The first part, if any, must begin at triangle 0. Returns
-  // INVALID_ARGUMENT naming `vertices` and the vertex, `indices` and the triangle, `parts` and the part, or the
-  // exceeded limit. O(V + T).
+  // Creates a mesh from the coordinates of V vertices and the vertex indices of T triangles, three numbers each. The
+  // first part, if any, must begin at triangle 0. Returns INVALID_ARGUMENT naming `vertices` and the vertex, `indices`
+  // and the triangle, `parts` and the part, or the exceeded limit. O(V + T).
   static absl::StatusOr<TriangleMesh> create(std::vector<float> vertices, std::vector<uint32_t> indices,
                                              std::vector<MeshPart> parts);
 
   uint32_t triangle_count() const { return static_cast<uint32_t>(indices_.size() / 3); }
-  // Returns the count of triangles without area, which no ray hits; they keep their numbers.
+  // Returns the number of triangles without area. No ray hits them, but they stay in the mesh, so that the other
+  // triangles keep their numbers.
   uint32_t zero_area_count() const { return zero_area_count_; }
   const Aabbf& bounds() const { return bounds_; }
   const std::vector<float>& vertices() const { return vertices_; }
@@ -45,7 +46,7 @@ class TriangleMesh {
 
  private:
   TriangleMesh() = default;
-  // Checks the sizes and the bounds. O(1).
+  // Checks the sizes of the arrays and that the bounds are not empty. O(1).
   void check_invariants() const;
 
   std::vector<float> vertices_;

@@ -8,13 +8,13 @@
 namespace locus::internal {
 namespace {
 
-// A brick with fewer sorted values is always sorted again, which costs no more than a log.
+// Min number of sorted values for a log: sorting a smaller brick again costs no more than appending to a log.
 constexpr uint32_t kMinSorted = 48;
 constexpr uint32_t kSortedPerChange = 8;  // min ratio of sorted values to changes of one batch, for a log
 constexpr uint32_t kSortedPerDead = 4;    // min ratio of sorted values to dead ones, for a log
 constexpr size_t kAhead = 16;             // prefetch distance in values
 
-// Mark of an unchanged value in the lists of changes by slot. Move indices are smaller.
+// Mark of an unchanged value in sorted_changes_ and recent_changes_. All move indices are smaller.
 constexpr uint32_t kStays = ~0u - 1;
 
 bool arrives(const BrickChange& change) { return change.slot == BrickChange::kArrives; }
@@ -57,7 +57,8 @@ BrickPtr BrickBuilder::build(const Brick* old, const BrickGeometry& geometry, ui
   return sorted_by_cell(old, sources_);
 }
 
-// Checks that each change refers to a live slot of `old`, or to an arrival, and to an existing move. O(changes).
+// Checks that each change refers to an existing arrival, or to a live slot of `old` and, unless the value leaves, to an
+// existing move. O(changes).
 void BrickBuilder::check_changes(const Brick* old, absl::Span<const BrickChange> changes) const {
   if constexpr (kDebugChecks) {
     for (const BrickChange& change : changes) {
@@ -76,7 +77,7 @@ void BrickBuilder::check_changes(const Brick* old, absl::Span<const BrickChange>
   }
 }
 
-// Checks that the writer's location of a written value is its slot, and that its extent is within the bound.
+// Checks a value that was just written: slots_ holds its location, and brick.max_extent is at least its extent.
 void BrickBuilder::check_value(const Brick& brick, const GridBlock& block, uint32_t slot, uint32_t flag) const {
   LOCUS_DCHECK_LT(block.handle(slot), slots_->size());
   LOCUS_DCHECK_LE(block.extent(slot), brick.max_extent);
@@ -86,7 +87,7 @@ void BrickBuilder::check_value(const Brick& brick, const GridBlock& block, uint3
   LOCUS_DCHECK_EQ(location.slot, slot | flag);
 }
 
-// Checks a version whose values have all been sorted. O(values), as the sort.
+// Checks a version whose values have all been sorted. O(values), like sorting them.
 void BrickBuilder::check_sorted(const Brick& brick) const {
   if constexpr (kDebugChecks) {
     brick.check_invariants();
@@ -103,7 +104,7 @@ void BrickBuilder::check_sorted(const Brick& brick) const {
   }
 }
 
-// Checks a version whose log has new values from slot `begin` on. O(new values), and O(words of dead bits).
+// Checks a version whose log has new values from slot `begin` on. O(new values + words of dead bits).
 void BrickBuilder::check_recent(const Brick& brick, uint32_t begin) const {
   if constexpr (kDebugChecks) {
     brick.check_invariants();
@@ -173,13 +174,14 @@ bool BrickBuilder::any_form_arrives(absl::Span<const BrickChange> changes) const
 
 bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickSource> sources) const {
   if (!parts_.moves.rotations.empty() || (old != nullptr && old->sorted->has_forms())) return true;
-  // Arrivals are at the end.
+  // The arrivals are the last sources.
   for (size_t i = sources.size(); i != 0 && (sources[i - 1].origin & BrickSource::kArrival) != 0; --i)
     if (!(parts_.arrivals[sources[i - 1].origin & ~BrickSource::kArrival].form == GridForm())) return true;
   return false;
 }
 
-// Prefetches a source. `from` holds the sorted and the recent values of the old brick.
+// Prefetches the memory that write() needs for a source. from[0] and from[1] point to the values of the old brick's
+// sorted block and log.
 inline void BrickBuilder::prefetch(const GridBlock::Values* from, const BrickSource& source) const {
   if (source.move != BrickSource::kNoMove) __builtin_prefetch(&parts_.moves.moves[source.move]);
   if ((source.origin & BrickSource::kArrival) != 0) return;
@@ -189,13 +191,13 @@ inline void BrickBuilder::prefetch(const GridBlock::Values* from, const BrickSou
   __builtin_prefetch(&(*slots_)[values.handles[slot]], 1);
 }
 
-// Writes the sources to the slots that slot_of(source) returns; it is called once per source, in order. `flag` is
+// Writes each source to the slot that slot_of(source) returns; slot_of() is called once per source, in order. `flag` is
 // GridSlot::kRecent if `block` is a log, else 0.
 template <class SlotOf>
 inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* old,
                                 absl::Span<const BrickSource> sources, const SlotOf& slot_of) {
   const GridBlock::Places places(block, geometry_->center);
-  // Placeholders stand in for missing blocks: no source refers to them.
+  // If the old brick or its log does not exist, another block stands in for it; no source refers to that block.
   const GridBlock& sorted = old == nullptr ? block : *old->sorted;
   const GridBlock::Values from[2] = {
       GridBlock::Values(sorted), GridBlock::Values(old == nullptr || old->recent == nullptr ? sorted : *old->recent)};
@@ -241,8 +243,8 @@ BrickPtr BrickBuilder::sort_anew(const Brick* old, absl::Span<const BrickChange>
   return sorted_by_cell(old, sources_);
 }
 
-// Returns a version whose sorted block holds all sources and whose log is empty; null if there are none. Counting sort
-// by cell.
+// Returns a version whose sorted block holds all sources, ordered by a counting sort by cell, and whose log is empty.
+// Returns null if there are no sources.
 BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSource> sources) {
   if (sources.empty()) return nullptr;
   const auto block = std::make_shared<GridBlock>(static_cast<uint32_t>(sources.size()), any_form(old, sources));

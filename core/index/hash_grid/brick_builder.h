@@ -1,5 +1,6 @@
-// Builder of brick versions: makes the next version of a brick from its present one and the changes of one batch. One
-// builder per grid, for its writer; one thread at a time. It keeps its buffers between bricks.
+// Builder of brick versions: makes the next version of a brick from its present version and the changes of one batch.
+// The writer of a grid has one builder, for all bricks. The builder keeps its buffers between bricks. One thread at a
+// time.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_BUILDER_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_BUILDER_H_
 
@@ -11,16 +12,16 @@
 
 namespace locus::internal {
 
-// Change of one value in a brick.
+// Change of one value in a brick: the value arrives, leaves, or moves within the brick.
 struct BrickChange {
   static constexpr uint32_t kArrives = ~0u;
   static constexpr uint32_t kLeaves = ~0u;
 
-  uint32_t slot;   // slot of a present value, as GridSlot::slot; or kArrives
-  uint32_t index;  // index of the arrival; or of the move, if the value stays in the brick; or kLeaves
+  uint32_t slot;   // present slot of the value, encoded as GridSlot::slot; kArrives if it arrives
+  uint32_t index;  // index in BatchParts::arrivals if the value arrives, in the moves if it moves; or kLeaves
 };
 
-// Moves and arrivals to which the indices of changes refer. All borrowed.
+// Arrays to which BrickChange::index refers. All borrowed.
 struct BatchParts {
   GridMoves moves;
   absl::Span<const GridItem> arrivals;
@@ -28,20 +29,20 @@ struct BatchParts {
 
 class BrickBuilder {
  public:
-  // Begins a batch. `slots`, indexed by handle, receives the new slot of each value that changes its slot. Both
-  // arguments are borrowed until end().
+  // Begins a batch. `slots`, indexed by handle, receives the new slot of each value that changes its slot. The arrays
+  // of `parts` and `slots` are borrowed until end().
   void begin(const BatchParts& parts, std::vector<GridSlot>& slots);
   // Ends the batch and frees large buffers.
   void end() { clear_scratch(sources_); }
 
-  // Returns the next version of the brick, null if no value remains. `old` is null for a brick that was empty. `index`
-  // is the index of the brick. Each value occurs at most once in `changes`, but a value that leaves may also arrive.
-  // O(values of the brick) or, for few changes, O(changes).
+  // Returns the next version of the brick, null if no value remains. `old` is the present version, null for a brick
+  // that was empty. `index` is the index of the brick. A value occurs at most once in `changes`, except that a value
+  // that leaves may also arrive. O(values of the brick) or, for few changes, O(changes).
   BrickPtr apply(const Brick* old, const BrickGeometry& geometry, uint32_t index,
                  absl::Span<const BrickChange> changes);
 
-  // Returns the next version made from `sources`, the values of `old` that stay, and from `changes`, which must be
-  // arrivals only.
+  // Returns the next version of the brick, null if no value remains. Sorts all values anew: `sources`, the values of
+  // `old` that stay in the brick, and `changes`, which must all be arrivals.
   BrickPtr build(const Brick* old, const BrickGeometry& geometry, uint32_t index, absl::Span<const BrickSource> sources,
                  absl::Span<const BrickChange> changes);
 
@@ -69,9 +70,9 @@ class BrickBuilder {
   uint32_t index_ = 0;
   BatchParts parts_;
   std::vector<GridSlot>* slots_ = nullptr;
-  std::vector<uint32_t> sorted_changes_, recent_changes_;  // by slot: move index, kLeaves or kStays
+  std::vector<uint32_t> sorted_changes_, recent_changes_;  // indexed by slot: move index, kLeaves or kStays
   std::vector<BrickSource> sources_;
-  float max_extent_ = 0;  // of the brick that is built
+  float max_extent_ = 0;  // bound for the version that is built
 };
 
 }  // namespace locus::internal

@@ -1,5 +1,5 @@
-// Scans of the values of one brick or of some of its cells: float kernels cull eight values at a time, and the
-// remaining values are passed to the caller. Plain functions; any thread.
+// Functions that scan the values of one brick, or of some of its cells: float kernels test eight values at a time and
+// drop those that cannot satisfy the query; the other values are passed to a visitor. Plain functions; any thread.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 
@@ -18,7 +18,8 @@
 
 namespace locus {
 
-// Reference to a value in the grid. Valid as long as the snapshot it came from. The accessors require a value.
+// Reference to a value of the grid, or an empty reference. Valid as long as the snapshot it came from exists.
+// Precondition of the accessors: the reference is not empty.
 class GridRef {
  public:
   GridRef() = default;
@@ -46,16 +47,17 @@ class GridRef {
 
 namespace internal {
 
-// Rounding allowance, relative to the magnitudes involved: bounds of values exceed their extent by the rounding of
-// predicates, 2^-40 of the magnitudes (core/geometry/shape.h). This factor covers that and the sums in this room.
+// Rounding allowance, as a factor of the magnitudes involved. The bounds of a value may exceed its extent by 2^-40 of
+// the magnitudes (see bounds_of() in core/geometry/shape.h). This factor covers that excess and the rounding of the
+// sums in core/index/hash_grid.
 inline constexpr double kBoundsGrowth = 0x1p-38;
 
 inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};
 
-// Returns the epsilon for culling values of `brick` in float: it covers the difference between bounds and extent of a
-// value and the rounding of its float columns.
+// Returns the epsilon for culling values of `brick` in float. It covers the rounding of the float columns and the
+// amount by which the bounds of a value may exceed its extent.
 inline double cull_epsilon(const Brick& brick) {
-  const double coordinate = brick.geometry.edge;  // twice the largest of the float columns
+  const double coordinate = brick.geometry.edge;  // twice the largest coordinate in the float columns
   const double extent = brick.max_extent;
   const double magnitude = max_component(abs(brick.geometry.center)) + brick.geometry.edge;
   return double{kCullEpsilon} * (coordinate + extent) + kBoundsGrowth * (magnitude + extent);
@@ -96,8 +98,8 @@ inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
   return cull;
 }
 
-// Ray relative to a brick, as input of float culling: a line through its point nearest to the centre of the brick,
-// which keeps the coordinates small.
+// Ray relative to a brick, as input of float culling: a line, given by its point nearest to the centre of the brick and
+// its direction. Starting from that point keeps the float coordinates small.
 class CullRay {
  public:
   // `ray_radius`: displacement bound of the values plus the padding of the slab test.
@@ -115,8 +117,8 @@ class CullRay {
       line_.point[axis] = static_cast<float>(point[axis]);
       line_.direction[axis] = static_cast<float>(toward[axis]);
     }
-    // Within the brick the error of the line's direction and point is a few 2^-24 of the lengths, plus 2^-50 of the
-    // distance to the origin of the ray.
+    // Within the brick, the errors of the line's direction and point displace it by a few 2^-24 of the lengths
+    // involved, plus 2^-50 of the distance to the origin of the ray.
     line_.radius =
         static_cast<float>((cull_epsilon(brick) + ray_radius + 0x1p-46 * far +
                             4 * double{kCullEpsilon} * (max_component(abs(point)) + 2 * brick.geometry.edge)) *
@@ -141,8 +143,8 @@ class CullRay {
   double speed_;  // length of the ray's direction
 };
 
-// Factories of culling functions for a box and for a ball: called with a brick, they return a function (rows, slots)
-// that runs the kernel. Borrow their argument.
+// Factories of culling functions for a box and for a ball. Called with a brick, a factory returns a function (rows,
+// slots) that runs the kernel. The region or ball must outlive the factory.
 class BoxCull {
  public:
   explicit BoxCull(const Aabbd& region) : region_(&region) {}
@@ -166,8 +168,8 @@ class BallCull {
   const Balld* ball_;
 };
 
-// Returns the slots of `cells`, which are relative to the brick, in its sorted block, as rows of consecutive slots.
-// Empty rows are left out, and adjacent ones are joined.
+// Returns the rows of consecutive slots that hold the values of `cells` in the sorted block; `cells` is relative to the
+// brick. Leaves out empty rows and joins adjacent ones.
 inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   static_assert(GridRows::kMax == 1 << (2 * kBrickBits));
   const GridBlock& sorted = *brick.sorted;
@@ -203,8 +205,8 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   return rows;
 }
 
-// Calls fn(rows) once, or for parts of at most kMaxValues values if there are more, until fn() returns false. Returns
-// false if a call did.
+// Calls fn(rows) once if the rows hold at most kMaxValues values, else once for each part of at most kMaxValues values.
+// Stops and returns false if a call of fn() returns false.
 template <class Fn>
 bool for_each_part(const GridRows& rows, const Fn& fn) {
   uint32_t values = 0;
@@ -221,8 +223,9 @@ bool for_each_part(const GridRows& rows, const Fn& fn) {
   return true;
 }
 
-// Calls visit(GridRef) for the values of `all` that cull(rows, slots) keeps, until it returns false. Returns false if a
-// call did.
+// Calls visit(GridRef) for the values in the rows `all` of `block` that the kernel cull(rows, slots) does not drop:
+// cull() writes their slots and returns their number. `brick` is the index of the brick. Stops and returns false if
+// visit() returns false.
 template <class Cull, class Visit>
 bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work& work, const Cull& cull,
                const Visit& visit) {
@@ -240,13 +243,14 @@ bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work
   });
 }
 
-// Scans the sorted values of `cells`, which are relative to the brick, like scan_rows().
+// Scans the values of the sorted block that lie in `cells`, which are relative to the brick. Culls and visits as
+// scan_rows() does.
 template <class Cull, class Visit>
 bool scan_cells(const Brick& brick, const KeyRange& cells, Work& work, const Cull& cull, const Visit& visit) {
   return scan_rows(*brick.sorted, brick.index, rows_of(brick, cells), work, cull, visit);
 }
 
-// Scans the values of the log, in whatever cell they are, like scan_rows().
+// Scans all values of the brick's log, which is not ordered by cell. Culls and visits as scan_rows() does.
 template <class Cull, class Visit>
 bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& visit) {
   if (brick.recent_count == 0) return true;
@@ -257,7 +261,8 @@ bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& 
       {vector_end}};
   if (!scan_rows(recent, brick.index, vectors, work, cull, visit)) return false;
   if (vector_end == brick.recent_count) return true;
-  // The tail of the last vector is copied, since the writer may write its other lanes meanwhile.
+  // If the last vector is only partly filled, its values are copied, since the writer may append to its other lanes at
+  // the same time.
   const uint32_t tail = brick.recent_count - vector_end;
   float columns[4][GridBlock::kLanes] = {};
   for (int column = 0; column < 4; ++column) std::copy_n(recent.column(column) + vector_end, tail, columns[column]);
@@ -272,7 +277,7 @@ bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& 
   return true;
 }
 
-// Calls visit(GridRef) for each live value until it returns false. Returns false if a call did.
+// Calls visit(GridRef) for each live value of the brick. Stops and returns false if visit() returns false.
 template <class Visit>
 bool for_each_value(const Brick& brick, const Visit& visit) {
   for (uint32_t slot = 0; slot < brick.sorted->count(); ++slot)

@@ -1,5 +1,5 @@
 // Moves of a batch, and the sources (values that stay, move or arrive) from which the next version of a brick is built.
-// For the one writer of a grid.
+// For the single writer of a grid.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_SOURCES_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SOURCES_H_
 
@@ -23,8 +23,9 @@ struct alignas(32) GridMove {
 struct GridMoves {
   absl::Span<const GridMove> moves;  // of distinct handles
   absl::Span<const Quaternion> rotations = {};
-  // Index of the move, by handle. The entry of a handle without a move may be any number: readers compare
-  // moves[i].handle. May be empty; if it is given, a batch that moves nearly all values costs less.
+  // Index in `moves` of the move of each handle; optional, but it reduces the cost of a batch that moves nearly all
+  // values. The entry of a handle without a move may be any number, so a reader must compare moves[i].handle with the
+  // handle.
   absl::Span<const uint32_t> by_handle = {};
 };
 
@@ -38,7 +39,7 @@ struct GridSlot {
   uint32_t slot = 0;
 };
 
-// Source of one value in the next version of a brick.
+// Source of one value of the next version of a brick: a slot of the present version or an arrival.
 struct BrickSource {
   static constexpr uint32_t kArrival = 1u << 30;  // bit of `origin`: set for the index of an arrival
   static constexpr uint32_t kNoMove = ~0u;
@@ -48,7 +49,7 @@ struct BrickSource {
   uint32_t cell;    // new cell; unused for values that go to the log
 };
 
-// Lookup of the move of a handle. Precondition: the batch has moves, and by_handle is given.
+// Lookup of moves by handle. Precondition: the batch has moves, and GridMoves::by_handle is given.
 class MoveFinder {
  public:
   explicit MoveFinder(const GridMoves& moves) : moves_(moves.moves), index_by_handle_(moves.by_handle) {
@@ -56,7 +57,8 @@ class MoveFinder {
     LOCUS_DCHECK(!index_by_handle_.empty());
   }
 
-  // Returns the index of the move of `handle`; for a handle without a move the index of any other move.
+  // Returns the index of the move of `handle`. For a handle without a move, returns the index of an arbitrary move, so
+  // the caller must compare the handle of that move with `handle`.
   uint32_t index_of(uint32_t handle) const {
     const uint32_t index = handle < index_by_handle_.size() ? index_by_handle_[handle] : 0;
     return index < moves_.size() ? index : 0;
@@ -68,10 +70,11 @@ class MoveFinder {
   absl::Span<const uint32_t> index_by_handle_;
 };
 
-// Writes to `out` the sources of those of the first `count` values of a block that stay in the brick; skips slots for
-// which is_dead(slot). Calls leave(block, slot, move) for each value that moves out of the brick. Adds to `moved` the
-// number of values that move, within the brick or out of it. `out` has room for `count` sources. Returns the end of the
-// written sources.
+// Writes to `out` a source for each of the first `count` values of a block that stays in the brick, whether it moves or
+// not. Returns the end of the written sources. Skips slots for which is_dead(slot) returns true. Calls leave(block,
+// slot, move) for each value that moves out of the brick. Adds to `moved` the number of values that move, within the
+// brick or out of it. `flag` is GridSlot::kRecent if the block is a log, else 0. `out` must have room for `count`
+// sources.
 template <class IsDead, class Leave>
 BrickSource* gather_block(const BrickGeometry& geometry, const GridBlock& block, uint32_t count, uint32_t flag,
                           const MoveFinder& moves, BrickSource* out, size_t& moved, const IsDead& is_dead,
@@ -104,7 +107,7 @@ BrickSource* gather_block(const BrickGeometry& geometry, const GridBlock& block,
   return out;
 }
 
-// Calls gather_block() for both blocks of a brick.
+// Calls gather_block() for the sorted block and the log of a brick.
 template <class Leave>
 BrickSource* gather_brick(const Brick& brick, const MoveFinder& moves, BrickSource* out, size_t& moved,
                           const Leave& leave) {

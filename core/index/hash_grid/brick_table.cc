@@ -39,7 +39,7 @@ void BrickTable::erase(const GridKey& key, uint32_t brick) {
   }
   slots_[slot_index] = {};
   --size_;
-  // Reinserts the entries up to the next free slot: the gap must not hide them from find().
+  // Reinserts the following entries up to the next free slot, since find() stops at a free slot and would miss them.
   for (size_t next = (slot_index + 1) & mask(); slots_[next].brick != kNone; next = (next + 1) & mask())
     put(std::exchange(slots_[next], Slot()));
   check_invariants(key, brick, false);

@@ -1,9 +1,9 @@
 // Hash table from the keys of one level to the indices of its bricks: open addressing with linear probing, at most half
-// full. An entry stores the index and part of the hash but no key, so callers compare the key of the brick itself.
-// A value type; threads as for a standard container.
+// full. An entry stores the index and part of the hash but no key, so the caller of find() compares the key with that
+// of the brick. A value type; threads as for a standard container.
 //
-// Invariant: size_ entries are occupied, at most half of them all; no free entry lies between an entry and the slot of
-// its hash.
+// Invariant: size_ entries are occupied, at most half of all entries; no free entry lies between an occupied entry and
+// the slot of its hash.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_TABLE_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_TABLE_H_
 
@@ -20,7 +20,8 @@ class BrickTable {
   static constexpr uint32_t kNone = ~0u;
 
   size_t size() const { return size_; }
-  // Returns the brick for which has_key(brick) holds, among those with the hash of `key`; kNone if there is none.
+  // Returns the brick for which has_key(brick) is true, kNone if there is none. Calls has_key() only for bricks with
+  // the hash of `key`.
   template <class HasKey>
   uint32_t find(const GridKey& key, const HasKey& has_key) const {
     const uint32_t hash = hash_of(key);
@@ -34,7 +35,7 @@ class BrickTable {
   void insert(const GridKey& key, uint32_t brick);
   // Removes an entry. Precondition: `brick` was inserted under `key`.
   void erase(const GridKey& key, uint32_t brick);
-  // Calls fn(brick) for each brick until it returns false. Returns false if a call did.
+  // Calls fn(brick) for each brick. Stops and returns false if fn() returns false.
   template <class Fn>
   bool for_each(const Fn& fn) const {
     for (const Slot& slot : slots_)
@@ -51,7 +52,8 @@ class BrickTable {
   static uint32_t hash_of(const GridKey& key) { return static_cast<uint32_t>(GridKeyHash()(key)); }
   size_t mask() const { return slots_.size() - 1; }
   void put(const Slot& slot);
-  // Checks the load, and that find() reaches `brick` under `key` exactly if `expected`. O(length of the probe).
+  // Checks the load factor, and that find() returns `brick` for `key` if `expected` is true, else kNone. O(length of
+  // the probe).
   void check_invariants(const GridKey& key, uint32_t brick, bool expected) const;
 
   std::vector<Slot> slots_ = std::vector<Slot>(8);

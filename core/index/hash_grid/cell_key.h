@@ -76,7 +76,7 @@ inline GridKey brick_of(const GridKey& cell) {
   return {cell.x >> kBrickBits, cell.y >> kBrickBits, cell.z >> kBrickBits};
 }
 
-// Returns the index of a cell within its brick, 0 to 63, z most significant.
+// Returns the index of a cell within its brick: 0 to 63; z is the most significant part.
 inline int index_in_brick(const GridKey& cell) {
   constexpr int64_t kMask = (int64_t{1} << kBrickBits) - 1;
   return static_cast<int>((cell.x & kMask) | (cell.y & kMask) << kBrickBits | (cell.z & kMask) << (2 * kBrickBits));
@@ -121,7 +121,7 @@ inline KeyRange cells_within(const Aabbd& box, double per_unit) {
   return range;
 }
 
-// Returns the bricks of a range of cells, or of the positions within a box.
+// Return the bricks that contain the cells of a range (bricks_of) or the positions within a box (bricks_within).
 inline KeyRange bricks_of(const KeyRange& cells) { return {brick_of(cells.lo), brick_of(cells.hi)}; }
 inline KeyRange bricks_within(const Aabbd& box, double per_unit) { return bricks_of(cells_within(box, per_unit)); }
 

@@ -18,8 +18,8 @@ double median_diameter(absl::Span<const SampledValue> sample) {
   return *middle;
 }
 
-// Returns the largest useful exponent: still wider cells separate no values, and their float columns lose all
-// precision.
+// Returns the largest useful exponent: wider cells would separate no values, and the float columns of their bricks
+// would lose all precision.
 int exponent_of_all(absl::Span<const SampledValue> sample) {
   Vec3d low = sample[0].position, high = low;
   for (const SampledValue& value : sample) {
@@ -27,13 +27,13 @@ int exponent_of_all(absl::Span<const SampledValue> sample) {
     high = max(high, value.position);
   }
   const double width = max_component(high - low), magnitude = max_component(max(abs(low), abs(high)));
-  // The term with the magnitude keeps cells above zero width if all values coincide: they would leave such cells with
-  // every move.
+  // If all values coincide, `width` is zero. The term with the magnitude then prevents tiny cells, which the values
+  // would leave with every move.
   return exponent_covering(std::max(4 * width, 0x1p-16 * magnitude), kMinCellExponent, kMaxBaseExponent);
 }
 
-// Returns the expected number of other values in the cell of a random value. The share of sample pairs in one cell
-// estimates the share of pairs of the population, so the sample size does not bias the estimate.
+// Returns the expected number of other values in the cell of a random value. The fraction of the sample's pairs of
+// values that share a cell estimates this fraction for the population, so the sample size does not bias the estimate.
 double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
   if (sample.size() < 2) return 0;
   std::vector<GridKey> cells;

@@ -15,11 +15,11 @@ namespace locus::internal {
 
 // Approximate number of sampled values.
 inline constexpr size_t kCellSizeSample = 2048;
-// Max mean number of other values in the cell of a random value: kMaxMeanPerCell, or kMaxAddedPerCell more than at the
-// smallest cell that is considered, whichever is larger.
+// Limit of choose_cell_exponent() for the mean number of other values in the cell of a random value: kMaxMeanPerCell
+// or, if larger, kMaxAddedPerCell more than the mean at the smallest cell size considered.
 inline constexpr double kMaxMeanPerCell = 24;
 inline constexpr double kMaxAddedPerCell = 12;
-// Range of that mean in which a cell size chosen before is kept.
+// Range of that mean within which cell_exponent_fits() accepts a cell size that was chosen earlier.
 inline constexpr double kMinOthersPerCell = 6;
 inline constexpr double kMaxOthersPerCell = 64;
 
@@ -30,17 +30,18 @@ struct SampledValue {
 
 // Returns the exponent of the largest cell edge, at least the median diameter, at which a random value shares its cell
 // with at most kMaxMeanPerCell others on average. The mean is estimated for `population` values, of which `sample` is
-// an even selection. Values that no cell size separates raise the limit, so they do not prevent larger cells. Unless
-// the median diameter requires it, no cell is much wider than the bounds of all values. Preconditions: `sample` is not
-// empty, population >= sample.size(). Cost: at most about fifty sorts of the sample.
+// an even selection. Values that share a cell at every cell size raise the limit, so they do not prevent larger cells.
+// Unless the median diameter requires it, no cell is much wider than the bounds of all values. Preconditions: `sample`
+// is not empty, population >= sample.size(). Cost: at most about fifty sorts of the sample.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
-// Returns true if cells of that exponent are still suitable: a random value shares its cell with kMinOthersPerCell to
-// kMaxOthersPerCell others on average. Cost: one sort of the sample, so it is the cheap check for an unchanged world.
+// Returns true if cells with an edge of 2^exponent are still suitable: a random value shares its cell with
+// kMinOthersPerCell to kMaxOthersPerCell others on average. Costs one sort of the sample, much less than
+// choose_cell_exponent().
 bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
-// Even selection among `population` values, which are offered one by one: all of them if they are fewer than
-// kCellSizeSample, else kCellSizeSample to twice as many.
+// Even selection among `population` values, which are offered one by one. Selects all of them if they are fewer than
+// kCellSizeSample, else kCellSizeSample to 2 * kCellSizeSample of them.
 class EvenSample {
  public:
   explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}

@@ -5,8 +5,8 @@
 namespace locus::internal {
 
 GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((count + kLanes - 1) / kLanes * kLanes) {
-  // A vector load at the last value of the last float column ends within the handles or entries, so it stays in
-  // memory_.
+  // A vector load at the last value of the last float column reads beyond the column, but ends within the handles or
+  // entries and so within memory_.
   const size_t floats = size_t{4} * stride_ * sizeof(float);
   const size_t handles = size_t{stride_} * sizeof(uint32_t);
   const size_t entries = count * sizeof(GridEntry);

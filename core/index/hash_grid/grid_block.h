@@ -1,8 +1,9 @@
 // Block: values of one brick of the hash grid, in columns. Float columns, relative to the centre of the brick, serve
 // culling of eight values at a time; the exact values in double are one entry each.
 //
-// Threads: immutable once shared; any thread. A log is the exception: its one writer appends values behind those that
-// readers of earlier versions know, which share its memory.
+// Threads: immutable once shared; any thread. A log is the exception: its single writer appends values behind the slots
+// that earlier versions use, while the readers of these versions read the same memory.
+//
 // Invariants: in a sorted block values are ordered by cell, and those of cell c occupy the slots offsets[c] to
 // offsets[c + 1] - 1; in a log they are in order of arrival. Float columns are padded with zeros to whole vectors, and
 // a vector load may start at any value.
@@ -31,7 +32,7 @@ struct GridEntry {
 };
 static_assert(sizeof(GridEntry) == 56);
 
-// Rotation, size and radius of a shape, as in Shape. Default for most values.
+// Rotation, size and radius of a shape, as in Shape. Most values have the default form, so a block may omit the forms.
 struct GridForm {
   Quaternion rotation;
   Vec3f size;
@@ -42,7 +43,7 @@ struct GridForm {
 
 // Value with all its parts, for example to be inserted. `handle` is the identifier that the caller assigned. `reach` is
 // the extent of the value: an upper bound of the distance from its position to its bounds along any axis and under any
-// rotation, without the rounding of bounds; for balls the exact radius.
+// rotation, not including the growth of bounds_of() by rounding; for balls the exact radius.
 struct GridItem {
   GridEntry entry;
   uint32_t handle = 0;
@@ -69,7 +70,7 @@ class GridBlock {
     LOCUS_DCHECK(0 <= index && index < 4);
     return floats_ + size_t{stride_} * static_cast<size_t>(index);
   }
-  // Return the parts of a value. Precondition: slot < count().
+  // Return one part of the value in `slot`. Precondition: slot < count().
   const GridEntry& entry(uint32_t slot) const {
     LOCUS_DCHECK_LT(slot, count_);
     return entries_[slot];
@@ -87,19 +88,19 @@ class GridBlock {
     return handles_[slot];
   }
   GridItem item(uint32_t slot) const { return {entry(slot), handle(slot), extent(slot), form(slot)}; }
-  // Returns the slot of the handle, or count() if there is none. O(count), a vector at a time.
+  // Returns the slot of `handle`, or count() if the block does not contain it. O(count), a vector at a time.
   uint32_t find(uint32_t handle) const;
-  // Returns the last slot of the handle among the first `count` slots of a log, or `count` if there is none.
+  // Returns the last slot of `handle` among the first `count` slots of a log, or `count` if there is none.
   uint32_t find_last(uint32_t handle, uint32_t count) const;
-  // Returns the slot of the handle if it is one of the 16 slots around `slot`, else count(). A block of one vector is
-  // searched whole.
+  // Returns the slot of `handle` if it is one of the 16 slots around `slot`, else count(). A block of at most one
+  // vector is searched completely.
   uint32_t find_near(uint32_t handle, uint32_t slot) const;
 
   std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }
   const std::array<uint32_t, kBrickCells + 1>& offsets() const { return offsets_; }
 
-  // Prefetch the memory of a slot: prefetch_entry() its entry, which spans two cache lines more often than one;
-  // prefetch_value() also its handle and extent; prefetch_target() all columns, for a put().
+  // Prefetch the memory of a slot: prefetch_entry() its entry, which usually spans two cache lines; prefetch_value()
+  // also its handle and extent; prefetch_target() all columns, for Places::put().
   [[gnu::always_inline]] void prefetch_entry(uint32_t slot) const {
     const char* const entry = reinterpret_cast<const char*>(&entries_[slot]);
     __builtin_prefetch(entry);
@@ -160,7 +161,8 @@ class GridBlock {
     forms_[slot] = form;
   }
 
-  // Checks the offsets and the padding of a block that is not a log and whose slots have all been written. O(cells).
+  // Checks the cell offsets and the padding of the float columns. Precondition: the block is a sorted block, not a log,
+  // and all its slots have been written. O(cells).
   void check_invariants() const;
 
   size_t bytes() const { return sizeof(GridBlock) + bytes_; }

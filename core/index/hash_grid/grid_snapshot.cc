@@ -11,8 +11,8 @@ namespace locus {
 namespace internal {
 
 KeyRange cells_near(const GridLevel& level, const Aabbd& region) {
-  // All positions lie within the bounds of the level. Clipping to them keeps the cell indices in range, and max_extent
-  // includes the rounding.
+  // The position of every value lies within the bounds of the level, so clipping to these loses no value, and it keeps
+  // the cell indices in range. max_extent is already rounded up, so no further allowance is needed.
   const Aabbd& bounds = level.geometry.bounds;
   const Aabbd near = grown(region, level.geometry.max_extent);
   const Aabbd inside{max(near.min, bounds.min), min(near.max, bounds.max)};
@@ -60,7 +60,7 @@ void GridSnapshot::check_invariants() const {
 }
 
 GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
-  // A value that moved within the brick may have a slot in both blocks; the one in `sorted` is then dead.
+  // Searches the log first: a value that moved within the brick may still have a slot in `sorted`, which is dead.
   if (const uint32_t slot = brick.find_recent(handle); slot != brick.recent_count)
     return {*brick.recent, slot, brick.index};
   const uint32_t slot = brick.sorted->find(handle);

@@ -3,11 +3,11 @@
 // the value in double.
 //
 // A value is stored in the one cell that contains its position, on the level whose cells are at least as wide as the
-// value. A query therefore widens its range on each level by the largest extent of that level, at most half a cell for
-// values that fit the largest level. It misses no value, and a large value does not widen the lookups on other levels.
-// Levels are visited coarse to fine, so that a hit on a large near value shortens a ray before the many small values
-// are tested. Source: Ericson, Real-Time Collision Detection, 2005, 7.2 (one cell per value); Schornbaum, Hierarchical
-// Hash Grids for Coupled Particle Simulations, 2009.
+// value. A query therefore widens its range on each level by the largest extent of that level, which is at most half a
+// cell unless a value is wider than the cells of the coarsest possible level. So it misses no value, and a large value
+// does not widen the lookups on other levels. Levels are visited coarse to fine, so that a hit on a large near value
+// shortens a ray before the many small values are tested. Source: Ericson, Real-Time Collision Detection, 2005, 7.2
+// (one cell per value); Schornbaum, Hierarchical Hash Grids for Coupled Particle Simulations, 2009.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 
@@ -36,7 +36,7 @@ namespace internal {
 
 inline constexpr size_t kBricksPerLeaf = 64;
 using BrickArray = PersistentArray<BrickPtr, kBricksPerLeaf>;
-// Index of the brick of each value, by handle.
+// Index of the brick of each value, indexed by handle.
 using BrickIndices = PersistentArray<uint32_t, 1024>;
 
 struct GridLevel {
@@ -46,9 +46,10 @@ struct GridLevel {
   std::shared_ptr<const BrickTable> table;
 };
 
-// Returns the cells of a level that can contain the position of a value whose bounds overlap `region`.
+// Returns the cells of `level` in which a value whose bounds overlap `region` may be stored.
 KeyRange cells_near(const GridLevel& level, const Aabbd& region);
-// Returns the cells of `range` that lie in the brick, relative to it: coordinates 0 to 3.
+// Returns the part of the cell range `range` that lies in the brick with the key `brick`, relative to that brick:
+// coordinates 0 to 3.
 KeyRange within_brick(const KeyRange& range, const GridKey& brick);
 
 }  // namespace internal
@@ -73,12 +74,13 @@ class GridSnapshot {
   // returns false.
   template <class Visit>
   void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
-  // Calls visit(GridRef) for every value that shares a point with the ball, and for some others near it. `bounds` are
-  // the bounds of the ball. Visits fewer values than visit_region(bounds), and not all whose bounds overlap `bounds`.
+  // Calls visit(GridRef) for every value that shares a point with the ball, and for some others near it. Ends if
+  // visit() returns false. `bounds` are the bounds of the ball. Visits fewer values than visit_region(bounds): a value
+  // whose bounds overlap `bounds` may still be culled.
   template <class Visit>
   void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
-  // Calls fn(brick, cells) for each brick that visit_region(region) would scan, with the cells relative to the brick.
-  // Returns false, possibly after some calls, if the region may need more than `max_bricks` bricks.
+  // Calls fn(brick, cells) for each brick that visit_region(region) would scan; `cells` are the cells to scan, relative
+  // to the brick. Returns false, possibly after some calls, if the region may need more than `max_bricks` bricks.
   template <class Fn>
   bool for_few_bricks(const Aabbd& region, size_t max_bricks, Work& work, const Fn& fn) const;
 
@@ -92,15 +94,17 @@ class GridSnapshot {
 
   // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
   // for some others near it; roughly near to far on each level. limit() may fall during the visit. Ends if visit()
-  // returns false. Cost: the cells within the final limit(), or one test per brick of the level if bricks are fewer.
+  // returns false. Cost on each level: proportional to the cells within the final limit() and their values. If these
+  // cells lie in more bricks than the level has, each brick of the level is tested once instead.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 
-  // Calls visit(GridRef) for each value until it returns false. Returns false if a call did.
+  // Calls visit(GridRef) for each value. Stops and returns false if visit() returns false.
   template <class Visit>
   bool for_each(const Visit& visit) const;
-  // Calls visit(GridRef) for the values from the cursor on and advances the cursor behind each visited value, so that a
-  // long iteration can be split into steps. Returns false if a call did. O(visited values + values of the first brick).
+  // Continues an iteration over all values at `cursor`: calls visit(GridRef) for each further value until visit()
+  // returns false, and advances the cursor past each visited value. So a long iteration can be split into steps.
+  // Returns false if visit() did. O(visited values + values of the brick at the cursor).
   template <class Visit>
   bool for_each_from(GridCursor& cursor, const Visit& visit) const;
 
@@ -109,14 +113,14 @@ class GridSnapshot {
   // Returns the value of a handle, or an empty reference if the handle is not in use in this snapshot. O(values in a
   // brick).
   GridRef find(uint32_t handle) const;
-  // Returns find(value.handle()) for a value of another snapshot of the grid. Faster if the value has about the same
-  // slot in this snapshot.
+  // Returns find(value.handle()) for a value of another snapshot of the same grid. Faster than find() if the value has
+  // about the same slot in this snapshot.
   GridRef find_like(const GridRef& value) const;
 
   // Returns counts and memory of this snapshot. O(values).
   GridStatistics statistics() const;
-  // Returns the bytes of this snapshot that `other`, another snapshot of the grid, does not share. O(bricks that
-  // differ).
+  // Returns the size in bytes of the parts of this snapshot that are not shared with `other`, another snapshot of the
+  // same grid. O(bricks that differ).
   size_t unshared_bytes(const GridSnapshot& other) const;
 
  private:
@@ -124,27 +128,28 @@ class GridSnapshot {
   void check_invariants() const;
   const internal::Brick* find_brick(const internal::GridLevel& level, const internal::GridKey& key) const;
   static GridRef find_in(const internal::Brick& brick, uint32_t handle);
-  // Calls fn(brick) for the existing bricks of a range until it returns false. Returns false if a call did. Looks up
-  // each key, or iterates over the bricks of the level if they are fewer.
+  // Calls fn(brick) for the existing bricks of a range of keys. Stops and returns false if fn() returns false. Looks up
+  // each key or, if the level has fewer bricks than the range has keys, iterates over the bricks of the level.
   template <class Fn>
   bool for_each_brick(const internal::GridLevel& level, const internal::KeyRange& bricks, Work& work,
                       const Fn& fn) const;
-  // Visits the values of all cells near `region` that the culling function cull_of(brick) keeps (see scan_rows()).
+  // Visits the values in the cells near `region` that the culling function cull_of(brick) does not drop (see
+  // scan_rows()).
   template <class CullOf, class Visit>
   void visit_cells(const Aabbd& region, Work& work, const CullOf& cull_of, const Visit& visit) const;
   // Visits the bricks of one level slab by slab. Returns false if visit() did.
   template <class Limit, class Visit>
   bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double ray_radius,
              const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
-  // Returns the estimated number of values per cell near `point`.
+  // Returns the estimated number of values per cell of `level` near `point`.
   double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
-  // Visits the present shell and all later ones brick by brick, from near to far: used if a shell would name more
-  // bricks than the level has. Returns false if visit() did.
+  // Visits the values of the present shell and all later ones brick by brick, from near to far. Used if the range of a
+  // shell has more keys than the level has bricks. Returns false if visit() did.
   template <class Limit, class Visit>
   bool visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells, const Vec3d& point,
                             const Limit& limit, Work& work, const Visit& visit) const;
-  // Visits all bricks of a level that the ray meets, from near to far: used if march() would name more bricks than the
-  // level has. Returns false if visit() did.
+  // Visits all bricks of a level that the ray meets, from near to far. Used if march() would look up more keys than the
+  // level has bricks. Returns false if visit() did.
   template <class Limit, class Visit>
   bool visit_by_distance(const internal::GridLevel& level, double max_extent, double ray_radius,
                          const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
@@ -324,7 +329,7 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double ma
 
 template <class Limit, class Visit>
 void GridSnapshot::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
-  constexpr size_t kFewBricks = 1024;  // a shell of at most so many bricks is always visited key by key
+  constexpr size_t kFewBricks = 1024;  // a shell with at most this many brick keys is always visited key by key
   internal::NearCandidates candidates;
   for (const internal::GridLevel& level : levels_) {
     internal::NearestShells shells(point, level.geometry, values_per_cell(level, point));

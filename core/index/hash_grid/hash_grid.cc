@@ -49,7 +49,8 @@ void HashGrid::check_in_use(uint32_t handle) const {
   }
 }
 
-// Checks the invariants of the class for the bricks and values that the batch has changed. O(changes + levels).
+// Checks the invariants of the class for the levels and for the bricks and values that the batch has changed. O(changes
+// + levels).
 void HashGrid::check_invariants(const GridBatch& batch) const {
   if constexpr (kDebugChecks) {
     size_t values = 0, bricks = 0;
@@ -68,7 +69,8 @@ void HashGrid::check_invariants(const GridBatch& batch) const {
   }
 }
 
-// Checks that a brick agrees with its entry in brick_info_ and with its level; a dropped brick passes. O(1).
+// Checks that the version of a brick agrees with its entry in brick_info_ and with its level. Skips a dropped brick,
+// which has no version. O(1).
 void HashGrid::check_brick(uint32_t brick) const {
   if (bricks_[brick] == nullptr) return;
   const internal::Brick& version = *bricks_[brick];
@@ -132,8 +134,9 @@ uint32_t HashGrid::brick_for(Level& level, const GridKey& key) {
   return brick;
 }
 
-// A brick is touched if touched_ holds it at its index in touched_indices_. An index left by an earlier batch fails
-// this test, so touched_indices_ needs no clearing between batches.
+// Returns the index of `brick` in touched_, appending it if necessary. A brick is touched if touched_ holds it at its
+// index in touched_indices_. An index left by an earlier batch fails this test, so touched_indices_ needs no clearing
+// between batches.
 inline uint32_t HashGrid::touch(uint32_t brick) {
   const uint32_t known_index = touched_indices_[brick];
   if (known_index < touched_.size() && touched_[known_index] == brick) return known_index;
@@ -313,8 +316,8 @@ bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
          moves >= size_ / 2;
 }
 
-// Replaces move_all() if nearly all values move: iterates over the bricks and looks up the move of each value. Values
-// of a brick are adjacent in memory and most stay in their cell, so moves need not be grouped by brick.
+// Replaces move_all() if at least half of all values move: iterates over the bricks and looks up the move of each
+// value. Values of a brick are adjacent in memory and most stay in their cell, so moves need not be grouped by brick.
 void HashGrid::gather_all(const GridMoves& moves) {
   const internal::MoveFinder finder(moves);
   const auto bricks = static_cast<uint32_t>(brick_info_.size());  // later bricks are new and hold arrivals only
@@ -343,7 +346,7 @@ void HashGrid::gather_all(const GridMoves& moves) {
 
 size_t HashGrid::apply(const GridBatch& batch) {
   replaced_bytes_ = 0;
-  if (size_ == 0 && batch.inserted.size() >= first_choice_) {  // files a bulk load once, by the right cell size
+  if (size_ == 0 && batch.inserted.size() >= first_choice_) {  // files a bulk load only once
     internal::EvenSample sample(batch.inserted.size());
     for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
     base_exponent_ = internal::choose_cell_exponent(sample.values(), batch.inserted.size());
@@ -385,8 +388,8 @@ void HashGrid::choose_cell_size() {
   if (exponent != base_exponent_) start_refiling(exponent);
 }
 
-// Lists all bricks as stale. Neighbours follow each other in stale_bricks_, since their values go to the same new
-// bricks; refile() takes bricks from the end.
+// Adds all bricks to stale_bricks_, sorted so that neighbours follow each other, since their values move to the same
+// new bricks. The order is reversed, since refile() takes bricks from the end.
 void HashGrid::start_refiling(int base_exponent) {
   base_exponent_ = base_exponent;
   for (uint32_t brick = 0; brick < brick_info_.size(); ++brick)
@@ -399,7 +402,8 @@ void HashGrid::start_refiling(int base_exponent) {
   std::sort(stale_bricks_.begin(), stale_bricks_.end(), [&](uint32_t a, uint32_t b) { return order(b) < order(a); });
 }
 
-// Moves about `max_values` values, in whole bricks, from stale bricks to the levels of the new base cell.
+// Moves values from stale bricks to the levels of the new base cell, a whole brick at a time, until at least
+// `max_values` values have moved or no stale brick remains.
 void HashGrid::refile(size_t max_values) {
   std::vector<uint32_t> leaving;
   std::vector<GridItem> items;

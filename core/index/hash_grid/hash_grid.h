@@ -27,15 +27,16 @@
 namespace locus {
 
 struct HashGridOptions {
-  // Edge of the base cell until the first choice, rounded up to a power of two between 2^-20 and 2^31.
+  // Edge of the cells of the base level until the grid chooses the cell size itself for the first time. Rounded up to a
+  // power of two between 2^-20 and 2^31.
   double cell_size = 8;
-  // Number of values at which the cell size is chosen for the first time; the maximum of size_t means never. With up to
-  // about a thousand values the choice results in one brick, which is a list in columns.
+  // Number of values at which the grid chooses the cell size for the first time; the maximum of size_t means never.
+  // With up to about a thousand values the choice results in one brick, which works like a list in columns.
   size_t first_choice = 8;
 };
 
-// Changes of one batch. Handles are distinct within `removed` and `moves` together, and within `inserted`; a value may
-// be removed and inserted again under its handle.
+// Changes of one batch, applied in the order of the members. No handle occurs twice in `removed` and `moves` together,
+// nor twice in `inserted`. A handle may occur in both `removed` and `inserted`, which replaces its value.
 struct GridBatch {
   absl::Span<const uint32_t> removed;
   GridMoves moves;
@@ -52,12 +53,13 @@ class HashGrid {
   GridRef at(uint32_t handle) const;
   // Prefetches the memory that at() reads first.
   [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { __builtin_prefetch(&slots_[handle]); }
-  // Applies a batch. Returns the bytes that existing snapshots hold and later ones will not. Cost: O(changes), and for
-  // each touched brick O(changes) or O(values of the brick).
+  // Applies a batch. Returns the size in bytes of the data that the batch replaced: earlier snapshots still hold it,
+  // later ones will not. Cost: O(changes), plus for each touched brick O(changes of the brick) or O(values of the
+  // brick).
   size_t apply(const GridBatch& batch);
 
-  // Fills an empty grid with `items`, using the cell_size() of another grid that held the same values. The cell size is
-  // not chosen again until the rules above require it.
+  // Fills an empty grid with `items`. `cell_size` is the cell_size() of another grid that held the same values, so it
+  // is not chosen again until the rules above require it.
   void fill(absl::Span<const GridItem> items, double cell_size);
 
   // Calls visit(GridRef) for each value, until it returns false. O(size).
@@ -98,11 +100,12 @@ class HashGrid {
   void move_to_other_brick(const GridMove& move, const GridMoves& moves);
   void insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves);
   void insert(const GridItem& item);
-  // Returns the exponent of the level for values of that extent.
+  // Returns the exponent of the level for values of extent `extent`.
   int exponent_for(float extent) const;
-  // Returns the level for values of that extent; creates it if it does not exist.
+  // Returns the level for values of extent `extent`; creates it if it does not exist.
   Level& level_for(float extent);
-  // Returns the index of the brick of `key`; creates an entry without a version if there is none.
+  // Returns the index of the brick with key `key`. If there is none, creates its entries in brick_info_ and the level's
+  // table; its version in bricks_ is null until the batch is built.
   uint32_t brick_for(Level& level, const internal::GridKey& key);
   // Returns the index of `brick` in touched_; appends it if this batch has not touched it before.
   uint32_t touch(uint32_t brick);
@@ -133,7 +136,7 @@ class HashGrid {
   size_t size_at_choice_ = 0;
   size_t changes_since_choice_ = 0;
   size_t size_ = 0;
-  size_t replaced_bytes_ = 0;                   // bytes that the current batch has replaced
+  size_t replaced_bytes_ = 0;                   // size in bytes of the data that the current batch has replaced
   std::vector<std::unique_ptr<Level>> levels_;  // coarse to fine
   std::vector<BrickInfo> brick_info_;           // indexed by brick
   std::vector<uint32_t> free_bricks_;
@@ -155,7 +158,7 @@ class HashGrid {
   std::vector<internal::BrickChange> grouped_;  // changes in the order of touched_
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
-  // Values that stay in a brick, gathered by a batch that moves nearly all values.
+  // Values that stay in a brick, collected by gather_all().
   struct GatheredBrick {
     bool is_gathered = false;  // false: the next version of the brick follows from its changes alone
     absl::Span<const internal::BrickSource> sources;

@@ -11,7 +11,7 @@ constexpr double kFirstShellValues = 12;  // target number of values in the firs
 constexpr uint32_t kMinForEstimate = 4;   // min number of values for an estimate of the density
 constexpr double kShellGrowth = 1.6;      // factor of the width from shell to shell
 
-// Returns the query of the kernels for a shell, relative to the brick.
+// Returns the input of the kernel collect_near() for a shell, relative to the brick.
 GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_to) {
   const Vec3d to_point = point - brick.geometry.center;
   GridNear near;
@@ -23,8 +23,8 @@ GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_t
   return near;
 }
 
-// Returns the epsilon by which the region of a shell is widened, so that it contains all keys of the shell: more than
-// twice the epsilon of near_of() plus the rounding of the sides.
+// Returns the epsilon by which the region of a shell is widened, so that it overlaps the bounds of every value whose
+// key lies in the shell: more than twice the epsilon of near_of() plus the rounding of the region's sides.
 double epsilon_of(const Vec3d& point, const LevelGeometry& level) {
   const double edge = (1 << kBrickBits) / level.cells_per_unit;
   const double size = max_component(abs(point)) + magnitude(level.bounds);
@@ -40,7 +40,7 @@ float key_limit(double limit) {
 }
 
 double values_per_cell(const Brick& brick, const Vec3d& point) {
-  // Counts the cells around the cell corner nearest to the point, if they are in the brick.
+  // Counts the values in those cells of the brick that adjoin the cell corner nearest to the point.
   constexpr int kLast = (1 << kBrickBits) - 1;
   int low[3], high[3];
   for (int axis = 0; axis < 3; ++axis) {
@@ -153,8 +153,8 @@ void NearCandidates::sort() {
     std::sort(candidates_.begin(), candidates_.end(), before);
     return;
   }
-  // Sorts integers: the bits of a key, which is not negative, are ordered like the key. Their lowest bits are replaced
-  // by the index of the candidate.
+  // Sorts integers instead of floats: keys are not negative, so their bits have the same order. The lowest bits of each
+  // key are replaced by the index of its candidate.
   int32_t packed[kMaxSorted];
   Candidate given[kMaxSorted];
   for (uint32_t i = 0; i < count; ++i) {

@@ -1,11 +1,11 @@
 // Nearest-value search of the hash grid: visits shells around a point, each a little wider than the one before. The
-// values of a shell are collected by their distance in float and visited from near to far, so that few values are
-// visited that are not among the nearest, however many values lie around. For GridSnapshot; one object per query and
+// values of a shell are collected by their distance in float and visited from near to far. So few values are visited
+// that are not among the nearest, even if many values surround the point. For GridSnapshot; one object per query and
 // thread.
 //
 // The key of a value is the squared distance of its bounds from the point, in float and never greater than the exact
-// one; it is the same for every shell. A shell is a range of keys (above, up_to], so each value lies in exactly one
-// shell.
+// squared distance; it is the same for every shell. A shell is a range of keys (above, up_to], so each value lies in
+// exactly one shell.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 
@@ -18,7 +18,7 @@
 
 namespace locus::internal {
 
-// Returns an upper bound of the keys of all values within the squared distance `limit`.
+// Returns an upper bound of the keys of all values whose squared distance is at most `limit`.
 float key_limit(double limit);
 
 // Returns the estimated number of values per cell near `point`, which lies in the brick; 0 if the brick has too few
@@ -34,13 +34,13 @@ class NearestShells {
   NearestShells(const Vec3d& point, const LevelGeometry& level, double per_cell);
   NearestShells(const Vec3d& point, const LevelGeometry&& level, double per_cell) = delete;
 
-  // Advances to the next shell. Returns false if no key within the squared distance `limit` remains.
+  // Advances to the next shell. Returns false if no further key belongs to a squared distance of at most `limit`.
   bool next(double limit);
   float above() const { return above_; }
   float up_to() const { return up_to_; }
   // Returns a box that overlaps the bounds of every value of this shell.
   const Aabbd& region() const { return region_; }
-  // Returns a box that overlaps the bounds of every value within the squared distance `limit`.
+  // Returns a box that overlaps the bounds of every value whose squared distance is at most `limit`.
   Aabbd region_within(double limit) const;
 
  private:
@@ -57,11 +57,12 @@ class NearestShells {
 // Candidates of one shell: values of some bricks, to be visited from near to far.
 class NearCandidates {
  public:
-  // Adds the values of `cells`, which are relative to the brick, and of its log whose key is in (above, up_to].
+  // Adds the values of the brick whose key is in (above, up_to]: those of `cells`, which are relative to the brick, and
+  // those of its log.
   void collect(const Brick& brick, const KeyRange& cells, const Vec3d& point, float above, float up_to, Work& work);
 
-  // Calls visit(GridRef) for each candidate within limit(), the nearest first, until it returns false; limit() may fall
-  // during the visit. Returns false if a call did. Removes all candidates.
+  // Calls visit(GridRef) for each candidate within limit(), the nearest first, until visit() returns false; limit() may
+  // fall during the visit. Returns false if visit() did. Removes all candidates.
   template <class Limit, class Visit>
   bool visit(const Limit& limit, Work& work, const Visit& visit);
 
@@ -83,9 +84,9 @@ class NearCandidates {
   }
   void collect_rows(const GridBlock& block, uint32_t brick, const GridRows& rows, const GridNear& near);
   void collect_recent(const Brick& brick, const GridNear& near, Work& work);
-  // Adds candidates of the last source.
+  // Adds `count` candidates of the block sources_.back().
   void add(const uint32_t* slots, const float* keys, uint32_t count);
-  // Sorts the candidates by key. May lower the keys a little, which keeps their order.
+  // Sorts the candidates by key. May lower each key by a few units in the last place; the keys stay sorted.
   void sort();
 
   absl::InlinedVector<Candidate, kMaxSorted> candidates_;

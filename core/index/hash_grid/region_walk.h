@@ -1,6 +1,6 @@
-// Region walk: visits the values near many regions, one region after the other, in steps, so that the memory of the
-// next few regions is prefetched while one is visited. A grid of a million values does not fit the caches, and each
-// step of a query waits for memory whose address the step before has read; in a walk only the first query waits.
+// Region walk: visits the values near each of many regions. It works in steps, so that the memory of the next few
+// regions is prefetched while one is visited. In a grid of a million values, which does not fit the caches, each step
+// of a query waits for memory whose address the step before has read; in a walk only the first query waits.
 //
 // A walk belongs to one thread and borrows the grids. It visits for each region the same values as the visits of
 // GridSnapshot. Regions of more than a few bricks or values are passed to GridSnapshot, since waiting is a small part
@@ -19,14 +19,15 @@
 
 namespace locus {
 
-// Region of a grid query: the values in `ball` if it is given, with `bounds` as its bounds; else the values in
+// Region of a query on one grid: the ball if it is given, with `bounds` as the bounds of the ball; else the box
 // `bounds`.
 struct GridRegion {
   const GridSnapshot* grid = nullptr;
   Aabbd bounds;
   std::optional<Balld> ball;
 
-  // Calls visit(GridRef) like GridSnapshot::visit_ball() or visit_region().
+  // Calls visit(GridRef) as GridSnapshot::visit_ball() does if `ball` is given, else as GridSnapshot::visit_region()
+  // does.
   template <class Visit>
   void visit(Work& work, const Visit& visit) const {
     if (ball) return grid->visit_ball(*ball, bounds, work, visit);
@@ -36,7 +37,8 @@ struct GridRegion {
 
 namespace internal {
 
-// State of one region between its steps, which are called in this order, some time apart.
+// State of one region between the steps of its query. The find functions must be called in the order of their
+// declaration, then visit(). Each prefetches memory for the next, so other work should be done in between.
 class RegionSteps {
  public:
   void find_bricks(const GridRegion& region);
@@ -44,7 +46,7 @@ class RegionSteps {
   void find_rows();
   void find_values();
 
-  // Calls visit(GridRef) for each value until it returns false.
+  // Calls visit(GridRef) for each value near the region until visit() returns false.
   template <class Visit>
   void visit(Work& work, const Visit& visit) const;
 
@@ -95,16 +97,16 @@ void RegionSteps::visit(Work& work, const Visit& visit) const {
 
 class RegionWalk {
  public:
-  // Returns true if a walk through such a grid is faster than separate visits: from about 30 MB on. Measured: equal at
-  // 100,000 values, 1.5 to 2 times as fast at a million, a third slower if the grid fits the caches.
+  // Returns true if a walk through `grid` is faster than separate visits, which holds from about 30 MB of values on.
+  // Measured: equal at 100,000 values, 1.5 to 2 times as fast at a million, a third slower if the grid fits the caches.
   static bool pays(const GridSnapshot& grid) { return grid.size() >= 250'000; }
 
-  // Prepares a walk over region_of(begin) to region_of(end - 1). The function is called in this order, up to kAhead
-  // regions before the visit.
+  // Prepares a walk over region_of(begin) to region_of(end - 1). region_of() is called in this order, up to kAhead
+  // regions before the region is visited.
   RegionWalk(size_t begin, size_t end, std::function<GridRegion(size_t)> region_of);
 
-  // Calls visit(GridRef) for the values of the next region until it returns false. Precondition: not all regions have
-  // been visited.
+  // Calls visit(GridRef) for the values near the next region until visit() returns false. Precondition: not all regions
+  // have been visited.
   template <class Visit>
   void visit(Work& work, const Visit& visit) {
     LOCUS_DCHECK_LT(next_, end_);
@@ -115,7 +117,8 @@ class RegionWalk {
  private:
   static constexpr size_t kAhead = 4;  // number of steps before a visit
 
-  // Runs the first step of the region kAhead after the next one, and the following steps of those between.
+  // Runs one step for each of the kAhead regions after region next_: the last step for the nearest of them, the first
+  // step for the farthest.
   void take_steps();
   void take_step(size_t region, size_t step);
 

@@ -9,8 +9,8 @@
 namespace locus::internal {
 namespace {
 
-// Relative epsilon: covers the rounding of a dozen operations on numbers that are not much greater than the magnitude
-// it is multiplied by.
+// Relative epsilon: multiplied by a magnitude, it covers the rounding errors of a dozen operations on numbers that are
+// not much greater than this magnitude.
 constexpr double kRounding = 0x1p-44;
 
 int dominant_axis(Vec3d direction) {

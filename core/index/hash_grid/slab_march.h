@@ -3,9 +3,9 @@
 //
 // Every bound is computed from the integer index of the slab, never accumulated along the ray, and widened by the
 // largest extent of the level, the padding of the slab test and the rounding of the bounds themselves. Therefore a
-// value that passes the slab test is always stored in a brick that the march names, and each brick is named at most
-// once. Compare Amanatides and Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987, whose accumulated steps
-// miss cells on long rays.
+// value that passes the slab test is always stored in a brick that a slab lists, and each brick is listed at most once.
+// Compare Amanatides and Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987, whose accumulated steps miss
+// cells on long rays.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_SLAB_MARCH_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_SLAB_MARCH_H_
 
@@ -28,19 +28,19 @@ class SlabMarch {
     KeyRange bricks;  // may be empty
   };
 
-  // Prepares a march along the part of the ray up to `limit`, in the unit of the slab test.
+  // Prepares a march along the part of the ray up to `limit`, which is in units of the slab test.
   SlabMarch(const SlabRay<double>& ray, const LevelGeometry& level, double limit);
 
   // Returns the number of slabs; 0 if the ray misses the level.
   int64_t slabs() const { return slabs_; }
-  // Returns the approximate number of bricks that all slabs name for the limit of the constructor. Infinite if a bound
-  // overflows: slab() and layer() must then not be called.
+  // Returns the approximate number of brick keys that all slabs list for the limit of the constructor. Infinite if a
+  // bound overflows: slab() and layer() must then not be called.
   double bricks() const { return bricks_; }
-  // Returns slab `n`, counted from the near end. `limit` is at most the limit of the constructor.
-  // Precondition: 0 <= n < slabs().
+  // Returns slab `n`, counted from the near end, for the part of the ray up to `limit`. Preconditions: 0 <= n <
+  // slabs(), and `limit` is at most the limit of the constructor.
   Slab slab(int64_t n, double limit) const;
 
-  // Layer of cells within a slab; the four layers are counted from the near end.
+  // Layer of cells within a slab, one cell thick; the four layers of a slab are counted from the near end.
   struct Layer {
     double near;
     KeyRange cells;  // may be empty

@@ -34,8 +34,8 @@ class ListIndex {
     check_invariants(values_.size() - 1);
   }
 
-  // Removes the value with the id of `value`. Returns false and changes nothing if there is none. O(1): the last value
-  // takes the free slot, so the order is not kept.
+  // Removes the value with the id of `value`. If there is none, returns false and changes nothing. O(1): the last value
+  // moves to the free slot, so the order of values is not preserved.
   bool remove(const V& value) {
     const auto found = slots_.find(Traits::id(value));
     if (found == slots_.end()) return false;
@@ -70,7 +70,8 @@ class ListIndex {
   }
 
  private:
-  // Checks the sizes and, if it exists, the entry of `slot`, which has changed. O(1).
+  // Checks that the array and the map have the same size and, if `slot` exists, that the map has its entry. Call it
+  // with the slot that has changed. O(1).
   void check_invariants(size_t slot) const {
     if constexpr (kDebugChecks) {
       LOCUS_DCHECK_EQ(values_.size(), slots_.size());

@@ -1,10 +1,10 @@
 // Kernels that cull the values of the hash grid in float, eight at a time: plain data and a table of functions,
 // compiled once per instruction set. They only cull; exact decisions are made elsewhere, in double. Threads: any.
 //
-// A kernel keeps every value that the caller's query allows, in spite of rounding in its own few operations, because
-// callers widen the query by kCullEpsilon times the magnitudes involved. This covers, with room to spare, the rounding
-// of the columns to float (2^-24 of a coordinate), of the query (2^-24), and of the sums, products and fused products
-// below (each 2^-24 of its result).
+// A kernel never drops a value that satisfies the caller's original query, in spite of rounding in its own operations,
+// because callers widen the query by kCullEpsilon times the magnitudes involved. This covers, with room to spare, the
+// rounding of the columns to float (2^-24 of a coordinate), of the query (2^-24), and of the sums, products and fused
+// products of the kernels (each 2^-24 of its result).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 
@@ -38,7 +38,7 @@ struct GridBox {
 
 struct GridLine {
   float point[3], direction[3];  // the direction has length 1
-  float radius;                  // added to kDiagonal times the extent of a value
+  float radius;                  // added to kDiagonal times the extent of each value
   float from, to;                // part of the line, as signed distances from `point`
 };
 
@@ -61,7 +61,8 @@ struct GridKernels {
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
-  // Writes the slots of the values in the shell, in order, and their keys, which never exceed the exact ones.
+  // Writes the slots of the values in the shell, in order, to `slots` and their keys to `keys`. A key never exceeds the
+  // exact squared distance. Both arrays have room for kMaxValues and one vector more.
   uint32_t (*collect_near)(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys);
   // Sorts at most kMaxSorted distinct integers.
   void (*sort_few)(int32_t* values, uint32_t count);

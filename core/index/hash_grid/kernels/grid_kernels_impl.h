@@ -42,7 +42,7 @@ inline uint32_t bits_of(Lanes lanes) {
 #endif
 }
 
-// Returns a mask of the dead values among `slot` to slot + 7.
+// Returns a mask with one bit for each of the values `slot` to slot + 7, set if the value is dead.
 inline uint32_t dead_bits(const uint64_t* dead, uint32_t slot) {
   uint16_t bits;
   std::memcpy(&bits, reinterpret_cast<const char*>(dead) + slot / 8, sizeof(bits));
@@ -50,7 +50,7 @@ inline uint32_t dead_bits(const uint64_t* dead, uint32_t slot) {
 }
 
 #ifdef __AVX2__
-// Table from a mask of lanes to the indices of its lanes in order, one byte each.
+// Table that maps a mask of lanes to the indices of the lanes in the mask, ascending, one byte each.
 struct LanesOfMasks {
   constexpr LanesOfMasks() {
     for (uint32_t mask = 0; mask < 256; ++mask) {
@@ -76,7 +76,7 @@ inline void write_slots(uint32_t kept, uint32_t slot, uint32_t* slots) {
 #endif
 }
 
-// Writes the slots and keys of the lanes in the mask `kept`, like write_slots().
+// Writes the slots and the keys of the lanes in the mask `kept`, in the same way as write_slots().
 inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slots, float* keys) {
 #ifdef __AVX2__
   const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfMasks.lanes[kept])));
@@ -95,7 +95,7 @@ inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slot
 #endif
 }
 
-// List of the vectors of all rows: one loop over the list is faster than a loop of unknown length for each row.
+// List of the vectors of all rows. One loop over this list is faster than a loop of unknown length for each row.
 struct RowVectors {
   static constexpr uint32_t kUsual = 4;  // vectors of a row that are written without a loop of unknown length
   static constexpr uint32_t kMax = GridRows::kMaxValues / kLanes + GridRows::kMax + kUsual;
@@ -118,7 +118,8 @@ struct RowVectors {
   uint32_t lanes[kMax];
 };
 
-// Writes the slots of all live values of the rows for which the mask keep(slot) has a bit. Returns their number.
+// Writes the slots of all live values of the rows that keep(slot) accepts. keep(slot) returns a mask with one bit for
+// each of the eight values from `slot` on. Returns the number of written slots.
 template <class Keep>
 inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep) {
   uint32_t count = 0;
