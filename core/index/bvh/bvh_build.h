@@ -54,8 +54,8 @@ absl::Status cancelled_build();
 absl::Status refuse_bounds(size_t index);
 
 // Builds a tree over `boxes`. Errors: INVALID_ARGUMENT for an empty box, a box that is not finite, or bins out of
-// range; RESOURCE_EXHAUSTED for more than limits::kMaxBvhValues boxes; CANCELLED. Cost: typically O(n log n), O(n *
-// kMaxBvhDepth) in the worst case. Defined for float and double.
+// range; RESOURCE_EXHAUSTED for more than limits::kMaxBvhValues boxes; CANCELLED. Cost: typically O(n log n); in the
+// worst case O(n * kMaxBvhDepth). Defined for float and double.
 template <class S>
 absl::StatusOr<BvhLayout<S>> build_bvh_layout(absl::Span<const Aabb<S>> boxes, const BvhOptions& options);
 

@@ -17,7 +17,7 @@ inline constexpr int kTreeStack = 64 * (kTreeWidth - 1) + 1 + kTreeWidth;
 // Bit of TriangleNode::child that is set if the child is a block and clear if it is a node. The other bits are the
 // index of the block or node.
 inline constexpr uint32_t kBlockBit = 0x80000000u;
-// Value of TriangleNode::child in an unused slot.
+// Value of TriangleNode::child in an unused slot. It includes kBlockBit, so test for kNoChild first.
 inline constexpr uint32_t kNoChild = 0xFFFFFFFFu;
 
 // One node. A build stores children in order of increasing surface area; a restored tree stores them in the order of

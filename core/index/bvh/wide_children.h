@@ -1,5 +1,5 @@
-// Children of one wide node, given by its root in the binary tree: the up to eight binary nodes below that root which
-// remain when the binary nodes between are opened as their WideChoice says. Borrows the binary tree.
+// Children of one wide node: the up to eight binary nodes that are reached from the wide node's root in the binary tree
+// by opening binary nodes according to their WideChoice. Borrows the binary tree.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 

@@ -1,6 +1,6 @@
-// Ray kernels: intersect many rays with the tree of one mesh by vector instructions; the kernels of every instruction
-// set are in their own object file. A kernel decides in float only outside a documented error bound, and otherwise in
-// double by the arithmetic of TriangleRay (core/geometry/ray_triangle.h), so that its answers equal those of
+// Ray kernels: intersect many rays with the tree of one mesh by vector instructions; each instruction set has its
+// kernels in an object file of its own. A kernel decides in float only outside a documented error bound, and otherwise
+// in double by the arithmetic of TriangleRay (core/geometry/ray_triangle.h), so that its answers equal those of
 // TriangleRay bit for bit. If double cannot decide either, the ray is left undecided and the caller traces it triangle
 // by triangle. Plain data; functions without state, safe from any thread; a call uses 220 KB of stack.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
@@ -20,7 +20,7 @@ struct KernelRay {
   double direction[3];
   float limit;        // maximum t of a hit, inclusive, in units of the direction's length
   bool accept_front;  // whether to report triangles seen counter-clockwise
-  bool accept_back;
+  bool accept_back;   // whether to report triangles seen clockwise
   // True if the ray was not rotated into mesh axes: a zero component of its direction is exact, so that a triangle
   // perpendicular to that axis is exactly edge-on.
   bool unrotated = false;
@@ -48,8 +48,8 @@ struct KernelHit {
 
 // One of the hits found by all().
 struct KernelRow {
-  float t;  // in units of the direction's length
-  uint32_t number;
+  float t;          // in units of the direction's length
+  uint32_t number;  // triangle number
 };
 
 // Kernels of one instruction set.

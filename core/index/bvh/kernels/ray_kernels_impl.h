@@ -21,16 +21,17 @@ namespace {
 
 constexpr uint32_t kMaxFlights = 32;     // rays traced interleaved
 constexpr uint32_t kMaxPackets = 2;      // packets of coherent rays traced interleaved
-constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; an index of one fits in a byte
+constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; the index of such a ray fits in a byte
 static_assert(kPreparedRays <= 256 && kPreparedRays % kTreeWidth == 0 && kMaxFlights <= 256);
 
 // Ray being traced. `waiting` is a stack of child slot values: the nodes and blocks that the ray enters at or before
-// its limit. Its lowest element is the sentinel kNoChild. `nears` holds the entry distance of each element.
+// its limit. Its lowest element is the sentinel kNoChild. `nears` holds the t of entry for each other element (not if
+// kAny).
 struct alignas(64) InFlightRay {
   PreparedRay ray;
-  uint32_t index;
-  uint32_t now;  // current node or block, or kNoChild at the end
-  uint32_t top;
+  uint32_t index;  // index of the ray in the arrays of rays and hits
+  uint32_t now;    // current node or block, or kNoChild at the end
+  uint32_t top;    // number of elements in `waiting`
   float limit;
   uint32_t number;  // triangle number of the best hit so far; kAll: count of rows stored
   uint32_t nodes, tests;
@@ -117,8 +118,8 @@ class RayStream {
     next_steps.add(slot, kNode);
   }
 
-  // Opens the current node: pushes the children that the ray may hit, the nearest one last. If kAny, the order is that
-  // of the slots, which is faster and equally correct.
+  // Opens the current node: pushes the children that the ray may hit, the nearest one last. If kAny, pushes them in the
+  // order of their slots, because any hit will do.
   inline void open_node(uint32_t slot) {
     InFlightRay& flight = flights_[slot];
     const PreparedRay ray = flight.ray;

@@ -7,11 +7,11 @@
 //
 // Most triangles are decided by their vertices alone, relative to the centre:
 // - The error of the squared length of such a vertex is 5 u of its value: a vertex is certainly inside if this square
-//   is at most r^2 (1 - 2^-19). The predicate then finds the triangle, because the edge that starts at this vertex is
-//   near enough, whatever its length.
-// - The error of the projection of a vertex on another one, A, is 5 u L |A|; squaring both sides of the comparison adds
-//   6 u. If all three projections are beyond (r + 2^-19 (r + E)) |A|, the triangle is outside: a plane separates it
-//   from the ball by more than 2^-22 L.
+//   is at most r^2 (1 - 2^-19). The predicate then finds the triangle too: by its distance from the edge that starts at
+//   this vertex, whatever the lengths of the edges.
+// - The error of the projection of a vertex on another one, A, is 5 u L |A|; the squares on both sides of the
+//   comparison add 6 u. If all three projections are beyond (r + 2^-19 (r + E)) |A|, the triangle is outside: a plane
+//   separates it from the ball by more than 2^-22 L.
 //
 // The other triangles need a closer test:
 // - The error of the foot of the perpendicular on an edge is 5 u L for the dot product, 5 u for the square of the edge

@@ -1,5 +1,5 @@
 // Region kernels: find all triangles of one mesh's tree that overlap a ball or a box, eight boxes or triangles at a
-// time; the kernels of every instruction set are in their own object file. A kernel decides in float only outside a
+// time; each instruction set has its kernels in an object file of its own. A kernel decides in float only outside a
 // documented error bound. Otherwise it calls the caller's RegionJudge, which uses the predicates of
 // core/geometry/triangle_overlap.h, so that the answers of kernels equal those of the predicates. The triangle numbers
 // of a subtree that lies completely inside the region are copied without tests. The kernels are used through

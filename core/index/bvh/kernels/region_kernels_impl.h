@@ -66,7 +66,8 @@ struct Sink {
   // Returns whether the buffer may be too small for the numbers of one more block.
   inline bool full() const { return room - count < kTreeWidth; }
 
-  // Copies as many triangle numbers of `rest` as fit, and removes them from `rest`. Must not be called if full().
+  // Copies as many triangle numbers of `rest` as fit, and removes them from `rest`. Leaves seven elements of the buffer
+  // free, because copy_numbers() may overwrite seven elements beyond those copied. Must not be called if full().
   inline void copy_rest(const TriangleTree& tree) {
     const size_t max_count = room - count - (kTreeWidth - 1);
     const uint32_t fits = rest.count <= max_count ? rest.count : static_cast<uint32_t>(max_count);
