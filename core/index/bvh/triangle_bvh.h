@@ -78,8 +78,9 @@ class TriangleBvh {
   template <RegionVisitor<Triangle> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
-  // Passes candidates to `visitor`, roughly nearest first. Culls by float distances to boxes, whose error bound ensures
-  // that no triangle within visitor.limit() is culled (box_distances.h). Allocates no memory.
+  // Passes candidates to `visitor`, roughly nearest first. Culls using float distances to boxes; BoxDistances raises
+  // the limit by the error of these distances, so that no triangle within visitor.limit() is culled. Allocates no
+  // memory.
   template <PointVisitor<Triangle> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 

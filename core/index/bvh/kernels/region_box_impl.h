@@ -4,19 +4,19 @@
 // centre and along the box's axes, exceeds R. All computations start with differences of floats, whose relative error
 // is u, and each product and each sum is counted as one rounding, as without fused products. If the box is not rotated:
 //
-// - On the axis perpendicular to a box axis and an edge (x, y), the error of a projected vertex is
-//   4 u (|x| R_y + |y| R_x): two differences, a product and a sum; that of the projected box is the same. Half extents
-//   that are smaller or larger by 16 u R change the projected box by twice that. If an edge is parallel to the box's
-//   axis, all projections are exactly zero, which counts as overlapping. Edges are scaled by 2^60, so that no product
-//   underflows.
+// - On the axis perpendicular to a box axis and an edge (x, y), the error of a projected vertex is 4 u (|x| R_y + |y|
+//   R_x): two differences, a product and a sum; the error of the projected box is the same. The half extents `inner`
+//   and `outer`, which differ from h by 16 u R, change the projected box by twice the sum of both errors. If an edge is
+//   parallel to the box's axis, all projections are exactly zero, which counts as overlapping. Edges are scaled by
+//   2^60, so that no product underflows.
 // - The error of a normal's component, which is at most E^2, is 3 u of each of its products and u of itself: 7 u E^2.
 //   The error of the triangle's height is 7 u and 4 u of E^2 (R_x + R_y + R_z), that of the projected box 7 u and 3 u,
 //   and each sum with the bound adds u: 23 u in total, within plane = 32 u of it.
 //
 // If the box is rotated, with S the sum of R: the error of coordinates, sums of three products, is 5 u S, and that of
-// edges 9 u E: half extents differ by 2^-18 S. Across an edge, the error of a projected vertex is 42 u E S and that of
-// the projected box 14 u E S, within 2^-17 E S. The error of a normal's component is 78 u E^2, that of the height 78 u,
-// 26 u and 9 u of E^2 S, and that of the projected box 87 u, within 2^-15 E^2 S.
+// edges 9 u E; `inner` and `outer` differ from h by 2^-18 S. Across an edge, the error of a projected vertex is 42 u E
+// S and that of the projected box 14 u E S, within 2^-17 E S. The error of a normal's component is 78 u E^2, that of
+// the height 78 u, 26 u and 9 u of E^2 S, and that of the projected box 87 u, within 2^-15 E^2 S.
 //
 // A triangle that certainly overlaps on all axes has a point in common with the box; so has the triangle's own bounding
 // box, which the predicate tests too. Triangles without area are never certain unless a vertex is inside; a vertex
