@@ -14,9 +14,9 @@ namespace {
 // Maximum number of references in a subtree that one thread builds as one task. A constant, so that the tree does not
 // depend on the number of threads.
 constexpr uint32_t kSubtreeReferences = 4096;
-constexpr size_t kChunkReferences = 1u << 16;  // references in one task that computes an extent
-// Fixed cost of all nodes of a tree together, relative to the area of its root, if there were one node for each block.
-// Each node costs its part of it (see measure_costs()).
+constexpr size_t kChunkReferences = 1u << 16;  // number of references whose extent one task computes
+// Sum of the fixed costs of all nodes of a tree that has one node for each block, relative to the area of the root. A
+// node's fixed cost is this value divided by the number of blocks (see measure_costs()).
 constexpr double kNodeCost = 4;
 
 }  // namespace
@@ -46,7 +46,7 @@ class BinaryBuilder {
  private:
   using Nodes = typename BinaryTree<S>::Nodes;
 
-  // A node that has no children yet.
+  // Node that has no children yet, with its extent and its depth (1 for the root).
   struct Part {
     BinaryNode<S>* node;
     Extent<S> extent;
@@ -73,7 +73,8 @@ class BinaryBuilder {
     return node;
   }
 
-  // Splits nodes that are too large for one task, level by level. Returns the nodes that one task can build.
+  // Splits nodes that are too large for one task, level by level. Returns the nodes whose subtrees one task each can
+  // build.
   std::vector<Part> split_top(const Part& root, Nodes& nodes) const {
     std::vector<Part> small, level, next;
     const auto enqueue = [&](const Part& part) {
@@ -119,15 +120,15 @@ class BinaryBuilder {
     return {Part{&children[0], halves.parts[0], part.depth + 1}, Part{&children[1], halves.parts[1], part.depth + 1}};
   }
 
-  // Computes the factors of a wide node's cost: its area relative to the root's, and a small fixed cost that keeps the
-  // number of nodes low.
+  // Sets the two constants of a wide node's cost: area_share_, the factor that makes its area relative to the root's
+  // area, and node_cost_, a small fixed cost that keeps the number of nodes low.
   void measure_costs(const Extent<S>& total, uint32_t count) {
     const double area = half_area(total.bounds);
     area_share_ = area > 0 && std::isfinite(area) ? 1 / area : 0;
     node_cost_ = static_cast<float>(kNodeCost / blocks_for(count));
   }
 
-  // Computes how to collapse a node, whose children have their choices.
+  // Computes node.choice, which determines how the node is collapsed. The choices of its children must be known.
   void choose(BinaryNode<S>& node) const {
     if (node.is_leaf()) {
       LOCUS_DCHECK_LE(node.count, kBvhLeafSize);
@@ -142,8 +143,8 @@ class BinaryBuilder {
       for (BinaryNode<S>& node : *pair) choose(node);
   }
 
-  // Verifies that the children of each inner node partition its references, and that its bounds are the box around
-  // theirs. O(nodes).
+  // Verifies, in debug builds, that the two children of each inner node partition the node's references, and that the
+  // node's bounds are the box around its children's bounds. O(nodes).
   void check_invariants() const {
     if constexpr (kDebugChecks) {
       for (const Nodes& nodes : tree_.nodes_)

@@ -1,7 +1,7 @@
-// Binary tree over boxes with leaves of up to kBvhLeafSize: the intermediate result from which wide trees are made.
-// Equal references and options result in an equal tree, whatever threads and order BvhOptions::parallel_for chooses.
-// Immutable after build(). Invariants: the two children of a node partition its references; a node's bounds are exactly
-// the box around its references. Internal to this folder.
+// Binary tree over boxes with leaves of up to kBvhLeafSize boxes: the intermediate result of a build, which is
+// collapsed to nodes of up to eight children. Equal references and options result in an equal tree, whatever threads
+// and order BvhOptions::parallel_for chooses. Immutable after build(). Invariants: the two children of a node partition
+// its references; a node's bounds are exactly the box around its references. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
 #define LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
 
@@ -31,12 +31,13 @@ struct BinaryNode {
 template <class S>
 class BinaryTree {
  public:
-  // Builds a tree of `count` references, at least one, which it reorders. Returns CANCELLED if the cancel flag was set.
+  // Builds a tree of the `count` elements of `references`, at least one, and reorders them. Returns CANCELLED if the
+  // cancel flag was set.
   static absl::StatusOr<BinaryTree> build(std::unique_ptr<BoxReference<S>[]> references, uint32_t count,
                                           const BvhOptions& options);
 
   const BinaryNode<S>& root() const { return nodes_.front().front()[0]; }
-  // Returns the input index of the value at a position of the tree's order.
+  // Returns the input index of the value at `position` in the tree's order.
   uint32_t index(uint32_t position) const { return references_[position].index(); }
 
  private:
@@ -46,8 +47,8 @@ class BinaryTree {
   using Nodes = std::deque<std::array<BinaryNode<S>, 2>>;
 
   std::unique_ptr<BoxReference<S>[]> references_;
-  // First the nodes of the top, beginning with the root, then those of each subtree built as one task. In each list
-  // children follow their parents.
+  // The first element holds the nodes of the top of the tree, beginning with the root; each other element holds the
+  // nodes of one subtree that was built as one task. Within an element, children follow their parents.
   std::deque<Nodes> nodes_;
 };
 

@@ -1,6 +1,6 @@
 // Squared distances from a point to eight boxes, or to the boxes of eight triangles, computed in float for culling. If
-// a distance exceeds limit(x) in float, then the exact distance exceeds x in double: culling never drops a wanted box.
-// The loops over eight adjacent floats are compiled to vector instructions. Immutable; any thread.
+// a computed float distance exceeds limit(x), then the exact squared distance exceeds x, so culling never drops a box
+// within the limit x. The loops over eight adjacent floats are compiled to vector instructions. Immutable; any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_BOX_DISTANCES_H_
 #define LOCUS_CORE_INDEX_BVH_BOX_DISTANCES_H_
 
@@ -23,25 +23,27 @@ class BoxDistances {
         // Rounding the point to float moves it by less than 2^-24 sqrt(3) times its largest coordinate.
         pad_(planted(PlantedBug::kNearestTreePad) ? 0 : 0x1p-23 * max_component(abs(point))) {}
 
-  // Returns the limit in float for a limit of squared distances in double. The relative rounding error of gaps, squares
-  // and sums is less than 2^-22 of the distance.
+  // Returns the limit to which float distances must be compared if `squared` is the limit of the exact squared
+  // distances. It is raised by the error of the float distances: rounding of gaps, squares and sums changes a distance
+  // by less than 2^-22 of its value.
   float limit(double squared) const {
     LOCUS_DCHECK(!std::isnan(squared));
     const double raised = std::sqrt(squared) * (1 + kRounding) + pad_;
     const double result = raised * raised * (1 + kRounding);
-    // Squares below this lose precision in float (denormal range).
+    // Smaller limits are raised to kMin, because smaller squares lose precision in float (denormal range).
     constexpr double kMin = 0x1p-100, kMax = std::numeric_limits<float>::max();
     return result > kMax ? std::numeric_limits<float>::infinity() : static_cast<float>(std::max(result, kMin));
   }
 
-  // Writes the squared distance to each of eight boxes.
+  // Writes the squared distance from the point to each of eight boxes, given as in TriangleNode::bounds.
   void to_boxes(const float (&bounds)[6][kTreeWidth], float (&distances)[kTreeWidth]) const {
     for (int i = 0; i < kTreeWidth; ++i)
       distances[i] = squared(gap(x_, bounds[0][i], bounds[3][i]), gap(y_, bounds[1][i], bounds[4][i]),
                              gap(z_, bounds[2][i], bounds[5][i]));
   }
 
-  // Writes the squared distance to the box of each of eight triangles.
+  // Writes the squared distance from the point to the box around each of eight triangles, given as in
+  // TriangleBlock::vertices.
   void to_triangles(const float (&v)[9][kTreeWidth], float (&distances)[kTreeWidth]) const {
     for (int i = 0; i < kTreeWidth; ++i)
       distances[i] = squared(gap(x_, min_of_three(v[0][i], v[3][i], v[6][i]), max_of_three(v[0][i], v[3][i], v[6][i])),

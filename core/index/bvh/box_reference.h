@@ -1,5 +1,5 @@
-// Element that the builder sorts instead of a value: a box and an index, as small as vector instructions allow. Plain
-// data.
+// Element that the builder sorts in place of a value: the value's box and index, as small as vector instructions allow.
+// Plain data.
 #ifndef LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
 #define LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
 
@@ -13,25 +13,25 @@
 
 namespace locus {
 
-// A value's box and its index, which is stored in the spare lane of `min`. It has no default member initializers, so
-// that large arrays are first written by the threads that fill them.
+// Box and index of a value; the index is stored in the spare lane of `min`. It has no default member initializers, so
+// that allocating a large array writes no element: the threads that fill the array write first.
 template <class S>
 struct BoxReference {
   Quad<S> min, max;
 
-  // Makes a reference. The spare lanes of `box` may hold any value.
+  // Makes a reference from a box and an index. The spare lanes of `box` may hold any value.
   static BoxReference of(const QuadBox<S>& box, uint32_t index);
   uint32_t index() const;
   QuadBox<S> box() const { return {min, max}; }
-  // Returns twice the centre; used only in comparisons with other centres.
+  // Returns twice the centre of the box. The factor does no harm, because centres are compared only with each other.
   Quad<S> center() const { return min + max; }
 };
 
 template <class S>
 using BoxReferences = absl::Span<BoxReference<S>>;
 
-// Stores the index in the bits of a normal float of at least 2: arithmetic on the spare lane stays fast, because it
-// meets no denormal number.
+// Stores the index in the low 30 bits of a float of at least 2. The float is never denormal, because vector arithmetic,
+// which includes the spare lane, is slow for denormal numbers.
 template <>
 inline BoxReference<float> BoxReference<float>::of(const QuadBox<float>& box, uint32_t index) {
   constexpr uint32_t kNormalBits = 0x40000000u;

@@ -2,9 +2,10 @@
 // values a leaf, built once by the surface area heuristic. Serves the instances of a scene; meshes have TriangleBvh.
 //
 // Threads: immutable after build(); every member may run concurrently.
-// Invariants: a node's box contains the bounds of every value below it, so that the slab test, which is monotone, never
-// culls a value that a list would report; the depth is at most limits::kMaxBvhDepth, which sizes the fixed stack of a
-// visit; nodes and values are stored in depth-first order.
+// Invariants: a node's box contains the bounds of every value below it. The slab test is monotone: a ray that hits a
+// box also hits every larger box. It therefore never culls a value that a ListIndex, which tests every value, would
+// report; the depth is at most limits::kMaxBvhDepth, which sizes the fixed stack of a visit; nodes and values are
+// stored in depth-first order.
 // Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008 (wide
 // nodes).
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_H_
@@ -33,11 +34,11 @@ class Bvh {
  public:
   using Value = V;
 
-  // An empty tree.
+  // Makes an empty tree.
   Bvh() = default;
 
   // Builds a tree of `values`, whose ids must be unique; an empty vector is legal. Returns the errors of
-  // build_bvh_layout(), whose field "values" carries the index of the refused value.
+  // build_bvh_layout(); an error about one value names the field "values" and the value's index.
   static absl::StatusOr<Bvh> build(std::vector<V> values, const BvhOptions& options = {}) {
     std::vector<Aabb<S>> boxes;
     boxes.reserve(values.size());
@@ -47,7 +48,8 @@ class Bvh {
   }
 
   size_t size() const { return values_.size(); }
-  // Returns all values in storage order: depth-first, determined by the input and the options.
+  // Returns all values in storage order: the order is depth-first, and depends only on the input and the options of the
+  // build.
   absl::Span<const V> values() const { return values_; }
   // Returns the box around all values; an empty box for an empty tree.
   const Aabb<S>& bounds() const { return bounds_; }
@@ -55,26 +57,26 @@ class Bvh {
   size_t node_count() const { return nodes_.size(); }
   size_t bytes() const { return nodes_.size() * sizeof(BvhNode<S>) + values_.size() * sizeof(V); }
 
-  // Returns the expected number of nodes and leaves opened by a random ray that hits the tree's bounds: the sum of
-  // their surface areas, relative to that of the bounds. 0 for an empty tree. O(nodes).
+  // Returns the expected number of nodes and leaves opened by a random ray that hits bounds(): 1 for the root plus, for
+  // each node and leaf below it, its surface area divided by that of bounds(). Returns 0 for an empty tree. O(nodes).
   double sah_cost() const;
 
-  // Hands over candidates roughly in the order in which the ray enters their leaves: the children of each node in order
-  // of entry. Allocates only if more than 16 nodes are pending.
+  // Passes candidates to `visitor` roughly in the order in which the ray enters their leaves: the children of each node
+  // are visited in order of entry. Allocates memory only if more than 16 nodes and leaves are pending.
   template <RayVisitor<V> Visitor>
   void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
 
-  // Hands over the values whose own bounds overlap the region, in storage order. Allocates nothing.
+  // Passes to `visitor` the values whose own bounds overlap its region, in storage order. Allocates no memory.
   template <RegionVisitor<V> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
-  // Hands over the values whose own bounds are within the limit, roughly nearest first. Allocates only if more than
-  // 16 nodes are pending.
+  // Passes to `visitor` the values whose own bounds have a squared distance of at most visitor.limit() from `point`,
+  // roughly nearest first. Allocates memory only if more than 16 nodes and leaves are pending.
   template <PointVisitor<V> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
   // Resumable traversal of a ray: next() returns one candidate a call, so that the caller can process the candidates of
-  // many rays together. Borrows the tree. One thread at a time.
+  // many rays together. Borrows the tree. Must be used by one thread at a time.
   class RayWalk {
    public:
     RayWalk(const Bvh& tree, const SlabRay<S>& slabs)
@@ -93,18 +95,20 @@ class Bvh {
       S near;
     };
 
-    // Pushes the children that the ray may hit within the limit, the nearest one last.
+    // Pushes the children of `node` that the ray may hit at t <= `limit`, the nearest one last, so that it is popped
+    // first.
     void push_hit(const BvhNode<S>& node, S limit);
 
     const Bvh* tree_;
     SlabRay<S> slabs_;
     const V* value_ = nullptr;  // next value of the current leaf, up to end_
     const V* end_ = nullptr;
-    absl::InlinedVector<Pending, 16> pending_;  // seldom more than 16, at most kStackSize
+    absl::InlinedVector<Pending, 16> pending_;  // seldom more than 16 elements, at most kStackSize
   };
 
  private:
-  // Maximum number of pending children: all but one of each level, and one more on the last level.
+  // Maximum number of pending children: on each level one child is being visited and kBvhWidth - 1 are pending; on the
+  // last level all kBvhWidth are pending.
   static constexpr size_t kStackSize = size_t{limits::kMaxBvhDepth} * (kBvhWidth - 1) + 1;
 
   Bvh(BvhLayout<S> layout, std::vector<V> values)
@@ -118,11 +122,11 @@ class Bvh {
     check_invariants();
   }
 
-  // Verifies the bounds and ranges of all leaves, the order of nodes, and the depth. O(n).
+  // Verifies, in debug builds, the bounds and ranges of all leaves, the order of nodes, and the depth. O(n).
   void check_invariants() const;
 
-  // Returns whether a box can be skipped. A box entered exactly at the limit cannot: it may hold an equal hit with a
-  // lower id.
+  // Returns whether a box that the ray enters at `near` can be skipped. It cannot if `near` equals `limit`: the box may
+  // hold a hit at the same t with a lower id, which is preferred.
   static bool beyond(S near, S limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
 
   Interval<S> node_interval(const SlabRay<S>& slabs, const Aabb<S>& box) const {

@@ -15,7 +15,8 @@ inline constexpr uint32_t kBvhWidth = 8;     // children of a node
 inline constexpr uint32_t kBvhLeafSize = 8;  // maximum number of values in a leaf
 
 // Content of a child slot. A leaf (count > 0) holds the values at positions first .. first + count - 1; an inner child
-// (count == 0) is node `first`. It has no default member initializers, so that the stack of a visit needs no set-up.
+// (count == 0) is node `first`. It has no default member initializers, so that a visit need not initialize its stack
+// array.
 struct BvhChild {
   uint32_t first;
   uint32_t count;
@@ -31,9 +32,9 @@ struct BvhNode {
   uint32_t child_count = 0;
 };
 
-// A whole tree over boxes. Node 0 is the root. Nodes and values are stored in depth-first order: position i of the tree
-// holds value order[i] of the input, and the values of a subtree have contiguous positions. All members are empty if
-// there are no values.
+// Whole tree over boxes. Node 0 is the root. Nodes and values are stored in depth-first order: position i of the tree
+// holds the value at index order[i] of the input, and the values of a subtree have contiguous positions. If there are
+// no values, both vectors and `bounds` are empty.
 template <class S>
 struct BvhLayout {
   std::vector<BvhNode<S>> nodes;

@@ -1,6 +1,6 @@
-// Vector of four lanes: the coordinates x, y, z and a spare value, so that the builder processes all axes of a float
-// box by one vector instruction. Lanes are read by subscript or copied out, never by casting pointers: GCC 12
-// miscompiles such casts. Plain data.
+// Vector of four lanes: the coordinates x, y, z and a spare value. The builder processes all axes of a float box with
+// one vector instruction. Lanes are read by subscript or copied out, never by casting pointers: GCC 12 miscompiles such
+// casts. Plain data.
 #ifndef LOCUS_CORE_INDEX_BVH_QUAD_H_
 #define LOCUS_CORE_INDEX_BVH_QUAD_H_
 
@@ -28,14 +28,14 @@ struct Quad<float> {
   friend Quad operator+(Quad a, Quad b) { return {a.lanes + b.lanes}; }
   friend Quad operator-(Quad a, Quad b) { return {a.lanes - b.lanes}; }
   friend Quad operator*(Quad a, Quad b) { return {a.lanes * b.lanes}; }
-  // Lane by lane. If either lane is NaN, the result is the lane of `b`.
+  // Return the minimum or maximum of each lane. If either operand's lane is NaN, the result is the lane of `b`.
   friend Quad minimum(Quad a, Quad b) { return {a.lanes < b.lanes ? a.lanes : b.lanes}; }
   friend Quad maximum(Quad a, Quad b) { return {a.lanes > b.lanes ? a.lanes : b.lanes}; }
 
   // Returns 1 in each lane where a <= b, else 0.
   friend Quad less_or_equal(Quad a, Quad b) { return {a.lanes <= b.lanes ? splat(1).lanes : splat(0).lanes}; }
 
-  // Converts each lane by truncation. The lanes must be in the range of int32_t.
+  // Converts each lane to an integer by truncation. The lanes must be in the range of int32_t.
   std::array<int32_t, 4> to_int() const {
     using Integers = int32_t __attribute__((vector_size(16)));
     const auto integers = __builtin_convertvector(lanes, Integers);
@@ -45,7 +45,8 @@ struct Quad<float> {
   }
 };
 
-// Processes its lanes one by one: trees of doubles hold instances, which are few compared to the triangles of a mesh.
+// Quad of doubles, whose lanes are processed one by one: only trees of instances use it, and instances are few compared
+// to the triangles of a mesh.
 template <>
 struct Quad<double> {
   std::array<double, 4> lanes;
@@ -84,8 +85,8 @@ struct Quad<double> {
   }
 };
 
-// A box of quads; the spare lanes are ignored. It has no default member initializers, because only a part of the arrays
-// of boxes that the splitter declares is used.
+// Box whose corners are quads; the spare lanes are ignored. It has no default member initializers, because the splitter
+// declares arrays of boxes of which it uses only a part.
 template <class S>
 struct QuadBox {
   Quad<S> min, max;

@@ -15,12 +15,12 @@ using limits::kMaxBvhBins;
 constexpr size_t kMaxSorted = 32;
 // References processed between two checks of the cancel flag.
 constexpr size_t kReferencesBetweenChecks = 1u << 16;
-// Cost of a reference relative to that of a block. It decides between cuts with an equal number of blocks, which would
-// cost the same otherwise: the better one leaves fewer references in large boxes. A much larger value would result in
-// emptier blocks, which take memory.
+// Cost of a reference relative to the cost of a block. It makes a difference between cuts that need equally many
+// blocks: the cut that leaves fewer references in large boxes costs less. A much larger value would result in blocks
+// with fewer references, which wastes memory.
 constexpr double kReferenceCost = 1.0 / 128;
 
-// Calls `each` for successive chunks of `references`. Returns false if the build was cancelled.
+// Calls `each` for successive chunks of `references`. Returns false if the build was cancelled before the last chunk.
 template <class S, class Each>
 bool for_each_chunk(BoxReferences<S> references, const BvhOptions& options, Each each) {
   while (!references.empty()) {
@@ -31,8 +31,8 @@ bool for_each_chunk(BoxReferences<S> references, const BvhOptions& options, Each
   return true;
 }
 
-// Maps centres to bins along all axes at once. An axis has only one bin if all centres coincide along it, or if their
-// spread overflows or underflows.
+// Mapping of centres to bins along all axes at once. All centres are in bin 0 of an axis if they coincide along it, or
+// if the scale from centres to bins overflows or underflows.
 template <class S>
 class Binning {
  public:
@@ -55,29 +55,30 @@ class Binning {
   Quad<S> low_, last_, scale_;
 };
 
-// Bounds and number of the references in each bin, by axis.
+// Bounds and number of the references in each bin, indexed by axis and bin.
 template <class S>
 struct Bins {
   std::array<std::array<QuadBox<S>, kMaxBvhBins>, 3> boxes;
   std::array<std::array<uint32_t, kMaxBvhBins>, 3> counts;
 };
 
-// Returns the cost of visiting a part with `count` references.
+// Returns the cost of visiting a part with `count` references, relative to the part's surface area.
 template <class S>
 S cost_of(uint32_t count) {
   return static_cast<S>(blocks_for(count)) + static_cast<S>(kReferenceCost) * static_cast<S>(count);
 }
 
-// A cut of a range into two parts.
+// Cut of a range into two parts.
 template <class S>
 struct Split {
-  int axis = -1;     // none found
+  int axis = -1;     // -1 if no cut was found
   uint32_t bin = 0;  // first bin of the right part
   S cost = std::numeric_limits<S>::infinity();
-  uint32_t imbalance = 0;  // decides between cuts of equal cost: the smaller one is better
+  uint32_t imbalance = 0;  // sorted ranges: difference of the parts' lengths; the lower one wins at equal cost
 };
 
-// Sweeps the bins of one axis from both sides. Stores the cheapest cut in `best` if it is better than `best`.
+// Sweeps the bins of one axis from both sides. Replaces `best` by the cheapest cut between two bins if that costs less.
+// `total` is the number of references in all bins.
 template <class S>
 void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uint32_t total, Split<S>& best) {
   std::array<S, kMaxBvhBins> right_cost;
@@ -99,12 +100,12 @@ void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uin
   }
 }
 
-// Orders of up to kMaxSorted references along each axis: sorted by centre, stable.
+// Orders of up to kMaxSorted references, one for each axis: sorted by centre; equal centres keep their order.
 template <class S>
 class Orders {
  public:
-  // Computes the rank of each reference, which is the number of references before it. All pairs are compared, along all
-  // axes at once and without a branch.
+  // Computes the rank of each reference on each axis, which is the number of references before it in sorted order. All
+  // pairs of references are compared, on all axes at once and without a branch.
   explicit Orders(BoxReferences<S> references) {
     LOCUS_DCHECK_LE(references.size(), kMaxSorted);
     std::array<Quad<S>, kMaxSorted> centers, ranks;
@@ -137,8 +138,8 @@ class Orders {
   std::array<std::array<uint8_t, kMaxSorted>, 3> order_;
 };
 
-// Sweeps the sorted references of one axis from both sides. Stores the cheapest cut in `best` if it is better than
-// `best`; its `bin` is the length of the left part.
+// Sweeps the sorted references of one axis from both sides. Replaces `best` by the cheapest cut if that is better. In
+// such a cut, `bin` is the length of the left part.
 template <class S>
 void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, size_t axis, Split<S>& best) {
   const size_t count = references.size();
@@ -178,8 +179,9 @@ void fill_bins(BoxReferences<S> references, const Binning<S>& binning, uint32_t 
   });
 }
 
-// Moves the references of the left part to the front and computes the bounds of both parts' centres in the same pass.
-// Every reference is swapped, whatever its part: a branch here would be mispredicted half of the time.
+// Moves the references of the left part to the front, and computes the bounds of the centres of each part in the same
+// loop. Every reference is swapped, also one of the right part, because a branch here would be mispredicted half of the
+// time.
 template <class S>
 Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, const Split<S>& split,
                     const BvhOptions& options) {
@@ -209,7 +211,8 @@ Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, cons
   return halves;
 }
 
-// Splits by bins. Returns an empty left part if the heuristic finds no cut.
+// Splits at the cheapest border between two bins of any axis. Returns left_count 0 if there is no such cut of finite
+// cost.
 template <class S>
 Halves<S> split_binned(BoxReferences<S> references, const Extent<S>& extent, const BvhOptions& options) {
   const auto count = static_cast<uint32_t>(references.size());
@@ -228,7 +231,8 @@ Halves<S> split_binned(BoxReferences<S> references, const Extent<S>& extent, con
   return halves;
 }
 
-// Splits at the cheapest cut of the sorted centres along any axis. Returns an empty left part if areas overflow.
+// Splits at the cheapest cut of the references sorted by centre along any axis. Returns left_count 0 if the areas
+// overflow, so that no cut has a finite cost.
 template <class S>
 Halves<S> split_sorted(BoxReferences<S> references) {
   const Orders<S> orders(references);
@@ -245,7 +249,7 @@ Halves<S> halve(BoxReferences<S> references, const QuadBox<S>& centers) {
   const Vec3<S> spread = centers.box().extent();
   const int axis = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
   const size_t middle = references.size() / 2;
-  // The index decides between equal centres, so that the halves do not depend on the order of the input.
+  // Equal centres are ordered by index, so that the halves do not depend on the current order of `references`.
   std::nth_element(references.begin(), references.begin() + middle, references.end(),
                    [axis](const BoxReference<S>& a, const BoxReference<S>& b) {
                      const S center_a = a.center()[axis], center_b = b.center()[axis];

@@ -14,15 +14,15 @@
 namespace locus {
 namespace {
 
-// Blocks or nodes in one task.
+// Number of blocks or nodes that one task fills.
 constexpr size_t kChunk = 4096;
 
-// Returns INVALID_ARGUMENT.
+// Returns INVALID_ARGUMENT with `why` as the reason.
 absl::Status mismatch(absl::string_view why) {
   return absl::InvalidArgumentError(absl::StrCat("the topology does not fit the mesh: ", why));
 }
 
-// Restores a tree: verifies the topology, links blocks and nodes, then computes their boxes from the triangles.
+// Restorer of one tree: verifies the topology, links blocks and nodes, then computes their boxes from the triangles.
 class Restorer {
  public:
   Restorer(const TreeTopology& topology, uint32_t triangle_count, absl::FunctionRef<Triangle(uint32_t)> triangle,
@@ -77,7 +77,7 @@ class Restorer {
     node_boxes_.resize(arrays_.node_count);
   }
 
-  // Computes the first position of each block.
+  // Sets the storage position of each block's first triangle. Verifies the block sizes.
   absl::Status set_block_positions() {
     uint64_t position = 0;
     for (uint32_t block = 0; block < arrays_.block_count; ++block) {
@@ -90,7 +90,8 @@ class Restorer {
     return absl::OkStatus();
   }
 
-  // Sets the children of each node, and the first position of its triangles.
+  // Sets the children of each node, and the storage position of the first triangle below it. Verifies that the nodes
+  // and blocks form one tree within the depth limit.
   absl::Status link_nodes() {
     uint32_t next_block = 0;
     std::vector<Pending> pending = {{0, 0, 1}};
@@ -107,7 +108,8 @@ class Restorer {
         return mismatch("invalid children of a node");
       if (arrays_.block_count - next_block < static_cast<uint32_t>(std::popcount(children.blocks)))
         return mismatch("too few blocks");
-      // If no block is left, a node below this one is refused.
+      // If no block is left, this node has only nodes as children, and the topology is refused later: a node below this
+      // one has too few blocks, or nodes are missing. The position set here is then never used.
       arrays_.ranges[index].first =
           next_block < arrays_.block_count ? arrays_.blocks[next_block].first : arrays_.triangle_count;
       TriangleNode& node = arrays_.nodes[index];
@@ -122,7 +124,7 @@ class Restorer {
     return absl::OkStatus();
   }
 
-  // Calls work(0) .. work(count - 1) in parallel tasks; skips the rest if the build is cancelled.
+  // Calls work(0) .. work(count - 1) in parallel tasks. If the build is cancelled, tasks not yet started make no calls.
   void for_each_in_chunks(uint32_t count, absl::FunctionRef<void(uint32_t)> work) const {
     for_each(options_, (count + kChunk - 1) / kChunk, [&](size_t chunk) {
       if (cancelled(options_)) return;
@@ -151,8 +153,8 @@ class Restorer {
     return (child & kBlockBit) != 0 ? arrays_.blocks[child & ~kBlockBit].count : arrays_.ranges[child].count;
   }
 
-  // Computes the box and the number of triangles of each node, from the last node to the first: children follow their
-  // parents.
+  // Computes the box and the number of triangles of each node, from the last node to the first, so that children, which
+  // follow their parents, are computed first.
   void compute_node_boxes() {
     for (uint32_t index = arrays_.node_count; index-- > 0;) {
       uint32_t count = 0;

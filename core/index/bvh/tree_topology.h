@@ -1,7 +1,8 @@
 // Topology of a triangle tree: which triangles form a block, and which blocks and nodes are the children of a node. It
-// holds no coordinates and takes five bytes a triangle. The same tree is restored from it in a fraction of the time of
-// a build, byte for byte except for the signs of zeros in boxes. Boxes are computed from the triangles themselves, so
-// any topology that fits the mesh results in correct answers; a bad one only makes queries slow.
+// holds no coordinates and takes five bytes a triangle. restore_arrays() restores the tree from it in a fraction of the
+// time of a build; the result equals the original byte for byte, except for the signs of zeros in boxes. Boxes are
+// computed from the triangles themselves, so any topology that fits the mesh results in correct answers; a bad topology
+// only makes queries slow.
 //
 // Plain data; free functions, any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_TREE_TOPOLOGY_H_
@@ -20,8 +21,8 @@
 
 namespace locus {
 
-// Children of one node. Bit k of `blocks` is set if slot k holds a block, bit k of `nodes` if it holds a node. Used
-// slots are contiguous from slot 0 on.
+// Kinds of the children of one node. Bit k of `blocks` is set if slot k holds a block, bit k of `nodes` if it holds a
+// node. Used slots are contiguous from slot 0 on.
 struct NodeOutline {
   uint8_t blocks = 0;
   uint8_t nodes = 0;
@@ -32,17 +33,17 @@ struct NodeOutline {
 // Topology of a whole tree, in the order of a TriangleTree: depth-first, the blocks of a node before the nodes below
 // it.
 struct TreeTopology {
-  absl::Span<const uint32_t> numbers;  // triangle number of each position; borrowed
+  absl::Span<const uint32_t> numbers;  // triangle number at each storage position; borrowed
   std::vector<uint8_t> block_sizes;    // triangles of each block, 1 to kTreeWidth
   std::vector<NodeOutline> nodes;
 };
 
-// Returns the topology of a tree that is not empty. Borrows the triangle numbers from `arrays`.
+// Returns the topology of the tree in `arrays`, which must not be empty. Borrows the triangle numbers from `arrays`.
 TreeTopology topology_of(const TriangleArrays& arrays);
 
-// Restores the tree of a topology. Calls `triangle` once for each number below `triangle_count`, on any threads; the
-// vertices it returns must be finite. Errors: INVALID_ARGUMENT if the topology is not one of a tree of `triangle_count`
-// triangles within the depth limit; CANCELLED. O(n).
+// Restores the tree that `topology` describes. Calls `triangle` once for each number below `triangle_count`, on any
+// threads; the vertices it returns must be finite. Errors: INVALID_ARGUMENT if `topology` does not describe a tree of
+// `triangle_count` triangles within the depth limit; CANCELLED. O(n).
 absl::StatusOr<TriangleArrays> restore_arrays(const TreeTopology& topology, uint32_t triangle_count,
                                               absl::FunctionRef<Triangle(uint32_t)> triangle,
                                               const BvhOptions& options);

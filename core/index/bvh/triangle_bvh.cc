@@ -17,10 +17,10 @@ static_assert(limits::kMaxBvhValues < kBlockBit >> 1, "kernels use two flag bits
 
 namespace {
 
-// Triangles in one task that computes boxes.
+// Number of triangles whose BoxReference one task computes.
 constexpr size_t kChunkTriangles = 1u << 14;
 
-// Computes the reference of a triangle. Returns false if a vertex is not finite.
+// Computes the BoxReference of the triangle at `index` of the input. Returns false if a vertex is not finite.
 bool make_reference(const Triangle& triangle, uint32_t index, BoxReference<float>& reference) {
   const Quad<float> a = Quad<float>::of(triangle.a.x, triangle.a.y, triangle.a.z, 0);
   const Quad<float> b = Quad<float>::of(triangle.b.x, triangle.b.y, triangle.b.z, 0);
@@ -31,8 +31,8 @@ bool make_reference(const Triangle& triangle, uint32_t index, BoxReference<float
   return difference[0] + difference[1] + difference[2] == 0;
 }
 
-// Computes the references of all triangles. Errors: INVALID_ARGUMENT for the first triangle that is not finite;
-// CANCELLED.
+// Writes the BoxReference of each triangle to `references`. Errors: INVALID_ARGUMENT for the first triangle that is not
+// finite; CANCELLED.
 absl::Status make_references(absl::Span<const Triangle> triangles, const BvhOptions& options,
                              BoxReference<float>* references) {
   std::vector<size_t> bad((triangles.size() + kChunkTriangles - 1) / kChunkTriangles, triangles.size());
@@ -114,8 +114,8 @@ void TriangleBvh::check_invariants() const {
   }
 }
 
-// Verifies one node: contiguous slots, orders that contain every slot once, boxes that contain the boxes or triangles
-// below them, and the size of its range.
+// Verifies one node: its used slots are contiguous, each of its orders contains every slot once, its boxes contain the
+// boxes or triangles below them, and its range has the length of its children's ranges together.
 void TriangleBvh::check_node(uint32_t index) const {
   if constexpr (kDebugChecks) {
     const TriangleNode& node = arrays_.nodes[index];

@@ -1,6 +1,6 @@
-// Bounding volume hierarchy over the triangles of one mesh, in the layout that the vector kernels read. As a spatial
-// index it hands triangles to visitors, like Bvh. Callers that need no visitor pass tree() to the faster kernels of
-// ray_kernels.h and region_kernels.h.
+// Bounding volume hierarchy over the triangles of one mesh, in the layout that the vector kernels read. It has the same
+// visits as Bvh, which pass triangles to visitors (spatial_index.h). Callers that need no visitor pass tree() to the
+// faster kernels of ray_kernels.h and region_kernels.h.
 //
 // Threads: immutable after build() or restore(); every member may run concurrently.
 // Invariants: the box of a child slot contains all triangles below it; the depth is at most limits::kMaxBvhDepth;
@@ -28,37 +28,39 @@ class TriangleBvh {
  public:
   using Value = Triangle;
 
-  // An empty tree.
+  // Makes an empty tree.
   TriangleBvh() = default;
 
-  // Builds a tree of `triangles`, whose numbers must be unique; an empty span is legal. Returns the errors of
+  // Builds a tree of `triangles`, whose triangle numbers must be unique; an empty span is legal. Returns the errors of
   // build_bvh_layout().
   static absl::StatusOr<TriangleBvh> build(absl::Span<const Triangle> triangles, const BvhOptions& options = {});
-  // Restores a tree from its topology(). The triangles have the numbers 0 to triangle_count - 1 and finite vertices.
-  // O(n) and several times faster than build(). Any other topology of that many triangles results in a tree with
-  // equally correct answers, possibly slower. Returns the errors of restore_arrays().
+  // Restores a tree from its topology(). `triangle` returns the triangle of each number below `triangle_count`; its
+  // vertices must be finite. O(n), several times faster than build(). The topology of any other tree with that many
+  // triangles is legal too: answers stay correct, but queries may be slower. Returns the errors of restore_arrays().
   static absl::StatusOr<TriangleBvh> restore(const TreeTopology& topology, uint32_t triangle_count,
                                              absl::FunctionRef<Triangle(uint32_t)> triangle,
                                              const BvhOptions& options = {});
 
   size_t size() const { return arrays_.triangle_count; }
-  // Returns the triangle at a position of the storage order, which is determined by the input and options of the build,
-  // or by the topology. `position` must be below size(). O(log n).
+  // Returns the triangle at `position` in the storage order, which is determined by the input and options of the build,
+  // or by the topology. Precondition: `position` < size(). O(log n).
   Triangle at(size_t position) const;
   // Returns the box around all triangles; an empty box for an empty tree.
   const Aabbf& bounds() const { return bounds_; }
   uint32_t depth() const { return arrays_.depth; }
   size_t node_count() const { return arrays_.node_count; }
   size_t block_count() const { return arrays_.block_count; }
-  // Returns a triangle of a block of this tree. `lane` must be below the block's count.
+  // Returns the triangle in lane `lane` of `block`, which must be a block of this tree. Precondition: `lane` <
+  // block.count.
   Triangle triangle(const TriangleBlock& block, uint32_t lane) const;
-  // Returns the allocated bytes, without the object itself.
+  // Returns the size in bytes of the memory allocated by this object; sizeof(TriangleBvh) is not included.
   size_t bytes() const;
-  // Returns the expected cost of a random ray: see Bvh::sah_cost().
+  // Returns the expected number of nodes and blocks opened by a random ray, computed as by Bvh::sah_cost().
   double sah_cost() const;
-  // Returns the topology, which borrows from this object. The tree must not be empty.
+  // Returns the topology of this tree. Its triangle numbers are borrowed from this object. The tree must not be empty.
   TreeTopology topology() const { return topology_of(arrays_); }
-  // Returns a view of the arrays, valid until this object is moved or destroyed. The tree must not be empty.
+  // Returns a view of the nodes, ranges, blocks and triangle numbers, valid until this object is moved or destroyed.
+  // The tree must not be empty.
   TriangleTree tree() const {
     LOCUS_DCHECK_LT(0u, size());
     return {arrays_.nodes.get(), arrays_.ranges.get(), arrays_.blocks.get(), arrays_.numbers.get(), magnitude_};
@@ -68,21 +70,23 @@ class TriangleBvh {
   template <class Visit>
   void for_each(Visit visit) const;
 
-  // Hands over candidates roughly in the order in which the ray enters their blocks. Allocates nothing.
+  // Passes candidates to `visitor` roughly in the order in which the ray enters their blocks. Allocates no memory.
   template <RayVisitor<Triangle> Visitor>
   void visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const;
 
-  // Hands over the triangles whose own bounds overlap the region, in storage order. Allocates nothing.
+  // Passes to `visitor` the triangles whose own bounds overlap its region, in storage order. Allocates no memory.
   template <RegionVisitor<Triangle> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
-  // Hands over candidates, roughly nearest first. Culls by distances in float, which never drop a triangle within the
-  // limit (box_distances.h). Allocates nothing.
+  // Passes candidates to `visitor`, roughly nearest first. Culls using float distances to boxes; BoxDistances raises
+  // the limit by the error of these distances, so that no triangle within visitor.limit() is culled. Allocates no
+  // memory.
   template <PointVisitor<Triangle> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
  private:
-  // Maximum number of pending children in a visit, without the elements that vector code may write beyond them.
+  // Maximum number of pending children in a visit. kTreeStack is larger by kTreeWidth, because vector code may write
+  // that many elements beyond the last pending child.
   static constexpr int kMaxPending = kTreeStack - kTreeWidth;
 
   struct Pending {
@@ -91,20 +95,22 @@ class TriangleBvh {
   };
 
   void set_bounds(const Aabbf& bounds);
-  // Verifies the order of nodes, blocks and triangles, all ranges, boxes and orders. O(size).
+  // Verifies, in debug builds, the storage order of nodes, blocks and triangles, and the ranges, boxes and slot orders
+  // of all nodes. O(size).
   void check_invariants() const;
   void check_node(uint32_t index) const;
-  // Returns whether a box can be skipped. A box entered exactly at the limit cannot: it may hold an equal hit with a
-  // lower number.
+  // Returns whether a box that the ray enters at `near` can be skipped. It cannot if `near` equals `limit`: the box may
+  // hold a hit at the same t with a lower triangle number, which is preferred.
   static bool beyond(float near, float limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
   static Aabbf box(const TriangleNode& node, int slot) {
     return {{node.bounds[0][slot], node.bounds[1][slot], node.bounds[2][slot]},
             {node.bounds[3][slot], node.bounds[4][slot], node.bounds[5][slot]}};
   }
   Interval<float> node_interval(const SlabRay<float>& slabs, const Aabbf& box) const;
-  // Pushes the children within the limit, the nearest one last. Returns the new top.
+  // Pushes the children whose squared distance, given by slot, is at most `limit`. The nearest child is pushed last, so
+  // that it is popped first. Returns the new top of the stack.
   static Pending* push_near(const TriangleNode& node, const float (&distances)[kTreeWidth], float limit, Pending* top);
-  // Pushes the children that the ray may hit within the limit, the nearest one last. Returns the new top.
+  // Pushes the children that the ray may hit at t <= `limit`, the nearest one last. Returns the new top of the stack.
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
 
   absl::Span<const TriangleNode> nodes() const { return {arrays_.nodes.get(), arrays_.node_count}; }
@@ -165,7 +171,7 @@ void TriangleBvh::visit_region(Visitor& visitor, Work& work) const {
     if ((now & kBlockBit) == 0) {
       ++work.nodes;
       const TriangleNode& node = arrays_.nodes[now];
-      // Nodes are pushed first, so that blocks are popped before nodes: storage order.
+      // Nodes are pushed first, so that blocks are popped before nodes, which is the storage order.
       for (const uint32_t kind : {uint32_t{0}, kBlockBit}) {
         for (int slot = kTreeWidth; slot-- > 0;) {
           const uint32_t child = node.child[slot];

@@ -10,13 +10,14 @@
 namespace locus {
 namespace {
 
-// Coordinate of a box that no test hits: min = +kUnusedBound, max = -kUnusedBound.
+// Bound of the boxes of unused slots, which no test hits: min = +kUnusedBound, max = -kUnusedBound.
 constexpr float kUnusedBound = 1e30f;
 
-using Orders = std::array<uint32_t, 8>;  // one for each octant of directions
+using Orders = std::array<uint32_t, 8>;  // TriangleNode::order: one element for each octant of ray directions
 
-// Returns, for each octant of directions, the distance of the box's nearest corner along the octant's diagonal. Uses a
-// quarter of each coordinate, so that sums stay finite.
+// Returns, for each octant of ray directions, the distance of the box's nearest corner along the octant's diagonal.
+// Distances are scaled, and only comparable with each other: a quarter of each coordinate is added, so that sums stay
+// finite.
 std::array<float, 8> corner_distances(const Aabbf& box) {
   std::array<float, 8> result;
   for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -27,8 +28,9 @@ std::array<float, 8> corner_distances(const Aabbf& box) {
   return result;
 }
 
-// Returns, for each octant, the order of slots from far to near along its diagonal: unused slots first, equal distances
-// by slot. The rank of a slot is the number of slots before it; all octants are ranked at once, without a branch.
+// Returns, for each octant, the order of slots from far to near along the octant's diagonal. Unused slots come first;
+// slots at equal distances are in increasing order. A slot's rank is the number of slots before it; the ranks for all
+// octants are computed at once, without a branch.
 Orders orders_of(absl::Span<const Aabbf> boxes) {
   std::array<std::array<float, 8>, kTreeWidth> distances;
   std::array<Orders, kTreeWidth> ranks{};

@@ -9,13 +9,15 @@
 namespace locus {
 
 inline constexpr int kTreeWidth = 8;  // children of a node, triangles of a block
-// Length of the stack of a visit: each level leaves at most all but one of its children pending, and vector code may
-// write eight entries beyond the last one.
+// Length of a visit's stack. On each of at most 64 levels one child is being visited and up to kTreeWidth - 1 are
+// pending; on the last level one more is pending. Vector code may write kTreeWidth elements beyond the last pending
+// child.
 inline constexpr int kTreeStack = 64 * (kTreeWidth - 1) + 1 + kTreeWidth;
 
-// A child slot refers to a block if this bit is set, else to a node.
+// Bit of TriangleNode::child that is set if the child is a block and clear if it is a node. The other bits are the
+// index of the block or node.
 inline constexpr uint32_t kBlockBit = 0x80000000u;
-// Content of an unused child slot.
+// Value of TriangleNode::child in an unused slot. It includes kBlockBit, so test for kNoChild first.
 inline constexpr uint32_t kNoChild = 0xFFFFFFFFu;
 
 // One node. A build stores children in order of increasing surface area; a restored tree stores them in the order of
@@ -23,20 +25,20 @@ inline constexpr uint32_t kNoChild = 0xFFFFFFFFu;
 struct alignas(64) TriangleNode {
   float bounds[6][kTreeWidth];  // min x, y, z, max x, y, z
   uint32_t child[kTreeWidth];
-  // For each octant of directions (bit k is set if component k is negative): the slots in order from far to near, three
-  // bits each, the farthest one in the lowest bits. Unused slots come first.
+  // Slots from far to near, for each octant of ray directions (bit k of the octant is set if component k is negative):
+  // three bits a slot, the farthest slot in the lowest bits. Unused slots count as farthest.
   uint32_t order[kTreeWidth];
 };
 static_assert(sizeof(TriangleNode) == 256);
 
 // Leaf of up to eight triangles; unused lanes repeat the last triangle. It stores three vertices of each triangle,
-// never a vertex and two edges: vertex + edge is not the exact other vertex in float, which would leave gaps between
-// neighbouring triangles.
+// never a vertex and two edges: vertex + edge, rounded to float, can differ from the other vertex, which would leave
+// gaps between neighbouring triangles.
 struct alignas(64) TriangleBlock {
   float vertices[9][kTreeWidth];  // a.x, a.y, a.z, b.x ... c.z
   uint32_t first;                 // storage position of the first triangle
   uint32_t count;                 // 1 to 8
-  float extent;                   // longest side of the box around all of them, rounded up
+  float extent;                   // longest side of the box around the triangles, rounded up
   uint32_t unused[5];
 };
 static_assert(sizeof(TriangleBlock) == 320);
@@ -47,13 +49,14 @@ struct NodeRange {
   uint32_t count;
 };
 
-// A whole tree, borrowed. Node 0 is the root. Nodes, blocks and triangles are stored in depth-first order: for each
-// node first the blocks among its children, then the child nodes with everything below them, each in order of slots.
+// View of a whole tree, whose arrays it borrows. Node 0 is the root. Nodes, blocks and triangles are stored in
+// depth-first order: for each node first the blocks among its children, then the child nodes with everything below
+// them, each in order of slots.
 struct TriangleTree {
   const TriangleNode* nodes;
-  const NodeRange* ranges;  // by node
+  const NodeRange* ranges;  // range of each node
   const TriangleBlock* blocks;
-  const uint32_t* numbers;  // by storage position: the triangle's number in the uploaded index list
+  const uint32_t* numbers;  // for each storage position, the triangle's number in the uploaded index list
   float magnitude;          // largest |coordinate| of any vertex
 };
 

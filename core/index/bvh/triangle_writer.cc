@@ -13,7 +13,7 @@ static_assert(kBvhWidth == kTreeWidth && kBvhLeafSize == kTreeWidth);
 
 namespace {
 
-// Maximum number of triangles in a subtree that is written as one chunk. The result does not depend on it.
+// Maximum number of triangles in a subtree that is written as one chunk. The resulting tree does not depend on it.
 constexpr uint32_t kChunkTriangles = 8192;
 
 // Returns the children of a wide node in order of increasing area.
@@ -50,8 +50,8 @@ TriangleArrays TriangleWriter::write() {
   return std::move(arrays_);
 }
 
-// Pushes in reverse order, so that the first child is the next one popped: depth-first order. Leaves are popped before
-// inner nodes.
+// Pushes the children in reverse order, so that the first child is popped next, which results in depth-first order.
+// Leaves are popped before inner nodes.
 void TriangleWriter::push_children(const WideChildren<float>& children, uint32_t parent, uint32_t depth,
                                    std::vector<Pending>& pending) {
   for (const bool leaves : {false, true})
@@ -59,7 +59,7 @@ void TriangleWriter::push_children(const WideChildren<float>& children, uint32_t
       if (children[slot].is_leaf() == leaves) pending.push_back({&children[slot], parent, slot, depth});
 }
 
-// Returns the chunks in depth-first order: the single nodes of the top, and the subtrees below them.
+// Returns all chunks in depth-first order: the single nodes of the tree's top, and the subtrees below them.
 std::vector<TriangleWriter::Chunk> TriangleWriter::split_into_chunks() const {
   std::vector<Chunk> chunks;
   std::vector<Pending> pending = {{&tree_.root(), 0, 0, 1}};
@@ -102,7 +102,8 @@ TriangleWriter::Offsets TriangleWriter::count(Chunk& chunk) const {
   return size;
 }
 
-// Writes the nodes of the top, and links every chunk to its parent. All chunks must have their offsets.
+// Writes the nodes of the tree's top, and stores each chunk's root in the child slot of its parent. Chunk::start must
+// be set in all chunks.
 void TriangleWriter::write_top(const std::vector<Chunk>& chunks) {
   for (const Chunk& chunk : chunks)
     if (!chunk.is_subtree)
@@ -144,7 +145,7 @@ void TriangleWriter::write_subtree(const Chunk& chunk) {
   LOCUS_DCHECK_EQ(next.position, chunk.start.position + chunk.root->count);
 }
 
-// Writes a node except for its child indices, which are set when the children are written.
+// Writes a node and its range. Sets all child slots to kNoChild; the used slots are set when the children are written.
 void TriangleWriter::write_node(const WideChildren<float>& children, NodeRange range, uint32_t index) {
   LOCUS_DCHECK_LT(index, arrays_.node_count);
   arrays_.ranges[index] = range;

@@ -1,7 +1,8 @@
-// Converts a binary tree over triangles to the nodes and blocks of a TriangleBvh: children in order of increasing area,
-// everything depth-first, blocks before nodes. The tree is divided into chunks. A first pass counts the nodes, blocks
-// and triangles of each chunk, which determines where it is stored; a second pass writes the chunks. Both passes run on
-// many threads. Internal to this folder.
+// Converts a binary tree over triangles to the nodes and blocks of a TriangleBvh. The children of a node are in order
+// of increasing area; nodes and blocks are stored depth-first, the blocks of a node before its child nodes. The tree is
+// divided into chunks. A first pass counts the nodes, blocks and triangles of each chunk, from which the chunk's
+// offsets in the output arrays follow; a second pass writes the chunks. Both passes process chunks in parallel.
+// Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 
@@ -26,21 +27,23 @@ struct TriangleArrays {
   uint32_t depth = 0;  // levels of nodes
 };
 
-// Writes one tree. Borrows its arguments; for one call of write().
+// Writer of one tree. Borrows the constructor's arguments. write() must be called only once.
 class TriangleWriter {
  public:
   TriangleWriter(absl::Span<const Triangle> triangles, const BinaryTree<float>& tree, const BvhOptions& options)
       : triangles_(triangles), tree_(tree), options_(options) {}
 
-  // Returns the arrays, which are incomplete if the build was cancelled.
+  // Writes the tree and returns its arrays, whose contents are incomplete if the build was cancelled.
   TriangleArrays write();
 
  private:
-  // Offsets in the arrays, or numbers of elements.
+  // Offsets of the next element in the arrays `nodes`, `blocks` and `numbers` of TriangleArrays. As the result of
+  // count(): the numbers of nodes, blocks and triangles in a chunk.
   struct Offsets {
     uint32_t node = 0, block = 0, position = 0;
   };
-  // Unit of work: a single node of the top, or a whole subtree.
+  // Unit of work: a single node of the tree's top, which has too many triangles below it for one chunk, or a whole
+  // subtree.
   struct Chunk {
     const BinaryNode<float>* root;
     bool is_subtree;
@@ -48,7 +51,8 @@ class TriangleWriter {
     uint32_t depth;  // levels of nodes from the tree's root to the chunk's root; count() extends it to the deepest node
     Offsets start;
   };
-  // A child that was not visited yet.
+  // Child of a wide node that was not visited yet. `parent` is the index of the parent: that of its chunk in
+  // split_into_chunks(), that of its node in write_subtree().
   struct Pending {
     const BinaryNode<float>* node;
     uint32_t parent, slot;
@@ -59,8 +63,8 @@ class TriangleWriter {
                             std::vector<Pending>& pending);
   std::vector<Chunk> split_into_chunks() const;
   bool is_block(const Chunk& chunk) const;
-  // Returns the numbers of nodes, blocks and triangles of a chunk. Raises the chunk's depth to that of its deepest
-  // node.
+  // Returns the numbers of nodes, blocks and triangles written for a chunk; a single node counts without its children.
+  // For a subtree, raises chunk.depth to the depth of the deepest node.
   Offsets count(Chunk& chunk) const;
   void write_top(const std::vector<Chunk>& chunks);
   void write_subtree(const Chunk& chunk);

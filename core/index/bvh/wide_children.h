@@ -1,5 +1,5 @@
-// Children of one wide node: the up to eight binary nodes to which the choices of wide_choice.h collapse it. Borrows
-// the binary tree.
+// Children of one wide node: the up to eight binary nodes that are reached from the wide node's root in the binary tree
+// by opening binary nodes according to their WideChoice. Borrows the binary tree.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 
@@ -13,8 +13,8 @@ namespace locus {
 template <class S>
 class WideChildren {
  public:
-  // Collects the children from left to right. If `root` is a leaf, which happens only for a tree of a single leaf, it
-  // is its own only child.
+  // Collects the children of the wide node with the given `root`, from left to right. If `root` is a leaf, which
+  // happens only if the whole tree is one leaf, the only child is `root` itself.
   explicit WideChildren(const BinaryNode<S>& root) {
     struct Pending {
       const BinaryNode<S>* node;
@@ -60,7 +60,7 @@ class WideChildren {
   }
 
  private:
-  // Verifies that the children, from left to right, partition the references of `root`.
+  // Verifies, in debug builds, that the children, from left to right, partition the references of `root`.
   void check_children(const BinaryNode<S>& root) const {
     if constexpr (kDebugChecks) {
       uint32_t next = root.first;

@@ -1,8 +1,9 @@
-// Choice of how a binary tree is collapsed to nodes of eight children at the least cost. For each binary node and each
-// number of child slots it may occupy, it states whether the node is opened, and how many of the slots its left child
-// gets. Computed from the leaves upwards by dynamic programming. The cost of a wide node is its area plus a small
-// constant, which keeps the number of nodes low. Immutable.
-// Invariants: more slots never cost more; each child gets at least one slot of an opened node.
+// Choice of how a binary node is collapsed into nodes of up to eight children at minimum cost. For each number of child
+// slots that the binary node may occupy in a wide node, the choice is either to make the binary node a wide node of its
+// own, or to open it: its two children then share the slots, and the choice says how many the left child gets. Computed
+// from the leaves upwards by dynamic programming. The cost of a wide node is its area plus a small constant, which
+// keeps the number of nodes low. Immutable.
+// Invariants: the cost never increases with the number of slots; each child of an opened node gets at least one slot.
 // Source: Ylitie, Karras, Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, 2017.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
@@ -20,7 +21,8 @@ class WideChoice {
   // Makes the choice of a leaf, whose cost is 0 with any number of slots.
   WideChoice() = default;
 
-  // Makes the choice of an inner node from those of its children. `cost` is the cost of a wide node of its own.
+  // Makes the choice of an inner node from the choices of its children. `cost` is the cost of the wide node that it can
+  // become, without that node's children.
   WideChoice(const WideChoice& left, const WideChoice& right, float cost) {
     std::array<float, kBvhWidth + 1> opened{};
     for (uint32_t slots = 2; slots <= kBvhWidth; ++slots) opened[slots] = best_share(left, right, slots);
@@ -33,15 +35,16 @@ class WideChoice {
     check_invariants();
   }
 
-  // Returns how many of `slots` slots, two to eight, the left child of an inner node gets; 0 if the node is not opened
-  // but becomes a wide node of its own. With eight slots it is always opened.
+  // Returns how many of `slots` slots, two to eight, the left child of an inner node gets. Returns 0 if the node is not
+  // opened, but becomes a wide node of its own. With eight slots the node is always opened.
   uint32_t left_slots(uint32_t slots) const {
     LOCUS_DCHECK(2 <= slots && slots <= kBvhWidth);
     return left_slots_[slots];
   }
 
  private:
-  // Verifies that more slots never cost more, and that each child gets at least one slot of an opened node.
+  // Verifies, in debug builds, that the cost never increases with the number of slots, and that a node is opened if it
+  // has eight slots.
   void check_invariants() const {
     if constexpr (kDebugChecks) {
       for (uint32_t slots = 2; slots < kBvhWidth; ++slots) LOCUS_DCHECK_LE(costs_[slots], costs_[slots - 1]);
@@ -50,8 +53,8 @@ class WideChoice {
     }
   }
 
-  // Returns the least cost of sharing `slots` slots between the children, and stores the left child's share. The even
-  // share is tried first and wins if costs are equal.
+  // Returns the minimum cost of sharing `slots` slots between the children, and stores the left child's number of slots
+  // in left_slots_. The even share is tried first and wins if costs are equal.
   float best_share(const WideChoice& left, const WideChoice& right, uint32_t slots) {
     uint32_t best = slots / 2;
     float min_cost = left.costs_[best] + right.costs_[slots - best];
@@ -66,7 +69,7 @@ class WideChoice {
     return min_cost;
   }
 
-  std::array<float, kBvhWidth> costs_{};  // least cost by number of slots, from 1 on
+  std::array<float, kBvhWidth> costs_{};  // minimum cost for each number of slots, 1 to 7
   std::array<uint8_t, kBvhWidth + 1> left_slots_{};
 };
 

@@ -1,4 +1,4 @@
-// Selection of the tree's kernels for the instruction set in use.
+// Selection of the ray and region kernels for the instruction set in use.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 

@@ -13,7 +13,7 @@
 namespace locus {
 namespace {
 
-// Prefetches `bytes` bytes of memory from `from` on.
+// Prefetches the cache lines of the `bytes` bytes of memory that begin at `from`.
 static inline void prefetch(const void* from, int bytes) {
   for (int line = 0; line < bytes; line += 64) _mm_prefetch(static_cast<const char*>(from) + line, _MM_HINT_T0);
 }

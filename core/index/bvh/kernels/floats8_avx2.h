@@ -29,32 +29,32 @@ struct Floats8 {
 static inline Floats8 multiply_add(Floats8 a, Floats8 b, Floats8 c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
 static inline Floats8 multiply_subtract(Floats8 a, Floats8 b, Floats8 c) { return {_mm256_fmsub_ps(a.v, b.v, c.v)}; }
 static inline Floats8 subtract_product(Floats8 c, Floats8 a, Floats8 b) { return {_mm256_fnmadd_ps(a.v, b.v, c.v)}; }
-// Return the second operand in lanes where either is NaN.
+// Return the minimum or maximum of each lane; the lane of `b` if either operand's lane is NaN.
 static inline Floats8 minimum(Floats8 a, Floats8 b) { return {_mm256_min_ps(a.v, b.v)}; }
 static inline Floats8 maximum(Floats8 a, Floats8 b) { return {_mm256_max_ps(a.v, b.v)}; }
 static inline Floats8 square_root(Floats8 a) { return {_mm256_sqrt_ps(a.v)}; }
 static inline Floats8 absolute(Floats8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v)}; }
 
-// Returns lanes with the given bits.
+// Returns a vector whose lanes all have the bit pattern `bits`.
 static inline Floats8 bits_of(uint32_t bits) {
   return {_mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int>(bits)))};
 }
 static inline Floats8 bit_and(Floats8 a, Floats8 b) { return {_mm256_and_ps(a.v, b.v)}; }
 static inline Floats8 bit_or(Floats8 a, Floats8 b) { return {_mm256_or_ps(a.v, b.v)}; }
 static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
-// Returns lanes whose sign bit is set if a >= b.
+// Returns a mask for select(): the sign bit of a lane is set if a >= b.
 static inline Floats8 greater_equal_mask(Floats8 a, Floats8 b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_GE_OQ)}; }
 // Returns `yes` in the lanes where the sign bit of `mask` is set, `no` in the others.
 static inline Floats8 select(Floats8 mask, Floats8 yes, Floats8 no) { return {_mm256_blendv_ps(no.v, yes.v, mask.v)}; }
 
-// Returns the largest lane in all lanes.
+// Returns a vector whose lanes all have the value of the largest lane of `a`.
 static inline Floats8 horizontal_max(Floats8 a) {
   const __m256 halves = _mm256_max_ps(a.v, _mm256_permute2f128_ps(a.v, a.v, 1));
   const __m256 pairs = _mm256_max_ps(halves, _mm256_permute_ps(halves, _MM_SHUFFLE(1, 0, 3, 2)));
   return {_mm256_max_ps(pairs, _mm256_permute_ps(pairs, _MM_SHUFFLE(2, 3, 0, 1)))};
 }
 
-// Return one bit a lane: a <= b or a < b. The bit is 0 if either is NaN.
+// Return one bit a lane: at_most() whether a <= b, below() whether a < b. The bit is 0 if either operand's lane is NaN.
 static inline uint32_t at_most(Floats8 a, Floats8 b) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
 }
@@ -62,8 +62,8 @@ static inline uint32_t below(Floats8 a, Floats8 b) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
 }
 
-// For each set of lanes, the indices of its lanes in increasing order, at the front of the row. Computed at compile
-// time.
+// Table with one row for each set of lanes, given as a bit mask: the indices of the lanes in the set, in increasing
+// order, at the front of the row. Computed at compile time.
 struct PackTable {
   alignas(64) uint8_t lanes[256][8];
   constexpr PackTable() : lanes() {
@@ -76,13 +76,13 @@ struct PackTable {
 };
 static constexpr PackTable kPack;
 
-// Returns the permutation that moves the lanes of a set to the front.
+// Returns the permutation that moves the lanes in the mask `set` to the front.
 static inline __m256i pack_permutation(uint32_t set) {
   return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kPack.lanes[set])));
 }
 
-// Writes the children whose boxes are hit (near <= far) in the order of their slots, and returns their number. Always
-// writes eight elements.
+// Writes the children whose boxes are hit (near <= far) in the order of their slots, and returns their number. May
+// overwrite all eight elements of `children`.
 static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t* children) {
   const uint32_t set = at_most(near, far);
   const __m256i all_children = _mm256_load_si256(reinterpret_cast<const __m256i*>(node.child));
@@ -91,14 +91,16 @@ static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Flo
   return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
-// Returns a node's slots from far to near for an octant of directions, each in the lowest three bits of a lane.
+// Returns the slots of a node from far to near for an octant of ray directions, each in the lowest three bits of a
+// lane. The other bits of a lane are not zero.
 static inline __m256i slots_in_order(const TriangleNode& node, uint32_t octant) {
   const __m256i shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
   return _mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(node.order[octant])), shifts);
 }
 
-// Writes the slots of the children whose boxes are hit from far to near for an octant of directions, each in the lowest
-// three bits of an element, and returns their number. Always writes eight elements.
+// Writes the slots of the children whose boxes are hit (near <= far), from far to near for an octant of ray directions,
+// and returns their number. Each slot is in the lowest three bits of an element, whose other bits are not zero. May
+// overwrite all eight elements of `slots`.
 static inline uint32_t pack_slots(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
                                   uint32_t* slots) {
   const __m256i order = slots_in_order(node, octant);
@@ -108,8 +110,8 @@ static inline uint32_t pack_slots(const TriangleNode& node, Floats8 near, Floats
   return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
-// Writes the children whose boxes are hit from far to near, and their entry distances, and returns their number. Always
-// writes eight elements of each.
+// Writes the children whose boxes are hit (near <= far) from far to near, with their entry distances in `nears`, and
+// returns their number. May overwrite all eight elements of `children` and of `nears`.
 static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
                                    uint32_t* children, float* nears) {
   const __m256i order = slots_in_order(node, octant);
@@ -124,8 +126,8 @@ static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Float
   return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
-// Moves the entries from..from + 7 whose bits are set in `set` to `to` <= `from`, in both columns. Always reads and
-// writes eight elements of each.
+// Moves those of the elements from .. from + 7 whose bits are set in `set` to the indices from `to` on, in both
+// `children` and `nears`. Precondition: `to` <= `from`. May read and write eight elements of each array.
 static inline void pack_entries(uint32_t* children, float* nears, uint32_t from, uint32_t set, uint32_t to) {
   const __m256i packed = pack_permutation(set);
   const __m256i child = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(children + from));
@@ -134,7 +136,7 @@ static inline void pack_entries(uint32_t* children, float* nears, uint32_t from,
   _mm256_storeu_ps(nears + to, _mm256_permutevar8x32_ps(near, packed));
 }
 
-// Returns three doubles rounded to float.
+// Returns the three doubles at `from`, rounded to float.
 static inline __m128 rounded_three(const double* from) {
   return _mm256_cvtpd_ps(_mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(from)), _mm_load_sd(from + 2), 1));
 }
@@ -160,7 +162,7 @@ static inline Doubles widened(float a, float b, float c) {
   return reinterpret_cast<Doubles>(_mm256_cvtps_pd(_mm_setr_ps(a, b, c, c)));
 }
 
-// PackTable in decreasing order of lanes.
+// Table like PackTable, but with the lanes in decreasing order.
 struct FallingPackTable {
   alignas(64) uint8_t lanes[256][8];
   constexpr FallingPackTable() : lanes() {
@@ -173,7 +175,7 @@ struct FallingPackTable {
 };
 static constexpr FallingPackTable kFallingPack;
 
-// Returns the children of a node, with `flag` set in those whose bits are set in `flagged`.
+// Returns the child slots of a node, with the bits of `flag` set in the slots that are in the mask `flagged`.
 static inline __m256i flagged_children(const TriangleNode& node, uint32_t flagged, uint32_t flag) {
   const __m256i lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
   const __m256i bits = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(flagged)), lanes);
@@ -181,8 +183,8 @@ static inline __m256i flagged_children(const TriangleNode& node, uint32_t flagge
   return _mm256_or_si256(_mm256_load_si256(reinterpret_cast<const __m256i*>(node.child)), flags);
 }
 
-// Writes the children whose bits are set in `set`, from the last slot to the first, with `flag` set in those whose bits
-// are set in `flagged`. Always writes eight elements.
+// Writes the child slots in the mask `set`, from the last to the first, with the bits of `flag` set in those that are
+// also in the mask `flagged`. May overwrite all eight elements of `children`.
 static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
                                 uint32_t* children) {
   const __m256i order =
@@ -191,32 +193,34 @@ static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t
                       _mm256_permutevar8x32_epi32(flagged_children(node, flagged, flag), order));
 }
 
-// Writes the same children from the first slot to the last.
+// Does the same as pack_falling(), but writes from the first slot to the last.
 static inline void pack_rising(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
                                uint32_t* children) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(children),
                       _mm256_permutevar8x32_epi32(flagged_children(node, flagged, flag), pack_permutation(set)));
 }
 
-// Returns one bit for each slot that holds a block or is unused.
+// Returns the mask of the slots that hold a block or are unused.
 static inline uint32_t block_slots(const TriangleNode& node) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_load_ps(reinterpret_cast<const float*>(node.child))));
 }
 
-// Loads the first `count` numbers, at most eight, without reading beyond them; the other lanes are 0.
+// Loads `count` numbers, or the first eight if there are more, without reading beyond them. Lanes without a number are
+// 0.
 static inline __m256i load_numbers(const uint32_t* from, uint32_t count) {
   const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   const __m256i within = _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(count)), lanes);
   return _mm256_maskload_epi32(reinterpret_cast<const int*>(from), within);
 }
 
-// Writes those of `count` numbers, at most eight, whose bits are set in `set`. Always writes eight elements.
+// Writes those of the `count` numbers at `from` whose bits are set in `set`; `count` is at most eight. May overwrite
+// eight elements at `to`.
 static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t set, uint32_t* to) {
   const __m256i all_numbers = load_numbers(from, count);
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all_numbers, pack_permutation(set)));
 }
 
-// Copies `count` numbers. May write up to seven elements beyond them.
+// Copies `count` numbers. May write up to seven more elements at `to`.
 static inline void copy_numbers(const uint32_t* from, uint32_t count, uint32_t* to) {
   for (uint32_t done = 0; done < count; done += 8)
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + done), load_numbers(from + done, count - done));

@@ -1,4 +1,5 @@
-// Code shared by single rays and packets of rays: the rows of a node's bounds by octant, and the choice between hits.
+// Code shared by single rays and packets of rays: the table of the rows of a node's bounds, and the choice between
+// hits.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 
@@ -11,8 +12,9 @@ namespace {
 
 constexpr uint32_t kNoNumber = 0xFFFFFFFFu;
 
-// For each octant of directions, the rows of TriangleNode::bounds with the planes through which a ray enters and leaves
-// a box, by axis: indices of their first floats.
+// Table of the rows of TriangleNode::bounds that contain the planes through which a ray enters and leaves the boxes,
+// indexed by the octant of the ray's direction and the axis. A row is given by the offset of its first float in
+// `bounds`.
 struct RowTable {
   uint32_t entered[8][4], left[8][4];
   constexpr RowTable() : entered(), left() {
@@ -27,21 +29,21 @@ struct RowTable {
 };
 static constexpr RowTable kRows;
 
-// Returns the number of a triangle of a block.
+// Returns the triangle number of the triangle in lane `lane` of `block`.
 static inline uint32_t number_of(const TriangleTree& tree, const TriangleBlock& block, int lane) {
   return tree.numbers[block.first + static_cast<uint32_t>(lane)];
 }
 
-// Returns whether a hit replaces the best one so far: it is nearer, or equally near with a lower number. If a hit was
-// found before, `limit` is its t.
+// Returns whether the hit (t, number) replaces the ray's best hit so far, because it is nearer, or equally near with a
+// lower triangle number. If `found`, the best hit so far is (limit, best); otherwise `limit` is the limit of the ray.
 static inline bool is_better(float t, uint32_t number, float limit, bool found, uint32_t best) {
   if (t > limit || (planted(PlantedBug::kKernelLimit) && !found && t == limit)) return false;
   return !found || t < limit || (number >= best) == planted(PlantedBug::kKernelTie);
 }
 
-// The lowest hits of one ray so far, up to `max_rows`.
+// Buffer of the lowest hits of one ray so far by (t, triangle number), at most `max_rows`.
 struct KeptRows {
-  KernelRow* rows;  // if there are max_rows of them, the farthest one is first
+  KernelRow* rows;  // if max_rows rows are stored, the highest one is first
   uint32_t max_rows;
 
   static inline bool is_lower(const KernelRow& a, const KernelRow& b) {
@@ -49,8 +51,8 @@ struct KeptRows {
     return a.t < b.t || (a.t == b.t && a.number < b.number);
   }
 
-  // Adds a hit if it is among the lowest. `count` is the number of rows. Lowers `limit` to the farthest row once there
-  // are max_rows rows.
+  // Stores a hit if it is among the lowest max_rows hits so far. `count` is the number of rows stored, and is
+  // incremented until it is max_rows; from then on, `limit` is lowered to the t of the highest row.
   inline void offer(const KernelRow& row, uint32_t& count, float& limit) const {
     if (row.t > limit) return;
     if (count < max_rows)

@@ -1,20 +1,20 @@
 // Test of one ray with the eight triangles of a block, or of eight rays with one triangle: float rules out triangles,
-// double decides the others. Error bounds, with R = max |origin| + max |vertex|, E = the block's extent, and lengths
-// along the shear divided by the direction's largest component d:
+// double decides the others. Error bounds, with R = max |origin| + max |vertex|, E = the block's extent, and d = the
+// direction's largest component. Sheared coordinates are those of TriangleRay divided by d:
 //
 // - The error of a sheared coordinate is at most 10 * 2^-24 R: rounding of the origin, the differences, the shear, the
 //   product and the sum. A ray that hits the block's padded box passes within 2^-20 R of it, so sheared coordinates are
 //   at most 2 E + 2^-18 R, and the error of an edge function (two products and a difference) is less than
 //   edge = 2^-17 R E + 2^-36 R^2.
-// - t is an average of vertex depths with the edge functions as weights. If |determinant| > 8 edge, its error is
-//   at most (6 edge E / |determinant| + 2^-20 R) / |d|. A ray that starts on a triangle hits it although rounding may
+// - t is an average of vertex depths with the edge functions as weights. If |determinant| > 8 edge, its error is at
+//   most (6 edge E / |determinant| + 2^-20 R) / |d|. A ray that starts on a triangle hits it although rounding may
 //   place the triangle up to 2^-42 R^3 / |determinant / d| behind the start; the interval of t includes this distance.
 //   Products that underflow add at most 2^-150 / |determinant|, which is within 2^-20 R / |d| if R >= 2^-25 and |d| <=
 //   2^20.
-// - If TriangleRay calls a triangle nearly edge-on, double is too coarse, and the ray is left undecided. Any other hit
-//   has an error in double of less than 2^-24 of its own coordinates and the origin's. It therefore lies within the
-//   padded slabs of its own box, so that the clamps of t in TriangleRay and to the bounds of an instance have no
-//   effect.
+// - If TriangleRay treats a triangle as nearly edge-on, double is too coarse, and the ray is left undecided. Any other
+//   hit has an error in double of less than 2^-24 of its own coordinates and the origin's. The hit therefore lies
+//   within the padded slabs of the triangle's own box. TriangleRay clamps t to that box, and queries clamp it to the
+//   bounds of the instance; neither clamp has an effect on such a hit.
 //
 // Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
@@ -36,14 +36,15 @@ struct Pairs {
   Floats8 from_x, from_y, from_z;  // origin of the ray, by the axes of the projection
   Floats8 shear_x, shear_y, reciprocal_z;
   Floats8 limit;
-  Floats8 edge, noise, t_floor;  // error bounds: of edge functions; of t, as noise / |determinant| + t_floor
+  Floats8 edge, noise, t_floor;  // error bounds: `edge` for edge functions; noise / |determinant| + t_floor for t
   Floats8 xs[3], ys[3], zs[3];   // coordinates of the triangle's vertices
 };
 
-// Pairs projected along the ray, relative to its origin. All coordinates are negated, which changes no edge function.
+// Triangles of eight pairs, projected along the ray, relative to the ray's origin. All coordinates are negated, which
+// does not change the edge functions, because these are sums of products of two coordinates.
 struct Projected {
   Floats8 weight_a, weight_b, weight_c;  // edge functions
-  Floats8 a_z, b_z, c_z;                 // depths
+  Floats8 a_z, b_z, c_z;                 // depths, negated
 };
 
 static inline Projected project(const Pairs& pairs) {
@@ -63,12 +64,12 @@ static inline Projected project(const Pairs& pairs) {
   return p;
 }
 
-// Results in float for eight pairs; one bit a pair.
+// Results of the float test of eight pairs; in masks, one bit a pair.
 struct PairResults {
-  uint32_t candidates;             // may hit within the limit
-  uint32_t inside;                 // all edge functions may have the same sign
-  uint32_t edge_on;                // may be edge-on: t is not known
-  Floats8 min_weight, max_weight;  // of the edge functions
+  uint32_t candidates;             // pairs that may hit within the limit
+  uint32_t inside;                 // pairs whose edge functions may all have the same sign
+  uint32_t edge_on;                // pairs that may be edge-on, for which t is not known
+  Floats8 min_weight, max_weight;  // smallest and largest edge function of each pair
   Floats8 earliest, latest;        // bounds of t
 };
 
@@ -95,21 +96,21 @@ static inline PairResults test_pairs(const Pairs& pairs) {
   return results;
 }
 
-// Returns the pairs that certainly hit within the limit. `front` and `back` are the pairs whose rays accept a triangle
-// seen from that side.
+// Returns the mask of the pairs that certainly hit within the limit. `front` and `back` are the masks of the pairs
+// whose rays accept a triangle seen from the front or from the back.
 static inline uint32_t certain_hits(const Pairs& pairs, const PairResults& results, uint32_t front, uint32_t back) {
   const Floats8 zero = Floats8::splat(0);
   return results.inside & ~results.edge_on & below(zero, results.earliest) & at_most(results.latest, pairs.limit) &
          ((front & below(pairs.edge, results.min_weight)) | (back & below(results.max_weight, zero - pairs.edge)));
 }
 
-// Results for one ray and a block; one bit a triangle.
+// Results of the float test of one ray with a block; one bit a triangle.
 struct BlockResults {
-  uint32_t candidates;  // may be hit within the limit
-  uint32_t certain;     // are certainly hit within the limit; kAny only
+  uint32_t candidates;  // triangles that the ray may hit within the limit
+  uint32_t certain;     // triangles that the ray certainly hits within the limit; kAny only
 };
 
-// Tests one ray with the triangles of a block in float.
+// Tests one ray with the triangles of a block in float. `query` is the same ray as `ray`, as the caller gave it.
 template <bool kAny>
 static inline BlockResults test_block(const TriangleBlock& block, PreparedRay ray, float limit,
                                       const KernelRay& query) {
@@ -144,21 +145,22 @@ static inline BlockResults test_block(const TriangleBlock& block, PreparedRay ra
 }
 
 static inline Doubles splat(double value) { return Doubles{value, value, value, value}; }
-// Returns a coordinate of the three vertices of a triangle; the fourth lane is unused.
+// Returns the coordinate on mesh axis `axis` of the three vertices of the triangle in lane `lane`. The fourth element
+// is unused.
 static inline Doubles coordinates(const TriangleBlock& block, uint32_t axis, int lane) {
   const float(*const rows)[kTreeWidth] = block.vertices + axis;
   return widened(rows[0][lane], rows[3][lane], rows[6][lane]);
 }
 
-// Decision of one pair in double.
+// Decision in double about one ray and one triangle.
 struct Verdict {
   KernelVerdict verdict;
   float t;
 };
 
-// Returns whether TriangleRay may call the triangle nearly edge-on, by its bound or a larger one. With sheared
-// coordinates of up to 2 E + 2^-18 R (as above) its bound is at most d^2 (2^-12 E^2 + 2^-29 R E + 2^-48 R^2), which is
-// cheaper to compute and is tested first.
+// Returns true if TriangleRay would treat the triangle as nearly edge-on; may also return true slightly beyond
+// TriangleRay's bound. Sheared coordinates are at most 2 E + 2^-18 R (as above), so that bound is at most d^2 (2^-12
+// E^2 + 2^-29 R E + 2^-48 R^2). This larger value is cheaper to compute and is tested first.
 static inline bool may_be_edge_on(const TriangleBlock& block, PreparedRay prepared, Doubles x, Doubles y,
                                   Doubles depths, double along, double size) {
   const double extent = block.extent, edge_scale = prepared.value(kEdgeScale);
@@ -173,8 +175,8 @@ static inline bool may_be_edge_on(const TriangleBlock& block, PreparedRay prepar
   return size <= 4 * longest * width * (0x1p-16 * span + 0x1p-35 * reach);
 }
 
-// Computes TriangleRay::is_exactly_edge_on(): the triangle's plane is perpendicular to an axis and contains the ray's
-// direction, which is frequent if walls are aligned to a grid.
+// Returns the result of TriangleRay::is_exactly_edge_on(): whether the triangle's plane is perpendicular to a mesh axis
+// and contains the ray's direction. This is frequent if walls are aligned with the axes.
 static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, const KernelRay& ray) {
   uint32_t across = 0;
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -185,8 +187,9 @@ static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, cons
   return ray.unrotated && across != 0;
 }
 
-// Decides one triangle in double. It computes TriangleRay::edge_test() without its scaling by powers of two, which
-// changes no bit within the range of directions and distances accepted by the kernels.
+// Decides in double whether the ray hits the triangle in lane `lane`. It computes TriangleRay::edge_test() without the
+// scaling by powers of two, which changes no bit of the result for the directions and distances that the kernels
+// accept.
 static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray, PreparedRay prepared) {
   const uint32_t axis_x = prepared.integer(kAxisX), axis_y = prepared.integer(kAxisY),
                  axis_z = prepared.integer(kAxisZ);
@@ -209,7 +212,8 @@ static inline Verdict decide(const TriangleBlock& block, int lane, const KernelR
   const double t = (shares[0] + shares[1] + shares[2]) / (determinant * along);
   if (t < 0) {
     const double unit = along * along;
-    // A triangle far behind the origin is not hit. One slightly behind it is decided by TriangleRay::depth_noise().
+    // A triangle far behind the origin is not hit. For a triangle slightly behind it TriangleRay::depth_noise() must
+    // decide, so the ray is left undecided here.
     const double noise = double{prepared.value(kStartNoise)} * unit / size + double{prepared.value(kTFloor)};
     return {t < -noise ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
   }

@@ -1,8 +1,8 @@
-// Ray kernels: intersect many rays with the tree of one mesh by vector instructions; every instruction set has its own
-// object. A kernel decides in float only outside a documented error bound, and otherwise in double by the arithmetic of
-// TriangleRay (core/geometry/ray_triangle.h), so that its answers equal those of TriangleRay bit for bit. If double
-// cannot decide either, the ray is left undecided and the caller traces it triangle by triangle. Plain data; functions
-// without state, safe from any thread; they use 220 KB of stack.
+// Ray kernels: intersect many rays with the tree of one mesh by vector instructions; each instruction set has its
+// kernels in an object file of its own. A kernel decides in float only outside a documented error bound, and otherwise
+// in double by the arithmetic of TriangleRay (core/geometry/ray_triangle.h), so that its answers equal those of
+// TriangleRay bit for bit. If double cannot decide either, the ray is left undecided and the caller traces it triangle
+// by triangle. Plain data; functions without state, safe from any thread; a call uses 220 KB of stack.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 
@@ -14,13 +14,13 @@
 namespace locus {
 
 // Ray in mesh axes. Precondition: the origin is finite, and the largest |component| of the direction is within
-// kMinKernelDirection .. kMaxKernelDirection; otherwise the kernels may miss or invent hits.
+// kMinKernelDirection .. kMaxKernelDirection; otherwise the kernels may miss hits or report hits that do not exist.
 struct KernelRay {
   double origin[3];
   double direction[3];
-  float limit;        // largest t of a hit, inclusive; in lengths of the direction
-  bool accept_front;  // triangles seen counter-clockwise
-  bool accept_back;
+  float limit;        // maximum t of a hit, inclusive, in units of the direction's length
+  bool accept_front;  // whether to report triangles seen counter-clockwise
+  bool accept_back;   // whether to report triangles seen clockwise
   // True if the ray was not rotated into mesh axes: a zero component of its direction is exact, so that a triangle
   // perpendicular to that axis is exactly edge-on.
   bool unrotated = false;
@@ -28,19 +28,19 @@ struct KernelRay {
 
 inline constexpr double kMinKernelDirection = 0x1p-20;
 inline constexpr double kMaxKernelDirection = 0x1p20;
-// Limits of the largest |coordinate| of the origin plus the largest |coordinate| of the mesh. Outside of them the
-// products of the error bounds would underflow or overflow.
+// Limits of the sum of the largest |coordinate| of the origin and the largest |coordinate| of the mesh. Outside these
+// limits, products in the error bounds would underflow or overflow.
 inline constexpr double kMinKernelReach = 0x1p-24;
 inline constexpr double kMaxKernelReach = 0x1p33;
-// A ray that has tested more triangles than this is left undecided, which bounds the time of a call.
+// A ray that was tested with more triangles than this is left undecided, which bounds the time of a call.
 inline constexpr uint32_t kMaxKernelTests = 4096;
 
 enum class KernelVerdict : uint8_t { kMiss, kHit, kUndecided };
 
 // Answer to one ray.
 struct KernelHit {
-  float t;          // in lengths of the direction; first() only
-  uint32_t number;  // first(): lowest number of the triangles hit at t; all(): number of rows
+  float t;          // in units of the direction's length; first() only
+  uint32_t number;  // first(): lowest triangle number of those hit at t; all(): count of rows
   KernelVerdict verdict;
   uint32_t nodes;  // nodes opened
   uint32_t tests;  // triangles tested
@@ -48,26 +48,27 @@ struct KernelHit {
 
 // One of the hits found by all().
 struct KernelRow {
-  float t;  // in lengths of the direction
-  uint32_t number;
+  float t;          // in units of the direction's length
+  uint32_t number;  // triangle number
 };
 
 // Kernels of one instruction set.
 struct RayKernels {
   const char* name;  // instruction set
-  // Finds the nearest hits of `count` rays. One call with many rays is faster than many calls, because the rays are
-  // traced interleaved. Each answer depends only on its own ray.
+  // Finds the nearest hit of each of `count` rays. One call with many rays is faster than many calls, because the rays
+  // are traced interleaved. Each answer depends only on its own ray.
   void (*first)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
   // Determines whether each of `count` rays hits any triangle.
   void (*any)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
-  // Finds all hits of each ray, or the lowest `max_rows` of them by (t, number); `max_rows` >= 1. The rows of ray i
-  // begin at rows[i * max_rows] and are not sorted. The rows of an undecided ray are undefined.
+  // Finds all hits of each ray, or if there are more than `max_rows`, the lowest `max_rows` by (t, triangle number).
+  // Precondition: `max_rows` >= 1. The rows of ray i begin at rows[i * max_rows] and are not sorted. The rows of an
+  // undecided ray are undefined.
   void (*all)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count, KernelRow* rows,
               uint32_t max_rows);
 };
 
-// Return the kernels of one instruction set: the only exported symbol of its object. Must be called only on a processor
-// that supports the instruction set.
+// Return the kernels of one instruction set. Each function is the only symbol that its object file exports. Must be
+// called only on a processor that supports the instruction set.
 const RayKernels& ray_kernels_avx2();
 const RayKernels& ray_kernels_sse4();
 

@@ -21,30 +21,32 @@ namespace {
 
 constexpr uint32_t kMaxFlights = 32;     // rays traced interleaved
 constexpr uint32_t kMaxPackets = 2;      // packets of coherent rays traced interleaved
-constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; their indices fit in a byte
+constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; the index of such a ray fits in a byte
 static_assert(kPreparedRays <= 256 && kPreparedRays % kTreeWidth == 0 && kMaxFlights <= 256);
 
-// A ray being traced. `waiting` is a stack of nodes and blocks that the ray enters no later than the limit, above a
-// sentinel kNoChild; `nears` are their entry distances.
+// Ray being traced. `waiting` is a stack of child slot values: the nodes and blocks that the ray enters at or before
+// its limit. Its lowest element is the sentinel kNoChild. `nears` holds the t of entry for each other element (not if
+// kAny).
 struct alignas(64) InFlightRay {
   PreparedRay ray;
-  uint32_t index;
-  uint32_t now;  // current node or block, or kNoChild at the end
-  uint32_t top;
+  uint32_t index;  // index of the ray in the arrays of rays and hits
+  uint32_t now;    // current node or block, or kNoChild at the end
+  uint32_t top;    // number of elements in `waiting`
   float limit;
-  uint32_t number;  // triangle of the best hit so far; kAll: number of rows kept
+  uint32_t number;  // triangle number of the best hit so far; kAll: count of rows stored
   uint32_t nodes, tests;
   bool found, undecided;
   alignas(64) uint32_t waiting[kTreeStack];
   float nears[kTreeStack];
 };
 
-// Kind of a ray's next step. kCandidates has all bits of the others, so that it is set by a bitwise or.
+// Kind of a ray's next step. kCandidates has all bits set, so that the bitwise or of kCandidates and any other step is
+// kCandidates. kSteps is the number of kinds.
 enum Step : uint32_t { kNode = 0, kBlock = 1, kEnd = 2, kCandidates = 3, kSteps = 4 };
-// Returns the step for a child reference.
+// Returns the step that processes the value of a child slot: kNode, kBlock, or kEnd for kNoChild.
 static inline uint32_t step_at(uint32_t reference) { return (reference >> 31) + (reference == kNoChild ? 1u : 0u); }
 
-// Lists of the flights that need each kind of step.
+// Lists of the rays in flight by the kind of their next step. A ray is identified by its index in RayStream's flights.
 struct WorkList {
   uint8_t flights[kSteps][kMaxFlights];
   uint32_t counts[kSteps] = {};
@@ -53,10 +55,11 @@ struct WorkList {
   inline bool empty() const { return counts[kNode] + counts[kBlock] + counts[kEnd] == 0; }
 };
 
-// Kind of query.
+// Kind of query: the nearest hit, any hit, or all hits.
 enum class Wanted : uint8_t { kFirst, kAny, kAll };
 
-// Traces up to kPreparedRays rays, whose indices are given, through one tree.
+// Tracer of up to kPreparedRays rays, selected by their indices, through one tree. In the member functions, `slot` is
+// the index of a ray's element in `flights`.
 template <Wanted kWanted>
 class RayStream {
  public:
@@ -71,7 +74,7 @@ class RayStream {
         count_(count),
         flights_(flights) {}
 
-  // Traces all rays. The part that depends on the result of a step runs in a second pass over the rays, so that the
+  // Traces all rays. What depends on the result of a step runs in a second loop over the same rays, so that the
   // processor's out-of-order window contains the independent steps of several rays.
   inline void run() {
     WorkList now;
@@ -99,7 +102,7 @@ class RayStream {
     uint32_t index;  // index of the block
   };
 
-  // Starts the next ray at the root.
+  // Starts the next ray, at the root of the tree.
   inline void start(uint32_t slot, WorkList& next_steps) {
     InFlightRay& flight = flights_[slot];
     const uint32_t index = indices_[next_++];
@@ -115,7 +118,8 @@ class RayStream {
     next_steps.add(slot, kNode);
   }
 
-  // Pushes the children that the ray may hit, the nearest one last (kAny: in order of slots).
+  // Opens the current node: pushes the children that the ray may hit, the nearest one last. If kAny, pushes them in the
+  // order of their slots, because any hit will do.
   inline void open_node(uint32_t slot) {
     InFlightRay& flight = flights_[slot];
     const PreparedRay ray = flight.ray;
@@ -160,10 +164,11 @@ class RayStream {
     opened.index = block_index;
   }
 
-  // Pops the next node or block, or first schedules the decision of candidates.
+  // Pops the next node or block. If the opened block has candidates, or the ray has exceeded kMaxKernelTests, schedules
+  // resolve() instead, which pops afterwards.
   inline void finish_block(uint32_t slot, WorkList& next_steps) {
     InFlightRay& flight = flights_[slot];
-    // Without branches, which would be mispredicted too often here.
+    // Computed without branches, which would be mispredicted too often here.
     const uint32_t resolve_first = static_cast<uint32_t>(opened_[slot].results.candidates != 0) |
                                    static_cast<uint32_t>(flight.tests > kMaxKernelTests);
     const uint32_t next_reference = flight.waiting[flight.top - 1], step = step_at(next_reference);
@@ -173,7 +178,7 @@ class RayStream {
     next_steps.add(slot, step | ((0u - resolve_first) & kCandidates));
   }
 
-  // Decides the candidates of a block in double, then pops the next node or block.
+  // Decides the candidates of the opened block in double, then pops the next node or block, or ends the ray.
   inline void resolve(uint32_t slot, WorkList& next_steps) {
     const OpenedBlock& opened = opened_[slot];
     InFlightRay& flight = flights_[slot];
@@ -209,8 +214,8 @@ class RayStream {
     }
   }
 
-  // Removes the pending entries beyond the limit. Entries exactly at the limit stay: they may hold an equal hit with a
-  // lower number.
+  // Removes the elements of `waiting` that the ray enters beyond its limit. Elements entered exactly at the limit
+  // remain: they may hold a hit at the same t with a lower triangle number.
   static inline void drop_beyond(InFlightRay& flight) {
     const Floats8 limit = Floats8::splat(flight.limit);
     uint32_t kept = 1;
@@ -226,7 +231,7 @@ class RayStream {
     flight.top = kept;
   }
 
-  // Writes the answer of a ray and starts the next one.
+  // Writes the answer of a ray, and starts the next ray if there is one.
   inline void end(uint32_t slot, WorkList& next_steps) {
     const InFlightRay& flight = flights_[slot];
     const KernelVerdict verdict = flight.undecided ? KernelVerdict::kUndecided
@@ -236,7 +241,8 @@ class RayStream {
     if (next_ != count_) start(slot, next_steps);
   }
 
-  // Prefetches the next node or block. The address comes from a table, because a branch would often be mispredicted.
+  // Prefetches the next node or block. Its address is computed from tables indexed by the step, because a branch would
+  // often be mispredicted.
   __attribute__((always_inline)) inline void prefetch_next(uint32_t reference, uint32_t step) const {
     const char* const at = bases_[step] + uint64_t{reference & ~kBlockBit} * sizes_[step];
     for (uint64_t line = 0; line < sizeof(TriangleBlock); line += 64) _mm_prefetch(at + line, _MM_HINT_T0);
@@ -246,11 +252,12 @@ class RayStream {
   const KernelRay* const rays_;
   const PreparedRays* const prepared_;
   KernelHit* const hits_;
-  const KeptRows kept_;  // kAll: rows of the first ray
+  const KeptRows kept_;  // kAll: output rows of the first ray
   const uint8_t* const indices_;
   const uint32_t count_;
   InFlightRay* const flights_;
-  // Arrays and element sizes of each step; a ray at its end prefetches the root.
+  // Array and element size for each step, used for prefetching. For kEnd the size is 0: the root is prefetched,
+  // needlessly, but without a branch.
   const char* const bases_[3] = {reinterpret_cast<const char*>(tree_.nodes),
                                  reinterpret_cast<const char*>(tree_.blocks),
                                  reinterpret_cast<const char*>(tree_.nodes)};
@@ -259,12 +266,13 @@ class RayStream {
   OpenedBlock opened_[kMaxFlights];
 };
 
-// Answers the groups of eight coherent rays by packets. Lists the other rays in `rest` and returns their number.
+// Divides the rays into groups of eight consecutive rays, and traces each group of coherent rays as one Packet, which
+// writes their hits. Writes the indices of all other rays to `rest` and returns the number of these rays.
 template <bool kAny>
 static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared,
                               KernelHit* hits, uint32_t count, uint8_t* rest) {
   uint32_t rest_count = 0, first = 0;
-  // Starts the next coherent group. Returns false if there is none.
+  // Starts `packet` with the next group of coherent rays. Returns false if there is none.
   const auto start_next = [&](Packet<kAny>& packet) {
     while (first < count) {
       const uint32_t now = first, size = count - now < kTreeWidth ? count - now : kTreeWidth;
@@ -295,7 +303,7 @@ static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, c
   return rest_count;
 }
 
-// Answers `count` rays.
+// Traces `count` rays, up to kPreparedRays at a time, and writes their answers to `hits` and, if kAll, to `kept`.
 template <Wanted kWanted>
 static inline void trace(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count,
                          KeptRows kept) {

@@ -1,7 +1,8 @@
 // Packet of eight coherent rays, traced through one tree together: each box and each triangle is tested with all rays
-// at once. Cameras and sensors send such rays. Each ray tests the same boxes and triangles by the same arithmetic as if
-// it were alone, so that its answer is the same. Boxes that no ray can hit are culled first, eight at a time, by a
-// frustum around the rays. Packets are stepped in turns, so that one continues while another waits for memory.
+// at once. Cameras and sensors send such rays. Each ray is tested with the same boxes and triangles, using the same
+// arithmetic, as if it were traced alone, so that its answer is the same. Boxes that no ray can hit are culled first,
+// eight at a time, by a frustum around the rays. Several packets take steps in turn, so that one packet continues while
+// another waits for memory.
 //
 // Source: Wald, Slusallek, Benthin, Wagner, Interactive Rendering with Coherent Ray Tracing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
@@ -15,8 +16,9 @@
 namespace locus {
 namespace {
 
-// Returns whether eight rays are coherent. They must have the same octant and the same axis of projection, which the
-// packet requires; and, for speed, directions within a narrow cone and origins that are close compared to the mesh.
+// Returns whether eight rays are coherent. Coherent rays have the same octant and the same projection axis z, which
+// Packet requires. For speed, they must also have directions within a narrow cone, and origins that are close to each
+// other compared to `magnitude`, the largest |coordinate| of the mesh.
 static inline bool are_coherent(const PreparedRays& rays, float magnitude) {
   constexpr float kMaxSpread = 0.03f;
   const auto differ = [&](uint32_t column, float max_difference) {
@@ -26,7 +28,8 @@ static inline bool are_coherent(const PreparedRays& rays, float magnitude) {
   for (uint32_t column = kFromX; column <= kFromZ; ++column)
     if (differ(column, kMaxSpread * magnitude)) return false;
   if (differ(kShearX, kMaxSpread) || differ(kShearY, kMaxSpread)) return false;
-  // Compared as integers: as floats they are denormal, and equal if the host process treats denormals as zero.
+  // The octant and the axis are compared as integers: interpreted as floats they are denormal, and would compare equal
+  // if the host process treats denormals as zero.
   const PreparedRay first(rays, 0);
   uint32_t different = 0;
   for (uint32_t i = 1; i < kTreeWidth; ++i) {
@@ -40,7 +43,7 @@ static inline bool are_coherent(const PreparedRays& rays, float magnitude) {
 template <bool kAny>
 class Packet {
  public:
-  // Starts eight rays at the root. `hits` has eight elements.
+  // Starts eight rays at the root of the tree. `rays` and `hits` have eight elements; all arguments are borrowed.
   inline void start(const TriangleTree& tree, const KernelRay* rays, const PreparedRays& prepared, KernelHit* hits) {
     tree_ = &tree;
     rays_ = rays;
@@ -64,14 +67,16 @@ class Packet {
     top_ = 1;
   }
 
-  // Opens one node or block. If none is left, writes the answers and returns false; must not be called again then.
+  // Opens one node or block and returns true. If none is left, completes the answers and returns false; step() must not
+  // be called again before start().
   inline bool step() {
     while (top_ != 0) {
-      // By reference: a copy would be stored in two halves, and the following load of the whole would stall.
+      // This is a reference, because a copy would be stored in two halves, and the load of the whole that follows would
+      // stall.
       const Waiting& now = waiting_[--top_];
       const uint32_t reference = now.reference;
-      // Limits may have decreased since the push. A box entered exactly at a limit is opened: it may hold an equal hit
-      // with a lower number.
+      // The rays' limits may have decreased since the box was pushed. A box that a ray enters exactly at its limit is
+      // opened: it may hold a hit at the same t with a lower triangle number.
       const Floats8 limit = Floats8::load(limits_);
       const uint32_t rays =
           now.rays & (planted(PlantedBug::kKernelPruneEqual) ? below(now.near, limit) : at_most(now.near, limit));
@@ -90,15 +95,15 @@ class Packet {
 
  private:
   static constexpr uint32_t kMaxCandidates = 4;
-  static constexpr float kNever = -1;  // limit of a ray that needs no more hits
+  static constexpr float kNever = -1;  // limit of a ray that needs no more tests
 
   struct Waiting {
-    Floats8 near;   // entry distances of the rays
-    uint32_t rays;  // rays that hit the box
+    Floats8 near;   // t at which each ray enters the box
+    uint32_t rays;  // mask of the rays that hit the box
     uint32_t reference;
   };
 
-  // A triangle that a ray may hit, to be decided in double.
+  // Triangle that a ray certainly hits, at a t that is still to be computed in double.
   struct Candidate {
     const TriangleBlock* block;
     uint32_t lane;
@@ -119,9 +124,9 @@ class Packet {
       prefetch(&tree_->blocks[reference & ~kBlockBit], sizeof(TriangleBlock));
   }
 
-  // Frustum around the rays, the same in all lanes: bounds of their origins and reciprocal directions, from which a
-  // slab is entered no later and left no earlier than by any of the rays. It uses twice the pad of the rays, for the
-  // rounding of this computation.
+  // Frustum around the rays, with equal values in all lanes: bounds of the rays' origins and reciprocal directions.
+  // According to these bounds, a slab is entered no later and left no earlier than by any of the rays. The pad is twice
+  // that of the rays, which covers the rounding of this computation.
   struct RayFrustum {
     Floats8 near_origin[3], far_origin[3], min_reciprocal[3], max_reciprocal[3], pad[3];
   };
@@ -141,7 +146,8 @@ class Packet {
     }
   }
 
-  // Writes the slots whose boxes the frustum hits, from far to near. Returns their number.
+  // Writes the slots whose boxes the frustum hits, from far to near, in the lowest three bits of the elements of
+  // `slots`. Returns the number of these slots.
   inline uint32_t slots_hit(const TriangleNode& node, uint32_t octant, Floats8 limit, uint32_t* slots) const {
     const float* const bounds = node.bounds[0];
     Floats8 near[3], far[3];
@@ -156,10 +162,10 @@ class Packet {
     return pack_slots(node, entered, left, octant, slots);
   }
 
-  // Pushes the children that any of the rays may hit, the nearest one last. Returns the new top.
+  // Pushes the children of `node` that any of the rays may hit, the nearest one last. Returns the new top of the stack.
   inline uint32_t open_node(const TriangleNode& node, uint32_t top) {
     ++nodes_;
-    // Copies, because the compiler would reload the members after each store to the stack.
+    // Local copies, because the compiler would reload the members after each store to waiting_.
     const Slabs slabs = slabs_;
     const Floats8 limit = Floats8::load(limits_);
     const uint32_t octant = axis(kOctant);
@@ -184,7 +190,8 @@ class Packet {
     return top;
   }
 
-  // Tests the rays with a block: triangle by triangle, or ray by ray if few of the rays hit the block.
+  // Tests the rays in the mask `rays` with a block: each triangle with all of these rays at once or, if few rays hit
+  // the block's box, each ray with all triangles at once.
   inline void open_block(const TriangleBlock& block, uint32_t rays) {
     for (uint32_t i = 0; i < kTreeWidth; ++i) hits_[i].tests += (rays >> i & 1u) * block.count;
     constexpr int kRayCost = 5, kTriangleCost = 2;  // measured relative costs
@@ -239,10 +246,11 @@ class Packet {
     }
   }
 
-  // Returns an axis or the octant, which is equal for all rays of the packet.
+  // Returns the integer in `column`, an axis or the octant, which is equal for all rays of the packet.
   inline uint32_t axis(uint32_t column) const { return PreparedRay(*prepared_, 0).integer(column); }
 
-  // Returns pairs with all members set that depend only on the rays and the block.
+  // Returns pairs of the eight rays with a triangle of `block`. All members are set except for the coordinates of the
+  // triangle's vertices.
   inline Pairs pairs_with(const TriangleBlock& block) const {
     const auto column = [&](uint32_t index) { return Floats8::load(prepared_->columns[index]); };
     const Floats8 extent = Floats8::splat(block.extent);
@@ -261,8 +269,9 @@ class Packet {
     return pairs;
   }
 
-  // Adds a triangle that is certainly hit. Its exact t is computed later, because most hits found first are not the
-  // nearest. `limit` is the upper bound of its t; hits beyond it are not wanted any more.
+  // Adds a triangle that ray `i` certainly hits. Its exact t is computed later, because most hits found first are not
+  // the nearest. `limit` is an upper bound of its t: it becomes the ray's limit if it is lower, and candidates beyond
+  // it are removed.
   inline void add_candidate(uint32_t i, const Candidate& candidate, float limit) {
     if (limit < limits_[i]) {
       limits_[i] = limit;
@@ -285,8 +294,8 @@ class Packet {
     candidate_counts_[i] = 0;
   }
 
-  // Decides a pair in double. Does nothing for a ray that needs no more hits: a ray that was given up stays undecided,
-  // even if it hits another triangle of the same block.
+  // Decides in double whether ray `i` hits the triangle in lane `lane`, and records the hit. Does nothing if the ray
+  // needs no more tests: a ray that was given up stays undecided, even if it hits another triangle of the same block.
   inline void resolve(const TriangleBlock& block, int lane, uint32_t i) {
     if (limits_[i] < 0 && !planted(PlantedBug::kKernelHitAfterGivingUp)) return;
     const Verdict verdict = decide(block, lane, rays_[i], PreparedRay(*prepared_, i));
@@ -295,13 +304,13 @@ class Packet {
     record_hit(i, verdict.t, number_of(*tree_, block, lane));
   }
 
-  // Records that the ray hits something (kAny only).
+  // Records that ray `i` hits a triangle, so that it needs no more tests (kAny only).
   inline void record_any_hit(uint32_t i) {
     hits_[i].verdict = KernelVerdict::kHit;
     limits_[i] = kNever;
   }
 
-  // Records a hit if it is better than the best one so far.
+  // Records a hit of ray `i` if it is better than the ray's best hit so far.
   inline void record_hit(uint32_t i, float t, uint32_t number) {
     KernelHit& hit = hits_[i];
     if (!is_better(t, number, hit.t, hit.verdict == KernelVerdict::kHit, hit.number)) return;
@@ -314,7 +323,7 @@ class Packet {
       limits_[i] = t;
   }
 
-  // Leaves a ray undecided.
+  // Leaves ray `i` undecided, so that it needs no more tests.
   inline void give_up(uint32_t i) {
     hits_[i].verdict = KernelVerdict::kUndecided;
     limits_[i] = kNever;
@@ -326,7 +335,7 @@ class Packet {
   KernelHit* hits_;
   Slabs slabs_;
   RayFrustum frustum_;
-  uint32_t front_, back_;  // rays that accept a triangle seen from the front, and from the back
+  uint32_t front_, back_;  // masks of the rays that accept a triangle seen from the front or back
   uint32_t nodes_;
   uint32_t top_;
   alignas(32) float limits_[kTreeWidth];

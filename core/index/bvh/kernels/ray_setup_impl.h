@@ -11,17 +11,18 @@
 namespace locus {
 namespace {
 
-// Relative pad of the slabs of nodes: twice SlabRay's pad of a triangle's own box, so that rounding in float culls no
-// box that SlabRay would keep.
+// Relative pad of the slabs of nodes: twice SlabRay's pad of a triangle's own box, so that no box is culled because of
+// rounding in float if SlabRay would not cull it.
 constexpr float kTreePad = 0x1p-20f;
 
-// Constants of each ray. Lengths along a ray are in lengths of its direction. x, y and z are the axes of the projection
-// along the ray: z is the axis of the direction's largest component (of equal ones the first), as TriangleRay chooses
-// it; x and y are the other two, in the order that keeps the orientation of a projected triangle the same for all rays.
+// Columns of PreparedRays: the constants computed for each ray. t is in units of the direction's length. x, y and z are
+// the axes of the projection along the ray: z is the axis of the direction's largest component (the first of equal
+// components), as in TriangleRay; x and y are the other two axes, in the order that preserves the orientation of a
+// projected triangle for all rays.
 enum Column : uint32_t {
-  kReciprocal = 0,  // three, by axis of the mesh: 1 / direction
-  kNearOffset = 3,  // three: a slab is entered at t = bound * reciprocal - near offset
-  kFarOffset = 6,   // three: and left at t = bound * reciprocal - far offset
+  kReciprocal = 0,  // three columns, by axis of the mesh: 1 / direction
+  kNearOffset = 3,  // three columns: a slab is entered at t = bound * reciprocal - near offset
+  kFarOffset = 6,   // three columns: a slab is left at t = bound * reciprocal - far offset
   kLimit = 9,
   kFromX,
   kFromY,
@@ -34,19 +35,19 @@ enum Column : uint32_t {
   kEdgeNoise,  // error bound of t: (edge noise * bound of edge functions * extent + start noise) / determinant + floor
   kStartNoise,
   kTFloor,
-  kAxisX,  // axes of the mesh that are x, y and z: integers
+  kAxisX,  // mesh axes (0 to 2) that are x, y and z of the projection: integers
   kAxisY,
   kAxisZ,
   kOctant,  // bit k is set if component k of the direction is negative: an integer
   kColumns
 };
 
-// Constants of eight rays: one column each, one lane a ray.
+// Constants of eight rays: one column for each constant, one lane for each ray.
 struct alignas(64) PreparedRays {
   float columns[kColumns][kTreeWidth];
 };
 
-// Reference to one lane of PreparedRays.
+// Reference to the constants of one ray: one lane of PreparedRays.
 class PreparedRay {
  public:
   inline PreparedRay() = default;
@@ -87,7 +88,8 @@ static inline RayColumns columns_of(const KernelRay* rays, size_t count) {
   return columns;
 }
 
-// Axes of eight rays' projections; permutes components of vectors from mesh axes to projection axes.
+// Projection axes of eight rays. Given the components of eight vectors on the mesh axes, along() returns their
+// components on the projection axis z, first() on x and second() on y.
 class Projection {
  public:
   inline Projection(const Floats8* direction, const KernelRay* rays, size_t count) {
@@ -110,7 +112,8 @@ class Projection {
   }
 
  private:
-  // Chooses between equal components in double, because the last bits of t depend on the axis.
+  // Chooses the axis z in double for the rays in the mask `ties`, whose largest components are equal in float. The
+  // choice must be that of TriangleRay, because the last bits of t depend on the axis.
   void decide_ties(uint32_t ties, const KernelRay* rays, size_t count) {
     alignas(32) float x[kTreeWidth], y[kTreeWidth];
     is_x_.store(x);
@@ -126,14 +129,15 @@ class Projection {
     is_y_ = Floats8::load(y);
   }
 
-  Floats8 is_x_, is_y_, backwards_;  // sign bits
+  Floats8 is_x_, is_y_, backwards_;  // masks: the sign bit of a lane is set if true
 };
 
-// Computes the slab constants and the octant. `inverse` receives the reciprocals of the directions.
+// Computes the slab constants and the octant. `reach` is the largest |coordinate| of each origin plus that of the mesh.
+// Writes the reciprocals of the directions to `inverse`, three elements.
 static inline void prepare_slabs(const RayColumns& rays, Floats8 reach, Floats8* inverse, PreparedRays& to) {
   const Floats8* const d = rays.direction;
   const Floats8 longest = maximum(maximum(absolute(d[0]), absolute(d[1])), absolute(d[2]));
-  // A component of zero is replaced by 1e-18 of the largest one, like in SlabRay.
+  // A component smaller than 1e-18 of the largest component is replaced by that value, as in SlabRay.
   const Floats8 min_component = longest * Floats8::splat(1e-18f),
                 pad = reach * Floats8::splat(planted(PlantedBug::kKernelTreePad) ? 0 : kTreePad);
   Floats8 octant = bits_of(0);
@@ -149,7 +153,7 @@ static inline void prepare_slabs(const RayColumns& rays, Floats8 reach, Floats8*
   octant.store(to.columns[kOctant]);
 }
 
-// Computes the error bounds explained in ray_block_impl.h. `reach` is R.
+// Computes the error bounds explained in ray_block_impl.h, where `reach` is called R.
 static inline void prepare_bounds(Floats8 reach, Floats8 abs_reciprocal_z, PreparedRays& to) {
   (reach * Floats8::splat(0x1p-17f)).store(to.columns[kEdgeScale]);
   (reach * reach * Floats8::splat(0x1p-36f)).store(to.columns[kEdgeFloor]);
@@ -158,7 +162,8 @@ static inline void prepare_bounds(Floats8 reach, Floats8 abs_reciprocal_z, Prepa
   (reach * Floats8::splat(0x1p-20f) * abs_reciprocal_z).store(to.columns[kTFloor]);
 }
 
-// Computes the constants of the first eight rays, or of all if there are fewer.
+// Computes the constants of the first eight of `count` rays, or of all if there are fewer. `magnitude` is the largest
+// |coordinate| of the mesh.
 static inline void prepare(const KernelRay* rays, size_t count, float magnitude, PreparedRays& to) {
   const RayColumns columns = columns_of(rays, count);
   const Floats8* const o = columns.origin;

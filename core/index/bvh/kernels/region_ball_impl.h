@@ -6,11 +6,12 @@
 // difference of two such products, and 5 u within a dot product.
 //
 // Most triangles are decided by their vertices alone, relative to the centre:
-// - The error of the square of such a vertex is 5 u of its value: a vertex is certainly inside if its square is at most
-//   r^2 (1 - 2^-19). The predicate finds the triangle by the edge that starts there, whatever the lengths of the edges.
-// - The error of the projection of a vertex on another one, A, is 5 u L |A|; both squares add 6 u. If all three
-//   projections are beyond (r + 2^-19 (r + E)) |A|, the triangle is outside: a plane separates it from the ball by more
-//   than 2^-22 L.
+// - The error of the squared length of such a vertex is 5 u of its value: a vertex is certainly inside if this square
+//   is at most r^2 (1 - 2^-19). The predicate then finds the triangle too: by its distance from the edge that starts at
+//   this vertex, whatever the lengths of the edges.
+// - The error of the projection of a vertex on another one, A, is 5 u L |A|; the squares on both sides of the
+//   comparison add 6 u. If all three projections are beyond (r + 2^-19 (r + E)) |A|, the triangle is outside: a plane
+//   separates it from the ball by more than 2^-22 L.
 //
 // The other triangles need a closer test:
 // - The error of the foot of the perpendicular on an edge is 5 u L for the dot product, 5 u for the square of the edge
@@ -31,8 +32,8 @@
 //   6 u E^2, of heights 10 u E^2 R and of the radius times the length 10 u E^2 r, within 2^-19 E^2 (R + r).
 //
 // The predicate's own rounding errors are smaller by a factor of 2^-28, or 2^-12 for squared distances, so that a
-// certain result here equals its verdict. The predicate also tests whether the ball overlaps the triangle's own box,
-// which is never farther away than the triangle.
+// certain result here equals the result of the predicate. The predicate also tests whether the ball overlaps the
+// triangle's own box, which is never farther away than the triangle.
 //
 // Source: Ericson, Real-Time Collision Detection, 2005 (distances by clamped segments and weights of the foot).
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_BALL_IMPL_H_
@@ -45,27 +46,27 @@
 namespace locus {
 namespace {
 
-// Results for the children of a node; one bit a slot.
+// Result masks for the children of a node; one bit a slot.
 struct ChildResults {
   uint32_t overlapping;  // boxes that the region may overlap
-  uint32_t contained;    // those of them that are certainly inside the region
+  uint32_t contained;    // those of the overlapping boxes that are certainly inside the region
 };
 
-// Results for the triangles of a block; one bit a lane.
+// Result masks for the triangles of a block; one bit a lane.
 struct TriangleResults {
-  uint32_t certain;    // certainly overlap the region
-  uint32_t undecided;  // must be decided by the judge
+  uint32_t certain;    // triangles that certainly overlap the region
+  uint32_t undecided;  // triangles that the RegionJudge must decide
 };
 
 constexpr float kSquarePad = 0x1p-19f;  // relative pad of squared distances to boxes, whose rounding error is 2^-21
 
-// Returns the pad for squares, and products of more lengths, that underflow.
+// Returns the absolute pad that covers the underflow of squares and of products of more than two lengths.
 static inline float square_floor() { return planted(PlantedBug::kRegionFloor) ? 0 : 0x1p-120f; }
 
-// Returns an error bound, or 0 if the planted bug drops it.
+// Returns `bound`, or 0 if `bug` is planted, so that tests can show that the error bound is needed.
 static inline float bound_unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
 
-// Eight vectors.
+// Eight vectors of three components.
 struct Vector8 {
   Floats8 x, y, z;
 
@@ -88,14 +89,14 @@ static inline Vector8 cross(Vector8 a, Vector8 b) {
 // Returns the squared distance from a point to a segment. `offset` is the vector from the segment's start to the point,
 // `edge` the segment, `along` their dot product and `length` the square of `edge`.
 static inline Floats8 squared_distance_to_edge(Vector8 offset, Vector8 edge, Floats8 along, Floats8 length) {
-  // A quotient of zeros becomes the second operand, zero.
+  // If the edge has no length, the quotient of zeros is NaN, and maximum() returns its second operand, zero.
   const Floats8 foot = minimum(maximum(along / length, Floats8::splat(0)), Floats8::splat(1));
   const Vector8 rest = {subtract_product(offset.x, foot, edge.x), subtract_product(offset.y, foot, edge.y),
                         subtract_product(offset.z, foot, edge.z)};
   return dot(rest, rest);
 }
 
-// A ball as a query of region_kernels_impl.h.
+// Ball as a Query of region_kernels_impl.h.
 class BallQuery {
  public:
   inline void set(const KernelBall& ball) {
@@ -135,15 +136,16 @@ class BallQuery {
   }
 
  private:
-  // Returns whether three vertices lie beyond the plane perpendicular to the first one at the distance sqrt(limit),
-  // given the first vertex' square and the dot products of the other two with it.
+  // Returns one bit a triangle: whether its vertices, relative to the centre, all lie beyond the plane that is
+  // perpendicular to the first vertex and has the distance sqrt(limit) from the centre. `square` is the squared length
+  // of the first vertex, and `second` and `third` are its dot products with the other two vertices.
   static inline uint32_t are_beyond_plane(Floats8 square, Floats8 second, Floats8 third, Floats8 limit) {
     const Floats8 min_product = maximum(minimum(square, minimum(second, third)), Floats8::splat(0));
     return below(multiply_add(square, limit, Floats8::splat(square_floor())), min_product * min_product);
   }
 
-  // Tests the ball with the triangles of a block whose bits are set. Not inline, because its registers would spill
-  // those of the caller.
+  // Tests the ball with those triangles of a block whose bits are set in `asked_lanes`. Not inline, because its use of
+  // registers would make the caller spill its own.
   __attribute__((noinline)) TriangleResults test_closely(const TriangleBlock& block, uint32_t asked_lanes) const {
     const Vector8 a = Vector8::load(block.vertices), b = Vector8::load(block.vertices + 3),
                   c = Vector8::load(block.vertices + 6);
@@ -180,7 +182,8 @@ class BallQuery {
     const TriangleResults results = {certain, open & ~certain & ~(far & below(min_weight, Floats8::splat(-weight)))};
     if (results.undecided == 0) return results;
 
-    // Most of these are small triangles in a block of large ones: bounds by their own size decide them.
+    // Most triangles that are still undecided are small ones in a block with large ones: error bounds that depend on a
+    // triangle's own size, not on the block's extent, decide them.
     const Floats8 longest = maximum(bb, cc), reach8 = square_root(maximum(longest, dot(offset, offset)));
     const Floats8 own_weight = multiply_add(Floats8::splat(bound_unless(PlantedBug::kRegionOwnBounds, 0x1p-17f)),
                                             longest * square_root(longest) * reach8, Floats8::splat(square_floor()));
@@ -194,7 +197,7 @@ class BallQuery {
   }
 
   Vector8 center_;
-  Floats8 outer_, inner_;  // squares of the radius
+  Floats8 outer_, inner_;  // squared radius, padded up and down
   float radius_;
 };
 

@@ -4,23 +4,23 @@
 // centre and along the box's axes, exceeds R. All computations start with differences of floats, whose relative error
 // is u, and each product and each sum is counted as one rounding, as without fused products. If the box is not rotated:
 //
-// - On the axis perpendicular to a box axis and an edge (x, y), the error of a projected vertex is
-//   4 u (|x| R_y + |y| R_x): two differences, a product and a sum; that of the projected box is the same. Half extents
-//   that are smaller or larger by 16 u R change the projected box by twice that. If an edge is parallel to the box's
-//   axis, all projections are exactly zero, which counts as overlapping. Edges are scaled by 2^60, so that no product
-//   underflows.
+// - On the axis perpendicular to a box axis and an edge (x, y), the error of a projected vertex is 4 u (|x| R_y + |y|
+//   R_x): two differences, a product and a sum; the error of the projected box is the same. The half extents `inner`
+//   and `outer`, which differ from h by 16 u R, change the projected box by twice the sum of both errors. If an edge is
+//   parallel to the box's axis, all projections are exactly zero, which counts as overlapping. Edges are scaled by
+//   2^60, so that no product underflows.
 // - The error of a normal's component, which is at most E^2, is 3 u of each of its products and u of itself: 7 u E^2.
 //   The error of the triangle's height is 7 u and 4 u of E^2 (R_x + R_y + R_z), that of the projected box 7 u and 3 u,
 //   and each sum with the bound adds u: 23 u in total, within plane = 32 u of it.
 //
 // If the box is rotated, with S the sum of R: the error of coordinates, sums of three products, is 5 u S, and that of
-// edges 9 u E: half extents differ by 2^-18 S. Across an edge, the error of a projected vertex is 42 u E S and that of
-// the projected box 14 u E S, within 2^-17 E S. The error of a normal's component is 78 u E^2, that of the height 78 u,
-// 26 u and 9 u of E^2 S, and that of the projected box 87 u, within 2^-15 E^2 S.
+// edges 9 u E; `inner` and `outer` differ from h by 2^-18 S. Across an edge, the error of a projected vertex is 42 u E
+// S and that of the projected box 14 u E S, within 2^-17 E S. The error of a normal's component is 78 u E^2, that of
+// the height 78 u, 26 u and 9 u of E^2 S, and that of the projected box 87 u, within 2^-15 E^2 S.
 //
-// A triangle that certainly overlaps on all axes has a point in common with the box, and so have its bounds. Triangles
-// without area are never certain unless a vertex is inside; a vertex inside overlaps on every axis, because rounding is
-// monotone.
+// A triangle that certainly overlaps on all axes has a point in common with the box; so has the triangle's own bounding
+// box, which the predicate tests too. Triangles without area are never certain unless a vertex is inside; a vertex
+// inside overlaps on every axis, because rounding is monotone.
 //
 // Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_BOX_IMPL_H_
@@ -40,7 +40,8 @@ static inline Vector8 max_of_three(Vector8 a, Vector8 b, Vector8 c) {
 static inline Vector8 absolute(Vector8 a) { return {absolute(a.x), absolute(a.y), absolute(a.z)}; }
 static inline Vector8 scaled(Vector8 a, Floats8 s) { return {a.x * s, a.y * s, a.z * s}; }
 
-// Box of floats, in all lanes. Tests whether it overlaps or contains the boxes `low` to `high`.
+// One axis-aligned box, repeated in all lanes. overlaps() and contains() test whether it overlaps or contains each of
+// eight boxes with the corners `low` and `high`.
 struct Boxes8 {
   Vector8 min, max;
 
@@ -54,19 +55,20 @@ struct Boxes8 {
   }
 };
 
-// Results of the separating axis test for eight triangles; one bit a triangle.
+// Result masks of the separating axis test for eight triangles; one bit a triangle.
 struct OverlapBits {
-  uint32_t possible;  // not certainly separated from the box along any axis tested so far
-  uint32_t certain;   // certainly not separated along any axis tested so far
+  uint32_t possible;  // triangles not certainly separated from the box along any axis tested so far
+  uint32_t certain;   // triangles certainly not separated along any axis tested so far
 
-  // Adds an axis. `gap` is the distance between the projections of the box's centre and the triangle.
+  // Adds the result for one axis. `gap` is the distance between the projections of the box's centre and the triangle;
+  // `inner` and `outer` are lower and upper bounds of the half extent of the box's projection.
   inline void add_axis(Floats8 gap, Floats8 inner, Floats8 outer) {
     certain &= at_most(gap, inner);
     possible &= at_most(gap, outer);
   }
 };
 
-// A box as a query of region_kernels_impl.h.
+// Box as a Query of region_kernels_impl.h.
 template <bool kRotated>
 class BoxQuery {
  public:
@@ -118,7 +120,8 @@ class BoxQuery {
   }
 
  private:
-  // Half extents of the box and error bounds for the triangles of one block.
+  // Half extents of the box, exact (`half`) and padded (`inner`, `outer`), and error bounds for the triangles of one
+  // block.
   struct BlockBounds {
     inline BlockBounds(const KernelBox& box, float extent) {
       float reach[3], pad[3], sum = 0;
@@ -142,7 +145,7 @@ class BoxQuery {
 
     Vector8 half, inner, outer;
     Floats8 across, plane;
-    bool in_range;  // no product of projections underflows
+    bool in_range;  // whether no product of projections can underflow
   };
 
   static constexpr float kEdgeScale = 0x1p60f;
@@ -160,12 +163,14 @@ class BoxQuery {
     return {column(0), column(1), column(2)};
   }
 
-  // Returns the edge between two vertices, given by their rows, in box axes.
+  // Returns the edge between two vertices in box axes. `from` and `to` are the vertices' first rows in
+  // TriangleBlock::vertices.
   inline Vector8 edge_of(const TriangleBlock& block, int from, int to) const {
     return to_box_axes(Vector8::load(block.vertices + to) - Vector8::load(block.vertices + from));
   }
 
-  // Tests the rotated box with boxes along its own axes. `low` and `high` are relative to its centre.
+  // Tests the rotated box with eight boxes, using the rotated box's own axes as separating axes. `low` and `high` are
+  // the corners of the eight boxes, relative to the rotated box's centre.
   inline ChildResults test_rotated(Vector8 low, Vector8 high) const {
     const Floats8 half = Floats8::splat(0.5f);
     const Vector8 middle = to_box_axes({(low.x + high.x) * half, (low.y + high.y) * half, (low.z + high.z) * half});
@@ -187,14 +192,14 @@ class BoxQuery {
     return {overlapping, contained & overlapping};
   }
 
-  // Adds the normal of the triangle as an axis. `vertex` is any vertex.
+  // Adds the normal of the triangle as a separating axis. `vertex` is any vertex of the triangle.
   static inline void add_normal(Vector8 normal, Vector8 vertex, const BlockBounds& bounds, OverlapBits& overlap) {
     const Floats8 height = absolute(dot(normal, vertex)), projected_half = dot(absolute(normal), bounds.half);
     overlap.add_axis(height, projected_half - bounds.plane, projected_half + bounds.plane);
   }
 
-  // Adds the axes perpendicular to an edge and each box axis. The edge starts at `from`; `other` is the opposite
-  // vertex.
+  // Adds three separating axes: those perpendicular to an edge and to one box axis each. The edge starts at `from`;
+  // `other` is the opposite vertex.
   static inline void add_edge_axes(Vector8 edge, Vector8 from, Vector8 other, const BlockBounds& bounds,
                                    OverlapBits& overlap) {
     const Vector8 e = scaled(edge, Floats8::splat(planted(PlantedBug::kRegionEdgeScale) ? 1 : kEdgeScale));
@@ -206,7 +211,8 @@ class BoxQuery {
                   bounds.outer.y, bounds.across, overlap);
   }
 
-  // Adds one axis, in the plane of two of the box's axes: the axis perpendicular to the edge (x, y) is (-y, x).
+  // Adds one separating axis, which lies in the plane of two box axes, called x and y here: (-y, x), which is
+  // perpendicular to the edge (x, y).
   static inline void add_edge_axis(Floats8 x, Floats8 y, Floats8 from_x, Floats8 from_y, Floats8 other_x,
                                    Floats8 other_y, Floats8 inner_x, Floats8 inner_y, Floats8 outer_x, Floats8 outer_y,
                                    Floats8 across, OverlapBits& overlap) {

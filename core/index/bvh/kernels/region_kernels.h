@@ -1,8 +1,9 @@
 // Region kernels: find all triangles of one mesh's tree that overlap a ball or a box, eight boxes or triangles at a
-// time; every instruction set has its own object. A kernel decides in float only outside a documented error bound, and
-// asks the caller's RegionJudge, the predicates of core/geometry/triangle_overlap.h, otherwise, so that its answers
-// equal theirs bit for bit. The numbers of a subtree that lies completely inside the region are copied without tests.
-// Use them through core/query/kinds/triangle_search.h. Plain data; functions without state, safe from any thread.
+// time; each instruction set has its kernels in an object file of its own. A kernel decides in float only outside a
+// documented error bound. Otherwise it calls the caller's RegionJudge, which uses the predicates of
+// core/geometry/triangle_overlap.h, so that the answers of kernels equal those of the predicates. The triangle numbers
+// of a subtree that lies completely inside the region are copied without tests. The kernels are used through
+// core/query/kinds/triangle_search.h. Plain data; functions without state, safe from any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 
@@ -13,8 +14,8 @@
 
 namespace locus {
 
-// Ball in mesh axes. Precondition: it is finite, and the largest |coordinate| of its centre + its radius + the tree's
-// magnitude is at most kMaxRegionReach.
+// Ball in mesh axes. Precondition: all members are finite, and the largest |coordinate| of its centre + its radius +
+// the tree's magnitude is at most kMaxRegionReach.
 struct KernelBall {
   float center[3];
   float radius;
@@ -31,17 +32,19 @@ struct KernelBox {
 };
 
 inline constexpr float kMaxRegionReach = 0x1p29f;
-// A call pauses after this number of tested triangles, so that its caller can check deadlines and cancellation.
+// Number of tested triangles after which a call of RegionKernel::one() pauses, so that its caller can check deadlines
+// and cancellation.
 inline constexpr uint32_t kMaxRegionTests = 4096;
-// Minimum room for numbers in a call.
+// Minimum of RegionVisit::room: the triangle numbers of one block must fit.
 inline constexpr size_t kMinRegionRoom = 8;
 // Maximum number of regions in a call of many().
 inline constexpr size_t kMaxRegions = 16;
-// A visit stops opening nodes when it has more unprocessed items (blocks and contained subtrees) than this. Opening one
-// node adds up to eight items.
+// Number of unprocessed items (blocks and contained subtrees) above which a visit opens no more nodes until all items
+// are processed. Opening one node adds up to eight items.
 inline constexpr uint32_t kMaxRegionItems = 56;
 
-// Predicate for the triangles that float cannot decide.
+// Predicate for the triangles that float cannot decide. meets() returns whether the triangle in lane `lane` of `block`
+// overlaps `region`.
 struct RegionJudge {
   bool (*meets)(const void* region, const TriangleBlock& block, uint32_t lane);
   const void* region;
@@ -51,15 +54,15 @@ struct RegionJudge {
 struct RegionVisit {
   RegionJudge judge;
   uint32_t* numbers;   // output of the next call
-  size_t room;         // its length, at least kMinRegionRoom; the call may write to all of it
-  size_t found;        // number of numbers written by the last call; in storage order over all calls
+  size_t room;         // length of `numbers`, at least kMinRegionRoom; a call may overwrite all of it
+  size_t found;        // count of triangle numbers written by the last call; successive calls write in storage order
   uint32_t nodes;      // nodes opened by the last call
   uint32_t tests;      // triangles tested by the last call
-  uint32_t judged;     // number of these that were decided by the judge
+  uint32_t judged;     // number of these triangles that the judge decided
   uint32_t top;        // length of `waiting`
   uint32_t next, end;  // range of unprocessed elements of `items`
-  NodeRange rest;      // remaining positions of a contained subtree that did not fit
-  alignas(32) uint32_t waiting[kTreeStack];  // nodes, and contained subtrees
+  NodeRange rest;      // part of a contained subtree that did not fit and is still to be copied
+  alignas(32) uint32_t waiting[kTreeStack];  // stack of nodes to open and contained subtrees
   alignas(32) uint32_t items[kMaxRegionItems + kTreeWidth];
 
   // Begins a visit at the root.
@@ -70,15 +73,17 @@ struct RegionVisit {
     rest = {};
     waiting[0] = 0;
   }
-  // Returns whether all triangles were found.
+  // Returns whether the visit is complete, so that no further call is needed.
   bool over() const { return top == 0 && next == end && rest.count == 0; }
 };
 
 // Kernel of one kind of region.
-// - one() continues a visit until it is over, its room is used up, or kMaxRegionTests triangles were tested.
+// - one() continues a visit until it is complete, the room for numbers is used up, or at least kMaxRegionTests
+//   triangles were tested.
 // - many() answers up to kMaxRegions regions and opens their nodes in turns, which overlaps their memory accesses. It
-//   writes the numbers of the regions one after the other, and the count of each. It returns the number of answered
-//   regions: all of them, unless `room` was too small for the next one.
+//   writes the triangle numbers found for each region to `numbers`, one region after the other, and how many there are
+//   for each region to `counts`. It returns the number of answered regions, which is less than `regions` if `room` was
+//   too small for the next one.
 template <class Region>
 struct RegionKernel {
   void (*one)(const TriangleTree&, const Region&, RegionVisit&);
@@ -90,12 +95,12 @@ struct RegionKernel {
 struct RegionKernels {
   const char* name;  // instruction set
   RegionKernel<KernelBall> ball;
-  RegionKernel<KernelBox> box;  // not rotated
+  RegionKernel<KernelBox> box;  // box that is not rotated
   RegionKernel<KernelBox> turned_box;
 };
 
-// Return the kernels of one instruction set: the only exported symbol of its object. Must be called only on a processor
-// that supports the instruction set.
+// Return the kernels of one instruction set. Each function is the only symbol that its object file exports. Must be
+// called only on a processor that supports the instruction set.
 const RegionKernels& region_kernels_avx2();
 const RegionKernels& region_kernels_sse4();
 

@@ -1,6 +1,6 @@
 // Traversal of the region kernels, compiled once for each instruction set by the .cc file that includes it. A traversal
 // first opens nodes and collects items: blocks to test, and blocks and subtrees that are completely inside the region.
-// Then it processes the items one by one. The two phases alternate, so that the mispredicted branches of one do not
+// Then it processes the items one by one. The two phases alternate, so that mispredicted branches of one phase do not
 // delay the other. Of a node's children, the blocks become items at once and the nodes are pushed with the last slot
 // lowest, so that items are collected in storage order. region_ball_impl.h and region_box_impl.h contain the tests and
 // their error bounds.
@@ -28,7 +28,7 @@ struct Walk {
   // Returns whether a node is pending and `items` has room for its blocks.
   inline bool can_continue() const { return (top != 0) & (end <= kMaxRegionItems); }
 
-  // Pops and opens one node.
+  // Pops one element of the stack: opens it if it is a node, or makes it an item if it is a contained subtree.
   __attribute__((always_inline)) inline void step(const TriangleTree& tree) {
     const uint32_t now = waiting[--top];
     if ((now & kContainedBit) != 0) {
@@ -46,7 +46,7 @@ struct Walk {
   }
 };
 
-// Returns the bits of `undecided` whose triangles overlap the region, by the judge.
+// Returns those bits of `undecided` whose triangles overlap the region according to `judge`.
 static inline uint32_t judged(const TriangleBlock& block, uint32_t undecided, const RegionJudge& judge) {
   uint32_t found = 0;
   for (; undecided != 0; undecided &= undecided - 1u) {
@@ -56,17 +56,18 @@ static inline uint32_t judged(const TriangleBlock& block, uint32_t undecided, co
   return found;
 }
 
-// Output of triangle numbers.
+// Output buffer of triangle numbers, with the counters of the tests.
 struct Sink {
   uint32_t* out;
   size_t count, room;
-  NodeRange rest;  // remaining positions of a subtree that did not fit
+  NodeRange rest;  // part of a subtree that did not fit and is still to be copied
   uint32_t tests, judged;
 
-  // Returns whether there is no room for a block.
+  // Returns whether the buffer may be too small for the numbers of one more block.
   inline bool full() const { return room - count < kTreeWidth; }
 
-  // Copies as much of `rest` as fits. Must not be called when full.
+  // Copies as many triangle numbers of `rest` as fit, and removes them from `rest`. Leaves seven elements of the buffer
+  // free, because copy_numbers() may overwrite seven elements beyond those copied. Must not be called if full().
   inline void copy_rest(const TriangleTree& tree) {
     const size_t max_count = room - count - (kTreeWidth - 1);
     const uint32_t fits = rest.count <= max_count ? rest.count : static_cast<uint32_t>(max_count);
@@ -76,7 +77,8 @@ struct Sink {
     rest.count -= fits;
   }
 
-  // Writes the numbers of an item's triangles that overlap the region.
+  // Writes the numbers of those triangles of an item that overlap the region. If a contained subtree does not fit
+  // completely, the part not written stays in `rest`.
   template <class Query>
   __attribute__((always_inline)) inline void process_item(const TriangleTree& tree, const Query& query,
                                                           const RegionJudge& judge, uint32_t item) {
@@ -134,7 +136,7 @@ static void find_one(const TriangleTree& tree, const Region& region, RegionVisit
   visit.judged = sink.judged;
 }
 
-// Traversals of several queries.
+// Traversals of up to kMaxRegions queries through one tree.
 template <class Query>
 class Walks {
  public:
@@ -153,8 +155,8 @@ class Walks {
 
   inline Walk<Query>& operator[](size_t i) { return lanes_[i].walk; }
 
-  // Opens nodes of all queries in turns: while one waits for memory or for the result of its last step, the others
-  // continue.
+  // Opens nodes of all queries in turns: while one query waits for memory or for the result of its last step, the
+  // others continue. Stops for each query when no node is pending or its items are full.
   inline void open_all(const TriangleTree& tree) {
     uint32_t active[kMaxRegions];
     for (uint32_t i = 0; i < count_; ++i) active[i] = i;
@@ -181,7 +183,8 @@ class Walks {
   uint32_t count_;
 };
 
-// Completes a walk and writes its numbers. Returns false if there is no room for them.
+// Completes a walk and writes the triangle numbers that it finds. Returns false if there may be too little room for
+// them.
 template <class Query>
 static inline bool finish(const TriangleTree& tree, const RegionJudge& judge, Walk<Query>& walk, Sink& sink) {
   for (;;) {
