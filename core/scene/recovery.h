@@ -33,8 +33,8 @@ struct RecoveredMesh {
 };
 
 // Returns the mesh that is stored under stored.name, with its tree from the cached topology. If that is not possible,
-// builds the tree and stores the topology in the log's cache for the next recovery. The result lacks the parts of the
-// name: pass it to recover_name().
+// builds the tree and stores the topology in the log's cache for the next recovery. Does not read the parts that are
+// stored for the name: recover_name() does.
 absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
 
 // Returns the mesh of the name stored.name, with the parts that are stored for this name. The mesh shares the bytes and
@@ -42,9 +42,9 @@ absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& sto
 absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& stored, const MeshPtr& content);
 
 // Returns a function that finds the meshes which `registry` restored from `log`; both outlive the function. Records of
-// format 1 identify a mesh by its content hash alone. For them the function returns, among the names of this content
-// that were stored in format 1, the name that sorts first. Every recovery makes the same choice, because a name cannot
-// be deleted while instances use it.
+// format 1 identify a mesh by its content hash alone. For them the function chooses among the names of this content
+// that were stored in format 1: it returns the mesh of the name that sorts first. Every recovery makes the same choice
+// for an existing instance, because a name cannot be deleted while instances use it.
 FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry);
 
 }  // namespace locus

@@ -108,7 +108,7 @@ class Scene {
   absl::StatusOr<Acks> apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Applies several batches as one revision, which all their acks name. Precondition: the batches satisfy may_join().
+  // Applies several batches together, as one revision. Precondition: the batches satisfy may_join().
   // Returns one ack or error for each batch. If the call itself fails, with an error of apply(), no batch was applied.
   absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                     Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
@@ -167,8 +167,8 @@ class Scene {
   // Drops the revisions that are retained for kExactly views, except the latest one. Called when memory is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
 
-  // Closes the scene after its deletion: wakes all waiters and refuses later views and changes
-  // with NOT_FOUND.
+  // Closes the scene after its deletion: wakes all waiters, and refuses later calls of view() and of the
+  // members that change the scene with NOT_FOUND.
   void close() LOCUS_EXCLUDES(mutex_);
   // Deletes the scene from its log and closes it. If the log fails, returns its error, and the scene stays open.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);

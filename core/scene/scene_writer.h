@@ -109,8 +109,9 @@ class SceneWriter {
   bool drops_history(const UpdateBatch& batch) const { return batch.restart_ticks && has_past(); }
   // Returns the scene's tick once the batch is applied.
   uint64_t tick_of(const UpdateBatch& batch) const;
-  // If the batch begins a new tick, adds the state at the end of the current tick to the history; if the batch restarts
-  // ticks, drops the history. Does nothing for a scene without history. Call before the batch is applied.
+  // Ends the current tick if the batch begins another one: adds the state at the end of the current tick to the
+  // history, or drops the history if the batch restarts ticks. Does nothing for a scene without history. Call before
+  // the batch is applied.
   void start_tick(const UpdateBatch& batch);
   // Makes the next revision if `changes` is true or the batch begins a new tick. Then sets the epoch, revision and tick
   // of the ack in `result`.
