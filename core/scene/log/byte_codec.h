@@ -54,7 +54,7 @@ class ByteWriter {
  private:
   template <class T>
   static bool all_same(absl::Span<const T> values, size_t width) {
-    // Compares all entries but the last with all entries but the first, and so each entry with the one before it.
+    // Compares each entry with the next one: the column with itself, shifted by one entry.
     return values.size() > width &&
            std::memcmp(values.data(), values.data() + width, (values.size() - width) * sizeof(T)) == 0;
   }

@@ -39,7 +39,7 @@ UpdateAck read_ack(ByteReader& reader) {
   return ack;
 }
 
-// Returns true if all values are within [min, max]. NaN is not.
+// Returns true if all values are within [min, max]. A NaN is not.
 template <class T>
 bool all_within(absl::Span<const T> values, double min, double max) {
   bool valid = true;

@@ -101,8 +101,7 @@ class UpdateLog {
 
   // Appends records in order, all or none, with one sync if `level` requires it; one sync may serve several scenes that
   // append at the same time. Preconditions: the entries have the scene's epoch (FAILED_PRECONDITION otherwise), and
-  // together at most kMaxRecordBytes. Returns the sequence number of the last
-  // record.
+  // together at most kMaxRecordBytes. Returns the sequence number of the last record.
   virtual absl::StatusOr<uint64_t> append(SceneKey scene, absl::Span<const LogEntry> entries, AckLevel level) = 0;
   // Passes the records from sequence number `from` on to `sink`, in order, until `sink` fails. Precondition: the
   // snapshot does not include record `from`.
