@@ -28,8 +28,8 @@ class ObjectSet {
 
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
-  // Returns a reference to the object with this id, or a null reference. O(1), plus a search through the keys of one
-  // brick.
+  // Returns a reference to the object with this id, or a null reference if there is none. O(1), plus a search through
+  // the keys of one brick.
   GridRef find_ref(Id id) const;
   std::optional<Object> find(Id id) const;
   // Returns true if an object with this id is stored at exactly this position.

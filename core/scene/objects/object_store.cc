@@ -10,7 +10,7 @@ namespace locus {
 namespace {
 
 constexpr size_t kAhead = 16;       // prefetch distance, in objects
-constexpr uint32_t kNewLife = ~0u;  // stands for the index of an updated object: there is none
+constexpr uint32_t kNewLife = ~0u;  // in place of an index: the inserted object updates no removed one
 
 // Returns for each object of `inserted` the index in `removed` of the object that it updates; kNewLife if there is
 // none.

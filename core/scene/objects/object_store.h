@@ -67,8 +67,8 @@ class ObjectStore {
   // that existing sets hold and later sets will not share.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                const absl::flat_hash_set<Id>& replaced = {});
-  // Moves objects. Precondition: the handles belong to objects and are distinct. Returns what apply()
-  // returns.
+  // Moves objects. Precondition: the handles belong to objects and are distinct. Returns the number of replaced bytes,
+  // like apply().
   size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
   // Inserts the objects of `chunks` into an empty store with cells of about `cell_size`. Frees each chunk once it is

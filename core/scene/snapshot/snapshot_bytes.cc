@@ -18,7 +18,7 @@ const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) 
 }
 
 // Returns the bytes of the history records of `held` that `later` does not hold. HistoryRecord::bytes excludes memory
-// shared with the next record: it is counted with the next record, unless `later` holds that record.
+// shared with the next record: it is counted with the next record, or `later` still holds it.
 uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   if (held.history == nullptr || held.history == later.history) return 0;
   uint64_t bytes = 0;

@@ -51,7 +51,8 @@ class StaticMesh {
   const std::string& name() const { return name_; }
   const Sha256& sha256() const { return content_->sha256; }
   MeshKey key() const { return {sha256(), name_}; }
-  // Returns the tree. Queries with STATIC_DETAIL_TRIANGLES return rows in the storage order of the tree.
+  // Returns the tree. Overlap queries with STATIC_DETAIL_TRIANGLES return an instance's rows in the tree's storage
+  // order.
   const TriangleBvh& tree() const { return content_->tree; }
   uint32_t vertex_count() const { return content_->vertex_count; }
   uint32_t triangle_count() const { return static_cast<uint32_t>(tree().size()); }

@@ -30,8 +30,8 @@ class BatchApplier {
   // Applies clear, removes, inserts, moves and relabels, in this order. Call once.
   void run();
 
-  // Returns the number of objects after the batch. It is enough to check this number against a limit: nothing is
-  // removed after the inserts, so that no earlier count of the inserts is higher.
+  // Returns the number of objects after the batch. Nothing is removed after the inserts, so that no insert leads to a
+  // higher number: it is enough to check this one against a limit.
   size_t object_count() const { return count_; }
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
