@@ -46,7 +46,7 @@ class SceneJournal {
   // Appends a single record for all batches, which become one revision.
   absl::Status append_joined(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
   // Appends a static change. Syncs it even for a scene with AckLevel::kMemory: once the change removes the last
-  // instance of a mesh, the mesh may be deleted, and a crash must not undo the change but keep the deletion.
+  // instance of a mesh, the mesh may be deleted, and after a crash that loses the change the scene would need the mesh.
   absl::Status append_change(uint64_t epoch, const StaticChange& change, absl::Span<const Id> placed)
       LOCUS_EXCLUDES(mutex_);
   // Deletes the scene from the log.

@@ -1,10 +1,10 @@
-// Displacements of objects since the last recorded tick. Searches at a time between two ticks are widened by them. Used
-// by the writer of a scene with history; one thread at a time.
+// Displacements of objects since the last recorded tick. Searches at a time between two ticks are widened by these
+// displacements. Used by the writer of a scene with history; one thread at a time.
 //
 // Most objects move little, and one bound covers all of them. The few that moved farther than a cell are listed one by
-// one, so that a single fast object does not widen every search. If the list gets longer than kMaxFast, the length that
-// counts as fast is doubled until the list is short. Invariants: the list is ascending by handle, holds at most
-// kMaxFast objects, and holds exactly the objects of Kind::kListed.
+// one, so that a single fast object does not widen every search. If more than kMaxFast objects are listed, the length
+// above which an object is fast is doubled until at most half as many are. Invariants: the list is ascending by handle,
+// holds at most kMaxFast objects, and holds exactly the objects of Kind::kListed.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_TICK_MOVES_H_
 #define LOCUS_CORE_SCENE_OBJECTS_TICK_MOVES_H_
 

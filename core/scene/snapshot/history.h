@@ -57,8 +57,8 @@ class HistoryRecorder {
   // scene is at `next_tick`. `since_last` is the displacement since the last record. Precondition: last record's tick <
   // `tick` < `next_tick`. O(records + memory that the tick changed).
   void close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last, uint64_t next_tick);
-  // Counts the memory of the last record that the current objects `now` do not share. Only the first call after each
-  // close() has an effect.
+  // Counts the memory of the last record that is not shared with the current objects `now`. Only the first call after
+  // each close() has an effect.
   void measure(const ObjectSet& now);
   // Drops all records.
   void drop();
