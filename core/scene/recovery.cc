@@ -27,13 +27,13 @@ std::string hex(const Sha256& sha256) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
 }
 
-// Puts `what` in front of the error message.
+// Returns `status` with `what` in front of its message; OK stays OK.
 absl::Status named(absl::string_view what, const absl::Status& status) {
   return status.ok() ? status : absl::Status(status.code(), absl::StrCat(what, ": ", status.message()));
 }
 
-// Finder of meshes during replay. Returns a placeholder for a missing mesh: a later record may remove its instances,
-// after which the mesh was deleted.
+// Lookup of meshes during replay. Returns a placeholder for a missing mesh, which may have been deleted after a later
+// record removed its instances. check() reports a placeholder that is still in use after the replay.
 class Meshes {
  public:
   explicit Meshes(const FindMesh& find) : find_(find) {}
@@ -70,7 +70,7 @@ class Meshes {
   std::vector<MeshPtr> placeholders_;
 };
 
-// Replay of records, one after another, on the state of a snapshot.
+// Replay of the records after a snapshot, in order, by the writer that was restored from the snapshot.
 class Replay {
  public:
   Replay(const StoredScene& stored, SceneWriter& writer, Meshes& meshes, const RecoveryProgress& progress)
@@ -90,7 +90,7 @@ class Replay {
     return absl::OkStatus();
   }
 
-  // Checks that all records were applied, and enters the epoch of the log.
+  // Checks that all records were applied, then starts the epoch that is stored for the scene.
   absl::Status finish() {
     if (last_ != stored_.last_sequence)
       return data_loss(absl::StrCat("records ", last_ + 1, " to ", stored_.last_sequence, " are not there"));
@@ -103,7 +103,7 @@ class Replay {
     return last_ - stored_.snapshot_sequence;
   }
 
-  // Enters `epoch`. DATA_LOSS if it is 0 or an earlier epoch of the scene.
+  // Starts `epoch` unless it is the current one. DATA_LOSS if it is 0 or an earlier epoch of the scene.
   absl::Status enter_epoch(uint64_t epoch) {
     if (epoch == writer_.epoch()) return absl::OkStatus();
     ended_epochs_.insert(writer_.epoch());
@@ -113,7 +113,8 @@ class Replay {
     return absl::OkStatus();
   }
 
-  // Applies one record. A batch that was refused when it was logged is refused again and has no effect.
+  // Applies the content of one record. A batch that was refused when it was logged is refused again and has no effect,
+  // so its error is ignored.
   absl::Status apply(Record::Content& content) {
     if (const auto* batch = std::get_if<UpdateBatch>(&content); batch != nullptr) {
       writer_.apply(*batch).IgnoreError();
@@ -176,7 +177,8 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
   return std::make_shared<Scene>(stored.name, *std::move(spec), std::move(writer), on);
 }
 
-// Restores a mesh from the cached topology. Returns null if there is none or it does not fit: then the tree is built.
+// Returns the mesh with the tree of the cached topology. Returns null if no topology is cached or it does not fit the
+// mesh: then the caller builds the tree.
 MeshPtr restore_mesh(const UpdateLog& log, const StoredMesh& stored, const TriangleMesh& columns,
                      const BvhOptions& options) {
   const std::optional<std::string> kept = log.read_outline(stored.sha256);

@@ -17,12 +17,13 @@
 
 namespace locus {
 
-// Called from time to time with the number of records applied so far and of all records.
+// Function that is called at regular intervals with the number of records applied so far and the number of all records
+// to apply.
 using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
 
-// Returns the scene in the state after its last record, in the epoch of the log. It appends to `log`, which outlives
-// it. `find_mesh` is called for each mesh that was used since the snapshot and may return null for meshes that no
-// instance uses any more. O(snapshot + records).
+// Returns the scene in the state after its last record, in the epoch stored.epoch. The scene appends to `log`, which
+// outlives the scene. `find_mesh` is called for each mesh that the snapshot or a later record uses, and may return null
+// for a mesh that no instance uses any more. O(snapshot + records).
 absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
                                        const RecoveryProgress& progress = nullptr);
 
@@ -31,15 +32,19 @@ struct RecoveredMesh {
   bool built = false;  // true: the tree was built; false: it was restored from the cached topology
 };
 
-// Returns a stored mesh. If its tree must be built, stores the topology in the log's cache for the next recovery.
+// Returns the mesh that is stored under stored.name, with its tree from the cached topology. If that is not possible,
+// builds the tree and stores the topology in the log's cache for the next recovery. Does not read the parts that are
+// stored for the name: recover_name() does.
 absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
 
-// Returns the mesh of a stored name with the parts of that name. `content` is what recover_mesh() made of any name of
-// the same content, which the mesh shares.
+// Returns the mesh of the name stored.name, with the parts that are stored for this name. The mesh shares the bytes and
+// the tree of `content`, which recover_mesh() returned for any name of the same content.
 absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& stored, const MeshPtr& content);
 
-// Finds the meshes that `registry` restored from `log`; both outlive the function. Records of format 1 name a content
-// only: they mean the lowest name that was written in format 1, which is in use and so never deleted before them.
+// Returns a function that finds the meshes which `registry` restored from `log`; both outlive the function. Records of
+// format 1 identify a mesh by its content hash alone. For them the function chooses among the names of this content
+// that were stored in format 1: it returns the mesh of the name that sorts first. Every recovery makes the same choice
+// for an existing instance, because a name cannot be deleted while instances use it.
 FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry);
 
 }  // namespace locus

@@ -26,7 +26,7 @@ absl::Status refuse_name(absl::StatusCode code, Reason reason, absl::string_view
 
 bool name_character(char c) { return absl::ascii_islower(c) || absl::ascii_isdigit(c); }
 
-// Returns the first entry of a map after a key.
+// Returns the first entry with a key above `after`, or the first of all entries if `after` is empty.
 template <class Map>
 auto after_key(const Map& map, const std::string& after) {
   return after.empty() ? map.begin() : map.upper_bound(after);
@@ -86,7 +86,8 @@ absl::StatusOr<ScenePtr> Registry::log_scene(const std::string& name, const Scen
   return std::make_shared<Scene>(name, spec, std::move(writer), on);
 }
 
-// Holds changes_mutex_, so that creations of the same name and deletions of meshes that `static_from` uses wait.
+// Holds changes_mutex_ throughout, so that meanwhile no scene of the same name is created and no mesh that
+// `static_from` uses is deleted.
 absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string& name, const SceneSpec& spec,
                                                               uint64_t epoch, const std::string& static_from,
                                                               bool if_absent) {
@@ -135,7 +136,7 @@ absl::Status Registry::delete_scene(const std::string& name) {
   if (!scene.ok())
     return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "name",
                        absl::StrCat("no scene is called '", name, "'"));
-  // The scene can be found until its deletion is logged, and is closed then.
+  // remove() closes the scene once the deletion is logged. Until then the scene can be found.
   RETURN_IF_ERROR((*scene)->remove());
   const MutexLock lock(mutex_);
   scenes_.erase(name);
@@ -217,7 +218,7 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
   absl::StatusOr<MeshPtr> known = begin_mesh(name, mesh);
   if (!known.ok() || *known != nullptr) return known;
   if (log_ != nullptr) {
-    std::optional<MeshWriter> content;  // made only if the log asks for the content
+    std::optional<MeshWriter> content;  // created only if the log has not stored the content yet
     const auto next = [&]() -> absl::StatusOr<std::optional<std::string>> {
       if (!content) content.emplace(mesh);
       return content->next();

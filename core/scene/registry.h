@@ -1,11 +1,12 @@
-// Registry of a server: scenes by name, and meshes by name and by content. Scenes keep the meshes they use alive. With
-// a log, a scene or mesh becomes visible after its creation is logged, and disappears after its deletion is logged.
+// Registry of a server: scenes by name, and meshes by name and by content hash. A scene shares the ownership of the
+// meshes that it uses. With a log, a scene or mesh becomes visible once its creation is logged. A scene stays visible
+// until its deletion is logged; a mesh is hidden before its deletion is logged, and is visible again if the log fails.
 //
-// Threads: every member may be called from any thread. Members that change scenes are serialised and wait for the log,
-// and so are members that change meshes, which may take seconds to write; delete_scene() also waits for a batch that is
-// being applied, delete_mesh() for changes of both kinds; all others never wait. Lock order: mesh_changes_mutex_,
-// changes_mutex_, the locks of a scene; mutex_ is held only for a lookup or an insertion, and is taken before a scene's
-// reader lock.
+// Threads: every member may be called from any thread. Changes of scenes run one at a time and wait for the log.
+// Changes of meshes run one at a time, too, and may take seconds to write a mesh. delete_scene() also waits for a batch
+// that is being applied, and delete_mesh() for running changes of scenes and of meshes. All other members never wait.
+// Lock order: mesh_changes_mutex_, changes_mutex_, then the locks of a scene. mutex_ is held only for a lookup or an
+// insertion; while it is held, only Scene::mutex_ may be locked.
 #ifndef LOCUS_CORE_SCENE_REGISTRY_H_
 #define LOCUS_CORE_SCENE_REGISTRY_H_
 
@@ -23,31 +24,31 @@ namespace locus {
 using ScenePtr = std::shared_ptr<Scene>;
 using MeshPtr = std::shared_ptr<const StaticMesh>;
 
-// Checks a scene name: ^[a-z]([a-z0-9-]{0,61}[a-z0-9])?$. INVALID_ARGUMENT naming `field` otherwise.
+// Returns OK if `name` matches ^[a-z]([a-z0-9-]{0,61}[a-z0-9])?$, otherwise INVALID_ARGUMENT naming `field`.
 absl::Status check_scene_name(absl::string_view name, absl::string_view field);
-// Checks a mesh name: 1 to 63 printable characters without spaces. INVALID_ARGUMENT naming `field` otherwise.
+// Returns OK if `name` has 1 to 63 printable ASCII characters and no space, otherwise INVALID_ARGUMENT naming `field`.
 absl::Status check_mesh_name(absl::string_view name, absl::string_view field);
 
 class Registry {
  public:
-  // `log` may be null; otherwise it outlives the registry and its scenes. The registry outlives every change of its
-  // scenes.
+  // `log` may be null; otherwise it outlives the registry and its scenes. The registry outlives every call of
+  // Scene::change_instances() of its scenes, which asks the registry whether a mesh is still registered.
   explicit Registry(UpdateLog* log = nullptr) : log_(log) {}
 
   struct CreatedScene {
     ScenePtr scene;
     bool existed = false;
   };
-  // Creates a scene, with the instances of the scene `static_from` unless that is empty. If the name is taken, returns
-  // the existing scene with `if_absent` and ALREADY_EXISTS otherwise. NOT_FOUND if `static_from` does not exist;
-  // DATA_LOSS if a damaged scene has one of the names; or the log's error.
+  // Creates a scene. It begins with the instances of the scene `static_from`, or without instances if `static_from` is
+  // empty. If the name is taken, returns the existing scene if `if_absent` is true, else ALREADY_EXISTS. NOT_FOUND if
+  // `static_from` does not exist; DATA_LOSS if `name` or `static_from` names a damaged scene; or the log's error.
   absl::StatusOr<CreatedScene> create_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                             const std::string& static_from, bool if_absent)
       LOCUS_EXCLUDES(changes_mutex_, mutex_);
-  // Returns the scene; NOT_FOUND, or DATA_LOSS for a damaged scene.
+  // Returns the scene of this name. NOT_FOUND if there is none; DATA_LOSS if it is damaged.
   absl::StatusOr<ScenePtr> find_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
-  // Closes and deletes a scene, damaged or not: its waiters get NOT_FOUND. After an error of the log the scene
-  // continues.
+  // Deletes a scene, damaged or not, and closes it: its waiters get NOT_FOUND. If the log fails, returns its error, and
+  // the scene stays open.
   absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
   // Returns at most `limit` scenes in name order, beginning after the name `after`.
   std::vector<ScenePtr> list_scenes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
@@ -59,17 +60,21 @@ class Registry {
   std::vector<Damaged> damaged_scenes() const LOCUS_EXCLUDES(mutex_);
   size_t scene_count() const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the mesh of that content with the lowest name, or null.
+  // Returns a mesh whose content has this hash, or null. If several names have this content, returns the mesh of the
+  // name that sorts first.
   MeshPtr find_content(const Sha256& sha256) const LOCUS_EXCLUDES(mutex_);
-  // Returns the mesh that has that name and that content, or null. Without a name as find_content().
+  // Returns the mesh that is registered under key.name if its content has the hash key.sha256, else null. If key.name
+  // is empty (data format 1), returns find_content(key.sha256).
   MeshPtr find_stored(const MeshKey& key) const LOCUS_EXCLUDES(mutex_);
+  // Returns the mesh of this name. NOT_FOUND, naming `field`, if there is none; DATA_LOSS if it is damaged.
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
-  // Adds `mesh` under `name` and returns the mesh that is registered: it shares the content of a mesh of equal content
-  // if there is any, so that equal content is held once, and has its own parts. Returns a known name of equal content
-  // and parts as it is. ALREADY_EXISTS if the name has other content or other parts.
+  // Adds `mesh` under `name` and returns the registered mesh, which has this name and the parts of `mesh`. If a
+  // registered mesh has equal content, both share it, so that equal content is in memory once. If the name is
+  // registered with equal content and equal parts, returns the registered mesh. ALREADY_EXISTS if the name has other
+  // content or other parts.
   absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
-  // Deletes a mesh. FAILED_PRECONDITION IN_USE, with the number of instances, while a scene uses it or a pending change
-  // places it.
+  // Deletes a mesh, damaged or not. FAILED_PRECONDITION IN_USE, naming the number of its instances, if a scene has
+  // instances placed under this name or a pending change places some.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
   struct NamedMesh {
     std::string name;
@@ -78,11 +83,13 @@ class Registry {
   };
   std::vector<NamedMesh> list_meshes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
   size_t mesh_count() const LOCUS_EXCLUDES(mutex_);
-  // Returns the number of instances in all scenes that were placed under the name of `mesh`.
+  // Returns the number of instances of `mesh` in the latest revisions of all scenes. Instances of an equal mesh under
+  // another name are not counted.
   uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
-  // Add the scenes and meshes that were recovered from the log: see core/scene/recovery.h. Each name once; meshes
-  // before scenes, because recover_scene() finds them by find_stored(). Equal content is held once.
+  // Add a scene or mesh that was recovered from the log: see core/scene/recovery.h. Call once for each name. Add all
+  // meshes before scenes are recovered, because recover_scene() looks meshes up with find_stored(). Meshes of equal
+  // content share it.
   void restore_scene(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
   void restore_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
   // Add a damaged scene or mesh: lookups of its name return `damage` (DATA_LOSS) until it is deleted.
@@ -94,7 +101,7 @@ class Registry {
     SceneKey key;
     absl::Status damage;
   };
-  // Start of a new scene: its instances, or the scene that exists under the name.
+  // Result of begin_scene(): the instances that the new scene begins with, or the existing scene of that name.
   struct Beginning {
     ScenePtr existing;
     std::shared_ptr<const StaticSet> statics;
@@ -108,16 +115,19 @@ class Registry {
   std::optional<SceneKey> damaged_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
   absl::Status delete_damaged_scene(const std::string& name, SceneKey key) LOCUS_REQUIRES(changes_mutex_)
       LOCUS_EXCLUDES(mutex_);
-  // Returns the mesh that is registered under `name`, or null if `mesh` may be added. In that case `mesh` shares the
-  // content of a registered mesh of equal content.
+  // Checks whether `mesh` may be added under `name`. If the name is registered with equal content and parts, returns
+  // the registered mesh. If the name is free, returns null and replaces `mesh` by to_keep(name, mesh).
   absl::StatusOr<MeshPtr> begin_mesh(const std::string& name, MeshPtr& mesh) const LOCUS_EXCLUDES(mutex_);
-  // Returns `mesh` under `name`; it shares the content of a registered mesh of equal content if there is any.
+  // Returns a mesh with the name `name` and the parts of `mesh`. It shares the content of a registered mesh of equal
+  // content if there is one, else the content of `mesh`.
   MeshPtr to_keep(const std::string& name, MeshPtr mesh) const LOCUS_REQUIRES(mutex_);
-  // Removes the name of a mesh, unless the mesh is in use, and returns the mesh; returns null for a damaged mesh, whose
-  // name stays.
+  // Removes the mesh `name` from meshes_ and returns it. FAILED_PRECONDITION IN_USE if it is in use. Returns null for a
+  // damaged mesh, which it does not remove.
   absl::StatusOr<MeshPtr> take_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
+  // Returns true if `mesh` is the mesh that is registered under its name.
   bool is_kept(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
   uint32_t count_uses(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
+  // Returns find_content(sha256).
   MeshPtr content(const Sha256& sha256) const LOCUS_REQUIRES(mutex_);
 
   UpdateLog* const log_;

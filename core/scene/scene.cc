@@ -57,7 +57,8 @@ absl::Status readers_too_slow(uint64_t budget) {
       refusal);
 }
 
-// Returns a refusal that names the placement whose id, at `position` of all placed ids, was taken.
+// Returns the refusal of a change because an object took the id `id` meanwhile. `position` is the index of the id among
+// all placed ids of the change; the refusal names the placement that contains this index.
 absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id) {
   size_t list = 0;
   while (position >= change.place[list].count()) position -= change.place[list++].count();
@@ -74,8 +75,8 @@ absl::Status mesh_is_gone(const StaticChange& change, size_t list) {
                 refusal);
 }
 
-// Returns the batches that pass check_form(), and appends an entry for each batch to `acks`: the error of its form, or
-// an empty ack.
+// Returns the batches that pass check_form(), and appends an entry for each batch to `acks`: the error of check_form(),
+// or an empty ack.
 std::vector<const UpdateBatch*> well_formed(absl::Span<const UpdateBatch* const> batches, Scene::Acks& acks) {
   std::vector<const UpdateBatch*> good;
   good.reserve(batches.size());
@@ -127,8 +128,8 @@ absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until)
   return std::move(acks.front());
 }
 
-// Skips leading batches that the writer table answers already. The ones after the first logged batch are all logged,
-// because applying it may change the answer.
+// Skips leading batches that are not new: the writer table answers them without a change. All batches from the first
+// new one on are logged, because applying one may make a later batch of the same writer new.
 absl::Status Scene::log_each(absl::Span<const UpdateBatch* const> batches) {
   const WriterTable& writers = writer_.writers();
   while (!batches.empty() && !writers.is_new(batches.front()->writer, batches.front()->batch)) batches.remove_prefix(1);
@@ -140,11 +141,11 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
   const std::vector<const UpdateBatch*> good = well_formed(batches, acks);
   if (good.empty()) return acks;
   while (true) {
-    // Wait without the writer's lock, so that each caller can keep its own deadline.
+    // Wait without the writer's lock, so that each waiting caller can return at its own deadline.
     RETURN_IF_ERROR(wait_for_readers(until));
     const MutexLock lock(writer_mutex_);
     RETURN_IF_ERROR(check_open());
-    if (pins_->over_budget()) continue;  // another batch was applied meanwhile
+    if (pins_->over_budget()) continue;  // another batch exceeded the budget meanwhile
     RETURN_IF_ERROR(log_each(good));
     // From here on there is no error return: logged batches must be applied.
     auto next = good.begin();
@@ -162,7 +163,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
 }
 
 absl::Status Scene::log_joined(absl::Span<const UpdateBatch* const> batches) {
-  // If no batch is new, applying another one does not make it new.
+  // If none of the batches is new, none will be applied, and nothing needs to be logged.
   const bool any_new = std::any_of(batches.begin(), batches.end(), [this](const UpdateBatch* batch) {
     return writer_.writers().is_new(batch->writer, batch->batch);
   });
@@ -247,7 +248,7 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
   RETURN_IF_ERROR(wait_for_readers(ReaderTracker::kNever));
-  // Building takes long: hold only the instances of the revision meanwhile, not its objects.
+  // Hold only the instances of the revision while the tree is built, which takes long, and not its objects.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
   const std::shared_ptr<const StaticSet> statics = latest()->statics;
   ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, latest()->revision << 24));
@@ -276,7 +277,7 @@ void Scene::check_invariants() const {
 }
 
 void Scene::publish(const SnapshotPtr& snapshot) {
-  std::vector<SnapshotPtr> retired;  // freed after the lock, because freeing a large snapshot takes long
+  std::vector<SnapshotPtr> retired;  // freed after the lock is released, because that takes long
   {
     const MutexLock lock(mutex_);
     LOCUS_DCHECK_EQ(snapshot->revision, latest_->revision + 1);
@@ -356,7 +357,7 @@ absl::StatusOr<SnapshotPin> Scene::pin(const View& view, Deadline deadline) cons
 }
 
 void Scene::forget_recent() {
-  std::deque<SnapshotPtr> forgotten;  // freed after the lock, as in publish()
+  std::deque<SnapshotPtr> forgotten;  // freed after the lock is released, as in publish()
   const MutexLock lock(mutex_);
   forgotten.swap(recent_);
   recent_.push_back(latest_);

@@ -1,15 +1,16 @@
 // Scene: a named world with its latest snapshot, its single writer, and the callers that wait for a revision.
 //
-// A scene with a log appends a record before it applies a change, and applies the change only if the append succeeded.
-// The result depends only on the state before and on the record, so that a replay makes the same revisions, acks and
-// refusals: see core/scene/recovery.h. A record may have no effect.
+// A scene with a log appends a record of each change before it applies the change, and applies nothing if the append
+// fails. The result of a record depends only on the record and on the state before it, so that a replay gives the same
+// revisions, acks and refusals: see core/scene/recovery.h. A record may have no effect, for example if its batch is
+// refused.
 //
-// Threads: every member may be called from any thread. apply...() and change_instances() are serialised inside, and
-// wait for the log; latest() and view() never wait for the writer or the log, except for a revision that is asked for:
-// they take a lock only to copy a pointer, and the writer holds that lock only to replace it. Invariants: the revisions
-// of a scene are published in order without gaps, each after it is complete, with the writer's epoch; ticks never
-// decrease unless a batch restarts them; a published snapshot never changes; no change is published or acknowledged
-// before it is logged.
+// Threads: every member may be called from any thread. Calls of apply...() and change_instances() wait for each other
+// and for the log. latest() and view() never wait for the writer or the log, unless view() is asked for a future
+// revision: they hold a lock only to copy a pointer, and the writer holds that lock only to publish a revision.
+// Invariants: the revisions of a scene are published in order and without gaps, each once it is complete, with the
+// writer's epoch; ticks never decrease unless a batch restarts them; a published snapshot never changes; no change is
+// published or acknowledged before it is logged.
 #ifndef LOCUS_CORE_SCENE_SCENE_H_
 #define LOCUS_CORE_SCENE_SCENE_H_
 
@@ -31,14 +32,14 @@ namespace locus {
 
 // Treatment of update batches that arrive faster than they can be applied.
 enum class OverloadPolicy : uint8_t {
-  kEveryBatch,  // each batch is a revision of its own; senders wait
-  kLatestWins,  // queued batches that only move objects at one tick become one revision
+  kEveryBatch,  // each batch is a revision of its own; senders wait for earlier batches
+  kLatestWins,  // queued batches that only move objects, at the same tick, become one revision
 };
 
 // Durability of an update at the time of its acknowledgement, for a scene with a log.
 enum class Durability : uint8_t {
   kLocal,   // synced to this machine's disk
-  kMemory,  // to be synced soon: a crash of the machine may lose the latest updates
+  kMemory,  // not synced yet, but soon: a crash of the machine may lose the latest updates
 };
 
 constexpr AckLevel ack_level(Durability durability) {
@@ -49,12 +50,12 @@ struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
   HistoryOptions history = {};
-  uint64_t pinned_bytes = 0;  // budget of ReaderTracker; 0 = default
+  uint64_t pinned_bytes = 0;  // memory budget of readers in bytes; 0 = the default of ReaderTracker
   OverloadPolicy overload = OverloadPolicy::kEveryBatch;
   Durability durability = Durability::kLocal;
 };
 
-// Revision that a caller asks for. Epoch 0 matches every epoch.
+// Revision that a caller asks for. kLatest ignores `revision`. Epoch 0 matches every epoch.
 struct View {
   enum class Kind : uint8_t { kLatest, kAtLeast, kExactly };
   Kind kind = Kind::kLatest;
@@ -72,19 +73,19 @@ struct SceneStatus {
   uint64_t memory_bytes = 0;   // memory of the latest revision without meshes, which scenes share
   uint64_t history_bytes = 0;  // additional memory of the history
   uint32_t recorded_ticks = 0;
-  uint64_t pinned_bytes = 0;      // memory that only older revisions with readers hold
+  uint64_t pinned_bytes = 0;      // memory held only by older revisions that are still being read
   uint64_t max_pinned_bytes = 0;  // limit of pinned_bytes
   uint32_t pending_changes = 0;
-  uint64_t joined_updates = 0;   // number of batches that became visible only together with a later one
+  uint64_t joined_updates = 0;   // number of batches that share a revision with a later batch
   std::string last_build_error;  // message of the last static change that failed; later successes do not clear it
 };
 
 class Scene {
  public:
-  // Creates a scene without a log. `epoch` is not 0 and was never used for this name. `statics` may be shared with
-  // another scene.
+  // Creates a scene without a log. `epoch` is not 0 and no earlier scene of this name had it. `statics` may be shared
+  // with another scene.
   Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics);
-  // Creates a scene that continues from the state of `writer`, which equals the state in `log`.
+  // Creates a scene that continues from the state of `writer`, which is the state after the last record in `log`.
   Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLog& log);
 
   const std::string& name() const { return name_; }
@@ -92,54 +93,60 @@ class Scene {
 
   using Deadline = std::chrono::steady_clock::time_point;
 
-  // Applies one batch as one revision, or none if it changes nothing. Waits while readers exceed their budget: see
-  // ReaderTracker. Refuses the batch, without any change, with the error of check_form(), BATCH_GAP, an item's error if
-  // `all_or_nothing`, DEADLINE_EXCEEDED if it waited until `until`, NOT_FOUND once the scene is closed, or the log's
-  // error.
+  // Applies one batch as one revision; makes no revision if the batch changes nothing. Waits while readers exceed their
+  // memory budget: see ReaderTracker. An error means that nothing changed: the error of check_form();
+  // FAILED_PRECONDITION BATCH_GAP; the first refused item if `all_or_nothing` is set; RESOURCE_EXHAUSTED for too many
+  // objects; DEADLINE_EXCEEDED if readers still exceed their budget at `until`; NOT_FOUND if the scene is closed; or
+  // the log's error.
   absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using Acks = std::vector<absl::StatusOr<UpdateAck>>;
 
-  // Applies several batches one after another like apply(), but logs them together with one sync. Returns one entry for
-  // each batch. An error of the whole call is one of apply() and means that nothing has changed.
+  // Applies several batches like successive calls of apply(), but logs them with a single sync. Returns one ack or
+  // error for each batch. If the call itself fails, with an error of apply(), no batch was applied.
   absl::StatusOr<Acks> apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Applies several batches that may_join() as one revision, which their acks share. Returns one entry for each batch,
-  // like apply_each(). An error of the whole call is one of apply() and means that nothing has changed.
+  // Applies several batches together, as one revision. Precondition: the batches satisfy may_join().
+  // Returns one ack or error for each batch. If the call itself fails, with an error of apply(), no batch was applied.
   absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                     Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Removes and places instances as one revision. Builds the tree outside the writer's lock, one change at a time.
-  // Waits for readers like apply(), without a deadline. NOT_FOUND for a mesh that was deleted: see check_meshes().
+  // Removes instances and places new ones, as one revision. Builds the new tree of instances, one change at a time,
+  // without blocking update batches. Waits like apply() while readers exceed their budget, but without a deadline.
+  // NOT_FOUND if a placed mesh was deleted: see check_meshes().
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using IsKept = std::function<bool(const StaticMesh*)>;
-  // Refuses from now on to place meshes for which `is_kept` returns false. Call before other threads use the scene. A
-  // mesh is in_use() from before `is_kept` is called for it until its change has ended.
+  // Sets the check that a mesh is still registered: from now on change_instances() refuses to place a mesh for which
+  // `is_kept` returns false. Call before other threads use the scene. For a mesh to be placed, in_use() returns true
+  // from before the call of `is_kept` until the change has ended, so that the mesh cannot be deleted in between.
   void check_meshes(IsKept is_kept) { is_kept_ = std::move(is_kept); }
   // Returns true if the scene contains instances of the mesh, or a pending change places some.
   bool in_use(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
   SnapshotPtr latest() const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the snapshot that a view names; kAtLeast waits until `deadline`. FAILED_PRECONDITION SCENE_RESTARTED for
-  // another epoch, OUT_OF_RANGE for kExactly outside the recent revisions, DEADLINE_EXCEEDED, or NOT_FOUND once the
-  // scene is closed.
+  // Returns the snapshot of the revision that `view` asks for. kAtLeast waits for the revision until `deadline`, then
+  // returns DEADLINE_EXCEEDED. FAILED_PRECONDITION SCENE_RESTARTED if the scene has another epoch; OUT_OF_RANGE if
+  // kExactly asks for a revision that is not among the recent ones; NOT_FOUND if the scene is closed.
   absl::StatusOr<SnapshotPtr> view(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the snapshot like view(), with a pin: for readers that take long, and must poll SnapshotPin::status().
+  // Returns the snapshot of view() with a pin that registers the reader. For readers that take long: they must poll
+  // SnapshotPin::status().
   absl::StatusOr<SnapshotPin> pin(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
-  // Waits until all revoked pins are released or the scene is closed. DEADLINE_EXCEEDED, naming the limit, at `until`.
+  // Waits until all revoked pins are released or the scene is closed. DEADLINE_EXCEEDED, naming the limit pinned_bytes,
+  // if that takes longer than `until`.
   absl::Status wait_for_readers(Deadline until) const LOCUS_EXCLUDES(mutex_);
-  // Calls ReaderTracker::revoke_overdue(), for a writer that has waited too long.
+  // Calls the on_revoke() callbacks of revoked pins that are not released. For a writer that has waited too long.
   void revoke_overdue_readers() { pins_->revoke_overdue(); }
 
-  // Notification that the scene reached a revision or was closed, for callers that must not block in view(). `notify`
-  // is called once, from any thread, at the latest when that revision is published, and under the scene's lock: it must
-  // be quick, must not take a lock that is held while a Watch is created or destroyed, and must not call the scene. It
-  // is never called after the destructor, which waits for a running call. The scene outlives the Watch.
+  // Registration for one notification that the scene has reached a revision or was closed, for callers that must not
+  // block in view(). `notify` is called once: by the constructor if this is already so, otherwise by the thread that
+  // publishes the revision or closes the scene. The call holds the scene's lock: `notify` must be quick, must not call
+  // the scene, and must not take a lock that is held while a Watch is created or destroyed. It is not called after the
+  // destructor, which waits for a running call. The scene outlives the Watch.
   class Watch {
    public:
     Watch(const Scene& scene, uint64_t revision, std::function<void()> notify);
@@ -151,37 +158,41 @@ class Scene {
     friend class Scene;
     const Scene& scene_;
     const std::function<void()> notify_;
-    // Guarded by the scene's mutex_, like notified_; valid until notified.
+    // Entry of this Watch in the scene's watches_, valid while notified_ is false. The scene's mutex_ guards both
+    // members.
     std::multimap<uint64_t, Watch*>::iterator position_;
     bool notified_ = false;
   };
 
-  // Drops the recent revisions kept for kExactly views, except the latest. Frees memory when it is short.
+  // Drops the revisions that are retained for kExactly views, except the latest one. Called when memory is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
 
-  // Closes the scene after its deletion: wakes all waiters and refuses all later calls.
+  // Closes the scene after its deletion: wakes all waiters, and refuses later calls of view() and of the
+  // members that change the scene with NOT_FOUND.
   void close() LOCUS_EXCLUDES(mutex_);
-  // Deletes the scene from its log and closes it. After an error of the log the scene continues unchanged.
+  // Deletes the scene from its log and closes it. If the log fails, returns its error, and the scene stays open.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Returns the state to be written as the log's next snapshot: the latest revision and the sequence number of its
-  // record. Waits for a batch that is being applied; does not block the scene afterwards.
+  // record. Waits for a batch that is being applied. The returned state does not block later batches.
   FrozenScene freeze() LOCUS_EXCLUDES(writer_mutex_, mutex_);
-  // Returns the extent of the log.
+  // Returns the sequence numbers and the size of the scene's log.
   LogPosition log_position() const { return journal_.position(); }
-  // Records that a frozen state is now the log's snapshot. Takes `sequence` and `log_bytes` of FrozenScene.
+  // Records that a state from freeze() is now the log's snapshot. The arguments are FrozenScene::sequence and
+  // FrozenScene::log_bytes of that state.
   void snapshot_written(uint64_t sequence, uint64_t log_bytes) { journal_.snapshot_written(sequence, log_bytes); }
-  // Returns 0 for a scene without a log.
+  // Returns the scene's key in the log; 0 for a scene without a log.
   SceneKey log_key() const { return journal_.key(); }
 
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
  private:
-  // Checks latest_, recent_ and watches_. O(1).
+  // Checks that latest_, recent_ and watches_ are consistent. O(1).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
-  // Makes the next revision visible, notifies waiters and watches, and enforces the budget of readers.
+  // Makes `snapshot` the latest revision: wakes the threads that wait in view(), notifies the Watches that wait for
+  // this revision, and then enforces the readers' memory budget.
   void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
-  // Notifies the watches of `revision` and earlier ones.
+  // Notifies and removes the Watches that wait for `revision` or an earlier one.
   void notify_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);
   absl::Status closed_status() const;
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
@@ -197,22 +208,22 @@ class Scene {
 
   const std::string name_;
   const SceneSpec spec_;
-  Mutex change_mutex_;  // one static change at a time; taken before writer_mutex_
-  Mutex writer_mutex_;  // taken before mutex_
+  Mutex change_mutex_;  // held during a static change; locked before writer_mutex_
+  Mutex writer_mutex_;  // locked before mutex_
   SceneWriter writer_ LOCUS_GUARDED_BY(writer_mutex_);
-  SceneJournal journal_;  // appended to under writer_mutex_
-  IsKept is_kept_;        // null: every mesh is kept
+  SceneJournal journal_;  // appends only under writer_mutex_
+  IsKept is_kept_;        // null: every mesh may be placed
   mutable Mutex mutex_;
   mutable ConditionVariable published_;
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
   std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);                   // oldest first, latest_ last
-  mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);  // not yet notified, by revision
+  mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);  // not notified yet, by awaited revision
   uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
-  std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // one entry for each pending placement
+  std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // meshes of pending changes
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
-  const std::shared_ptr<ReaderTracker> pins_;  // pins may outlive the scene
+  const std::shared_ptr<ReaderTracker> pins_;  // shared, because pins may outlive the scene
 };
 
 }  // namespace locus

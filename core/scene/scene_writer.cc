@@ -168,7 +168,7 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     ack.applied = moves_.applied();
     ack.refused = moves_.refused();
     ack.errors = std::move(moves_.errors());
-    // Record the ack now: a later batch of the list may be the next one of this writer, or a duplicate.
+    // Record the ack now: a later batch of `batches` may be the next one of this writer, or a duplicate.
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);

@@ -28,29 +28,31 @@ class SceneWriter {
   SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics,
               size_t max_objects = limits::kMaxObjects, const HistoryOptions& history = {});
 
-  // Returns a writer that continues from `state`. DATA_LOSS if an id occurs twice in it.
+  // Returns a writer that continues from `state`. DATA_LOSS if an id occurs twice in `state`.
   static absl::StatusOr<SceneWriter> restore(SceneState state, Winding winding, const HistoryOptions& history);
 
   struct Applied {
     UpdateAck ack;
     SnapshotPtr snapshot;  // null when nothing changed
   };
-  // Applies one batch. Precondition: it has passed check_form(). Item errors are listed in the ack; with all_or_nothing
-  // any of them refuses the batch. Too many objects refuse it, too, with RESOURCE_EXHAUSTED.
+  // Applies one batch. Precondition: it has passed check_form(). The ack lists refused items; with all_or_nothing, one
+  // refused item refuses the whole batch. RESOURCE_EXHAUSTED if the scene would have too many objects;
+  // FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
 
   struct Joined {
     std::vector<absl::StatusOr<UpdateAck>> acks;  // one entry for each batch
     SnapshotPtr snapshot;                         // null when nothing changed
   };
-  // Applies batches that may_join() and have passed check_form(), one after another, as one revision.
+  // Applies the batches in order, as one revision. Preconditions: each batch has passed check_form(), and each
+  // may_join() the first.
   Joined apply_joined(absl::Span<const UpdateBatch* const> batches);
 
-  // Makes the next revision, with other instances, and returns its snapshot.
+  // Makes the next revision, which has the instances `statics`, and returns its snapshot.
   SnapshotPtr replace_statics(std::shared_ptr<const StaticSet> statics);
 
-  // Begins replay: until end_replay() no snapshots are built if the scene has no history; apply() and the others may
-  // return null, and published() must not be called.
+  // Begins replay. If the scene has no history, no snapshots are built until end_replay(): then apply(), apply_joined()
+  // and replace_statics() return null snapshots, and published() must not be called.
   void begin_replay() {
     LOCUS_DCHECK(!replaying_);
     replaying_ = true;
@@ -67,7 +69,8 @@ class SceneWriter {
   }
   uint64_t epoch() const { return epoch_; }
   const WriterTable& writers() const { return writers_; }
-  // Returns true if restarting ticks would drop history, and so makes a revision.
+  // Returns true if a batch with restart_ticks would end a history. Such a batch makes a revision even if it changes
+  // nothing else.
   bool has_past() const { return recorder_.has_past(); }
 
   bool is_object(Id id) const { return objects_.handle(id) != ObjectStore::kNoHandle; }
@@ -79,34 +82,39 @@ class SceneWriter {
   SnapshotPtr freeze();
   SnapshotPtr next_revision();
   UpdateAck ack_now() const;
-  // Copies the counts and errors of the applied batch into the ack. Refuses the batch if it is all_or_nothing and an
-  // item is wrong.
+  // Moves the counts and errors of `applier` into the ack of `result`. Returns the refusal of the batch if the batch is
+  // all_or_nothing and an item was refused.
   template <class Applier>
   static absl::Status fill_ack(const UpdateBatch& batch, Applier& applier, Applied& result);
-  // Applies a batch that MoveApplier serves.
+  // Applies a batch for which MoveApplier::serves() returns true.
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
-  // Applies the staged moves at the tick of `batch`; returns the new snapshot, null if nothing changed.
+  // Applies the moves that moves_ has read, at the tick of `batch`. Returns the new snapshot, or null if nothing
+  // changed.
   SnapshotPtr publish_moves(const UpdateBatch& batch);
-  // Returns true if snapshots are not built now. With history each is needed, because records are made of snapshots.
+  // Returns true during a replay that builds no snapshots. A scene with history builds them during replay, too, because
+  // history records are made from them.
   bool defer_snapshots() const { return replaying_ && !recorder_.on(); }
-  // Applies the staged moves, or coalesces them during replay; returns true if they change anything.
+  // Applies the moves in moves_ to objects_, or adds them to coalesced_moves_ if snapshots are deferred. Returns true
+  // if they change an object.
   bool apply_staged_moves();
-  // Applies the coalesced moves.
+  // Applies coalesced_moves_ to objects_ and clears them.
   void flush_coalesced_moves();
   // Stamps the current epoch, revision and tick on the ack of an applied batch and stores it in the writer table.
   void record_ack(const UpdateBatch& batch, UpdateAck& ack);
-  // Returns the stored ack of a duplicate batch.
+  // Returns the stored ack of a duplicate batch; if it was dropped, an ack with the current revision.
   UpdateAck old_ack(const UpdateBatch& batch) const;
-  // Applies a batch of any kind.
+  // Applies a batch of any kind with BatchApplier.
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
   // Returns true if the batch drops history.
   bool drops_history(const UpdateBatch& batch) const { return batch.restart_ticks && has_past(); }
-  // Returns the tick after the batch.
+  // Returns the scene's tick once the batch is applied.
   uint64_t tick_of(const UpdateBatch& batch) const;
-  // Records the end of the previous tick in the history, or drops the history if the batch restarts ticks. Call before
+  // Ends the current tick if the batch begins another one: adds the state at the end of the current tick to the
+  // history, or drops the history if the batch restarts ticks. Does nothing for a scene without history. Call before
   // the batch is applied.
   void start_tick(const UpdateBatch& batch);
-  // Sets the tick, makes the next revision if the tick or, by `changes`, an object changed, and completes the ack.
+  // Makes the next revision if `changes` is true or the batch begins a new tick. Then sets the epoch, revision and tick
+  // of the ack in `result`.
   void publish_changes(const UpdateBatch& batch, bool changes, Applied& result);
 
   uint64_t epoch_;
@@ -117,7 +125,7 @@ class SceneWriter {
   std::shared_ptr<const StaticSet> statics_;
   ObjectStore objects_;
   MoveApplier moves_;
-  CoalescedMoves coalesced_moves_;  // not yet applied; only with defer_snapshots()
+  CoalescedMoves coalesced_moves_;  // not yet applied to objects_; empty unless defer_snapshots()
   WriterTable writers_;
   HistoryRecorder recorder_;
   uint64_t replaced_bytes_ = 0;  // memory of objects and statics replaced so far

@@ -10,9 +10,9 @@
 
 namespace locus {
 
-// Returns the bytes of a specification.
+// Returns the encoded specification.
 std::string encode_spec(const SceneSpec& spec);
-// Returns the specification; DATA_LOSS describes damage.
+// Returns the specification that encode_spec() encoded; DATA_LOSS describes damage.
 absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes);
 
 }  // namespace locus

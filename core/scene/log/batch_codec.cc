@@ -14,7 +14,7 @@ enum Flag : uint32_t {
   kAllFlags = 31,
 };
 
-// Minimum size of a list in bytes: its kind and the lengths of its columns.
+// Minimum encoded size in bytes of an insert, move or relabel list: the lengths of its at least four columns.
 constexpr size_t kMinListBytes = 32;
 
 uint32_t flag(bool set, Flag flag) { return set ? flag : 0u; }

@@ -7,9 +7,10 @@
 
 namespace locus {
 
-// Appends the batch. Precondition: `batch` has passed check_form(). O(bytes): copies each column.
+// Appends `batch` to `writer`. Precondition: `batch` has passed check_form(). O(bytes): copies each column.
 void write_batch(const UpdateBatch& batch, ByteWriter& writer);
-// Reads a batch that borrows from the bytes. The batch passes check_form(), or the reader fails.
+// Reads a batch whose columns borrow from the bytes of `reader`. If the batch does not pass check_form(), sets the
+// error of `reader`.
 UpdateBatch read_batch(ByteReader& reader);
 
 }  // namespace locus

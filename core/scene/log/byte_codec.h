@@ -1,6 +1,6 @@
-// Binary encoding of everything that a scene writes to its log: little-endian integers of 8 bytes, and columns aligned
-// to 8 bytes, which are read in place as spans of the bytes. Used by the codecs of records, state and meshes in this
-// folder; FORMAT.md describes the formats. One thread at a time.
+// Binary encoding of everything that a scene writes to its log: little-endian numbers of 8 bytes, and columns aligned
+// to 8 bytes, which are read in place: the result is a span of the encoded bytes. Used by the codecs of records, state
+// and meshes in this folder; FORMAT.md describes the formats. One thread at a time.
 //
 // A reader validates everything, because a disk may damage the bytes. After the first error it returns zeros and empty
 // columns, and status() describes the error.
@@ -27,7 +27,7 @@ class ByteWriter {
  public:
   static constexpr size_t kAlignment = 8;
 
-  // Appends to `to`. Precondition: its size is a multiple of 8.
+  // Creates a writer that appends to `to`. Precondition: the size of `to` is a multiple of 8.
   explicit ByteWriter(std::string& to) : to_(to) { LOCUS_DCHECK(to.size() % kAlignment == 0); }
 
   void number(uint64_t value) { append(&value, sizeof(value)); }
@@ -42,7 +42,8 @@ class ByteWriter {
     append(values.data(), values.size() * sizeof(T));
     to_.append((kAlignment - to_.size() % kAlignment) % kAlignment, '\0');
   }
-  // Writes a column of `width` values for each entry, or a single entry if all entries are equal bit for bit.
+  // Writes a column whose entries have `width` values each. If all entries are equal bit for bit, writes only one of
+  // them.
   template <class T>
   void shared_column(absl::Span<const T> values, size_t width) {
     LOCUS_DCHECK(width > 0 && values.size() % width == 0);
@@ -53,7 +54,7 @@ class ByteWriter {
  private:
   template <class T>
   static bool all_same(absl::Span<const T> values, size_t width) {
-    // Compares each entry with the one before it.
+    // Compares each entry with the next one: the column with itself, shifted by one entry.
     return values.size() > width &&
            std::memcmp(values.data(), values.data() + width, (values.size() - width) * sizeof(T)) == 0;
   }
@@ -62,17 +63,18 @@ class ByteWriter {
   std::string& to_;
 };
 
-// Returns DATA_LOSS for bytes that cannot be read.
+// Returns a DATA_LOSS error with the message `what`, for bytes that cannot be decoded.
 inline absl::Status data_loss(absl::string_view what) { return absl::DataLossError(what); }
 
 class ByteReader {
  public:
-  // Borrows `bytes`. Precondition: their address is a multiple of 8; see AlignedBytes.
+  // Creates a reader that borrows `bytes`. Precondition: the address of `bytes` is a multiple of 8; AlignedBytes
+  // provides such bytes.
   explicit ByteReader(absl::string_view bytes) : left_(bytes) {
     LOCUS_DCHECK(reinterpret_cast<uintptr_t>(bytes.data()) % ByteWriter::kAlignment == 0);
   }
 
-  // Reads an integer. `what` names the value in the error message, here and below.
+  // Reads an integer. In this and all other members, `what` names the value in the error message.
   uint64_t number(const char* what) {
     uint64_t value = 0;
     take(&value, sizeof(value), what);
@@ -98,7 +100,7 @@ class ByteReader {
     LOCUS_DCHECK_GT(min_bytes, 0u);
     return number_upto(left_.size() / min_bytes, what);
   }
-  // Reads a column as a span of the bytes.
+  // Reads a column. The result is a span of the bytes that were passed to the constructor.
   template <class T>
   absl::Span<const T> column(const char* what) {
     static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= ByteWriter::kAlignment);
@@ -112,7 +114,8 @@ class ByteReader {
     left_.remove_prefix(padded);
     return {first, values};
   }
-  // Reads a column of `entries` entries of `width` values each, or of one entry for all.
+  // Reads a column that ByteWriter::shared_column() wrote: `entries` entries of `width` values each, or a single entry
+  // that applies to all.
   template <class T>
   absl::Span<const T> shared_column(size_t entries, size_t width, const char* what) {
     const absl::Span<const T> values = column<T>(what);
@@ -125,7 +128,7 @@ class ByteReader {
     if (text.size() > max) fail(what, "is too long");
     return good() ? absl::string_view(text.data(), text.size()) : absl::string_view();
   }
-  // Fails if bytes are left.
+  // Fails if any bytes remain.
   void end(const char* what) {
     if (!left_.empty()) fail(what, "has bytes too many");
   }
@@ -133,7 +136,7 @@ class ByteReader {
   bool good() const { return status_.ok(); }
   const absl::Status& status() const { return status_; }
   size_t left() const { return left_.size(); }
-  // Sets the error, unless there is one, and drops the remaining bytes.
+  // Sets the error to the message "`what` `how`", unless there is an error already, and drops the remaining bytes.
   void fail(absl::string_view what, absl::string_view how);
 
  private:
@@ -148,8 +151,8 @@ class ByteReader {
   absl::Status status_;
 };
 
-// Bytes at an address that is a multiple of 8: the given ones, which are borrowed, or an aligned copy of them. A move
-// keeps the address, so that spans of the bytes stay valid.
+// Bytes at an address that is a multiple of 8. Borrows the bytes passed to the constructor if they are aligned,
+// otherwise holds an aligned copy. Moving this object does not change the address, so spans of the bytes stay valid.
 class AlignedBytes {
  public:
   explicit AlignedBytes(absl::string_view bytes) : bytes_(bytes) {
@@ -170,16 +173,16 @@ class AlignedBytes {
   absl::string_view bytes_;
 };
 
-// Kind of a record or chunk. Each begins with its kind and the version of its format.
+// Kind of a record or chunk. Every record and chunk begins with its kind and kBytesVersion.
 enum class BytesKind : uint32_t {
   kBatch = 0x4842'534c,
   kJoinedBatches = 0x4a42'534c,
-  kStaticChange = 0x4353'534c,  // format 1: meshes by content; read only
+  kStaticChange = 0x4353'534c,  // format 1, names meshes by content hash; read, never written
   kNamedChange = 0x434e'534c,
   kSceneSpec = 0x5053'534c,
   kStateHeader = 0x4854'534c,
   kStateWriters = 0x5754'534c,
-  kStateInstances = 0x4954'534c,  // format 1: meshes by content; read only
+  kStateInstances = 0x4954'534c,  // format 1, names meshes by content hash; read, never written
   kNamedInstances = 0x494e'534c,
   kStateObjects = 0x4f54'534c,
   kMeshHeader = 0x484d'534c,

@@ -11,14 +11,14 @@
 namespace locus {
 namespace {
 
-constexpr size_t kNumbersPerChunk = 3 * 65536;
+constexpr size_t kNumbersPerChunk = 3 * 65536;  // coordinates or vertex indices
 static_assert(kNumbersPerChunk * sizeof(float) + 64 <= UpdateLog::kMaxChunkBytes);
-// Size beyond which a chunk of parts ends.
+// Size in bytes above which a chunk of parts ends. Its last part may exceed this size.
 constexpr size_t kPartsChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kPartsChunk + limits::kMaxLabelLength + 64 <= UpdateLog::kMaxChunkBytes);
-constexpr size_t kMinPart = 2 * 8;
+constexpr size_t kMinPart = 2 * 8;  // encoded size of a part with an empty name
 
-// Appends the parts of one chunk.
+// Reads the parts of one chunk and appends them to `parts`.
 void read_parts(ByteReader& reader, std::vector<MeshPart>& parts) {
   while (reader.good() && reader.left() >= kMinPart) {
     MeshPart& part = parts.emplace_back();
@@ -56,7 +56,7 @@ std::string MeshWriter::header() const {
   write_kind(writer, BytesKind::kMeshHeader);
   writer.number(uint64_t{vertices_.size()});
   writer.number(uint64_t{3} * mesh_->triangle_count());
-  writer.number(uint64_t{0});  // the number of parts; format 1 had them here
+  writer.number(uint64_t{0});  // number of parts: only format 1 stores parts in the content
   return chunk;
 }
 

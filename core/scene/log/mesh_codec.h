@@ -1,5 +1,6 @@
-// Encodes the columns of a mesh, and the parts of one name, as chunks for the log, and decodes them. The tree is not
-// included: its topology is cached separately by tree_codec.h. One thread at a time.
+// Encodes and decodes meshes as chunks for the log: vertices and indices, which are stored once for all names of equal
+// content, and parts, which are stored for each name. The tree is not included: its topology is cached separately, see
+// tree_codec.h. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 
@@ -16,12 +17,14 @@
 
 namespace locus {
 
+// Encoder of the vertices and indices of a mesh.
 class MeshWriter {
  public:
-  // Unpacks all vertices now, and everything else one chunk at a time.
+  // Unpacks all vertices at once. next() unpacks the indices, one chunk at a time.
   explicit MeshWriter(std::shared_ptr<const StaticMesh> mesh);
 
-  // Returns the next chunk, at most UpdateLog::kMaxChunkBytes, or nullopt at the end. Suitable as a ChunkSource.
+  // Returns the next chunk, of at most UpdateLog::kMaxChunkBytes bytes, or nullopt at the end. Suitable as a
+  // ChunkSource.
   absl::StatusOr<std::optional<std::string>> next();
 
  private:
@@ -33,16 +36,16 @@ class MeshWriter {
   const std::vector<float> vertices_;
   PackedIndices::Reader indices_;
   bool begun_ = false;
-  size_t next_vertex_ = 0;  // index of a coordinate in vertices_
-  size_t next_index_ = 0;
+  size_t next_vertex_ = 0;  // index into vertices_ of the first coordinate not written yet
+  size_t next_index_ = 0;   // number of vertex indices written so far
 };
 
-// Writes the parts of one name: a header that says how many there are, then the parts.
+// Encoder of the parts of one name of a mesh: a header with the number of parts, then the parts.
 class PartsWriter {
  public:
   explicit PartsWriter(std::shared_ptr<const StaticMesh> mesh) : mesh_(std::move(mesh)) {}
 
-  // Returns the next chunk, as MeshWriter::next() does.
+  // Returns the next chunk, like MeshWriter::next().
   absl::StatusOr<std::optional<std::string>> next();
 
  private:
@@ -51,19 +54,20 @@ class PartsWriter {
   size_t next_part_ = 0;
 };
 
-// Reads what MeshWriter wrote, and meshes of format 1, whose parts stand with the columns.
+// Decoder of the chunks that MeshWriter wrote, and of meshes in format 1, whose content includes the parts.
 class MeshReader {
  public:
-  // Reads the next chunk, in the order in which they were written. DATA_LOSS describes damage.
+  // Decodes the next chunk. The chunks must be added in the order in which they were written. DATA_LOSS describes
+  // damage.
   absl::Status add(absl::string_view chunk);
-  // Makes the mesh after all chunks were added. DATA_LOSS if chunks are missing or the mesh is not valid.
+  // Returns the mesh once all chunks were added. DATA_LOSS if chunks are missing or the mesh is not valid.
   absl::StatusOr<TriangleMesh> finish() &&;
 
  private:
   void read_header(ByteReader& reader);
 
   bool begun_ = false;
-  uint64_t vertex_numbers_ = 0;  // expected counts, from the header
+  uint64_t vertex_numbers_ = 0;  // expected sizes of vertices_, indices_ and parts_, from the header
   uint64_t index_numbers_ = 0;
   uint64_t part_count_ = 0;
   std::vector<float> vertices_;
@@ -71,17 +75,18 @@ class MeshReader {
   std::vector<MeshPart> parts_;
 };
 
-// Reads what PartsWriter wrote.
+// Decoder of the chunks that PartsWriter wrote.
 class PartsReader {
  public:
-  // Takes the next chunk, as MeshReader::add() does.
+  // Decodes the next chunk, like MeshReader::add().
   absl::Status add(absl::string_view chunk);
-  // Returns the parts once all chunks came. DATA_LOSS where they do not fit a mesh of `triangles` triangles.
+  // Returns the parts once all chunks were added. DATA_LOSS if chunks are missing or the parts do not fit a mesh of
+  // `triangles` triangles.
   absl::StatusOr<std::vector<MeshPart>> finish(size_t triangles) &&;
 
  private:
   bool begun_ = false;
-  uint64_t part_count_ = 0;  // how many there are to be
+  uint64_t part_count_ = 0;  // expected size of parts_, from the header
   std::vector<MeshPart> parts_;
 };
 

@@ -11,6 +11,7 @@
 namespace locus {
 namespace {
 
+// Lower bounds of the encoded sizes. They limit the count that a damaged record can claim.
 constexpr size_t kMinBatchBytes = 96;
 constexpr size_t kMinPlacementBytes = 32 + 7 * 8;
 

@@ -1,9 +1,9 @@
-// Encodes and decodes the records of a scene's log: an update batch, several joined batches, or a static change, as the
-// scene admitted it. Applying a record depends only on the record and on the state before it, so that a replay gives
+// Encodes and decodes the records of a scene's log. A record is an update batch, several joined batches, or a static
+// change. The result of applying a record depends only on the record and on the state before it, so that a replay gives
 // the same revision, acks and refused items. FORMAT.md describes the bytes.
 //
-// Decoding validates everything: DATA_LOSS describes damage. Plain functions; any thread. Columns that the kind of a
-// shape does not use are not stored.
+// Decoding validates everything: DATA_LOSS describes damage. Columns that a shape's kind does not use are not stored.
+// Plain functions; any thread.
 #ifndef LOCUS_CORE_SCENE_LOG_RECORD_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_RECORD_CODEC_H_
 
@@ -20,24 +20,26 @@
 
 namespace locus {
 
-// Append one record to `to`. Preconditions: the size of `to` is a multiple of 8, and stays so; batches have passed
-// check_form(); the batches of encode_joined() may_join().
+// Append one record to `to`, whose size is a multiple of 8 before and after. Preconditions: the batches have passed
+// check_form(), and those of encode_joined() satisfy may_join().
 void encode_batch(const UpdateBatch& batch, std::string& to);
 void encode_joined(absl::Span<const UpdateBatch* const> batches, std::string& to);
-// `placed`: ids of the placed instances, chosen ids included, in the order of the change.
+// Appends a static change. `placed` has the ids of all placed instances in the order of the change, including the ids
+// that the scene chose.
 void encode_change(const StaticChange& change, absl::Span<const Id> placed, std::string& to);
 
-// Decoded record. Its content borrows from the record, and the record borrows from the bytes.
+// Decoded record. The columns of content() point into the bytes passed to decode(), which must outlive the record, or
+// into an aligned copy that the record holds.
 class Record {
  public:
   static absl::StatusOr<Record> decode(absl::string_view bytes);
 
   struct Joined {
-    std::vector<UpdateBatch> batches;  // at least one; all may_join()
+    std::vector<UpdateBatch> batches;  // at least one; all satisfy may_join()
   };
   struct Change {
-    StaticChange change;          // with ids, without mesh pointers
-    std::vector<MeshKey> meshes;  // mesh of each placement; without names in format 1
+    StaticChange change;          // ids are set, mesh pointers are null
+    std::vector<MeshKey> meshes;  // mesh of each placement; names are empty in format 1
   };
   using Content = std::variant<UpdateBatch, Joined, Change>;  // batches pass check_form()
   Content& content() { return content_; }

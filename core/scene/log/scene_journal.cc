@@ -9,7 +9,8 @@
 namespace locus {
 namespace {
 
-// Upper bounds of the encoded size of a batch: each item in all columns, and the lengths of each list.
+// The largest batch fits into a record, and so does the largest static change: an item or instance takes at most 128
+// bytes in all its columns, and the column lengths of a list take at most 256 bytes.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);
 static_assert(uint64_t{limits::kMaxInstances} * 128 <= UpdateLog::kMaxRecordBytes);

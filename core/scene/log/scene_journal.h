@@ -1,5 +1,5 @@
-// Write-ahead journal of a scene: encodes what the scene is about to apply and appends it to the log. Without a log it
-// does nothing.
+// Write-ahead journal of a scene: encodes each batch or static change that the scene is about to apply, and appends it
+// to the log. Does nothing if the scene has no log.
 //
 // Threads: only the scene's writer, one thread at a time, calls append_...() and remove(), which wait for the disk; any
 // thread may call position(), total_bytes() and snapshot_written(), which never wait. Invariants of the position:
@@ -19,19 +19,19 @@
 
 namespace locus {
 
-// Extent of a scene's log.
+// Sequence numbers and size of a scene's log.
 struct LogPosition {
   uint64_t sequence = 0;           // sequence number of the last record
-  uint64_t snapshot_sequence = 0;  // last record whose effect is in the snapshot
-  uint64_t bytes = 0;              // size of the records after the snapshot
+  uint64_t snapshot_sequence = 0;  // sequence number of the last record whose effect is in the snapshot
+  uint64_t bytes = 0;              // size in bytes of the records after the snapshot
 };
 
-// Log of one scene; null `log`: the scene is not logged.
+// Log of one scene. If `log` is null, the scene is not logged.
 struct SceneLog {
   UpdateLog* log = nullptr;  // outlives the scene
   SceneKey key = 0;
   AckLevel level = AckLevel::kLocal;
-  LogPosition position;  // position at which the scene continues
+  LogPosition position;  // position of the log when the journal begins
 };
 
 class SceneJournal {
@@ -41,32 +41,36 @@ class SceneJournal {
   bool on() const { return log_.log != nullptr; }
   SceneKey key() const { return log_.key; }
 
-  // Appends each batch as one record, all or none, with one sync. After an error nothing is logged.
+  // Appends one record for each batch, with a single sync. After an error none of the batches counts as logged.
   absl::Status append_each(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
-  // Appends batches that become one revision as one record.
+  // Appends a single record for all batches, which become one revision.
   absl::Status append_joined(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
-  // Appends a static change and syncs it whatever the scene's level is, because a mesh that the change releases may be
-  // deleted next.
+  // Appends a static change. Syncs it even for a scene with AckLevel::kMemory: once the change removes the last
+  // instance of a mesh, the mesh may be deleted, and after a crash that loses the change the scene would need the mesh.
   absl::Status append_change(uint64_t epoch, const StaticChange& change, absl::Span<const Id> placed)
       LOCUS_EXCLUDES(mutex_);
   // Deletes the scene from the log.
   absl::Status remove();
 
   LogPosition position() const LOCUS_EXCLUDES(mutex_);
-  // Returns the bytes of all records appended here, plus those after the snapshot at the start. Never decreases.
+  // Returns the size in bytes of all records appended by this journal, plus the records that followed the snapshot when
+  // the journal began. Never decreases.
   uint64_t total_bytes() const LOCUS_EXCLUDES(mutex_);
-  // Records that the snapshot now contains all records up to `sequence`, when total_bytes() was `total_bytes`.
+  // Records that the log's snapshot now includes all records up to `sequence`. `total_bytes` is what total_bytes()
+  // returned when `sequence` was the last record.
   void snapshot_written(uint64_t sequence, uint64_t total_bytes) LOCUS_EXCLUDES(mutex_);
 
  private:
   // Checks the invariants of the class comment. O(1).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
-  // Ends the record that was encoded into bytes_ last. `batch` gives the writer and batch numbers of its entry.
+  // Ends the record that was last encoded into bytes_: adds its entry, with the writer and batch number of `batch`, and
+  // its end.
   void end_record(uint64_t epoch, const UpdateBatch& batch);
   absl::Status append(AckLevel level) LOCUS_EXCLUDES(mutex_);
 
   const SceneLog log_;
-  // Encoded records that are being appended, and the end of each in bytes_. Empty between calls.
+  // Records being appended: their encoded bytes, the entry of each, and the end of each as an offset in bytes_. All are
+  // empty between calls.
   std::string bytes_;
   std::vector<LogEntry> entries_;
   std::vector<size_t> ends_;

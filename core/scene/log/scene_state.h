@@ -19,8 +19,8 @@ struct FrozenScene {
   SnapshotPtr snapshot;
   WriterTable writers;
   bool has_past = false;   // SceneWriter::has_past()
-  uint64_t sequence = 0;   // sequence number of the last record whose effect is included, and ...
-  uint64_t log_bytes = 0;  // ... bytes logged so far, both for Scene::snapshot_written()
+  uint64_t sequence = 0;   // sequence number of the last record whose effect is included
+  uint64_t log_bytes = 0;  // SceneJournal::total_bytes() at that record
 };
 
 // Decoded scene snapshot, the input of SceneWriter::restore().

@@ -39,7 +39,7 @@ UpdateAck read_ack(ByteReader& reader) {
   return ack;
 }
 
-// Returns false for NaN, too.
+// Returns true if all values are within [min, max]. A NaN is not.
 template <class T>
 bool all_within(absl::Span<const T> values, double min, double max) {
   bool valid = true;
@@ -201,7 +201,8 @@ void StateReader::read_objects(ByteReader& reader) {
   objects_read_ += n;
 }
 
-// Places the instances again. Transforms are stored exactly as placed, so that the result is the same.
+// Builds the set of instances by placing all of them again. Their transforms are stored exactly, so the result equals
+// the stored set.
 absl::Status StateReader::place(const FindMesh& find_mesh) {
   StaticChange change;
   for (const auto& [mesh, placed] : placed_) {

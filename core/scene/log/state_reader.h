@@ -15,19 +15,20 @@
 
 namespace locus {
 
-// Returns the mesh of that name and content, or null. Without a name (format 1), any mesh of that content.
+// Function that returns the mesh with the name and content of a key, or null if there is none. If the key has no name
+// (format 1), it may return any mesh of the content.
 using FindMesh = std::function<std::shared_ptr<const StaticMesh>(const MeshKey&)>;
 
 class StateReader {
  public:
-  // Reads the next chunk, in the order in which they were written.
+  // Decodes the next chunk. The chunks must be added in the order in which they were written.
   absl::Status add(absl::string_view chunk);
-  // Makes the state after all chunks were added, and builds the tree of instances. DATA_LOSS if chunks are missing or
-  // `find_mesh` does not find a mesh.
+  // Returns the state once all chunks were added, and builds the tree of instances. DATA_LOSS if chunks are missing or
+  // `find_mesh` returns null.
   absl::StatusOr<SceneState> finish(const FindMesh& find_mesh) &&;
 
  private:
-  // Placements of one mesh.
+  // Columns of the instances of one mesh.
   struct Placed {
     std::vector<uint64_t> ids, groups, tags;
     std::vector<uint32_t> layers;
@@ -42,7 +43,7 @@ class StateReader {
 
   SceneState state_;
   bool begun_ = false;
-  uint64_t writers_ = 0;  // expected counts, from the header
+  uint64_t writers_ = 0;  // expected numbers of writers, instances and objects, from the header
   uint64_t instances_ = 0;
   uint64_t objects_ = 0;
   uint64_t instances_read_ = 0;

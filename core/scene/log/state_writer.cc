@@ -12,7 +12,7 @@
 namespace locus {
 namespace {
 
-// Size beyond which a chunk of writers ends.
+// Size in bytes above which a chunk of writers ends. Its last writer may exceed this size.
 constexpr size_t kWritersChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kWritersChunk + size_t{limits::kMaxListedItemErrors} * kMaxBytesOfError + 1024 <=
               UpdateLog::kMaxChunkBytes);
@@ -32,7 +32,7 @@ void write_ack(const UpdateAck& ack, ByteWriter& writer) {
   }
 }
 
-// Writes get(item), an array of N values, for each item as one column.
+// Writes one column with an entry get(item) for each item. get() returns an array of the values of the entry.
 template <class Items, class Get>
 void write_each(ByteWriter& writer, const Items& items, const Get& get) {
   using Entry = std::decay_t<decltype(get(items[0]))>;

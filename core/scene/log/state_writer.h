@@ -20,9 +20,10 @@ class StateWriter {
  public:
   explicit StateWriter(FrozenScene scene);
 
-  // Returns the next chunk, at most UpdateLog::kMaxChunkBytes, or nullopt at the end. Suitable as a ChunkSource.
+  // Returns the next chunk, of at most UpdateLog::kMaxChunkBytes bytes, or nullopt at the end. Suitable as a
+  // ChunkSource.
   absl::StatusOr<std::optional<std::string>> next();
-  // Returns the size of all chunks so far.
+  // Returns the size in bytes of all chunks that next() has returned.
   uint64_t bytes() const { return bytes_; }
 
  private:

@@ -6,7 +6,7 @@ namespace locus {
 
 std::string encode_outline(const TreeTopology& topology) {
   std::string bytes;
-  // 64 bytes for the header, the lengths of the columns and their padding.
+  // Reserve 64 bytes for the header, the column lengths and the padding.
   bytes.reserve(topology.numbers.size() * sizeof(uint32_t) + topology.block_sizes.size() +
                 topology.nodes.size() * sizeof(NodeOutline) + 64);
   ByteWriter writer(bytes);

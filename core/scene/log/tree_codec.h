@@ -1,5 +1,6 @@
-// Encodes and decodes the topology of a mesh's tree (core/index/bvh/tree_topology.h) for the log, with the version of
-// the builder. Trees, and so the bytes, are equal for all instruction sets. Plain functions; any thread.
+// Encodes and decodes the topology of a mesh's tree (core/index/bvh/tree_topology.h) for the log. The bytes include the
+// version of the tree builder. They do not depend on the machine's instruction set, because trees do not. Plain
+// functions; any thread.
 #ifndef LOCUS_CORE_SCENE_LOG_TREE_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_TREE_CODEC_H_
 
@@ -11,11 +12,11 @@
 
 namespace locus {
 
-// Returns the bytes of a topology.
+// Returns the encoded topology.
 std::string encode_outline(const TreeTopology& topology);
 
-// Returns a topology that borrows from `bytes`. DATA_LOSS describes damage; FAILED_PRECONDITION: the topology is from
-// another version of the builder. Does not check that the topology fits the mesh: TriangleBvh::restore() does.
+// Returns a topology that borrows from `bytes`. DATA_LOSS describes damage; FAILED_PRECONDITION if another version of
+// the builder wrote it. Does not check that the topology fits the mesh: TriangleBvh::restore() does.
 absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes);
 
 }  // namespace locus

@@ -8,7 +8,8 @@
 // Threads: every member may be called from any thread; append() of one scene by one thread at a time. Calls wait for
 // the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full (queries need no disk: continue to serve them
 // and try again later), DATA_LOSS naming the damaged item, UNAVAILABLE if the disk fails otherwise. If a call that
-// writes fails, nothing counts as written, though a part may be found after a restart; the call may be repeated.
+// writes fails, nothing counts as written, although a part of it may be found after a restart. The call may be
+// repeated.
 #ifndef LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 #define LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 
@@ -30,15 +31,15 @@ using SceneKey = uint64_t;
 
 // Durability that append() waits for.
 enum class AckLevel : uint8_t {
-  kMemory,  // the log has the record and syncs it soon: survives a crash of the process, not of the machine
+  kMemory,  // the log has accepted the record and syncs it soon: survives a crash of the process, not of the machine
   kLocal,   // the record is synced to this machine's disk
 };
 
 // Record to be appended.
 struct LogEntry {
   uint64_t epoch = 0;
-  uint64_t writer = 0;  // writer and number of the batch, or of the last of joined batches; 0 if it has none
-  uint64_t batch = 0;
+  uint64_t writer = 0;      // writer of the batch, or of the last of joined batches; 0 if it has none
+  uint64_t batch = 0;       // number of that batch; 0 if it has none
   absl::string_view bytes;  // at most kMaxRecordBytes
 };
 
@@ -53,21 +54,21 @@ struct StoredScene {
   std::string name;
   std::string spec;  // specification, encoded by the caller
   uint64_t epoch = 0;
-  uint64_t snapshot_sequence = 0;  // last record whose effect is in the snapshot
+  uint64_t snapshot_sequence = 0;  // sequence number of the last record in the snapshot
   uint64_t last_sequence = 0;      // sequence number of the last record
-  uint64_t log_bytes = 0;          // size of the records after the snapshot
+  uint64_t log_bytes = 0;          // size in bytes of the records after the snapshot
   bool copied = false;             // copied by back_up(): the original may have advanced, so call restart_scene() first
   absl::Status damage;             // not OK (DATA_LOSS): the scene must not be served
 };
 
 struct StoredMesh {
   std::string name;
-  std::array<uint8_t, 32> sha256 = {};
-  absl::Status damage;            // not OK (DATA_LOSS): the mesh must not be used
-  bool parts_in_content = false;  // written in format 1, whose content holds the parts; read_parts() has none
+  std::array<uint8_t, 32> sha256 = {};  // hash of the content
+  absl::Status damage;                  // not OK (DATA_LOSS): the mesh must not be used
+  bool parts_in_content = false;        // stored in format 1: the content has the parts, read_parts() has none
 };
 
-// Returns the next chunk of a long sequence of bytes, nullopt at its end, or an error.
+// Function that returns the next chunk of a long sequence of bytes, nullopt at its end, or an error.
 using ChunkSource = absl::FunctionRef<absl::StatusOr<std::optional<std::string>>()>;
 using ChunkSink = absl::FunctionRef<absl::Status(absl::string_view)>;
 using RecordSink = absl::FunctionRef<absl::Status(const LogRecord&)>;
@@ -79,52 +80,56 @@ class UpdateLog {
 
   virtual ~UpdateLog() = default;
 
-  // Return the scenes and meshes that were found when the log was opened, by name. Later changes are not included.
+  // Return the scenes and meshes that were found when the log was opened, in name order. Later changes are not
+  // included.
   virtual const std::vector<StoredScene>& stored_scenes() const = 0;
   virtual const std::vector<StoredMesh>& stored_meshes() const = 0;
-  // Returns DATA_LOSS if these lists may lack scenes or meshes, or contain deleted ones.
+  // Returns DATA_LOSS if stored_scenes() or stored_meshes() may lack entries or contain deleted ones.
   virtual absl::Status catalogue_damage() const = 0;
   // Returns true if the previous process shut down cleanly, so that no record of AckLevel::kMemory is lost.
   virtual bool closed_in_order() const = 0;
 
-  // Creates a scene with the snapshot that `state` returns in chunks of at most kMaxChunkBytes, at sequence 0. Synced
-  // when this returns, like all calls except append().
+  // Creates a scene with a snapshot at sequence number 0; `state` returns its chunks, of at most kMaxChunkBytes each.
+  // Returns the key of the scene. Synced when this returns, like all calls except append().
   virtual absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                                 ChunkSource state) = 0;
   // Deletes a scene, damaged or not.
   virtual absl::Status delete_scene(SceneKey scene) = 0;
-  // Starts a new epoch for the records that follow, because records were lost or a copy continues elsewhere.
+  // Starts a new epoch for the records that follow. Required if records may be lost or the scene is a copy whose
+  // original may have advanced.
   virtual absl::Status restart_scene(SceneKey scene, uint64_t epoch) = 0;
 
   // Appends records in order, all or none, with one sync if `level` requires it; one sync may serve several scenes that
   // append at the same time. Preconditions: the entries have the scene's epoch (FAILED_PRECONDITION otherwise), and
-  // together at most kMaxRecordBytes. Returns the sequence number of the last one.
+  // together at most kMaxRecordBytes. Returns the sequence number of the last record.
   virtual absl::StatusOr<uint64_t> append(SceneKey scene, absl::Span<const LogEntry> entries, AckLevel level) = 0;
-  // Passes the records from sequence number `from` on, all later than the snapshot, to `sink` in order, until it fails.
+  // Passes the records from sequence number `from` on to `sink`, in order, until `sink` fails. Precondition: the
+  // snapshot does not include record `from`.
   virtual absl::Status read(SceneKey scene, uint64_t from, RecordSink sink) const = 0;
   // Returns the sequence number of the last record.
   virtual absl::StatusOr<uint64_t> latest(SceneKey scene) const = 0;
 
-  // Replaces the snapshot by `state` and drops the records up to `sequence`. Appending may continue meanwhile. After an
-  // error the previous snapshot stays in use.
+  // Replaces the snapshot by `state`, which includes the records up to `sequence`, and drops these records. append()
+  // may be called meanwhile. After an error the previous snapshot stays in use.
   virtual absl::Status write_snapshot(SceneKey scene, uint64_t sequence, ChunkSource state) = 0;
   virtual absl::Status read_snapshot(SceneKey scene, ChunkSink sink) const = 0;
 
-  // Adds a name for a mesh. Equal content is stored once under all its names: `content` is not called for known
-  // content. `parts` are stored for each name.
+  // Adds a mesh name. The content, vertices and indices, is stored once for all names of equal content: `content` is
+  // not called if the content is already stored. `parts` are stored for each name.
   virtual absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
                                 ChunkSource parts) = 0;
   virtual absl::Status delete_mesh(absl::string_view name) = 0;
   virtual absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const = 0;
   virtual absl::Status read_parts(absl::string_view name, ChunkSink sink) const = 0;
 
-  // Cache for the topology of the tree of that mesh (core/scene/log/tree_codec.h), which makes recovery faster. Reading
-  // returns the stored bytes or nullopt; errors of writing are ignored. Deleted with the mesh; not part of a backup.
-  // One thread at a time for one content.
+  // Write and read a cache of tree topologies (core/scene/log/tree_codec.h), one for each content, which makes recovery
+  // faster. Writing ignores errors; reading returns nullopt if nothing is stored. The topology is deleted with the last
+  // name of its content and is not part of a backup. One thread at a time for one content.
   virtual void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
   virtual std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const = 0;
 
-  // Writes a consistent copy of everything into the new directory `path`. Other calls may continue meanwhile.
+  // Writes a consistent copy of all scenes and meshes into the new directory `path`. Other calls may continue
+  // meanwhile.
   virtual absl::Status back_up(const std::string& path) = 0;
 };
 

@@ -8,12 +8,13 @@
 namespace locus {
 namespace {
 
-// Rounds up to a float.
+// Returns a float that is at least `length`.
 float at_least(double length) {
   return std::nextafter(static_cast<float>(length), std::numeric_limits<float>::infinity());
 }
 
-// Returns the extent of the shape under any rotation, so that a rotation never moves the object to another cell.
+// Returns how far the shape may reach from its position under any rotation. It does not depend on the current rotation,
+// so a rotation never moves an object to another cell.
 float extent_of(const Shape& shape) {
   switch (shape.kind) {
     case ShapeKind::kPoint:

@@ -16,7 +16,7 @@ namespace locus {
 // Return the shape, or the complete object, that a grid reference points to.
 Shape shape_of(const GridRef& value);
 Object object_of(const GridRef& value);
-// Converts an object to the grid's form, under `handle`.
+// Returns the grid item that stores `object` under `handle`.
 GridItem grid_item_of(const Object& object, uint32_t handle);
 
 class ObjectSet {
@@ -28,7 +28,8 @@ class ObjectSet {
 
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
-  // Returns a null reference if no object has the id. O(1), plus a search through the keys of one brick.
+  // Returns a reference to the object with this id, or a null reference if there is none. O(1), plus a search through
+  // the keys of one brick.
   GridRef find_ref(Id id) const;
   std::optional<Object> find(Id id) const;
   // Returns true if an object with this id is stored at exactly this position.
@@ -73,9 +74,9 @@ class ObjectSet {
   }
 
   GridStatistics statistics() const { return grid_.statistics(); }
-  // Returns the memory of objects, bricks and the tables that find them. O(bricks).
+  // Returns the size in bytes of the objects, the bricks and the lookup tables. O(bricks).
   size_t bytes() const { return unshared_bytes(ObjectSet()); }
-  // Returns the memory that `other`, a set of the same scene, does not share. O(size of the difference).
+  // Returns the bytes of this set that `other`, a set of the same scene, does not share. O(size of the difference).
   size_t unshared_bytes(const ObjectSet& other) const {
     return grid_.unshared_bytes(other.grid_) + handles_.unshared_bytes(other.handles_);
   }

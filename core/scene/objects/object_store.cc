@@ -9,8 +9,8 @@
 namespace locus {
 namespace {
 
-constexpr size_t kAhead = 16;  // prefetch distance, in objects
-constexpr uint32_t kNewLife = ~0u;
+constexpr size_t kAhead = 16;       // prefetch distance, in objects
+constexpr uint32_t kNewLife = ~0u;  // in place of an index: the inserted object updates no removed one
 
 // Returns for each object of `inserted` the index in `removed` of the object that it updates; kNewLife if there is
 // none.
@@ -59,7 +59,8 @@ void ObjectStore::free_handle(uint32_t handle) {
   }
 }
 
-// A set made at the end of a tick holds no object that was removed in that tick, so `tick <= oldest_tick` is enough.
+// Frees handles quarantined in `oldest_tick` as well: the set of that tick was made at its end, and so does not contain
+// the objects removed in it.
 void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   LOCUS_CHECK(moves_ != nullptr);
   tick_ = tick;
@@ -83,7 +84,7 @@ size_t ObjectStore::move(const GridMoves& moves) {
   return replaced_bytes;
 }
 
-// Returns the handles of objects, all of which are present.
+// Returns the handle of each object. Precondition: all objects are present.
 std::vector<uint32_t> ObjectStore::handles_of(absl::Span<const Object> objects) const {
   std::vector<Id> ids;
   ids.reserve(objects.size());

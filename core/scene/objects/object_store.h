@@ -1,10 +1,11 @@
 // Writer's store of a scene's objects: finds objects by id, applies batches of changes and makes immutable sets for
 // readers. One thread at a time uses the store; any thread may use the sets.
 //
-// A handle names one lifetime of an object, from its insertion to its removal. Invariants: every object has a handle of
-// its own, below handle_count(); the table from ids to handles and the grid hold the same objects; every handle below
-// handle_count() belongs to an object, is free, or is quarantined. A store that tracks lifetimes quarantines the handle
-// of a removed object until no kept set holds the object any more: no other object gets the handle before that.
+// A handle identifies one lifetime of an object, from its insertion to its removal. Invariants: every object has a
+// handle of its own, below handle_count(); the table from ids to handles and the grid hold the same objects; every
+// handle below handle_count() belongs to an object, is free, or is quarantined. A store that tracks lifetimes
+// quarantines the handle of a removed object for as long as a set in the history contains the object: no other object
+// gets the handle before that.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 
@@ -34,7 +35,8 @@ class ObjectStore {
     LOCUS_DCHECK_EQ(next_handle_, 0u);
     moves_ = std::make_unique<TickMoves>();
   }
-  // Begins `tick` and frees the handles that only sets older than `oldest_tick` may use. Requires track_lifetimes().
+  // Begins `tick`. `oldest_tick` is the oldest tick of the history: frees the quarantined handles that no set from this
+  // tick on uses. Requires track_lifetimes().
   void start_tick(uint64_t tick, uint64_t oldest_tick);
   // Returns how far objects moved since start_tick(); no displacement if lifetimes are not tracked.
   Displacement displacement() { return moves_ == nullptr ? Displacement() : moves_->displacement(); }
@@ -42,9 +44,10 @@ class ObjectStore {
   size_t size() const { return grid_.size(); }
   std::optional<Object> find(Id id) const;
   bool contains(const Object& object) const { return handle(object.id) != kNoHandle; }
-  // Returns kNoHandle for an unknown id. O(1), like contains().
+  // Returns the handle of an id, or kNoHandle if no object has the id. O(1), like contains().
   uint32_t handle(Id id) const { return handles_.find(id); }
-  // Writes the handle of ids[i] to handles[i]: faster than one call for each id. The spans have one size.
+  // Writes the handle of ids[i], or kNoHandle, to handles[i]: faster than a call of handle() for each id. The spans
+  // have the same size.
   void find_handles(absl::Span<const Id> ids, absl::Span<uint32_t> handles) const {
     LOCUS_DCHECK_EQ(ids.size(), handles.size());
     handles_.find(ids, handles);
@@ -60,17 +63,18 @@ class ObjectStore {
 
   // Replaces the objects `removed` by `inserted`. An id in both is an update of one object, unless it is in `replaced`:
   // then its lifetime ends and another begins. Preconditions: every removed object is present; no inserted id remains
-  // present after the removals. O(n), plus the bricks that change. Returns the bytes that existing sets hold and later
-  // sets will not.
+  // present after the removals. O(removed + inserted), plus the size of the changed bricks. Returns the number of bytes
+  // that existing sets hold and later sets will not share.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                const absl::flat_hash_set<Id>& replaced = {});
-  // Moves objects. Precondition: the handles belong to objects and are distinct. Returns the same count as apply().
+  // Moves objects. Precondition: the handles belong to objects and are distinct. Returns the number of replaced bytes,
+  // like apply().
   size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
-  // Inserts the first objects of an empty store, in cells of about `cell_size`. Frees each chunk once it is inserted.
-  // Returns false if an id occurs twice: then the store must not be used any more.
+  // Inserts the objects of `chunks` into an empty store with cells of about `cell_size`. Frees each chunk once it is
+  // inserted. Returns false if an id occurs twice: then the store must not be used any more.
   bool fill(std::vector<std::vector<Object>> chunks, double cell_size);
-  // Returns false and changes nothing if contains() is false.
+  // Removes the object with the id of `object`. Returns false and changes nothing if contains() is false.
   bool remove(const Object& object);
 
   // Calls fn(object) for each object. O(size).
@@ -100,7 +104,7 @@ class ObjectStore {
   uint32_t next_handle_ = 0;
   struct QuarantinedHandle {
     uint32_t handle;
-    uint64_t tick;
+    uint64_t tick;  // tick in which the object was removed
   };
   std::deque<QuarantinedHandle> quarantined_handles_;  // handles of removed objects, ascending by tick
   uint64_t tick_ = 0;                                  // tick of the last start_tick()

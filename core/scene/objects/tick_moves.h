@@ -1,10 +1,10 @@
-// Displacements of objects since the last recorded tick: they bound the search for positions between two ticks. Used by
-// the writer of a scene with history; one thread at a time.
+// Displacements of objects since the last recorded tick. Searches at a time between two ticks are widened by these
+// displacements. Used by the writer of a scene with history; one thread at a time.
 //
 // Most objects move little, and one bound covers all of them. The few that moved farther than a cell are listed one by
-// one, so that a single fast object does not widen every search. If the list gets longer than kMaxFast, the length that
-// counts as fast is doubled until the list is short. Invariants: the list is ascending by handle, holds at most
-// kMaxFast objects, and holds exactly the objects that are marked as listed.
+// one, so that a single fast object does not widen every search. If more than kMaxFast objects are listed, the length
+// above which an object is fast is doubled until at most half as many are. Invariants: the list is ascending by handle,
+// holds at most kMaxFast objects, and holds exactly the objects of Kind::kListed.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_TICK_MOVES_H_
 #define LOCUS_CORE_SCENE_OBJECTS_TICK_MOVES_H_
 
@@ -15,7 +15,7 @@
 
 namespace locus {
 
-// An object that moved far: the box of all positions of its centre, and its extent from there under any rotation.
+// Object that moved far: the box of all positions of its centre, and its extent around the centre under any rotation.
 struct FastMover {
   uint32_t handle = 0;
   float extent = 0;
@@ -33,7 +33,7 @@ class TickMoves {
  public:
   static constexpr size_t kMaxFast = 64;
 
-  // Begins a tick and forgets all moves. Objects that move farther than `fast_length` in the tick are fast.
+  // Begins a tick and drops the recorded moves. Objects that move farther than `fast_length` in the tick are fast.
   void start_tick(double fast_length);
   // Records a new object. It did not exist when the tick began, so that its moves do not count in this tick.
   void born(uint32_t handle);
@@ -46,9 +46,10 @@ class TickMoves {
   // Role of an object in this tick. kListed: the object is in fast_, and every further move extends its box, however
   // short the move is.
   enum class Kind : uint8_t { kOrdinary, kListed, kNewborn };
+  // State of an object when the tick began, written when the object first moves in the tick or is inserted.
   struct Start {
     Vec3d position;
-    uint64_t tick = 0;  // value of tick_ when this was written; otherwise the entry is stale
+    uint64_t tick = 0;  // value of tick_ when this was written; if tick_ differs, the entry is stale
     float extent = 0;
     Kind kind = Kind::kOrdinary;
   };

@@ -11,8 +11,8 @@
 namespace locus {
 namespace {
 
-// Bytes are counted again only after 1 / kCountShare of the budget was replaced since the last count, so that pins just
-// below the budget do not cause a count for every batch. Pins may exceed the budget by that amount.
+// Held bytes are counted again only after 1 / kCountShare of the budget was replaced since the last count, so that pins
+// just below the budget do not cause a count for every batch. Pins may exceed the budget by that amount.
 constexpr uint64_t kCountShare = 64;
 // Upper bound of the bytes that a revision holds and a later one does not, as a multiple of the bytes known to be
 // replaced in between, which do not include lookup tables. Measured: up to 2.2 times.
@@ -147,7 +147,8 @@ void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
     pinned = pinned_before(latest);
   }
   uint64_t held = count(pinned, latest);
-  // Measuring the scene takes longer than counting the held bytes, so it is measured only if it can matter.
+  // The budget may depend on the memory of the scene, which takes longer to measure than the held bytes. So measure it
+  // only if the held bytes exceed the smallest possible budget.
   const uint64_t budget = budget_for(held <= budget_for(0) ? 0 : bytes_of(latest));
   const MutexLock lock(mutex_);
   budget_ = budget;

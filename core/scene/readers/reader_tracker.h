@@ -52,7 +52,8 @@ class SnapshotPin {
     uint64_t replaced_bytes;  // SceneSnapshot::replaced_bytes
     uint32_t pins = 0;
     std::atomic<bool> revoked{false};
-    // Values at the time of the revocation. Written before `revoked`.
+    // Budget and held bytes at the time of the revocation. Written before `revoked`, and so safe to read once it is
+    // true.
     uint64_t budget = 0;
     uint64_t held = 0;
   };
@@ -80,13 +81,13 @@ class ReaderTracker {
 
   // Returns true while a revoked pin is not released, unless the tracker is closed.
   bool over_budget() const LOCUS_EXCLUDES(mutex_);
-  // Waits until over_budget() is false; returns false at `until` otherwise.
+  // Waits until over_budget() is false and returns true. Returns false if over_budget() is still true at `until`.
   bool wait_until_returned(Time until) const LOCUS_EXCLUDES(mutex_);
-  // Returns the budget of the last count, in bytes.
+  // Returns the budget in bytes that the last count of held memory used.
   uint64_t budget() const LOCUS_EXCLUDES(mutex_);
-  // Calls the callbacks of pins that are revoked but not released, once each.
+  // Calls the on_revoke() callbacks of pins that are revoked but not released, each at most once.
   void revoke_overdue() LOCUS_EXCLUDES(mutex_);
-  // Ends all waiting, now and later.
+  // Closes the tracker: running and later calls of wait_until_returned() return true at once.
   void close() LOCUS_EXCLUDES(mutex_);
 
   struct Use {
@@ -99,7 +100,8 @@ class ReaderTracker {
 
  private:
   friend class SnapshotPin;
-  // Pinned revision, with the bytes that the next pinned revision, or else the latest one, does not share.
+  // Pinned revision, and the bytes that it does not share with the next later pinned revision or, if there is none,
+  // with the latest revision.
   struct Holding {
     SnapshotPtr snapshot;
     uint64_t bytes = 0;
@@ -115,23 +117,24 @@ class ReaderTracker {
   bool may_exceed(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Returns the pinned revisions before `latest`, oldest first.
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
-  // Fills in the bytes of each of `pinned` and returns their sum.
+  // Sets Holding::bytes of each entry of `pinned`, which is in the order of revisions, and returns the sum.
   static uint64_t count(std::vector<Holding>& pinned, const SceneSnapshot& latest);
   void revoke(const SceneSnapshot& snapshot, uint64_t held) LOCUS_REQUIRES(mutex_);
 
-  const uint64_t fixed_;
+  const uint64_t fixed_;  // budget given to the constructor; 0 = derived from the memory of the scene
   mutable Mutex mutex_;
   mutable ConditionVariable returned_;
   std::map<uint64_t, SnapshotPin::Pinned> pinned_ LOCUS_GUARDED_BY(mutex_);  // by revision
   std::list<std::shared_ptr<SnapshotPin::Revocation>> revocations_ LOCUS_GUARDED_BY(mutex_);
   uint32_t revoked_ LOCUS_GUARDED_BY(mutex_) = 0;  // number of revoked entries of pinned_
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
-  // Last count: bytes held by pins that are not revoked, replaced_bytes of the latest snapshot then, and the budget.
+  // Results of the last count: the bytes held by pins that are not revoked, SceneSnapshot::replaced_bytes of the latest
+  // snapshot at that time, and the budget.
   uint64_t counted_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t counted_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t budget_ LOCUS_GUARDED_BY(mutex_);
-  // replaced_bytes of the last snapshot passed to enforce_budget(), and the bytes that pins which were added for an
-  // older revision since the last count may hold from before it.
+  // enforced_at_: replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_: bytes that were replaced
+  // before enforced_at_ and may be held by pins of older revisions that were added since the last count.
   uint64_t enforced_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t late_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

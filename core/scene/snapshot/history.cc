@@ -7,7 +7,8 @@
 namespace locus {
 namespace {
 
-// Returns a copy of `record` with its bytes, given the objects of the next record or of the latest revision.
+// Returns a copy of `record` whose `bytes` count the memory that it does not share with `next`, the objects of the next
+// record or of the latest revision.
 std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, const ObjectSet& next) {
   HistoryRecord counted = record;
   counted.bytes = sizeof(HistoryRecord) + record.objects.unshared_bytes(next);

@@ -1,7 +1,7 @@
 // History of a scene: the objects at the end of each of the last ticks. Records share unchanged memory with each other
-// and with the latest revision, so that a record costs as much memory as its tick changed. A History is immutable once
-// published and may be read by any thread. Invariants: records are ascending by tick; History::bytes is the sum of
-// the records' bytes and at most HistoryOptions::bytes.
+// and with the latest revision, so that a record costs only the memory that its tick changed. A History is immutable
+// once published and may be read by any thread. Invariants: records are ascending by tick; History::bytes is the sum of
+// HistoryRecord::bytes and at most HistoryOptions::bytes.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
 
@@ -17,8 +17,8 @@ namespace locus {
 struct HistoryRecord {
   uint64_t tick = 0;
   ObjectSet objects;     // at the end of that tick
-  Displacement to_next;  // displacement up to the next record; unset in the last one: see SceneSnapshot::since_close
-  size_t bytes = 0;      // memory that the next record, or the latest revision, does not share
+  Displacement to_next;  // displacement up to the next record; unset in the last record: see SceneSnapshot::since_close
+  size_t bytes = 0;      // memory that the next record, or else the latest revision, does not share
 };
 
 struct History {
@@ -27,7 +27,7 @@ struct History {
 };
 using HistoryPtr = std::shared_ptr<const History>;
 
-// Reason why no tick before the oldest one of a history is kept.
+// Reason why a history does not reach further back than its oldest tick.
 enum class PastLimit : uint8_t {
   kOff,       // the scene keeps no history
   kBegan,     // there is no tick before: the scene began there, or restarted its ticks
@@ -39,8 +39,8 @@ enum class PastLimit : uint8_t {
 struct HistoryOptions {
   // Number of ticks before the current one that queries may ask about. 0 keeps no history and costs nothing.
   uint32_t ticks = 0;
-  // Maximum memory of all records; the oldest are dropped beyond it. The memory of a record is counted when its tick
-  // ends and again when the next tick begins.
+  // Maximum memory of all records in bytes; beyond it the oldest records are dropped. The memory of a record is counted
+  // with the first revision after its tick, and again when the next record is appended.
   uint64_t bytes = 0;
 };
 
@@ -50,26 +50,28 @@ class HistoryRecorder {
   explicit HistoryRecorder(const HistoryOptions& options) : options_(options) {}
 
   bool on() const { return options_.ticks != 0; }
-  // Returns the kept history, or null if no record is kept.
+  // Returns the history, or null if it has no record.
   const HistoryPtr& history() const { return history_; }
 
-  // Appends the objects at the end of `tick`, and drops the records that are too old for `next_tick`. `since_last` is
-  // the displacement since the last record. Precondition: last record's tick < `tick` < `next_tick`. O(records + memory
-  // that the tick changed).
+  // Appends a record with `objects`, the objects at the end of `tick`, and drops the records that are too old once the
+  // scene is at `next_tick`. `since_last` is the displacement since the last record. Precondition: last record's tick <
+  // `tick` < `next_tick`. O(records + memory that the tick changed).
   void close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last, uint64_t next_tick);
-  // Counts the memory of the last record, given the current objects `now`. Has an effect once after each close().
+  // Counts the memory of the last record that is not shared with the current objects `now`. Only the first call after
+  // each close() has an effect.
   void measure(const ObjectSet& now);
   // Drops all records.
   void drop();
-  // Returns true if close() was called since drop(), even if no record is kept: this depends on the batches alone and
-  // not on the memory limit, so that a replay of the same batches gives the same result.
+  // Returns true if close() was called since the last drop(), even if all records were dropped to save memory. The
+  // result depends on the batches alone, so that a replay of the same batches gives the same revisions.
   bool has_past() const { return has_past_; }
-  // Starts with a scene that was read from disk. Its history, if `has_past`, is lost.
+  // Initialises the recorder of a scene that was read from disk. If `has_past` is true, the scene had a history, which
+  // is lost.
   void restore(bool has_past);
   PastLimit limit() const { return on() ? limit_ : PastLimit::kOff; }
   // Returns the memory of all records dropped so far. Never decreases.
   uint64_t dropped_bytes() const { return dropped_bytes_; }
-  // Returns the tick of the oldest record, or `present` if there is none.
+  // Returns the tick of the oldest record, or `present`, the current tick, if there is no record.
   uint64_t oldest_tick(uint64_t present) const { return history_ == nullptr ? present : history_->records[0]->tick; }
 
  private:

@@ -1,10 +1,10 @@
 // View of the moving objects of a scene at one time, which may lie between two recorded ticks. Queries run on it.
 // Borrows from a snapshot; cheap to copy; any thread.
 //
-// An object exists at a time if it existed at the end of the recorded tick before. It moves, in a straight line, only
-// if the same lifetime exists at the next recorded tick. A search runs on the stored set of the tick before, widened by
-// the displacement bound, and each object found is interpolated. At a recorded tick, and at the latest revision,
-// nothing is interpolated or widened.
+// An object exists at a time if it existed at the end of the last tick recorded up to that time. It moves on in a
+// straight line if the same lifetime exists at the next recorded tick, and else stays in place. A search runs on the
+// objects of the earlier tick, widened by the displacement bound, and each object found is interpolated. At a recorded
+// tick, and at the latest revision, nothing is interpolated or widened.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 
@@ -29,9 +29,10 @@ struct AsOf {
 
 class SceneAtTime {
  public:
-  // View of `objects` at their stored positions.
+  // Creates a view of `objects` at their stored positions.
   explicit SceneAtTime(const ObjectSet& objects) : at_(&objects) {}
-  // View of the objects `at`, interpolated towards `next`: 0 <= weight < 1. `displacement` is from `at` to `next`.
+  // Creates a view of the objects `at`, interpolated towards `next` with 0 <= weight < 1. `displacement` is the
+  // displacement from `at` to `next`.
   SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement);
 
   // Returns true if the time lies between two records, so that objects may be away from their stored positions.
@@ -48,14 +49,14 @@ class SceneAtTime {
     return displacement_bound_;
   }
 
-  // Returns the region of the grid of objects() to search for a query in the box `bounds` or, if given, in `ball`,
-  // whose bounds are `bounds`.
+  // Returns the region of the grid to search for the objects in the box `bounds` or, if `ball` is given, in that ball,
+  // whose bounds are `bounds`: the box or ball, widened by the displacement bound.
   GridRegion region(const Aabbd& bounds, const std::optional<Balld>& ball) const;
-  // Calls visit(GridRef) for the objects in that box or ball: the fast movers that may be in `bounds`, and the objects
-  // that ask(visit) finds in region(). Each object once.
+  // Calls visit(GridRef) once for each object that may be in a box or ball with the bounds `bounds`: for the fast
+  // movers near `bounds`, and for all other objects that ask(visit) finds. `ask` must search region().
   template <class Ask, class Visit>
   void visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const;
-  // Like the members of GridSnapshot, for objects() at their interpolated positions.
+  // Visit objects like the members of GridSnapshot with the same names, but at interpolated positions.
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
   template <class Limit, class Visit>
@@ -68,20 +69,20 @@ class SceneAtTime {
                                      [](const FastMover& mover, uint32_t value) { return mover.handle < value; });
     return at != fast_->end() && at->handle == handle;
   }
-  // Calls visit() for the fast movers for which might_meet(bounds of all their positions). Returns false once visit()
-  // returned false.
+  // Calls visit() for each fast mover for which might_meet(bounds of all its positions) is true. Returns false as soon
+  // as visit() returns false.
   template <class MightMeet, class Visit>
   bool visit_fast(const MightMeet& might_meet, Work& work, const Visit& visit) const;
 
   const ObjectSet* at_;
   const ObjectSet* next_ = nullptr;
   double weight_ = 0;
-  double displacement_bound_ = 0;                 // maximum distance of an object from its position in at_ ...
-  const std::vector<FastMover>* fast_ = nullptr;  // ... except for these, ascending by handle
+  double displacement_bound_ = 0;                 // maximum distance of an object from its position in at_
+  const std::vector<FastMover>* fast_ = nullptr;  // objects exempt from displacement_bound_, ascending by handle
 };
 
-// Returns the view of that time, or nullopt if it is before the oldest kept tick or after the snapshot's own tick.
-// O(log records).
+// Returns the view of the scene at `time`, or nullopt if `time` is before the oldest recorded tick or after the
+// snapshot's own tick. O(log records).
 std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const AsOf& time);
 // Returns the time nearest to `time` for which find_scene_at() returns a view.
 AsOf nearest_kept(const SceneSnapshot& snapshot, const AsOf& time);

@@ -14,18 +14,18 @@ namespace locus {
 enum class Winding : uint8_t { kCounterClockwise, kClockwise };
 
 struct SceneSnapshot {
-  uint64_t epoch = 0;     // names one unbroken history of revisions
+  uint64_t epoch = 0;     // identifies one unbroken sequence of revisions
   uint64_t revision = 0;  // +1 for each applied batch or static change
-  uint64_t tick = 0;      // the caller's time step
+  uint64_t tick = 0;      // time step, set by the update batches
   Winding winding = Winding::kCounterClockwise;
   std::shared_ptr<const StaticSet> statics;
   ObjectSet objects;
-  HistoryPtr history;        // null if no history is kept
-  Displacement since_close;  // displacement from the last record to this revision
-  // Total memory replaced by the revisions up to this one, without lookup tables. Includes memory that was allocated
-  // and replaced between two revisions, and memory that the history still holds. Never decreases.
+  HistoryPtr history;        // null if the history has no record
+  Displacement since_close;  // displacement from the last history record to this revision
+  // Total bytes that the revisions up to this one have replaced, without lookup tables. Includes memory that was
+  // allocated and replaced between two revisions, and memory that the history still holds. Never decreases.
   uint64_t replaced_bytes = 0;
-  PastLimit past_limit = PastLimit::kOff;  // reason why no tick before oldest_tick() is kept
+  PastLimit past_limit = PastLimit::kOff;  // reason why the history does not reach further back
 
   // Returns the oldest tick that queries may ask about.
   uint64_t oldest_tick() const { return history == nullptr ? tick : history->records.front()->tick; }

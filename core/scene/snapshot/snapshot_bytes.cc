@@ -17,15 +17,15 @@ const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) 
   return first == records.end() ? nullptr : first->get();
 }
 
-// Returns the bytes of records of `held` that `later` does not keep. HistoryRecord::bytes leaves out memory shared with
-// the next record, which is counted there, or kept.
+// Returns the bytes of the history records of `held` that `later` does not hold. HistoryRecord::bytes excludes memory
+// shared with the next record: it is counted with the next record, or `later` still holds it.
 uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   if (held.history == nullptr || held.history == later.history) return 0;
   uint64_t bytes = 0;
   for (const std::shared_ptr<const HistoryRecord>& record : held.history->records) {
     const HistoryRecord* kept = first_record(later, record->tick);
     if (kept == record.get()) continue;
-    // The last record is replaced by one with the same objects when the next record is added.
+    // Appending a record replaces the record before it by a copy with the same objects, so compare the objects.
     const bool same_tick = kept != nullptr && kept->tick == record->tick;
     bytes += same_tick ? record->objects.unshared_bytes(kept->objects) : record->bytes;
   }
@@ -37,7 +37,7 @@ uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& 
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   LOCUS_DCHECK_LE(held.revision, later.revision);
   const uint64_t statics = held.statics == later.statics ? 0 : held.statics->bytes();
-  // The oldest object set at or after `held` that `later` keeps: it shares most.
+  // Compare with the oldest set of objects since `held` that `later` holds: it shares the most memory with `held`.
   const HistoryRecord* next = first_record(later, held.tick);
   return statics + held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
          unshared_history_bytes(held, later);

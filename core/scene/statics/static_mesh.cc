@@ -9,7 +9,7 @@
 namespace locus {
 namespace {
 
-// Consumes the mesh, so that its columns are freed before the tree is built.
+// Returns the triangles of `mesh`. Consumes the mesh, so that its columns are freed before the tree is built.
 std::vector<Triangle> triangles_of(TriangleMesh mesh) {
   std::vector<Triangle> triangles;
   triangles.reserve(mesh.triangle_count());

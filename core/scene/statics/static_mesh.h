@@ -1,8 +1,8 @@
-// Named mesh with its parts and its tree, ready for queries: built once from the uploaded bytes and shared by all
-// scenes and instances. Meshes of equal bytes share the tree and everything else that follows from the bytes, and have
-// names and parts of their own: see share(). The tree stores every corner of every triangle, so the uploaded columns
-// are not stored: the data that the tree lacks is stored packed, and the columns can be restored byte for byte.
-// Immutable; safe to share between threads.
+// Mesh with a name, parts and a tree, ready for queries: built once from the uploaded columns and shared by all scenes
+// and instances. The content of a mesh is what follows from the uploaded bytes of vertices and indices, the tree
+// included. Meshes of equal bytes share one content, but each has a name and parts of its own: see share(). The tree
+// stores every corner of every triangle, so the columns themselves are not stored: the data that the tree lacks is
+// stored packed, and the columns can be restored byte for byte. Immutable; safe to share between threads.
 #ifndef LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 #define LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 
@@ -21,7 +21,7 @@ namespace locus {
 
 using Sha256 = std::array<uint8_t, 32>;
 
-// Identifies a mesh in stored data. The name is empty in records and snapshots of format 1.
+// Key of a mesh in records and snapshots. The name is empty in format 1, which stores only the hash of the content.
 struct MeshKey {
   Sha256 sha256 = {};
   std::string name;
@@ -31,25 +31,28 @@ struct MeshKey {
 
 class StaticMesh {
  public:
-  // Builds the tree. Errors: those of TriangleBvh::build(). `sha256` is the hash of the uploaded bytes; not verified.
+  // Builds a mesh and its tree. Errors: those of TriangleBvh::build(). `sha256` is the hash of the uploaded bytes; it
+  // is not verified.
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> build(std::string name, const Sha256& sha256,
                                                                  TriangleMesh mesh, const BvhOptions& options = {});
 
-  // Restores the tree from the topology that was stored for the same mesh. Errors: those of TriangleBvh::restore().
+  // Builds a mesh and restores its tree from `topology`, which was stored for the same content. Errors: those of
+  // TriangleBvh::restore().
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> restore(std::string name, const Sha256& sha256,
                                                                    const TriangleMesh& mesh,
                                                                    const TreeTopology& topology,
                                                                    const BvhOptions& options = {});
 
-  // Returns a mesh of the bytes of `other`, which shares its tree, under another name and with other parts. `parts`
-  // have passed check_parts().
+  // Returns a mesh with the given name and parts that shares the content of `other`, the tree included. Precondition:
+  // `parts` have passed check_parts() for this content.
   static std::shared_ptr<const StaticMesh> share(std::string name, std::vector<MeshPart> parts,
                                                  const StaticMesh& other);
 
   const std::string& name() const { return name_; }
   const Sha256& sha256() const { return content_->sha256; }
   MeshKey key() const { return {sha256(), name_}; }
-  // Returns the tree. Its storage order is the order of TRIANGLES rows.
+  // Returns the tree. Overlap queries with STATIC_DETAIL_TRIANGLES return an instance's rows in the tree's storage
+  // order.
   const TriangleBvh& tree() const { return content_->tree; }
   uint32_t vertex_count() const { return content_->vertex_count; }
   uint32_t triangle_count() const { return static_cast<uint32_t>(tree().size()); }
@@ -57,17 +60,17 @@ class StaticMesh {
   // Returns the bounds of all triangles.
   const Aabbf& bounds() const { return tree().bounds(); }
   const std::vector<MeshPart>& parts() const { return parts_; }
-  // Returns the triangle at that position of the uploaded index list. Precondition: number < triangle_count().
+  // Returns triangle `number`, counted in the order of the uploaded indices. Precondition: number < triangle_count().
   Triangle triangle(uint32_t number) const;
 
-  // Restore the uploaded columns: 3 coordinates for each vertex; 3 vertex indices for each triangle, read in order.
-  // O(size).
+  // Restore the uploaded columns: vertices() returns 3 coordinates for each vertex; indices() returns a reader of 3
+  // vertex indices for each triangle. vertices() and the reading of all indices take O(size).
   std::vector<float> vertices() const;
   PackedIndices::Reader indices() const { return PackedIndices::Reader(content_->indices); }
 
-  // Returns the memory of the mesh and its tree.
+  // Returns the size in bytes of the mesh, including its content.
   uint64_t bytes() const;
-  // Returns the part of bytes() that meshes of equal bytes share.
+  // Returns the size in bytes of the content, which meshes of equal bytes share.
   uint64_t shared_bytes() const;
 
  private:
@@ -76,12 +79,12 @@ class StaticMesh {
     std::array<float, 3> position;
   };
 
-  // Holds all that comes from the bytes.
+  // Data that follows from the uploaded vertices and indices, shared by meshes of equal bytes.
   struct Content {
     Sha256 sha256 = {};
     TriangleBvh tree;
     PackedIndices indices;
-    PackedNumbers blocks;  // by triangle number: the block that holds it
+    PackedNumbers blocks;  // index of the tree block of each triangle, by triangle number
     std::vector<UnusedVertex> unused_vertices;
     uint32_t vertex_count = 0;
     uint32_t zero_area_count = 0;

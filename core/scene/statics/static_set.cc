@@ -81,7 +81,8 @@ absl::Status refuse_group_zero(const StaticChange& change) {
                          static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
 }
 
-// Instances after a change: the kept ones and the placed ones, with their ids.
+// Change being applied. Collects the instances of the new set: those that remain after the removals, then the placed
+// ones.
 class Changing {
  public:
   Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, uint64_t seed)

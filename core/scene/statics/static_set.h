@@ -17,12 +17,12 @@
 
 namespace locus {
 
-// Borrowed columns of the placements of one mesh. N is the number of ids, or of translations if there are no ids.
-// Another column has N entries, one entry for all placements, or none for the default in brackets.
+// Borrowed columns of the placements of one mesh. N is the number of ids, or of translations if there are no ids. Each
+// other column has N entries, one entry for all placements, or none for the default in brackets.
 struct PlacementColumns {
   std::shared_ptr<const StaticMesh> mesh;
-  absl::Span<const uint64_t> ids;         // [chosen, bit 63 set]
-  absl::Span<const double> translations;  // 3N, or 3 with ids
+  absl::Span<const uint64_t> ids;         // [chosen by the set, with bit 63 set]
+  absl::Span<const double> translations;  // 3N; with ids, 3 for all are enough
   absl::Span<const float> rotations;      // 4N, x y z w [identity]
   absl::Span<const float> scales;         // N, > 0 [1]
   absl::Span<const uint32_t> layers;      // [bit 0]
@@ -47,8 +47,9 @@ class StaticSet {
     std::shared_ptr<const StaticSet> set;
     std::vector<Id> placed;  // in the order of the request, chosen ids included
   };
-  // Removes instances, then places new ones. `is_object` returns true for ids of objects; `seed` is the start of the
-  // choice of ids. Refuses the whole change, naming the field and index of the wrong value. O(instances).
+  // Returns a new set without the instances that the change removes and with those that it places. `is_object` returns
+  // true for the id of an object, which no instance may have. Ids that the set chooses are counted up from `seed`. An
+  // error refuses the whole change and names the field and index of the wrong value. O(instances).
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
                                 uint64_t seed) const;
 
@@ -56,9 +57,9 @@ class StaticSet {
   const Instance* find(Id id) const;
   size_t size() const { return tree_.size(); }
   uint64_t triangle_count() const { return triangle_count_; }
-  // Returns the number of instances of that mesh.
+  // Returns the number of instances of `mesh`, without instances of equal meshes under other names.
   uint32_t uses(const StaticMesh* mesh) const;
-  // Returns the memory of the set without the meshes, which sets share.
+  // Returns the size in bytes of the set without the meshes, which sets share.
   uint64_t bytes() const;
 
  private:

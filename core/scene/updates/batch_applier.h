@@ -22,15 +22,16 @@ enum class TrackLifetimes : uint8_t { kNo, kYes };
 
 class BatchApplier {
  public:
-  // Borrows all three for the lifetime of this object. Precondition: `batch` has passed check_form().
+  // Borrows `objects`, `statics` and `batch` for the lifetime of this object. Precondition: `batch` has passed
+  // check_form().
   BatchApplier(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
                TrackLifetimes track_lifetimes = TrackLifetimes::kNo);
 
   // Applies clear, removes, inserts, moves and relabels, in this order. Call once.
   void run();
 
-  // Returns the number of objects after the batch. Nothing is removed after the inserts, so that the final count is the
-  // highest.
+  // Returns the number of objects after the batch. Nothing is removed after the inserts, so that no insert leads to a
+  // higher number: it is enough to check this one against a limit.
   size_t object_count() const { return count_; }
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }

@@ -11,8 +11,8 @@ namespace locus {
 
 class CoalescedMoves {
  public:
-  // Adds the moves of one batch for objects of `store`. Returns true if any of them changes a position or rotation, as
-  // left by the moves before. O(moves).
+  // Adds the moves of one batch for objects of `store`. Returns true if any of them changes the position or rotation
+  // that the moves added before it have left. O(moves).
   bool add(const GridMoves& batch, const ObjectStore& store);
 
   bool empty() const { return moves_.empty(); }
@@ -24,7 +24,7 @@ class CoalescedMoves {
  private:
   // Checks the invariant of the class comment for the move of `handle`. O(1).
   void check_invariants(uint32_t handle);
-  // Returns the move of the object, or null.
+  // Returns the coalesced move of the object with this handle, or null.
   GridMove* find(uint32_t handle) {
     const uint32_t index = handle < move_of_handle_.size() ? move_of_handle_[handle] : 0;
     return index < moves_.size() && moves_[index].handle == handle ? &moves_[index] : nullptr;
@@ -33,7 +33,7 @@ class CoalescedMoves {
 
   std::vector<GridMove> moves_;  // distinct handles
   std::vector<Quaternion> rotations_;
-  std::vector<uint32_t> move_of_handle_;  // index into moves_ by handle; valid only if that move has the handle
+  std::vector<uint32_t> move_of_handle_;  // index into moves_ by handle; stale unless the move there has the handle
 };
 
 }  // namespace locus

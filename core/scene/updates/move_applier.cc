@@ -9,7 +9,7 @@
 namespace locus {
 namespace {
 
-// Number of items that are looked up together, so that their memory is prefetched.
+// Number of items whose handles are looked up together, so that their memory is prefetched before they are read.
 constexpr size_t kItemsAtOnce = 64;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Application of a batch that only moves objects, the common case at every tick: reads the columns directly into moves
-// of the grid. Like BatchApplier, it changes nothing; ObjectStore::move() applies the moves.
+// Application of a batch that only moves objects, the common case at every tick: converts the columns directly into
+// moves of the grid. Like BatchApplier, it does not change the store; ObjectStore::move() applies the moves.
 //
 // Reuses its memory from batch to batch; one thread. Invariant: each handle has at most one move.
 #ifndef LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_
@@ -26,7 +26,7 @@ class MoveApplier {
     add(objects, batch);
     finish(objects);
   }
-  // Read several batches: begin(), add() for each batch in order, finish().
+  // Read several batches together: call begin(), add() for each batch in order, and finish().
   void begin(const ObjectStore& objects);
   void add(const ObjectStore& objects, const UpdateBatch& batch);
   void finish(const ObjectStore& objects);
@@ -37,11 +37,11 @@ class MoveApplier {
     clear_scratch(rotations_);
   }
 
-  // Returns the moves of the last run(). A handle occurs once: the last of several moves of one object counts.
+  // Returns the moves of the last run() or finish(), one for each object that moves: its last move in the batches.
   GridMoves moves() const { return {moves_, rotations_, last_move_}; }
   // Returns true if any of moves() changes a position or a rotation.
   bool changes() const { return changes_; }
-  // Return the counts and the errors of the last batch.
+  // Return the numbers of applied and refused items, and the errors, of the last batch.
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
   std::vector<ItemError>& errors() { return errors_; }
@@ -61,7 +61,7 @@ class MoveApplier {
 
   std::vector<GridMove> moves_;
   std::vector<Quaternion> rotations_;
-  std::vector<uint32_t> last_move_;  // index into moves_ by handle; valid only if that move has the handle
+  std::vector<uint32_t> last_move_;  // index into moves_ by handle; stale unless the move there has the handle
   std::vector<uint32_t> handles_;    // handles of the items being read
   bool changes_ = false;
   uint32_t applied_ = 0;

@@ -33,20 +33,20 @@ struct MoveColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions;
   absl::Span<const double> positions_f64;
-  absl::Span<const float> rotations;  // [kept]
+  absl::Span<const float> rotations;  // [unchanged]
   bool teleport = false;
 };
 
 struct RelabelColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const uint32_t> layers;  // [kept], as groups and tags
+  absl::Span<const uint32_t> layers;  // [unchanged], like groups and tags
   absl::Span<const uint64_t> groups;
   absl::Span<const uint64_t> tags;
 };
 
 struct UpdateBatch {
   Vec3d frame;
-  std::optional<uint64_t> tick;  // [the scene's current tick]
+  std::optional<uint64_t> tick;  // tick of the batch [the scene's current tick]
   bool clear = false;
   absl::Span<const uint64_t> remove_ids;
   absl::Span<const uint64_t> remove_groups;
@@ -71,8 +71,8 @@ struct UpdateAck {
   uint64_t epoch = 0;
   uint64_t revision = 0;
   uint64_t tick = 0;
-  uint32_t applied = 0;  // number of items, likewise `refused`
-  uint32_t refused = 0;
+  uint32_t applied = 0;           // number of applied items
+  uint32_t refused = 0;           // number of refused items
   std::vector<ItemError> errors;  // at most limits::kMaxListedItemErrors
   bool duplicate = false;
 };

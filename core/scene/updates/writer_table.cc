@@ -34,7 +34,7 @@ void WriterTable::check_invariants() const {
 }
 
 absl::StatusOr<std::optional<UpdateAck>> WriterTable::admit(uint64_t writer, uint64_t batch) const {
-  LOCUS_DCHECK(writer == 0 || batch != 0);  // by check_form()
+  LOCUS_DCHECK(writer == 0 || batch != 0);  // check_form() has checked this
   if (writer == 0) return std::optional<UpdateAck>();
   const auto known = writers_.find(writer);
   const uint64_t last = known == writers_.end() ? 0 : known->second.batch;

@@ -1,8 +1,9 @@
 // Table of the last batch and ack of each known writer, so that a batch that is sent twice is applied once. Bounded:
 // the writer that was least recently active is evicted first, and its next batch is refused, because it may be a
-// duplicate. Acks are dropped before writers if they list more than kMaxKeptErrors errors. A value type; one thread at
-// a time. Invariants: at most limits::kMaxWriters writers, none of them 0, each with an activity count of at most
-// clock_; kept_errors_ is the number of errors in all kept acks, at most kMaxKeptErrors.
+// duplicate. If the stored acks would list more than kMaxKeptErrors errors, the acks of all writers are dropped, but no
+// writer is. A value type; one thread at a time. Invariants: at most limits::kMaxWriters writers, none of them 0, each
+// with an activity count of at most clock_; kept_errors_ is the number of errors in all stored acks, at most
+// kMaxKeptErrors.
 #ifndef LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 #define LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 
@@ -19,16 +20,17 @@ namespace locus {
 
 class WriterTable {
  public:
-  // Maximum number of item errors in all kept acks.
+  // Maximum number of item errors in all stored acks.
   static constexpr size_t kMaxKeptErrors = size_t{64} * limits::kMaxListedItemErrors;
 
-  // Returns nullopt if the batch is the next one of its writer, or has no writer; the stored ack, or an empty one, both
-  // marked duplicate, if it was applied before; FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
+  // Returns nullopt if the batch must be applied: it is the next one of its writer, or has no writer. If it was applied
+  // before, returns its ack, or an empty ack if that is not stored, marked as duplicate. FAILED_PRECONDITION BATCH_GAP
+  // if an earlier batch is missing.
   absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
   // Returns true if admit() would return nullopt. Faster than admit().
   bool is_new(uint64_t writer, uint64_t batch) const;
-  // Stores the ack of the latest batch of a writer, and evicts others to stay within the limits. Does nothing for
-  // writer 0.
+  // Stores the latest batch of a writer and its ack. Evicts another writer, or drops all acks, if a limit would be
+  // exceeded. Does nothing for writer 0.
   void record(uint64_t writer, uint64_t batch, const UpdateAck& ack);
 
   struct Writer {
@@ -40,8 +42,8 @@ class WriterTable {
   // Returns all known writers, ascending by number. O(writers).
   std::vector<Writer> writers() const;
   size_t size() const { return writers_.size(); }
-  // Inserts an entry of writers() again. Returns false and changes nothing if the table is full, the writer is known,
-  // or a number is 0.
+  // Inserts an entry that writers() returned. Returns false and changes nothing if a limit would be exceeded, the
+  // writer is known, or a number is 0.
   bool restore(Writer writer);
 
  private:
