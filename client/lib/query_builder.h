@@ -13,8 +13,8 @@ namespace locus::client {
 
 class QueryBuilder {
  public:
-  // Requires that the revision of the answers is at least `revision`, for example that of an ack ("read your own
-  // writes"). By default, the latest revision answers.
+  // Requires an answer at `revision` or a later one, for example at that of an ack ("read your own writes"). The server
+  // waits until the scene has reached it. By default it answers at the latest revision without waiting.
   QueryBuilder& at_least(const Revision& revision);
   // Requests exactly this revision. The query fails with OUT_OF_RANGE if the server no longer retains it.
   QueryBuilder& exactly(const Revision& revision);
