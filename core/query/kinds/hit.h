@@ -1,5 +1,5 @@
-// Single result of a query: one object, one instance, or one triangle of an instance. Plain data that any thread may
-// use. Borrows the object or instance from the snapshot, and the SceneAtTime at which an object was found.
+// Result row of a query: one object, one instance, or one triangle of an instance. Plain data that any thread may use.
+// Borrows the object or instance from the snapshot, and the SceneAtTime at which an object was found.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_H_
 

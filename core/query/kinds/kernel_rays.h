@@ -3,7 +3,7 @@
 // instance, then the kernels trace all rays that wait at instances of the same mesh in one call. A hit limits how far
 // its ray has to continue. Supports EXACT rays of all modes.
 //
-// Threads: one thread per call.
+// Threads: each call belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
 #define LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
 

@@ -8,8 +8,8 @@
 
 namespace locus {
 
-// Returns a hit with t = 0 on the object of `moment` that has this id, or else on the instance of `snapshot`; a miss if
-// neither exists. The hit borrows from `moment` and `snapshot`.
+// Returns a hit with t = 0 on the object of `moment` that has this id, or else on the instance of `snapshot` that has
+// it; a miss if neither exists. The hit borrows from `moment` and `snapshot`.
 Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id);
 
 // Returns for each group its objects at `moment` and its instances: those with ids above options.after_id, ascending by

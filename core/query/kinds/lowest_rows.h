@@ -12,7 +12,7 @@
 
 namespace locus {
 
-// One row, or consecutive rows of one instance that differ only in the triangle.
+// Single row, or consecutive rows of one instance that differ only in the triangle.
 struct RowRun {
   Hit row;                    // t is 0; triangle is not set
   size_t first_triangle = 0;  // index of the first one in OverlapAnswer::triangles

@@ -183,7 +183,7 @@ class ExactTest {
   const LoosePlacedTriangles placed_;
 };
 
-// Visitor of the triangles of one instance for EXACT queries that the kernels do not support.
+// Visitor of the triangles of one instance for EXACT queries that do not use the kernels.
 template <class Kind>
 class ExactTriangles {
  public:
