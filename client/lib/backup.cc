@@ -9,8 +9,8 @@
 namespace locus::client {
 namespace {
 
-// Returns whether a path may contain the byte. Bytes of UTF-8 sequences are allowed. The backslash is not, since
-// checksum files would have to escape it.
+// Returns whether a path may contain `byte`. All bytes of multi-byte UTF-8 characters are allowed. The backslash is
+// not, since checksum files would have to escape it.
 bool is_printable(char byte) {
   const auto code = static_cast<unsigned char>(byte);
   return code >= 0x20 && code != 0x7F && byte != '\\';

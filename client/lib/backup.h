@@ -1,6 +1,6 @@
-// Receiver of a server's backup, file by file, and the check of the paths of its files. For callers of Client::backup
-// and for tools that read a stored backup. Paths are checked because the receiver uses them in a file system: a
-// malicious server must not be able to write outside the backup's directory.
+// Interface of a receiver of a server's backup, and validation of the paths of its files. For callers of Client::backup
+// and for tools that read a stored backup. Paths are validated because receivers create files at them: a malicious
+// server must not be able to write outside the backup's directory.
 #ifndef LOCUS_CLIENT_LIB_BACKUP_H_
 #define LOCUS_CLIENT_LIB_BACKUP_H_
 
@@ -18,43 +18,46 @@ namespace locus::client {
 inline constexpr size_t kMaxBackupFiles = size_t{1} << 20;
 inline constexpr size_t kMaxBackupPathLength = 1024;
 
-// Number of files and bytes of a backup.
+// Size of a backup: the number of its files, and of the bytes in all of them.
 struct BackupSize {
   uint64_t files = 0;
   uint64_t bytes = 0;
 };
 
-// File whose bytes have the SHA-256 that the server sent.
+// Completely received file of a backup: its path, its size in bytes, and its SHA-256, which equals the one that the
+// server sent.
 struct BackupFile {
   std::string path;
   uint64_t bytes = 0;
   Sha256 sha256 = {};
 };
 
-// Receiver of the files. Called in the thread that called Client::backup: begin() once, then for each file
-// begin_file(), add() any number of times, and end_file(). A status that is not OK ends the backup with that status.
-// The received files are a complete backup only after Client::backup has returned OK.
+// Receiver of the files of a backup, implemented by the caller of Client::backup. Client::backup calls it in its
+// caller's thread: begin() once, then for each file begin_file(), add() any number of times, and end_file(). If a call
+// returns a status that is not OK, the backup ends with that status. The received files are a complete backup only
+// after Client::backup has returned OK.
 class BackupSink {
  public:
   virtual ~BackupSink() = default;
 
-  // Begins the backup; `announced` is its total size.
+  // Begins the backup. `announced` is the size that the whole backup will have.
   virtual absl::Status begin(const BackupSize& announced) = 0;
-  // Begins a file. `path` has passed BackupPaths::add(): it is relative, unique, and no folder of another file.
+  // Begins a file. `path` was accepted by BackupPaths::add(): it is relative, differs from the paths of all files
+  // before, and is not a folder of one of them.
   virtual absl::Status begin_file(const std::string& path) = 0;
-  // Appends bytes to the current file.
+  // Appends `bytes` to the current file.
   virtual absl::Status add(absl::string_view bytes) = 0;
   // Ends the current file, whose size and SHA-256 have been verified.
   virtual absl::Status end_file(const BackupFile& file) = 0;
 };
 
-// Paths of one backup. Not thread-safe. Invariant: no file of files_ is also in folders_.
+// Set of the validated file paths of one backup. Not thread-safe. Invariant: no path is both in files_ and in folders_.
 class BackupPaths {
  public:
-  // Adds a path. Returns INVALID_ARGUMENT, with a message that continues a sentence about the path, if the path is
-  // empty, too long, or not made of names separated by single slashes; if a name is `.` or `..`; if it contains `\` or
-  // a control character; if it was added before, is a folder of another path, or has another path as its folder; or if
-  // there are too many paths.
+  // Validates `path` and adds it. Returns INVALID_ARGUMENT if the path is empty, longer than kMaxBackupPathLength, or
+  // not made of names separated by single slashes; if a name is `.` or `..`; if the path contains `\` or a control
+  // character; if it was added before, is a folder of another path, or has another path as its folder; or if there are
+  // too many files or folders. The error message is a predicate such as "is empty", which callers put behind the path.
   absl::Status add(const std::string& path);
 
  private:

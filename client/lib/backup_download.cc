@@ -25,7 +25,8 @@ bool equal(const Sha256& hash, absl::string_view bytes) {
                     [](uint8_t a, char b) { return a == static_cast<uint8_t>(b); });
 }
 
-// Passes received files on to the sink, and verifies sizes, paths and hashes against the announcement.
+// Receiver of the messages of one backup. Passes the files on to the sink, and verifies their paths, their sizes and
+// hashes, and the announced total size.
 class BackupReceiver {
  public:
   explicit BackupReceiver(BackupSink& sink) : sink_(sink) {}
@@ -91,7 +92,7 @@ class BackupReceiver {
   bool first_ = true;
   bool in_file_ = false;
   BackupSize announced_;
-  BackupSize received_;  // files: complete ones
+  BackupSize received_;  // files: number of complete files
   BackupPaths paths_;
   BackupFile file_;
   Sha256Hasher hasher_;

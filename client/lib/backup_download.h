@@ -1,4 +1,4 @@
-// The streaming half of Client::backup. Internal to the library.
+// Reception of the message stream of Client::backup. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_BACKUP_DOWNLOAD_H_
 #define LOCUS_CLIENT_LIB_BACKUP_DOWNLOAD_H_
 
@@ -9,7 +9,7 @@
 
 namespace locus::client {
 
-// Performs one attempt of Client::backup.
+// Performs Client::backup with this stub. Fails with DEADLINE_EXCEEDED after `deadline`.
 absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stub, BackupSink& sink,
                                            absl::Time deadline);
 

@@ -1,4 +1,4 @@
-// Metadata of every call about a scene. Internal to the library.
+// Metadata that each call about a scene sends. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_CALL_METADATA_H_
 #define LOCUS_CLIENT_LIB_CALL_METADATA_H_
 
@@ -10,9 +10,9 @@ class ClientContext;
 
 namespace locus::client {
 
-// Sets `x-scene`, which routers use to find the server of a scene. Omits names with characters that no scene name may
-// have: gRPC aborts on bytes that are illegal in metadata, and the server refuses the name in the request anyway, with
-// a helpful message.
+// Adds the metadata entry `x-scene`, which routers use to find the server of a scene. Adds nothing if `scene` is not a
+// valid scene name: gRPC would abort the process for bytes that are illegal in metadata, whereas the server refuses the
+// invalid name in the request with a helpful message.
 void add_scene(grpc::ClientContext& context, absl::string_view scene);
 
 }  // namespace locus::client

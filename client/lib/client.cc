@@ -27,7 +27,7 @@ namespace {
 
 enum class Repeat { kNever, kWhenUnavailable };
 
-// Parameters of a call besides its request: deadline, retries, and the scene that it is about.
+// Parameters of a call besides its request: timeout, retries, and the name of its scene (empty if it has none).
 struct CallPlan {
   absl::Duration deadline;
   RetryPolicy retry;

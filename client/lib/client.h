@@ -8,11 +8,11 @@
 //   auto result = (*client)->query("arena", builder.build());
 //   auto hits = locus::client::RayHits::of(result->blocks(0));
 //
-// Errors are absl::Status with the server's code and message; error_of() (client/lib/status.h) gives the structured
-// refusal. UNAVAILABLE means that no server answered or that the server is draining. After DEADLINE_EXCEEDED the
-// outcome of a change is unknown. Calls that change nothing are retried within their deadline, on UNAVAILABLE, and on
-// RESOURCE_EXHAUSTED with a retry hint. An update is retried only if it carries `writer` and `batch`. No other call is
-// ever retried.
+// Errors are absl::Status with the server's code and message; error_of() (client/lib/status.h) returns the server's
+// structured error. UNAVAILABLE means that no server answered or that the server is draining. After DEADLINE_EXCEEDED
+// the outcome of a change is unknown. Calls that change nothing are retried within their deadline, on UNAVAILABLE, and
+// on RESOURCE_EXHAUSTED with a retry hint. An update is retried only if it carries `writer` and `batch`. No other call
+// is ever retried.
 #ifndef LOCUS_CLIENT_LIB_CLIENT_H_
 #define LOCUS_CLIENT_LIB_CLIENT_H_
 
@@ -43,16 +43,16 @@ inline constexpr char kDefaultAddress[] = "127.0.0.1:7575";
 // Health of a server or of one of its services, as reported by grpc.health.v1.
 enum class Health { kUnknown = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
-// Callback after each message of an upload, with the bytes sent so far and the total bytes.
+// Callback after each message of an upload, with the number of bytes sent so far and in total.
 using UploadProgress = std::function<void(uint64_t sent, uint64_t total)>;
 
-// Callback after each message of a download, with the bytes received so far and the total bytes.
+// Callback after each message of a download, with the number of bytes received so far and in total.
 using DownloadProgress = std::function<void(uint64_t received, uint64_t total)>;
 
-// Connection to one server. Thread promise: every method may be called from any number of threads at once. Streams
-// share ownership of the connections and may outlive the client. Each client has two connections of its own, so that
-// small calls do not wait behind large messages (see Lane); the second one is opened when it is first needed. Both
-// reconnect automatically.
+// Connection to one server. Thread-safe: every method may be called from any number of threads at once. Streams share
+// ownership of the connections and may outlive the client. Each client has two connections of its own, so that small
+// calls do not wait behind large messages (see Lane); the second one is opened when it is first needed. Both reconnect
+// automatically.
 class Client {
  public:
   // Connects to `address`: host:port, host alone (port 7575) or unix:/path. Blocks until the connection is established.
@@ -63,21 +63,21 @@ class Client {
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  // Returns the address with its port.
+  // Returns the server's address, including the port.
   const std::string& address() const;
 
-  // Returns version, features and limits. Retried.
+  // Returns the server's version, features and limits. Retried.
   absl::StatusOr<v1::GetServerResponse> get_server() const;
   // Returns the health of the whole server, or of one service given by its full name. Retried.
   absl::StatusOr<Health> health(absl::string_view service = "") const;
   // Passes a consistent copy of the server's data directory to `sink`, in this thread, and returns its size. Not
-  // retried: a second attempt starts again with a new sink. Returns DATA_LOSS if the received files differ from the
+  // retried; to try again, call it with a new sink. Returns DATA_LOSS if the received files differ from the
   // announcement (number, sizes, hashes) or a path leads out of the backup, and UNIMPLEMENTED if the server has no data
   // directory.
   absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
   // Create, read, list and delete scenes. get_scene() and list_scenes() are retried, the others are not. list_scenes()
-  // reads all pages and returns the scenes that have all of `labels`.
+  // reads all pages and returns every scene that has all of `labels`.
   absl::StatusOr<v1::Scene> create_scene(const v1::CreateSceneRequest& request) const;
   absl::StatusOr<v1::Scene> get_scene(absl::string_view name) const;
   absl::StatusOr<std::vector<v1::Scene>> list_scenes(const std::map<std::string, std::string>& labels = {}) const;
@@ -86,31 +86,31 @@ class Client {
   // Uploads a mesh in messages of at most 1 MiB. The first message carries its SHA-256, and the upload stops as soon as
   // the server answers, so a mesh that the server already has is not sent again. Returns when the server has built the
   // mesh's tree. Not retried; safe to call again. Returns INVALID_ARGUMENT, before anything is sent, if the length of a
-  // column is not a multiple of three or too large.
+  // column is not a multiple of three or is too large.
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
   // Downloads a mesh as the server stores it, completely into memory: 12 bytes per vertex and per triangle. Retried.
   // Returns DATA_LOSS if the received mesh differs from the announcement (counts, hash) or is invalid (an index beyond
   // the vertices, a vertex that is not finite, parts out of order). Never holds more data than was announced.
   absl::StatusOr<DownloadedMesh> download_mesh(absl::string_view name, const DownloadProgress& progress = {}) const;
-  // Returns all meshes, from all pages. Retried.
+  // Returns all meshes of the server, read page by page. Retried.
   absl::StatusOr<std::vector<v1::Mesh>> list_meshes() const;
   // Deletes a mesh. Not retried.
   absl::Status delete_mesh(absl::string_view name) const;
-  // Applies one atomic change of a scene's instances. Returns when it is visible, or at once with `no_wait`. Not
-  // retried.
+  // Applies one atomic change of a scene's instances. Returns when queries see the change, or, with request.no_wait, as
+  // soon as the server has accepted it. Not retried.
   absl::StatusOr<v1::ChangeInstancesResponse> change_instances(const v1::ChangeInstancesRequest& request) const;
-  // Passes the contents of a scene to `on_message`, message by message, in this thread. Ends early if `on_message`
-  // fails, with its status. Not retried.
+  // Passes the contents of a scene to `on_message`, message by message, in this thread. If `on_message` returns an
+  // error, stops and returns that error. Not retried.
   absl::Status dump(const v1::DumpSceneRequest& request,
                     const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const;
 
-  // Applies one batch. Retried only if it carries `writer` and `batch`. For a steady flow use update_stream().
+  // Applies one batch. Retried only if the batch carries `writer` and `batch`. For regular batches use update_stream().
   absl::StatusOr<v1::UpdateAck> apply(absl::string_view scene, v1::UpdateBatch batch) const;
-  // Answers one batch at one revision. Retried. For a steady flow use query_stream().
+  // Answers all queries of one batch at one revision. Retried. For regular batches use query_stream().
   absl::StatusOr<v1::QueryResult> query(absl::string_view scene, v1::QueryBatch batch) const;
 
-  // Open a stream for one scene. Neither connects before the first batch is sent.
+  // Open a stream for one scene. The stream starts its call to the server when the first batch is sent.
   std::unique_ptr<UpdateStream> update_stream(absl::string_view scene, const UpdateStreamOptions& options = {}) const;
   std::unique_ptr<QueryStream> query_stream(absl::string_view scene, const QueryStreamOptions& options = {}) const;
 

@@ -10,7 +10,8 @@
 
 namespace locus::client {
 
-// Appends `value` for the row after `rows_before` rows; leaves an empty column empty while `value` is the default.
+// Appends `value` to a column of a block that had `rows_before` rows before. A column without entries stays so while
+// every value is `default_value`.
 template <class T>
 void append_row(google::protobuf::RepeatedField<T>& column, int rows_before, T value, T default_value) {
   if (column.empty()) {

@@ -43,7 +43,7 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
-  // Ignores a proxy of the environment, which cannot reach this machine's loopback interface.
+  // Ignores the proxy that environment variables may name: it cannot reach this machine's loopback interface.
   if (is_local(target)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   return grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
 }

@@ -16,11 +16,12 @@ class Channel;
 
 namespace locus::client {
 
-// Returns the target for gRPC: `address`, with the default port if it has none. INVALID_ARGUMENT if it is empty.
+// Returns the gRPC target of `address`, to which it adds port 7575 if `address` has no port. Returns INVALID_ARGUMENT
+// if `address` is empty.
 absl::StatusOr<std::string> target_of(absl::string_view address);
 
-// Returns a channel to `target` whose connection is not shared with any other channel of this process. Does not
-// connect.
+// Returns a channel to `target`, which does not connect yet. Its connection is not shared with any other channel of
+// this process, so that each channel of a client has its own socket.
 std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options);
 
 // Waits until the channel is connected. Returns UNAVAILABLE naming `target` if the connection is refused (unless

@@ -1,4 +1,5 @@
-// Limits of the size of a gathered message and of its delay. For callers of QueryBatcher and MoveBatcher. Plain data.
+// Limits of the number of items that a batcher gathers into one message, and of the time for which it gathers them. For
+// callers of QueryBatcher and MoveBatcher. Plain data.
 #ifndef LOCUS_CLIENT_LIB_GATHER_LIMITS_H_
 #define LOCUS_CLIENT_LIB_GATHER_LIMITS_H_
 
@@ -11,7 +12,8 @@ namespace locus::client {
 struct GatherLimits {
   // Maximum number of items in a message, at least 1. A full message is sent at once.
   size_t max_items = 1024;
-  // Maximum delay of the first item of a message. 0 = a message is sent as soon as the one before has been sent.
+  // Maximum time for which the first item of a message waits for more items. 0 = a message is sent as soon as the
+  // previous message has been sent.
   absl::Duration max_delay = absl::Microseconds(500);
 };
 

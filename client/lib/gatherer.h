@@ -1,9 +1,9 @@
 // Gatherer of small items from many callers into one batch, which is sent when it is full or its first item has waited
 // for the maximum delay. Internal to the library: base of QueryBatcher and MoveBatcher.
 //
-// Threads: add() and flush() may be called from any thread; the gatherer calls `send` in a thread of its own,
-// one batch after another, without a lock held, so `send` may block; a full batch then blocks add(). Invariant: at any
-// time at most one batch is being gathered and at most one is being sent.
+// Threads: add() and flush() may be called from any thread; the gatherer calls `send` in a thread of its own, one batch
+// after another, without a lock held, so `send` may block. While it blocks, add() blocks as soon as the next batch is
+// full. Invariant: at any time at most one batch is being gathered and at most one is being sent.
 #ifndef LOCUS_CLIENT_LIB_GATHERER_H_
 #define LOCUS_CLIENT_LIB_GATHERER_H_
 
@@ -42,7 +42,7 @@ class Gatherer {
   Gatherer(const Gatherer&) = delete;
   Gatherer& operator=(const Gatherer&) = delete;
 
-  // Calls add_to(batch), which adds one item, with the lock held. Blocks while the batch is full.
+  // Calls add_to(batch), which must add one item to the batch, with the lock held. Waits first while the batch is full.
   template <class AddTo>
   void add(const AddTo& add_to) {
     std::unique_lock lock(mutex_);
@@ -52,7 +52,7 @@ class Gatherer {
     if (items_ == 1 || items_ == max_items_) changed_.notify_all();
   }
 
-  // Sends at once, and blocks until `send` has returned for all items added before.
+  // Sends the gathered items at once, and blocks until `send` has returned for all items that were added before.
   void flush() {
     std::unique_lock lock(mutex_);
     const uint64_t target = sent_ + (sending_ ? 1 : 0) + (items_ > 0 ? 1 : 0);
@@ -72,7 +72,7 @@ class Gatherer {
       changed_.wait(lock, [this] { return items_ > 0 || ending_; });
       if (items_ == 0) return;
       while (!is_due()) {
-        const Clock::time_point due = due_;  // flush() changes it meanwhile
+        const Clock::time_point due = due_;  // a copy, since flush() may change due_ during the wait
         changed_.wait_until(lock, due);
       }
       Batch batch = std::exchange(batch_, Batch());
@@ -96,7 +96,7 @@ class Gatherer {
   std::condition_variable changed_;
   Batch batch_;
   size_t items_ = 0;       // number of items in batch_
-  Clock::time_point due_;  // when batch_ is sent even if it is not full
+  Clock::time_point due_;  // time at which batch_ is sent even if it is not full
   bool sending_ = false;
   uint64_t sent_ = 0;  // number of batches for which `send` has returned
   bool ending_ = false;

@@ -15,7 +15,7 @@ namespace locus::client {
 
 // Borrowed columns of a mesh.
 struct MeshColumns {
-  std::string name;                           // server-wide, 1 to 63 characters
+  std::string name;                           // unique on the server, 1 to 63 characters
   absl::Span<const float> vertices = {};      // x, y, z of each vertex
   absl::Span<const uint32_t> indices = {};    // three vertex indices per triangle
   absl::Span<const v1::MeshPart> parts = {};  // ascending by first triangle; empty = one part without a name
@@ -34,7 +34,7 @@ struct DownloadedMesh {
 
 // Returns the SHA-256 of, in this order and little-endian: the number of vertices as uint32, the number of triangles as
 // uint32, the vertices as floats, the indices as uint32. It is the protocol's UploadMeshRequest.sha256: meshes with
-// equal hashes share one tree on the server. Linear; about 1 GB/s on processors with SHA instructions.
+// equal hashes share one tree on the server. Takes linear time, at about 1 GB/s on processors with SHA instructions.
 Sha256 mesh_sha256(absl::Span<const float> vertices, absl::Span<const uint32_t> indices);
 
 }  // namespace locus::client

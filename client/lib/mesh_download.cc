@@ -16,7 +16,8 @@ absl::Status damaged(absl::string_view name, absl::string_view what) {
   return absl::DataLossError(absl::StrCat("mesh ", name, " came damaged: ", what, "; download it again"));
 }
 
-// Appends a column of a message. Returns false, without any change, if the result would be longer than announced.
+// Appends `column` of a message to `to`. Returns false and appends nothing if `to` would have more than `announced`
+// entries.
 template <class T, class Repeated>
 bool append(const Repeated& column, size_t announced, std::vector<T>* to) {
   if (static_cast<size_t>(column.size()) > announced - to->size()) return false;

@@ -1,4 +1,4 @@
-// The streaming half of Client::download_mesh. Internal to the library.
+// Reception of the message stream of Client::download_mesh. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_MESH_DOWNLOAD_H_
 #define LOCUS_CLIENT_LIB_MESH_DOWNLOAD_H_
 
@@ -11,7 +11,7 @@
 
 namespace locus::client {
 
-// Performs one attempt of Client::download_mesh.
+// Performs one attempt of Client::download_mesh, which repeats failed attempts.
 absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& stub, absl::string_view name,
                                              absl::Time deadline, const DownloadProgress& progress);
 

@@ -45,7 +45,7 @@ class Sender {
   Sender(Writer& writer, const MeshColumns& mesh, const UploadProgress& progress)
       : writer_(writer), progress_(progress), total_((mesh.vertices.size() + mesh.indices.size()) * sizeof(uint32_t)) {}
 
-  // Sends a column in messages. Returns false if the server has already answered.
+  // Sends `values`, the values of one column, in several messages. Returns false if the server has already answered.
   template <class T, class Column>
   bool send(absl::Span<const T> values, Column column) {
     while (!values.empty()) {

@@ -1,4 +1,4 @@
-// The streaming half of Client::upload_mesh. Internal to the library.
+// Transmission of the message stream of Client::upload_mesh. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_MESH_UPLOAD_H_
 #define LOCUS_CLIENT_LIB_MESH_UPLOAD_H_
 
@@ -10,8 +10,8 @@
 
 namespace locus::client {
 
-// Performs Client::upload_mesh. The first message holds hash and counts but no columns, so that a server that already
-// has the mesh can answer before any column is sent.
+// Performs Client::upload_mesh with this stub. The first message has the hash and the counts but no columns, so that a
+// server that already has the mesh can answer before any column is sent.
 absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterface& stub, const MeshColumns& mesh,
                                                    absl::Time deadline, const UploadProgress& progress);
 

@@ -18,8 +18,8 @@
 
 namespace locus::client {
 
-// Thread promise: every method may be called from any thread. Moves of one caller are applied in order; of two moves of
-// one object the later one wins.
+// Thread-safe: every method may be called from any thread. Moves of one caller are applied in order. If an object is
+// moved twice, the later move wins.
 class MoveBatcher {
  public:
   // Callback for each message, with its ack, which lists refused moves (unknown ids), or with the error that ended the
@@ -33,7 +33,7 @@ class MoveBatcher {
   MoveBatcher& operator=(const MoveBatcher&) = delete;
 
   // Adds a move. Blocks while `max_items` moves wait because the server does not keep up. After the stream has ended,
-  // moves are dropped: see flush().
+  // moves are dropped, and flush() returns the stream's error.
   void move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation = std::nullopt);
 
   // Sends the gathered moves at once, and blocks until all moves added before are acked. Returns the error of the

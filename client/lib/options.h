@@ -6,14 +6,15 @@
 
 namespace locus::client {
 
-// Number of attempts and waits between them. The wait doubles with each attempt and varies randomly by a fifth, so that
-// many clients of one server do not retry in step; a server's hint (Error.retry_after_ms) lengthens it.
+// Number of attempts and waits between them. The wait doubles with each attempt and varies randomly by up to 20 %, so
+// that many clients of one server do not retry in step. If the server requests a longer wait (Error.retry_after_ms),
+// that wait is used instead.
 struct RetryPolicy {
   // Maximum number of attempts, including the first. 1 = no retries.
   int max_attempts = 5;
   // Wait before the second attempt.
   absl::Duration first_backoff = absl::Milliseconds(100);
-  // Maximum wait, unless a hint asks for more.
+  // Maximum wait before its random variation, unless the server requests a longer one.
   absl::Duration max_backoff = absl::Seconds(2);
 };
 
@@ -36,9 +37,9 @@ struct ClientOptions {
   absl::Duration long_deadline = absl::Minutes(10);
   // Maximum duration of a backup, which may be as large as a disk.
   absl::Duration backup_deadline = absl::Hours(24);
-  // Largest message sent; the server's default receives 32 MiB.
+  // Maximum size of a sent message in bytes. A server accepts 32 MiB by default.
   int max_send_bytes = 32 << 20;
-  // Largest message received; the protocol's max_reply_bytes goes up to 64 MiB.
+  // Maximum size of a received message in bytes. The largest max_reply_bytes that a query may request is 64 MiB.
   int max_receive_bytes = 64 << 20;
   // Retries of calls that change nothing, and of updates that carry `writer` and `batch`. No other call is ever
   // retried.

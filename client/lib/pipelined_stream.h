@@ -1,7 +1,7 @@
 // Pipelined stream: base of UpdateStream and QueryStream. Internal to the library. A bidirectional call whose responses
 // carry the sequence numbers of their requests, with a bounded number of requests in flight. After a broken connection
-// it reconnects and sends the unanswered requests again. A connection without any response for too long counts as
-// broken.
+// it reconnects and sends the unanswered requests again. A connection counts as broken if no response arrives for
+// Options::patience while requests are unanswered.
 //
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
 // each. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from any
@@ -48,23 +48,24 @@ class PipelinedStream {
   using Reactor = grpc::ClientBidiReactor<Request, Response>;
 
   struct Item {
-    std::shared_ptr<Request> request;  // shared with a write in progress: replaced, never modified
+    std::shared_ptr<Request> request;  // a write may still use it, so it is replaced, never modified
     Callback done;
-    bool written = false;  // on the current call
+    bool written = false;  // its write on the current call has begun
   };
   using Items = std::deque<Item>;
 
-  // Differences between the kinds of streams. number() and answered() are called with the stream's lock held.
+  // Operations in which update streams and query streams differ. number() and answered() are called with the stream's
+  // lock held.
   class Kind {
    public:
     virtual ~Kind() = default;
     virtual void start_call(grpc::ClientContext* context, Reactor* reactor) = 0;
-    // Assigns the sequence number of a new request, and batch numbers if the kind has them.
+    // Assigns the sequence number of a new request, and, for updates, the writer and batch number of its batch.
     virtual void number(Request& request) = 0;
     // Converts a response into the outcome of its request.
     virtual absl::StatusOr<Result> outcome_of(Response& response) = 0;
-    // Called after the item at `position` was answered and removed. May renumber the items behind it. An error ends the
-    // stream.
+    // Handles the outcome of an item that was at `position` and has been removed from `items`. May renumber the items
+    // behind it, which now begin at `position`. A returned error ends the stream.
     virtual absl::Status answered(const absl::StatusOr<Result>& outcome, Items& items, size_t position) = 0;
   };
 
@@ -74,7 +75,7 @@ class PipelinedStream {
     absl::Duration patience;  // maximum time without any response while requests are unanswered
   };
 
-  // Starts the supervisor. `kind` outlives the stream.
+  // Starts the supervisor thread. `kind` must outlive the stream.
   PipelinedStream(Kind& kind, std::string scene, const Options& options)
       : kind_(kind),
         scene_(std::move(scene)),
@@ -129,13 +130,15 @@ class PipelinedStream {
  private:
   using Clock = std::chrono::steady_clock;
 
-  // Maximum time for the server to end a stream that was closed.
+  // Maximum time for which close() waits until the server ends the call; then it cancels the call.
   static constexpr std::chrono::seconds kCloseTimeout{5};
-  // Maximum duration of one wait, so that the time of its end does not overflow.
+  // Maximum duration of one wait for a response: with an unlimited patience, the time at which the wait ends would
+  // overflow.
   static constexpr std::chrono::hours kLongestWait{1};
 
-  // One call. A hold keeps gRPC from finishing it while other threads may still start writes; the last read removes the
-  // hold. Members are guarded by the stream's lock, except `response_`, which only the sequential read reactions use.
+  // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes;
+  // the read that fails at the end of the call removes the hold. Members are guarded by the stream's lock, except
+  // `response_`, which only the read reactions use, one after another.
   class Attempt final : public Reactor {
    public:
     Attempt(PipelinedStream& stream, const std::string& scene) : stream_(stream) { add_scene(context_, scene); }
@@ -193,7 +196,8 @@ class PipelinedStream {
     std::optional<absl::Status> end_;
   };
 
-  // Starts the next write if no other is in progress. The lock is held.
+  // Starts writing the next unwritten request, or ends the writes of a closing stream without unanswered requests. Does
+  // nothing while a write is in progress. Precondition: the caller holds the lock.
   void pump() {
     if (!attempt_ || !attempt_->writable()) return;
     const auto next = std::find_if(items_.begin(), items_.end(), [](const Item& item) { return !item.written; });
@@ -205,8 +209,8 @@ class PipelinedStream {
     }
   }
 
-  // Completes the request of a response. Responses without a matching item belong to requests that were renumbered in
-  // the meantime, and are ignored.
+  // Completes the request that `response` answers. Ignores a response without a matching item: its request was
+  // renumbered in the meantime and is sent again.
   void receive(Response& response) {
     std::unique_lock lock(mutex_);
     const auto item = std::find_if(items_.begin(), items_.end(), [&](const Item& candidate) {
@@ -272,8 +276,8 @@ class PipelinedStream {
     return end;
   }
 
-  // Waits for the end of the current call. Returns false if it was cancelled here because no response arrived for too
-  // long.
+  // Waits for the end of the current call. Returns false if it cancelled the call because no response arrived for
+  // `patience_`.
   bool wait_for_end(std::unique_lock<std::mutex>& lock) {
     const auto ended = [this] { return attempt_->end().has_value(); };
     while (!ended()) {
@@ -317,18 +321,19 @@ class PipelinedStream {
   std::condition_variable changed_;
   Backoff backoff_;
   Items items_;
-  Clock::time_point last_response_;   // last response, or start of the wait for one
+  Clock::time_point last_response_;   // time of the last response, or since when one is awaited
   std::unique_ptr<Attempt> attempt_;  // the call in progress
   int running_callbacks_ = 0;         // number of running callbacks
   bool closing_ = false;
   bool broken_off_ = false;
-  absl::Status fatal_;                 // error by which the kind ended the stream
-  std::optional<absl::Status> ended_;  // OK = closed normally
+  absl::Status fatal_;                 // error of Kind::answered(), which ends the stream
+  std::optional<absl::Status> ended_;  // set once the stream has ended; OK = closed normally
 
   std::thread supervisor_;  // last: it uses everything above
 };
 
-// Adapts a future to a callback. An error of `send` also goes into the future.
+// Calls `send` with a callback that sets a future, and returns the future. If `send` itself returns an error, the
+// future gets that error.
 template <class Result, class Send>
 std::future<absl::StatusOr<Result>> send_for_future(const Send& send) {
   auto promise = std::make_shared<std::promise<absl::StatusOr<Result>>>();

@@ -36,7 +36,8 @@ void fail(const Gathered& gathered, const absl::Status& status) {
   for (const QueryBatcher::IdsCallback& on_ids : gathered.on_ids) on_ids(status);
 }
 
-// Calls the callbacks with the result. If the result does not match the queries, all callbacks get an error.
+// Calls the callback of each query with its part of `result`. If `result` does not match the queries, all callbacks get
+// an error.
 void deliver(const Gathered& gathered, const v1::QueryResult& result) {
   const int rays = gathered.rays.empty() ? 0 : 1, balls = gathered.balls.empty() ? 0 : 1;
   const absl::Status wrong = absl::DataLossError("the server's answer does not fit what was asked");

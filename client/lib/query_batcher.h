@@ -20,11 +20,11 @@
 
 namespace locus::client {
 
-// Positions are relative to the batcher's frame.
+// Query for the nearest hit of one ray. Positions of queries are relative to QueryBatcherOptions::frame.
 struct SingleRay {
   Float3 origin;
-  Float3 direction;                                      // unit of t; any length but zero
-  float t_max = std::numeric_limits<float>::infinity();  // included
+  Float3 direction;                                      // t is a multiple of it; any length but zero
+  float t_max = std::numeric_limits<float>::infinity();  // inclusive
   Filter filter = {};
 };
 
@@ -35,6 +35,7 @@ struct SingleHit {
   uint32_t triangle = kNoTriangle;
 };
 
+// Query for the objects and instances that overlap one ball.
 struct SingleBall {
   Float3 center;
   float radius = 0;
@@ -43,16 +44,16 @@ struct SingleBall {
 
 struct QueryBatcherOptions {
   GatherLimits limits = {};
-  // Added to every position.
+  // Origin of all positions: the server adds it to the position of each query.
   Double3 frame = {};
 };
 
-// Thread promise: every method may be called from any thread. Callbacks run one at a time on a thread of the library:
-// they must not block or call the batcher.
+// Thread-safe: every method may be called from any thread. Callbacks run one at a time on a thread of the library: they
+// must not block or call the batcher.
 class QueryBatcher {
  public:
   using HitCallback = std::function<void(absl::StatusOr<SingleHit>)>;
-  // Ids ascend.
+  // Callback with the ids of all objects and instances found, ascending.
   using IdsCallback = std::function<void(absl::StatusOr<std::vector<uint64_t>>)>;
 
   explicit QueryBatcher(std::unique_ptr<QueryStream> stream, const QueryBatcherOptions& options = {});
@@ -61,9 +62,9 @@ class QueryBatcher {
   QueryBatcher(const QueryBatcher&) = delete;
   QueryBatcher& operator=(const QueryBatcher&) = delete;
 
-  // Add a query. Its callback is called exactly once, with the answer or with the error of its message. An invalid
-  // value, for example one that is not finite, refuses all queries of the same message. Block while `max_items` queries
-  // wait because the server does not keep up.
+  // Add a query. Its callback is called exactly once, with the answer or with the error of its message. If one query
+  // has an invalid value, for example one that is not finite, the server refuses all queries of the same message. Both
+  // functions block while `max_items` queries wait because the server does not keep up.
   void ray(const SingleRay& ray, HitCallback on_hit);
   void ball(const SingleBall& ball, IdsCallback on_ids);
 

@@ -1,9 +1,10 @@
 // Builders of one block of a query batch: rays, balls, boxes, nearest or lookup, with the settings that all kinds
-// share. Returned by QueryBuilder, and valid until its build(). Nothing is checked here: the server refuses an invalid
-// batch as a whole, naming block, column and index. Not thread-safe.
+// share. QueryBuilder returns these builders, which are valid until QueryBuilder::build(). They check nothing: the
+// server refuses an invalid batch as a whole, naming block, column and index. Not thread-safe.
 //
 // A per-query column (t_max, max_distances, masks, ignored groups, rotations) is either filled row by row, or set as a
-// whole column: N entries, one for all, or none. Do not mix the two ways in one column of a block.
+// whole column with N entries, one entry for all queries, or no entries. Do not use both ways for one column of a
+// block.
 #ifndef LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 #define LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 
@@ -21,11 +22,11 @@ inline constexpr uint32_t kEveryMask = 0xFFFFFFFFu;
 
 // Filter of one query by layers and group.
 struct Filter {
-  uint32_t mask = kEveryMask;  // found iff (layers & mask) != 0
+  uint32_t mask = kEveryMask;  // finds only objects with (layers & mask) != 0
   uint64_t ignore_group = 0;   // 0 = none
 };
 
-// Settings of every kind of block. Each call returns the block, so that calls chain.
+// Settings of every kind of block. Each function returns the block, so that calls can be chained.
 template <class Derived>
 class BlockBuilder {
  public:
@@ -63,18 +64,18 @@ class BlockBuilder {
     assign(*block_->mutable_ignore_ids(), ids);
     return derived();
   }
-  // Sets the maximum number of rows per query; 0 = 1,024.
+  // Sets the maximum number of rows per query; 0 = the default of 1,024.
   Derived& max_results(uint32_t rows) {
     block_->set_max_results(rows);
     return derived();
   }
-  // Returns only rows with a higher id; continues after a truncated result.
+  // Restricts the result to rows with ids above `id`. Serves to continue after a truncated result.
   Derived& after_id(uint64_t id) {
     block_->set_after_id(id);
     return derived();
   }
-  // Sets the time of each query: N ticks or one for all, and N fractions of the way to the next tick, one for all, or
-  // none.
+  // Sets the time of each query. `ticks` has N entries or one for all queries. `fractions` are fractions of the way
+  // from a tick to the next one: N entries, one for all queries, or none.
   Derived& as_of(absl::Span<const uint64_t> ticks, absl::Span<const float> fractions = {}) {
     assign(*block_->mutable_as_of_ticks(), ticks);
     assign(*block_->mutable_as_of_fractions(), fractions);
@@ -112,7 +113,7 @@ class RayBlock : public BlockBuilder<RayBlock> {
                 const Filter& filter = {});
   // Appends N rays: 3N floats each.
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
-  // Sets the whole column: N entries or one for all.
+  // Sets the whole column of the largest t, inclusive: N entries, or one for all rays.
   RayBlock& t_max(absl::Span<const float> t_max);
 
  private:
@@ -125,7 +126,8 @@ class BallBlock : public BlockBuilder<BallBlock> {
 
   BallBlock& detail(v1::StaticDetail detail);
   BallBlock& ball(const Float3& center, float radius, const Filter& filter = {});
-  // Appends N centres (3N floats) and their radii: N, or, in the only call for the block, one for all.
+  // Appends N balls: 3N floats of centers, and N radii. If this is the only call for the block, one radius for all
+  // balls suffices.
   BallBlock& balls(absl::Span<const float> centers, absl::Span<const float> radii);
 
  private:
@@ -139,9 +141,10 @@ class BoxBlock : public BlockBuilder<BoxBlock> {
   BoxBlock& detail(v1::StaticDetail detail);
   BoxBlock& box(const Float3& center, const Float3& half_extents, const Rotation& rotation = {},
                 const Filter& filter = {});
-  // Appends N centres and their half extents: 3N floats, or, in the only call for the block, one triple for all.
+  // Appends N boxes: 3N floats of centers, and 3N floats of half extents. If this is the only call for the block, three
+  // floats of half extents for all boxes suffice.
   BoxBlock& boxes(absl::Span<const float> centers, absl::Span<const float> half_extents);
-  // Sets the whole column: 4N floats or one quaternion for all.
+  // Sets the whole column of rotations: N quaternions (4N floats: x, y, z, w), or one for all boxes.
   BoxBlock& rotations(absl::Span<const float> rotations);
 
  private:
@@ -153,22 +156,22 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
  public:
   explicit NearestBlock(v1::QueryBlock& block) : BlockBuilder(block), nearest_(block.mutable_nearest()) {}
 
-  // Sets the number of rows per point, at most 65,536; 0 = 1.
+  // Sets the maximum number of rows per point, up to 65,536; 0 = 1.
   NearestBlock& k(uint32_t count);
-  // Sets the detail: INSTANCES reports an instance once, by its nearest triangle.
+  // Sets the detail of the rows. INSTANCES reports an instance once, with its nearest triangle.
   NearestBlock& detail(v1::StaticDetail detail);
   NearestBlock& point(const Float3& point, float max_distance = std::numeric_limits<float>::infinity(),
                       const Filter& filter = {});
   // Appends N points: 3N floats.
   NearestBlock& points(absl::Span<const float> points);
-  // Sets the whole column: N entries or one for all. The limit itself is included.
+  // Sets the whole column of maximum distances, inclusive: N entries, or one for all points.
   NearestBlock& max_distances(absl::Span<const float> distances);
 
  private:
   v1::Nearest* nearest_;
 };
 
-// Lookup by ids, one row each in their order, or by groups; never both in one block.
+// Lookup by ids, with one row for each id in the order given, or by groups; one block cannot have both.
 class LookupBlock : public BlockBuilder<LookupBlock> {
  public:
   explicit LookupBlock(v1::QueryBlock& block) : BlockBuilder(block), lookup_(block.mutable_lookup()) {}

@@ -13,19 +13,19 @@ namespace locus::client {
 
 class QueryBuilder {
  public:
-  // Sets the oldest acceptable revision, for example that of an ack ("read your own writes"). The default is the
-  // latest.
+  // Requires an answer at `revision` or a later one, for example at that of an ack ("read your own writes"). The server
+  // waits until the scene has reached it. By default it answers at the latest revision without waiting.
   QueryBuilder& at_least(const Revision& revision);
-  // Requests exactly this revision, as long as the server keeps it.
+  // Requests exactly this revision. The query fails with OUT_OF_RANGE if the server no longer retains it.
   QueryBuilder& exactly(const Revision& revision);
-  // Sets the work budget in nodes, cells and tests; 0 = no limit.
+  // Sets the work budget of the batch, as a number of nodes, cells and tests together; 0 = no limit.
   QueryBuilder& max_work(uint64_t work);
-  // Requests a report of the work done.
+  // Requests a report of the work done for the batch.
   QueryBuilder& explain();
-  // Sets the maximum size of the reply; 0 = 4,000,000.
+  // Sets the maximum size of the reply in bytes; 0 = the default of 4,000,000.
   QueryBuilder& max_reply_bytes(uint32_t bytes);
 
-  // Open the next block; at most 256 per batch.
+  // Append a block to the batch, which may have at most 256.
   RayBlock rays() { return RayBlock(*batch_.add_blocks()); }
   BallBlock balls() { return BallBlock(*batch_.add_blocks()); }
   BoxBlock boxes() { return BoxBlock(*batch_.add_blocks()); }

@@ -21,25 +21,25 @@ class ChannelInterface;
 namespace locus::client {
 
 struct QueryStreamOptions {
-  // Maximum number of unanswered batches, at least 1; send() blocks at this number. 8 batches of 1,024 queries, or 2 of
-  // 8,192, keep a local server busy.
+  // Maximum number of unanswered batches, at least 1; send() blocks when it is reached. 8 batches of 1,024 queries, or
+  // 2 of 8,192, keep a local server busy.
   int max_in_flight = 8;
   // Reconnection after a broken connection. Every answer resets the count of attempts.
   RetryPolicy reconnect = {};
   // Maximum time without any answer while batches are unanswered; after that the connection counts as broken. Must be
   // longer than the largest batch takes.
   absl::Duration patience = absl::Seconds(10);
-  // kLatency for small batches whose answers are needed quickly.
+  // Connection of the stream. Use kLatency for small batches whose answers are needed quickly.
   Lane lane = Lane::kBulk;
 };
 
-// Thread promise: every method may be called from any thread. Callbacks run one at a time, in the order of the answers,
-// on a thread of the library: they must not block, or call send(), flush(), close() or the destructor.
+// Thread-safe: every method may be called from any thread. Callbacks run one at a time, in the order of the answers, on
+// a thread of the library: they must not block, or call send(), flush(), close() or the destructor.
 class QueryStream {
  public:
   using ResultCallback = std::function<void(absl::StatusOr<v1::QueryResult>)>;
 
-  // Called by Client::query_stream, which callers use instead.
+  // Opens a stream on `channel`. Callers use Client::query_stream instead.
   QueryStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const QueryStreamOptions& options);
   // Cancels the stream; unanswered batches get CANCELLED.
   ~QueryStream();

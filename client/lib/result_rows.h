@@ -1,8 +1,9 @@
 // Views of the columns of a query result, by query and row. For readers of v1::QueryResult. A view borrows its block
-// and copies nothing but the index of each query's first row. Immutable, so any number of threads may read one.
+// and copies no columns; it only stores the index of each query's first row. Immutable, so any number of threads may
+// read one.
 //
-// of() checks the lengths of the columns once, so that no access runs past their end, whatever the server sent: a block
-// with inconsistent lengths is DATA_LOSS. Indices of queries and rows are not checked, as with a vector.
+// of() checks the lengths of the columns once, and returns DATA_LOSS if they are inconsistent, so that no access runs
+// past their end, whatever the server sent. Indices of queries and rows are not checked, as in std::vector::operator[].
 #ifndef LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 #define LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 
@@ -43,14 +44,15 @@ class ResultRows {
   // Returns whether the query asked for a time outside the history and got the nearest kept time.
   bool clamped(size_t query) const;
 
-  // Return columns with one entry per row; empty if not requested.
+  // Return columns with one entry per row. A column that was not requested is empty.
   absl::Span<const float> t() const { return block_->t(); }
   absl::Span<const uint64_t> ids() const { return block_->ids(); }
   absl::Span<const uint32_t> triangles() const { return block_->triangles(); }
   absl::Span<const uint64_t> groups() const { return block_->groups(); }
   absl::Span<const uint64_t> tags() const { return block_->tags(); }
   absl::Span<const uint32_t> layers() const { return block_->layers(); }
-  // Return columns with several values per row: 2 for uvs, 4 for rotations, 3 for the others; empty if not requested.
+  // Return columns with several values per row: 2 for uvs, 4 for rotations, 3 for the others. A column that was not
+  // requested is empty.
   absl::Span<const float> uvs() const { return block_->uvs(); }
   absl::Span<const float> normals() const { return block_->normals(); }
   absl::Span<const float> points() const { return block_->points(); }
@@ -61,7 +63,7 @@ class ResultRows {
   ResultRows(const v1::BlockResult& block, std::vector<size_t> begins) : block_(&block), begins_(std::move(begins)) {}
 
   const v1::BlockResult* block_;
-  std::vector<size_t> begins_;  // first row of each query, and behind them the number of rows
+  std::vector<size_t> begins_;  // first row of each query, followed by the total number of rows
 };
 
 // Rows of rays of mode FIRST (one row per ray, a miss has id 0) and ALL (rows ascend by t), and of nearest queries
@@ -107,9 +109,9 @@ class Overlaps {
 
   const ResultRows& rows() const { return rows_; }
   size_t size() const { return rows_.queries(); }
-  // Returns ids in ascending order; the id of an instance repeats for each of its triangles.
+  // Returns the ids that the query found, in ascending order; the id of an instance repeats for each of its triangles.
   absl::Span<const uint64_t> ids(size_t query) const;
-  // Returns triangles, as many as ids(query); empty if not requested.
+  // Returns the triangle of each entry of ids(query); empty if the column was not requested.
   absl::Span<const uint32_t> triangles(size_t query) const;
 
  private:

@@ -1,4 +1,4 @@
-// Retries of calls that are safe to repeat. Internal to the library: callers configure them by RetryPolicy.
+// Retries of calls that are safe to repeat. Internal to the library: callers configure retries with RetryPolicy.
 #ifndef LOCUS_CLIENT_LIB_RETRY_H_
 #define LOCUS_CLIENT_LIB_RETRY_H_
 
@@ -16,10 +16,10 @@ class Backoff {
  public:
   explicit Backoff(const RetryPolicy& policy) : policy_(policy) {}
 
-  // Counts a failure. Returns the wait before the next attempt, at least the server's hint, or nothing if the attempts
-  // of the policy are used up.
+  // Counts a failure. Returns the wait before the next attempt, which is at least the wait that the server requested,
+  // or nothing if all attempts of the policy are used up.
   std::optional<absl::Duration> after_failure(const absl::Status& failure);
-  // Forgets the failures after a success: the next failure gets the first wait again.
+  // Resets the count of failures after a success, so that the next failure gets the shortest wait again.
   void reset() { failures_ = 0; }
 
  private:
@@ -27,8 +27,8 @@ class Backoff {
   int failures_ = 0;
 };
 
-// Returns whether a call that is safe to repeat should be repeated: after UNAVAILABLE, and after RESOURCE_EXHAUSTED
-// with a retry hint of the server.
+// Returns whether a call that is safe to repeat should be repeated: after UNAVAILABLE, and after RESOURCE_EXHAUSTED if
+// the server requested a wait before the retry.
 bool worth_repeating(const absl::Status& failure);
 
 // Calls `attempt` until it succeeds or fails with an error that is not worth repeating, until the attempts of the

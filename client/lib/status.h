@@ -15,8 +15,8 @@ class Status;
 
 namespace locus::client {
 
-// Returns the server's structured error, or nothing if the error does not come from the server: no connection, the
-// deadline, a proxy.
+// Returns the server's structured error, or nothing if the error does not come from the server, for example if there is
+// no connection or the deadline has expired.
 std::optional<v1::Error> error_of(const absl::Status& status);
 
 // Returns the wait that the server requests before the same request is sent again; zero if it requests none.
@@ -29,8 +29,8 @@ bool refused_by_server(const absl::Status& status);
 // Malformed details are dropped; code and message remain valid.
 absl::Status to_absl_status(const grpc::Status& status);
 
-// Converts an error that a stream reported under a sequence number. An invalid code (0, or no gRPC code) becomes
-// UNKNOWN, so that an error never turns into success.
+// Converts the error with which a stream answered one request. An invalid code (0, or not a gRPC code) becomes UNKNOWN,
+// so that an error never turns into success.
 absl::Status to_absl_status(const v1::Error& error);
 
 }  // namespace locus::client

@@ -2,9 +2,10 @@
 // checked here: the server checks each item, and the ack lists the refused ones. Not thread-safe. build() resets the
 // builder.
 //
-// Rows of one shape and one kind of position (relative or absolute) share one Insert, in the order added. Moves and
-// relabels keep the order added over all of them, since the later of two moves of one object wins: a row of another
-// form than the one before (with or without rotation, relative or absolute) opens a new entry.
+// Inserted rows with the same shape and kind of position (relative or absolute) share one Insert message, in the order
+// in which they were added. Moves stay in the order in which they were added, since the later of two moves of one
+// object wins: a move that needs other columns than the previous one (with or without rotation, relative or absolute
+// position), or another kind, begins a new Move message. Relabels do likewise, by which labels they set.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 #define LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 
@@ -18,8 +19,8 @@
 
 namespace locus::client {
 
-// Columns of N objects, borrowed for the call. `ids` has N entries; another column has N entries, one for all or none,
-// and exactly one of the two position columns is given.
+// Columns of N objects, borrowed for the call. `ids` has N entries; every other column has N entries, one entry for all
+// objects, or none. Exactly one of the two position columns must be given.
 struct InsertColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions = {};       // 3N, relative to the frame
@@ -34,10 +35,10 @@ struct MoveColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions = {};       // 3N, relative to the frame
   absl::Span<const double> positions_f64 = {};  // 3N, absolute
-  absl::Span<const float> rotations = {};       // 4N; none = kept
+  absl::Span<const float> rotations = {};       // 4N; none = rotations do not change
 };
 
-// New labels of one object; absent ones are kept.
+// New labels of one object. Labels without a value do not change.
 struct Relabeling {
   std::optional<uint32_t> layers = std::nullopt;
   std::optional<uint64_t> group = std::nullopt;
@@ -49,7 +50,7 @@ enum class MoveKind { kContinuous, kTeleport };
 
 class UpdateBuilder {
  public:
-  // Sets the frame of the batch. Float positions are relative to it.
+  // Sets the frame of the batch: the origin to which float positions are relative.
   UpdateBuilder& frame(const Double3& origin);
   UpdateBuilder& tick(uint64_t tick);
   // Makes an insert of a known id replace the object instead of being refused.
@@ -75,7 +76,7 @@ class UpdateBuilder {
   UpdateBuilder& insert_capsule(uint64_t id, const Position& position, const Float3& half_axis, float radius,
                                 const Rotation& rotation = {}, const Labels& labels = {});
 
-  // Insert whole columns, which are copied unchanged; each call makes an Insert of its own.
+  // Insert whole columns, which are copied unchanged. Each call adds an Insert message of its own.
   UpdateBuilder& insert_points(const InsertColumns& columns);
   UpdateBuilder& insert_balls(const InsertColumns& columns, absl::Span<const float> radii);
   UpdateBuilder& insert_boxes(const InsertColumns& columns, absl::Span<const float> half_extents);
@@ -98,8 +99,9 @@ class UpdateBuilder {
   v1::Insert& add_columns(const InsertColumns& columns);
 
   v1::UpdateBatch batch_;
-  bool move_takes_rows_ = false;  // the last of batch_.moves was added by row, not as whole columns
-  // Index of the entry of batch_.inserts that collects rows of each form, relative then absolute; -1 = none yet.
+  bool move_takes_rows_ = false;  // move() may append rows to the last of batch_.moves
+  // Index of the entry of batch_.inserts that collects the rows of a form and kind of position; -1 = none yet. Each
+  // form has two elements: one for relative positions, then one for absolute positions.
   std::array<int, 8> row_inserts_ = {-1, -1, -1, -1, -1, -1, -1, -1};
 };
 

@@ -20,9 +20,9 @@ uint64_t random_writer() {
   return writer;
 }
 
-// Returns whether the batch number of a failed batch can be used again. A refusal with a reason leaves the number
-// unused. A gap means that the server has lost state of the writer, and after an error without a reason it is unknown
-// whether the number was used: continuing could lose a batch silently.
+// Returns whether the batch number of a failed batch can be used again, which is so after a refusal with a reason. The
+// exception is REASON_BATCH_GAP: the server has lost state of the writer. After an error without a reason it is unknown
+// whether the server used the number, and continuing could lose a batch silently.
 bool batch_number_is_unused(const absl::Status& failure) {
   const std::optional<v1::Error> error = error_of(failure);
   return error && error->reason() != v1::REASON_UNSPECIFIED && error->reason() != v1::REASON_BATCH_GAP;

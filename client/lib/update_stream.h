@@ -1,15 +1,15 @@
 // Pipelined stream of update batches into one scene; each batch is applied exactly once, even across broken
 // connections. For game servers that send one batch per tick.
 //
-// Each batch carries the stream's random `writer` number and a dense `batch` number. After a broken connection, every
-// batch without an ack is sent again, in order, on a new one; the server answers batches that it had already applied
-// with `duplicate`. A batch that the server refuses does not use up its number, so the stream renumbers the batches
-// behind it and sends them again: the caller gets one outcome for each batch, in the order sent.
+// Each batch carries the stream's random `writer` number and a consecutive `batch` number. After a broken connection,
+// every batch without an ack is sent again, in order, on a new one; the server answers batches that it had already
+// applied with `duplicate`. A batch that the server refuses does not use up its number, so the stream renumbers the
+// batches behind it and sends them again: the caller gets one outcome for each batch, in the order sent.
 //
-// The stream ends permanently if the server refuses it (scene name, lost rights), if the server does not know the
-// writer any more (the scene was restarted without its state), or if reconnecting fails as often as the policy allows
-// without an ack in between. Every unanswered batch and every later send() gets that status. The outcome of the
-// unanswered batches is unknown; acked batches stay applied.
+// The stream ends permanently if the server refuses the stream itself (for example because of the scene name or of
+// missing rights), if the server does not know the writer any more (the scene was restarted without its state), or if
+// reconnecting fails as often as the policy allows without an ack in between. Every unanswered batch and every later
+// send() gets that status. The outcome of the unanswered batches is unknown; acked batches stay applied.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 #define LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 
@@ -33,8 +33,8 @@ class ChannelInterface;
 namespace locus::client {
 
 struct UpdateStreamOptions {
-  // Maximum number of unanswered batches, at least 1. send() blocks at this number, which limits the caller to the pace
-  // of the server.
+  // Maximum number of unanswered batches, at least 1. send() blocks when it is reached, which limits the caller to the
+  // rate of the server.
   int max_in_flight = 8;
   // Writer number; 0 draws a random one. Set it, and `next_batch`, only to continue the writer of an earlier stream.
   uint64_t writer = 0;
@@ -43,20 +43,20 @@ struct UpdateStreamOptions {
   RetryPolicy reconnect = {.max_attempts = 10};
   // Maximum time without any ack while batches are unanswered; after that the connection counts as broken.
   absl::Duration patience = absl::Seconds(10);
-  // kLatency for small batches whose acks are needed quickly.
+  // Connection of the stream. Use kLatency for small batches whose acks are needed quickly.
   Lane lane = Lane::kBulk;
 };
 
-// Thread promise: every method may be called from any thread; batches of several threads are numbered in the order in
+// Thread-safe: every method may be called from any thread; batches of several threads are numbered in the order in
 // which send() accepts them. Callbacks run one at a time, in the order of the batches, on a thread of the library: they
 // must not block, or call send(), flush(), close() or the destructor.
 class UpdateStream {
  public:
   using AckCallback = std::function<void(absl::StatusOr<v1::UpdateAck>)>;
 
-  // Called by Client::update_stream, which callers use instead.
+  // Opens a stream on `channel`. Callers use Client::update_stream instead.
   UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const UpdateStreamOptions& options);
-  // Cancels the stream; unanswered batches get CANCELLED. Call close() before to wait for their acks.
+  // Cancels the stream; unanswered batches get CANCELLED. To wait for their acks, call close() before the destructor.
   ~UpdateStream();
   UpdateStream(const UpdateStream&) = delete;
   UpdateStream& operator=(const UpdateStream&) = delete;
@@ -74,7 +74,8 @@ class UpdateStream {
   // Flushes and ends the stream. Later sends fail.
   absl::Status close();
 
-  // Returns the revision of the latest ack. A query with QueryBuilder::at_least() of it sees every batch acked so far.
+  // Returns the revision of the latest ack, or nothing before the first ack. A query with this revision in
+  // QueryBuilder::at_least() sees every batch acked so far.
   std::optional<Revision> last_ack() const;
   uint64_t writer() const;
 

@@ -22,7 +22,7 @@ struct Position {
   Position(const Float3& relative) : value{relative.x, relative.y, relative.z} {}  // NOLINT: meant to convert
   Position(const Double3& world) : value(world), absolute(true) {}                 // NOLINT: meant to convert
 
-  Double3 value;  // exact for both
+  Double3 value;  // holds float and double positions exactly
   bool absolute = false;
 };
 
@@ -40,7 +40,8 @@ struct Labels {
   uint64_t tag = 0;
 };
 
-// State of a scene. Revisions count within an epoch; a scene that was restarted without its state has another epoch.
+// Identifier of one state of a scene. Revisions are counted within an epoch; a scene that was restarted without its
+// state begins another epoch.
 struct Revision {
   uint64_t epoch = 0;
   uint64_t revision = 0;

@@ -5,9 +5,11 @@
 namespace locus {
 namespace {
 
-// Upper bounds of the encoded field tags and lengths: of all columns of one block, and of the reply's own fields.
+// Upper bounds in bytes of the encoded field tags and lengths: for all columns of one block, and for the fields of the
+// reply outside its blocks.
 constexpr uint64_t kBlockOverhead = 256;
 constexpr uint64_t kReplyOverhead = 256;
+// Upper bounds of encoded bytes per query: its row count, its index in the list of truncated queries, and its time.
 constexpr uint64_t kCountBytes = 4;
 constexpr uint64_t kTruncatedBytes = 4;
 constexpr uint64_t kTimeBytes = 16;  // resolved tick, resolved fraction, and an entry of `clamped`

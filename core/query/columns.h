@@ -1,9 +1,9 @@
-// The result columns of a block: their names, element types and widths in one table, which of them a kind of query
-// serves, and how many bytes they take in a reply.
+// Table of the result columns of a block: their names, element types and widths. Also defines which columns each kind
+// of query can return, and computes their size in a reply.
 //
 // To add a column: give it a number in Column (query_batch.h), an array in ColumnArrays and a row in kColumnNames and
-// kColumnArrays here, fill it in run/rows.cc, and name its field of the protocol in server/convert/result_columns.cc.
-// All code that allocates, copies or measures columns loops over the table.
+// kColumnArrays here, fill it in run/rows.cc, and map it to its protocol field in server/convert/result_columns.cc. All
+// code that allocates, copies or measures columns loops over the table.
 #ifndef LOCUS_CORE_QUERY_COLUMNS_H_
 #define LOCUS_CORE_QUERY_COLUMNS_H_
 
@@ -70,7 +70,8 @@ constexpr void for_each_column_array(const Visit& visit) {
   std::apply([&visit](const auto&... array) { (visit(array), ...); }, kColumnArrays);
 }
 
-// Pointer to the first entry of each array of a range of rows; null for columns that are not returned.
+// Destination of a range of result rows: for each array, a pointer to the entry of the first row; null for columns that
+// are not returned.
 template <class T>
 using Pointer = T*;
 using RowSpans = ColumnArrays<Pointer>;
@@ -78,7 +79,7 @@ using RowSpans = ColumnArrays<Pointer>;
 // Returns the name of a column as in kColumnNames.
 constexpr absl::string_view column_name(Column column) { return kColumnNames[static_cast<size_t>(column)]; }
 
-// Returns the encoded bytes of one row.
+// Returns the encoded size of one row with these columns, in bytes.
 constexpr uint32_t row_bytes(ColumnSet columns) {
   uint32_t bytes = 0;
   for_each_column_array([&bytes, columns](const auto& array) {
@@ -100,13 +101,13 @@ ColumnSet served_columns(const QueryBlock& block);
 // Returns the columns that the block returns: the requested ones, or the default ones of its kind if it requests none.
 ColumnSet returned_columns(const QueryBlock& block);
 
-// Layout of a block's result. Dense: one row per query, including misses. Bytes: one byte per query, no rows. Counted:
-// a count per query, and that many rows.
+// Layout of a block's result. Dense: one row per query, including misses. Bytes: one byte per query and no rows.
+// Counted: any number of rows per query, and a column with the number of rows of each query.
 enum class RowLayout : uint8_t { kDense, kBytes, kCounted };
 RowLayout row_layout(const QueryBlock& block);
 
-// Returns an upper bound of the encoded bytes of a reply without its counted rows: dense rows, counts, resolved times,
-// lists of truncated queries and field headers.
+// Returns an upper bound of the encoded size in bytes of a reply without its counted rows: dense rows, counts, resolved
+// times, lists of truncated queries and field headers.
 uint64_t fixed_reply_bytes(const QueryBatch& batch);
 // Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if it is 0.
 uint64_t reply_limit(const QueryBatch& batch);

@@ -14,7 +14,7 @@
 namespace locus {
 namespace {
 
-// Checks of one block; every error names the field of the block.
+// Validation of one block. Every error names the invalid field, such as blocks[2].rays.directions.
 class BlockCheck {
  public:
   BlockCheck(const QueryBlock& block, size_t index) : block_(block), field_(absl::StrCat("blocks[", index, "]")) {}
@@ -72,7 +72,8 @@ class BlockCheck {
     return check_column(values, width, n_, need, name(field));
   }
 
-  // Returns whether all points lie within the world. Without branches, since valid points are by far the usual case.
+  // Returns whether all points, given relative to the frame, lie within the world. Has no branches per value, since
+  // nearly all batches are valid; check_points() searches for the invalid point only if this returns false.
   bool all_within_world(absl::Span<const float> values) const {
     bool all = values.size() % 3 == 0;
     for (size_t i = 0; i + 2 < values.size(); i += 3)
@@ -81,7 +82,7 @@ class BlockCheck {
     return all;
   }
 
-  // Checks points relative to the frame: finite, and within the world.
+  // Checks that points, given relative to the frame, are finite and lie within the world.
   absl::Status check_points(absl::Span<const float> values, absl::string_view field) const {
     if (all_within_world(values)) return absl::OkStatus();
     for (size_t i = 0; i < values.size(); ++i) {
@@ -93,7 +94,7 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
-  // Checks lengths: finite, not negative, and at most the size of the world.
+  // Checks that lengths are finite, not negative, and at most limits::kMaxCoordinate.
   absl::Status check_sizes(absl::Span<const float> values, size_t width, absl::string_view field) const {
     for (size_t i = 0; i < values.size(); ++i) {
       if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, i / width, "needs finite numbers");
@@ -103,7 +104,7 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
-  // Checks limits of distances: not negative; infinity is allowed.
+  // Checks that limits of distances are not negative and not NaN. Infinity is allowed.
   absl::Status check_distance_limits(absl::Span<const float> values, absl::string_view field) const {
     bool all = true;
     for (const float value : values) all &= value >= 0;
@@ -119,7 +120,7 @@ class BlockCheck {
     return refuse_argument(reason, name(field), static_cast<uint32_t>(index), message);
   }
 
-  // Returns whether all directions are finite and not zero. Without branches, as above.
+  // Returns whether all directions are finite and not zero. Has no branches per value, like all_within_world().
   static bool all_directions_valid(absl::Span<const float> values) {
     constexpr float kMaxFloat = std::numeric_limits<float>::max();
     bool all = true;

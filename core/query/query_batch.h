@@ -2,8 +2,8 @@
 // request without copying, and for run/, which answers it. Plain data; any number of threads may read it.
 //
 // The caller keeps the columns alive while the batch is in use. A column has N entries, or one entry for all queries,
-// or none, which selects the default shown in brackets. N is the number of queries of the block: the length of the
-// first column of its kind.
+// or no entries. Brackets such as [+inf] show the default of a column without entries, or of a field that is 0. N is
+// the number of queries of the block, which is the length of the first column of its kind.
 #ifndef LOCUS_CORE_QUERY_QUERY_BATCH_H_
 #define LOCUS_CORE_QUERY_QUERY_BATCH_H_
 
@@ -101,14 +101,15 @@ struct QueryBlock {
   absl::Span<const uint64_t> ignore_groups;  // [0 = none]
   absl::Span<const uint64_t> ignore_ids;     // for the whole block
   uint32_t max_results = 0;                  // [limits::kDefaultMaxResults]
-  Id after_id = kNoId;                       // overlaps and groups: only ids above it
+  Id after_id = kNoId;                       // balls, boxes and groups: return only ids above this
   absl::Span<const uint64_t> as_of_ticks;    // [now]
   absl::Span<const float> as_of_fractions;   // [0], 0 <= f < 1; only with as_of_ticks
   OutsideHistory outside = OutsideHistory::kReject;
   std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns> kind;
 };
 
-// Returns the kind of the block. The numbers of BlockKind are the indices of the alternatives:
+// Returns the kind of the block. The values of BlockKind equal the indices of the variant's alternatives, as asserted
+// below.
 constexpr BlockKind block_kind(const QueryBlock& block) { return static_cast<BlockKind>(block.kind.index()); }
 template <BlockKind kKind>
 using ColumnsOf = std::variant_alternative_t<static_cast<size_t>(kKind), decltype(QueryBlock::kind)>;
@@ -121,7 +122,7 @@ static_assert(std::variant_size_v<decltype(QueryBlock::kind)> == kBlockKinds);
 
 struct QueryBatch {
   std::vector<QueryBlock> blocks;
-  uint64_t max_work = 0;         // primitive tests for the whole batch [no limit]
+  uint64_t max_work = 0;         // nodes, cells and primitive tests of the whole batch [no limit]
   uint32_t max_reply_bytes = 0;  // [limits::kDefaultReplyBytes]
 };
 

@@ -12,7 +12,7 @@ namespace {
 
 bool lower_id(const FoundObject& a, const FoundObject& b) { return a.id < b.id; }
 
-// Sorts by insertion: fast for few objects, or almost sorted ones.
+// Sorts by insertion, which is fast for few objects and for almost sorted ones.
 void insertion_sort(std::vector<FoundObject>& found) {
   for (size_t i = 1; i < found.size(); ++i) {
     if (!lower_id(found[i], found[i - 1])) continue;
@@ -23,10 +23,13 @@ void insertion_sort(std::vector<FoundObject>& found) {
   }
 }
 
+// Maximum number of objects that are sorted by insertion without buckets.
 constexpr size_t kFew = 12;
-// Maximum number of objects for the bucket sort: if their ids are evenly distributed, each bucket gets a few of them.
+// Maximum number of objects for the bucket sort: with evenly distributed ids, each of the 256 buckets gets about four
+// of them.
 constexpr size_t kMaxBucketed = 1024;
 constexpr int kBucketBits = 8;
+// Maximum number of objects in one bucket. With more, the ids are unevenly distributed and std::sort() is used.
 constexpr uint32_t kMaxPerBucket = 16;
 
 }  // namespace
@@ -56,8 +59,8 @@ void FoundObjects::keep_lowest() {
   check_invariants();
 }
 
-// Sorts through buckets where possible: comparing ids in random order mispredicts every other branch, and filling
-// buckets needs no comparison and leaves the objects almost sorted.
+// Sorts by id, through buckets if possible: filling buckets needs no comparisons, whose branches are mispredicted half
+// of the time for ids in random order, and leaves the objects almost sorted for insertion_sort().
 void FoundObjects::sort() {
   if (found_.size() <= kFew || (found_.size() <= kMaxBucketed && sort_by_bucket())) return insertion_sort(found_);
   std::sort(found_.begin(), found_.end(), lower_id);

@@ -1,5 +1,6 @@
-// Objects that one ball or box query found: the lowest by id, at most a given number, in order. A QueryTask reuses one
-// for all queries of a chunk, so that its memory is allocated once. Threads: one thread.
+// Collector of the objects that one ball or box query finds: retains those with the lowest ids, up to a given number,
+// and returns them ascending by id. A QueryTask reuses one collector for all queries of a chunk, so that memory is
+// allocated once. A collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 #define LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 
@@ -17,10 +18,11 @@ struct FoundObject {
   GridRef object;
 };
 
-// Invariant: at most 2 * max_count_ objects are collected between calls. Memory: three times max_count_ at most.
+// Invariant: between calls, found_ has at most 2 * max_count_ objects. Memory: found_ and bucketed_ together have at
+// most about 3 * max_count_ objects.
 class FoundObjects {
  public:
-  // Clears the collection for the next query, which keeps at most `max_count` objects.
+  // Clears the collector for the next query, which retains at most `max_count` objects.
   void restart(size_t max_count);
 
   // Adds an object. Precondition: no object with its id was added since restart().
@@ -30,17 +32,18 @@ class FoundObjects {
     if (found_.size() > 2 * max_count_) keep_lowest();
     check_invariants();
   }
-  // Returns the kept objects, ascending by id. Valid until the next call of restart() or offer().
+  // Returns the retained objects, ascending by id. The span is valid until the next call of restart() or offer().
   absl::Span<const FoundObject> finish();
-  // Returns whether more objects were added than are kept. Valid after finish().
+  // Returns whether more than `max_count` objects were added, so that some were dropped. Call it after finish().
   bool truncated() const { return truncated_; }
 
  private:
   void check_invariants() const { LOCUS_DCHECK_LE(found_.size(), 2 * max_count_); }
-  // Drops all but the max_count_ lowest.
+  // Drops all objects except the max_count_ objects with the lowest ids.
   void keep_lowest();
   void sort();
-  // Orders the objects by buckets of ids. Returns false, without any change, if the ids are too unevenly distributed.
+  // Orders found_ by buckets of ids, but not within a bucket. Returns false and leaves found_ unchanged if the ids are
+  // too unevenly distributed.
   bool sort_by_bucket();
 
   size_t max_count_ = 0;

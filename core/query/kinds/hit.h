@@ -1,5 +1,5 @@
-// Single result of a query: one object, one instance, or one triangle of an instance. Plain data that borrows from the
-// snapshot, and for objects from a SceneAtTime; any thread.
+// Result row of a query: one object, one instance, or one triangle of an instance. Plain data that any thread may use.
+// Borrows the object or instance from the snapshot, and the SceneAtTime at which an object was found.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_H_
 
@@ -15,22 +15,22 @@ namespace locus {
 
 // One row of a result; a default-constructed hit is a miss.
 struct Hit {
-  float t = std::numeric_limits<float>::infinity();  // multiple of the ray's direction, or distance of a nearest query
+  float t = std::numeric_limits<float>::infinity();  // ray: in multiples of its direction; nearest: distance
   Id id = kNoId;                                     // 0 = a miss
-  uint32_t triangle = kNoTriangle;                   // index in the uploaded index list
-  GridRef object;                                    // object or instance is set; neither for a miss
+  uint32_t triangle = kNoTriangle;                   // index of the triangle in the uploaded mesh
+  GridRef object;                                    // a hit has an object or an instance, a miss neither
   const Instance* instance = nullptr;
-  const SceneAtTime* moment = nullptr;  // objects: time at which the object was found; null: as in the snapshot
+  const SceneAtTime* moment = nullptr;  // time at which the object was found; null: the snapshot's latest state
 
-  // Returns the shape of the object at the time of the hit. Precondition: the hit is on an object.
+  // Returns the object's shape at the time at which it was found. Precondition: the hit is on an object.
   Shape object_shape() const {
     LOCUS_DCHECK(static_cast<bool>(object));
     return moment == nullptr ? shape_of(object) : moment->shape(object);
   }
 };
 
-// Returns a hit on an object as it is in the snapshot. The second overload returns a hit on an object as it was at
-// `moment`, which the hit borrows; the third a hit on an instance.
+// Return a hit at `t`: on an object in the snapshot's latest state, on an object at the time `moment`, which the hit
+// borrows, or on an instance.
 inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object}; }
 inline Hit hit_on(const GridRef& object, float t, const SceneAtTime& moment) {
   return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};

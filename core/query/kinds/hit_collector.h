@@ -1,5 +1,5 @@
-// Best hits of one ray so far, and the largest t that the next hit may have. For ray queries, whose searches shorten
-// the ray by limit(). Threads: a collector belongs to one thread.
+// Collector of the best hits of one ray. Its limit(), the largest t at which a hit may still be retained, decreases as
+// hits are found, so that ray searches skip everything beyond it. A collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 
@@ -17,20 +17,23 @@
 
 namespace locus {
 
-// Bounded set of the lowest hits in the order of nearer(). Invariants: it holds at most capacity_ hits; once it holds
-// capacity_, the hits are a heap with the highest in front, limit_ is the t of that hit, and limit_ never increases.
+// Bounded set of the first hits in the order of nearer(). Invariants: it has at most capacity_ hits. Once it is full,
+// the hits form a heap whose front is the last hit in that order, and limit_ is the t of the front. limit_ never
+// increases.
 class HitCollector {
  public:
   explicit HitCollector(const RayRequest& request)
       : mode_(request.mode),
-        // Keeps one more hit than requested, to detect truncation independently of the order of visiting.
+        // Retains one more hit than requested: the answer is truncated if this additional hit exists. The order in
+        // which hits are found therefore does not matter.
         capacity_(request.mode == RayMode::kAll ? size_t{request.max_results} + 1 : 1),
         limit_(request.t_max) {}
 
-  // Returns the largest t that may still matter. A hit at exactly this t matters if its id or triangle is lower.
+  // Returns the largest t at which a hit may still be retained. Once the collector is full, a hit at exactly this t
+  // replaces the last one only if its id or triangle is lower.
   float limit() const { return limit_; }
 
-  // Offers a hit. Returns false if no further hit matters.
+  // Adds `hit` if it is among the best so far. Returns false if the search can stop, because a kAny ray has its hit.
   bool offer(const Hit& hit) {
     LOCUS_DCHECK_NE(hit.id, kNoId);
     LOCUS_DCHECK(!(hit.t < 0));
@@ -42,7 +45,7 @@ class HitCollector {
     }
     answer_.hits.push_back(hit);
     if (answer_.hits.size() == capacity_) {
-      // The highest hit is in front: the next hit may replace it.
+      // The front of the heap is the last hit in the order of nearer(), which a better hit replaces.
       if (is_heap_)
         std::push_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
       else
@@ -55,10 +58,10 @@ class HitCollector {
     return mode_ != RayMode::kAny;
   }
 
-  // Returns whether no further hit matters.
+  // Returns true if the search can stop, because a kAny ray has its hit.
   bool done() const { return mode_ == RayMode::kAny && !answer_.hits.empty(); }
 
-  // Returns the hits in order, at most the requested number. Leaves the collector empty; call it once.
+  // Returns the hits in the order of nearer(), at most the requested number. Empties the collector; call it once.
   RayAnswer finish() {
     check_invariants();
     std::sort(answer_.hits.begin(), answer_.hits.end(), nearer);
@@ -75,7 +78,8 @@ class HitCollector {
       LOCUS_DCHECK_EQ(is_heap_, hits.size() == capacity_);
       if (!is_heap_) return;
       LOCUS_DCHECK_EQ(limit_, hits.front().t);
-      // The children of the top and the last hit; a check of the whole heap would cost more than the change.
+      // Checks only the children of the front and the last element: checking the whole heap would cost more than
+      // offer() itself.
       for (const size_t child : {size_t{1}, size_t{2}, hits.size() - 1})
         if (child < hits.size()) LOCUS_DCHECK(!nearer(hits.front(), hits[child]));
     }
@@ -84,11 +88,12 @@ class HitCollector {
   const RayMode mode_;
   const size_t capacity_;
   float limit_;
-  bool is_heap_ = false;  // answer_.hits has reached capacity_
+  bool is_heap_ = false;  // true once answer_.hits has capacity_ elements
   RayAnswer answer_;
 };
 
-// Returns `t` rounded once to a finite float. Adding 0 turns -0 into 0, so that equal results have equal bytes.
+// Returns `t` rounded to float, but at most the largest finite float. Adding 0 turns -0 into 0, so that equal results
+// have equal bytes.
 inline float rounded_distance(double t) {
   constexpr double kMaxFloat = std::numeric_limits<float>::max();
   return static_cast<float>(std::min(t, kMaxFloat)) + 0.0f;
@@ -101,7 +106,7 @@ inline std::optional<float> entry(const SlabRay<double>& slabs, const Aabbd& bou
   return rounded_distance(std::max(interval.near, 0.0));
 }
 
-// Returns a limit for double distances that excludes none which rounds to at most `limit` as a float.
+// Returns a limit for distances in double: every distance that rounds to a float of at most `limit` is below it.
 inline double raised(float limit) { return double{next_above(limit)}; }
 
 }  // namespace locus

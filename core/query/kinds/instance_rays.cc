@@ -9,11 +9,11 @@
 namespace locus {
 namespace {
 
-// Exact test of one ray against triangles of one instance.
+// Exact test of one ray against single triangles of one instance.
 class ExactTest {
  public:
-  // `slabs` is the slab test of the same ray in world axes. `nearest` is the t at which the ray enters the instance's
-  // bounds; no hit has a lower t.
+  // `slabs` is the same ray in world axes, prepared for tests against boxes. `nearest` is the t at which the ray enters
+  // the instance's bounds; hit() returns no lower t.
   ExactTest(const TriangleRay& ray, const SlabRay<double>& slabs, const Instance& instance, float nearest)
       : ray_(ray), slabs_(slabs), placed_(instance), nearest_(nearest) {}
 
@@ -39,7 +39,7 @@ bool offer(const Instance& instance, const Triangle& triangle, float t, HitColle
   return collector.offer(hit);
 }
 
-// Visitor of the triangles of one instance: EXACT.
+// Visitor of the triangles of one instance for EXACT rays: tests the triangles themselves.
 class TriangleVisitor {
  public:
   TriangleVisitor(QueryTask& task, const ExactTest& exact, const Instance& instance, HitCollector& collector)
@@ -59,9 +59,9 @@ class TriangleVisitor {
   HitCollector& collector_;
 };
 
-// Visitor of the triangles of one instance by their placed bounds: CONSERVATIVE. It also reports hits of the exact test
-// that lie beside or before these bounds because of rounding, so that every exact hit is found at the same t or
-// earlier.
+// Visitor of the triangles of one instance for CONSERVATIVE rays: tests the bounds of each triangle in world axes.
+// Because of rounding, the exact test may hit a triangle whose bounds the ray misses or enters later. Such a hit is
+// reported at its exact t, so that a CONSERVATIVE ray finds every exact hit at the same t or a lower one.
 class PlacedBoundsVisitor {
  public:
   PlacedBoundsVisitor(QueryTask& task, const RayRequest& request, const ExactTest& exact, const Instance& instance,

@@ -1,5 +1,5 @@
-// One ray against the triangles of one instance, one triangle at a time. For rays that the vector kernels leave
-// undecided, and for queries that they do not support. Any thread, with a QueryTask and a collector of its own.
+// Intersection of one ray with the triangles of one instance, one triangle at a time. Used for rays that the vector
+// kernels leave undecided or do not support. Any thread may call it with a QueryTask and a collector of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_INSTANCE_RAYS_H_
 #define LOCUS_CORE_QUERY_KINDS_INSTANCE_RAYS_H_
 
@@ -9,9 +9,9 @@
 
 namespace locus {
 
-// Offers the ray's hits of `instance` to `collector`. `slabs` is the slab test of the ray in world axes. `nearest` is
-// the t at which the ray enters the instance's bounds; no hit has a lower t. Cost: the nodes that the ray meets within
-// the collector's limit, and the triangles below them.
+// Offers the ray's hits on triangles of `instance` to `collector`. `slabs` is the ray in world axes, prepared for tests
+// against boxes. `nearest` is the t at which the ray enters the instance's bounds; no hit has a lower t. Cost: a test
+// of each tree node that the ray meets within the collector's limit, and of the triangles in the leaves among them.
 void trace_instance(QueryTask& task, const RayRequest& request, const SlabRay<double>& slabs, const Instance& instance,
                     float nearest, HitCollector& collector);
 

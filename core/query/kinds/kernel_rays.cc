@@ -11,18 +11,19 @@
 namespace locus {
 namespace {
 
-// Maximum number of kAll rows per ray and mesh in the output of the kernels, which bounds memory. A ray that may have
-// more is traced triangle by triangle instead.
+// Maximum number of hits that the kernels return for one kAll ray in one mesh, which bounds the size of rows_. A ray
+// that may have more hits is traced triangle by triangle instead.
 constexpr uint32_t kMaxRows = 128;
 
-// Ray that waits for the kernels at an instance.
+// Ray that has reached an instance and waits for the kernels to trace it there.
 struct Stop {
-  uint32_t ray;   // index in the rays
+  uint32_t ray;   // index in Rounds::rays_
   float nearest;  // t at which the ray enters the bounds of the instance
   const Instance* instance;
 };
 
-// Traversal of all rays of one call. Invariant: between rounds each ray has at most one stop.
+// Traversal of all rays of one trace_meshes() call. Each round traces all rays that wait at a stop, then advances each
+// of them to its next stop. Invariant: between rounds each ray has at most one stop.
 class Rounds {
   using InstanceWalk = Bvh<Instance>::RayWalk;
 
@@ -40,7 +41,7 @@ class Rounds {
       for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
-    max_rows_ = std::min(kMaxRows, rays.front().request.max_results + 1);  // one more detects truncation
+    max_rows_ = std::min(kMaxRows, rays.front().request.max_results + 1);  // one hit more reveals truncation
     rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * max_rows_);
   }
 
@@ -65,7 +66,8 @@ class Rounds {
  private:
   RayMode mode() const { return rays_.front().request.mode; }
 
-  // Advances a ray to the next instance that its filter accepts within its limit, if there is one.
+  // Advances ray `index` to the next instance that its filter accepts and whose bounds it enters within its collector's
+  // limit. Adds a stop there, or no stop if there is no such instance.
   void walk_on(uint32_t index) {
     PendingRay& ray = rays_[index];
     InstanceWalk& walk = walks_[index];
@@ -74,14 +76,15 @@ class Rounds {
       if (instance == nullptr) return;
       if (!task_.count_test()) return;
       if (!ray.filter.accepts(*instance)) continue;
-      // This test is part of the verdict and bounds t from below, since the tree over instances may cull by it.
+      // A ray hits an instance only if it enters the instance's bounds, and no hit has a lower t than this entry: the
+      // tree over instances may cull by these bounds, so the result must include their test.
       const std::optional<float> nearest = entry(slabs_[index], instance->bounds);
       if (!nearest || *nearest > ray.collector.limit()) continue;
       return stops_.push_back({index, *nearest, instance});
     }
   }
 
-  // Advances a ray to the only instance of the scene if the ray meets its bounds.
+  // Adds a stop of ray `index` at the only instance of the scene if the ray meets its bounds and its filter accepts it.
   void walk_to_only(uint32_t index) {
     PendingRay& ray = rays_[index];
     if (task_.ended()) return;
@@ -100,8 +103,8 @@ class Rounds {
                      [&](const Stop& a, const Stop& b) { return std::less<const TriangleBvh*>()(tree(a), tree(b)); });
   }
 
-  // Traces the rays of all stops at the tree of stop `first`, which meshes of equal bytes share. Returns the first stop
-  // at another tree.
+  // Traces the rays of all stops whose instance has the same tree as that of stop `first`; meshes with equal contents
+  // share one tree. Returns the index of the first stop with another tree.
   size_t trace_tree(size_t first) {
     const TriangleBvh& tree = current_[first].instance->mesh->tree();
     kernel_rays_.clear();
@@ -168,13 +171,14 @@ class Rounds {
     }
   }
 
-  // Traces one ray triangle by triangle.
+  // Traces the ray of `stop` at its instance triangle by triangle, without the kernels.
   void trace_triangles(const Stop& stop) {
     PendingRay& ray = rays_[stop.ray];
     trace_instance(task_, ray.request, slabs_[stop.ray], *stop.instance, stop.nearest, ray.collector);
   }
 
-  // Returns the ray in mesh axes, or nothing if its values exceed the range that the kernels support.
+  // Returns the ray in mesh axes, or nothing if its direction or coordinates lie outside the range that the kernels
+  // support.
   std::optional<KernelRay> kernel_ray(const Stop& stop) const {
     const PendingRay& ray = rays_[stop.ray];
     const Transform& transform = stop.instance->transform;
@@ -198,7 +202,7 @@ class Rounds {
   std::vector<KernelRay> kernel_rays_;
   std::vector<size_t> kernel_stops_;  // stop of each of kernel_rays_, as an index in current_
   std::vector<KernelHit> hits_;
-  uint32_t max_rows_ = 0;  // kAll: capacity of rows_ for each of kernel_rays_
+  uint32_t max_rows_ = 0;  // kAll: number of entries in rows_ for each of kernel_rays_
   std::unique_ptr<KernelRow[]> rows_;
 };
 

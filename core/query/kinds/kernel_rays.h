@@ -1,8 +1,9 @@
-// Rays of one chunk of a batch against the scene's meshes, by the vector kernels, which need many rays per call. Each
-// ray walks the tree over instances from near to far. In each round every ray advances to its next instance, the
-// kernels trace the waiting rays mesh by mesh, and their hits shorten the rays. Supports EXACT rays of all modes.
+// Intersection of many rays with the scene's static instances by the vector kernels, which are efficient only with many
+// rays per call. Each ray visits the instances from near to far. All rays advance in rounds: each ray moves to its next
+// instance, then the kernels trace all rays that wait at instances of the same mesh in one call. A hit limits how far
+// its ray has to continue. Supports EXACT rays of all modes.
 //
-// Threads: one thread per call.
+// Threads: each call belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
 #define LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
 
@@ -14,7 +15,7 @@
 
 namespace locus {
 
-// Ray in progress: its request, filter and hits so far.
+// Ray in progress: its request, its filter, and the hits found so far.
 struct PendingRay {
   PendingRay(const RayRequest& ray, const Filter& ray_filter) : request(ray), filter(ray_filter), collector(ray) {}
 
@@ -23,8 +24,8 @@ struct PendingRay {
   HitCollector collector;
 };
 
-// Offers the hits of each ray on the meshes to its collector. All rays have the same mode. Precondition: the task has
-// ray kernels.
+// Finds the hits of each ray on static instances and offers them to the ray's collector. Preconditions: all rays have
+// the same mode, and task.ray_kernels() is not null.
 void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays);
 
 }  // namespace locus

@@ -1,5 +1,5 @@
-// Lookup of objects and instances by id or group. Hidden ones (layers 0) are found too. Free functions; any thread,
-// with a QueryTask of its own.
+// Lookup of objects and instances by id or group. Also finds hidden objects and instances (layers 0). Free functions;
+// any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_LOOKUP_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_LOOKUP_QUERY_H_
 
@@ -8,12 +8,13 @@
 
 namespace locus {
 
-// Returns the object at `moment` or the instance of `snapshot` with this id, with t = 0, or a miss. The hit borrows
-// both.
+// Returns a hit with t = 0 on the object of `moment` that has this id, or else on the instance of `snapshot` that has
+// it; a miss if neither exists. The hit borrows from `moment` and `snapshot`.
 Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id);
 
-// Returns the objects at `moment` and the instances of each group, ascending by id. Duplicates in `groups` are answered
-// once. Cost: O(all objects and instances), independent of the number of groups.
+// Returns for each group its objects at `moment` and its instances: those with ids above options.after_id, ascending by
+// id, at most options.max_results rows. A group that occurs several times in `groups` has one entry in the result.
+// Cost: O(all objects and instances), independent of the number of groups.
 absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const SceneAtTime& moment,
                                                          absl::Span<const uint64_t> groups,
                                                          const OverlapOptions& options);

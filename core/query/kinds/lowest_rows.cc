@@ -65,8 +65,8 @@ void LowestRows::keep_lowest() {
   if (rows_ <= max_results_ && in_order()) return;
   const OverlapAnswer all = std::exchange(answer_, {{}, {}, {}, answer_.truncated || rows_ > max_results_});
   std::vector<RowRun> runs = all.runs;
-  // An instance may have two runs: one merged by an earlier call, and one with later triangles. The stable sort keeps
-  // their order.
+  // An instance may have two runs: one that an earlier call merged, and one with the triangles added since. The stable
+  // sort preserves their order.
   std::stable_sort(runs.begin(), runs.end(), lower_id);
   rows_ = 0;
   for (size_t i = 0; i < runs.size() && rows_ < max_results_;) {

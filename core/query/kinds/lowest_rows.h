@@ -1,6 +1,6 @@
-// Rows of one ball or box, or of one group, ascending by id and then by triangle, at most a given number. The rows of
-// one instance's triangles differ only by the triangle, so they are stored as one run with a list of triangles. One
-// thread.
+// Collector of the rows of one ball query, box query or group lookup: retains the rows with the lowest ids, up to a
+// given number. The rows of an instance's triangles differ only in the triangle, so they are stored as one run with a
+// list of triangles. A collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_LOWEST_ROWS_H_
 #define LOCUS_CORE_QUERY_KINDS_LOWEST_ROWS_H_
 
@@ -12,31 +12,32 @@
 
 namespace locus {
 
-// One row, or one row per triangle of a list for an instance.
+// Single row, or consecutive rows of one instance that differ only in the triangle.
 struct RowRun {
   Hit row;                    // t is 0; triangle is not set
-  size_t first_triangle = 0;  // index in OverlapAnswer::triangles
-  size_t triangle_count = 0;  // 0: one row without triangle
+  size_t first_triangle = 0;  // index of the first one in OverlapAnswer::triangles
+  size_t triangle_count = 0;  // 0: a single row without a triangle
 
   size_t rows() const { return triangle_count == 0 ? 1 : triangle_count; }
 };
 
-// Result of one overlap query or group.
+// Result of one ball query, box query or group lookup.
 struct OverlapAnswer {
   std::vector<RowRun> runs;
   std::vector<uint32_t> triangles;
-  // Objects ascending by id, in place of runs, if only objects were found. They belong to the QueryTask and are valid
-  // until its next query.
+  // If only objects were found: these objects, ascending by id, while `runs` is empty. The memory belongs to the
+  // QueryTask and is valid until its next query.
   absl::Span<const FoundObject> objects;
-  bool truncated = false;  // there were more rows, of higher ids
+  bool truncated = false;  // more rows were found than are returned
 
   absl::Span<const uint32_t> triangles_of(const RowRun& run) const {
     return absl::MakeConstSpan(triangles).subspan(run.first_triangle, run.triangle_count);
   }
 };
 
-// Bounded collection of the lowest rows. Invariants: rows_ is the number of rows of all runs; after keep_lowest() it is
-// at most max_results_ and runs ascend by id. Memory: twice max_results_ rows plus the rows of one offer().
+// Bounded collection of the rows with the lowest ids. Within an instance, the triangles are in storage order, or
+// ascending with `sorted_triangles`. Invariants: rows_ is the number of rows of all runs; after keep_lowest() it is at
+// most max_results_ and the runs ascend by id. Memory: twice max_results_ rows plus the rows of one offer().
 class LowestRows {
  public:
   explicit LowestRows(uint32_t max_results, bool sorted_triangles)
@@ -44,15 +45,16 @@ class LowestRows {
 
   // Adds a row without a triangle.
   void offer(const Hit& row);
-  // Adds one row per triangle of an instance. Several calls for one instance add its triangles in storage order.
+  // Adds one row for each of `triangles` of the instance of `row`. Several calls for one instance must pass its
+  // triangles in storage order.
   void offer(const Hit& row, absl::Span<const uint32_t> triangles);
-  // Returns the lowest rows in order. Call it once.
+  // Returns the retained rows in order and empties the collector. Call it once.
   OverlapAnswer finish();
 
  private:
-  // Checks what offer() changes: the last run.
+  // Checks the invariants of the counts and of the last run, the only one that offer() changes.
   void check_invariants() const;
-  // Checks all runs, in order.
+  // Checks the invariants of all runs after keep_lowest().
   void check_runs() const;
   bool in_order() const;
   // Sorts the runs, merges those of one instance, and drops rows beyond max_results_.

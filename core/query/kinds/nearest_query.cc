@@ -13,11 +13,11 @@
 namespace locus {
 namespace {
 
-// Returns a limit for squared distances; all beyond it round to more than `farthest` as a float.
+// Returns a limit for squared distances in double: the root of any larger value rounds to a float above `farthest`.
 double squared_limit_of(float farthest) { return squared_limit(raised(farthest)); }
 
-// Nearest rows so far, and the largest distance that the next one may have. Invariant: rows_ holds at most count_ rows,
-// sorted if in_order_, otherwise a heap with the last row in front once it is full.
+// Collector of the nearest rows. Invariant: rows_ has at most count_ rows, which are sorted if in_order_, and otherwise
+// form a heap whose front is the last row in the order of nearer().
 class NearestRows {
  public:
   explicit NearestRows(const NearestRequest& request)
@@ -29,9 +29,10 @@ class NearestRows {
     rows_.reserve(std::min<size_t>(count_, kMaxInOrder));
   }
 
-  // Returns the largest distance that may still matter. A row at exactly this distance matters if its id is lower.
+  // Returns the largest distance at which a row may still be retained. Once there are count_ rows, a row at exactly
+  // this distance replaces the last one only if its id or triangle is lower.
   float farthest() const { return farthest_; }
-  // Returns the limit of squared distances to boxes in world axes.
+  // Returns the limit of squared distances in world axes. A box beyond it has no row that would be retained.
   double limit() const { return limit_; }
 
   void offer(const Hit& row) {
@@ -58,7 +59,8 @@ class NearestRows {
   }
 
  private:
-  // Up to this many rows are kept sorted, since objects are offered nearly in order; more are kept as a heap.
+  // Maximum count_ for which rows_ is sorted at each insertion, which is cheap since rows are offered nearly in order.
+  // A larger count_ uses a heap.
   static constexpr size_t kMaxInOrder = 32;
 
   void check_invariants() const {
@@ -113,7 +115,7 @@ class ObjectsNear {
   NearestRows& rows_;
 };
 
-// Rows of one instance: one per triangle, or one for the nearest triangle.
+// Collector of the rows of one instance: one row per triangle, or one row for its nearest triangle.
 class InstanceRows {
  public:
   InstanceRows(const NearestRequest& request, const Instance& instance, NearestRows& rows)
@@ -124,12 +126,13 @@ class InstanceRows {
         farthest_(rows.farthest()),
         limit_(rows.limit()) {}
 
-  // Return the limits as NearestRows does, for this instance.
+  // Return limits like those of NearestRows. They are lower if the instance gets only one row and a nearer triangle of
+  // it was already found.
   float farthest() const { return farthest_; }
   double limit() const { return limit_; }
 
-  // Offers a triangle at the squared distance `squared`. The reported distance is never less than that to the
-  // instance's bounds, since the tree over instances may cull by them.
+  // Offers a triangle at the squared distance `squared`. The reported distance is at least the distance to the
+  // instance's bounds, because the tree over instances may cull by that distance.
   void offer(const Triangle& triangle, double squared) {
     Hit row = hit_on(instance_, rounded_distance(std::sqrt(std::max(squared, squared_bounds_distance_))));
     row.triangle = triangle.number;
@@ -162,7 +165,7 @@ class InstanceRows {
   Hit nearest_;
 };
 
-// Visitor of the triangles of one instance, which measures to their placed corners.
+// Visitor of the triangles of one instance for EXACT queries: computes the distance to each triangle in world axes.
 class TrianglesNear {
  public:
   TrianglesNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
@@ -192,8 +195,8 @@ class TrianglesNear {
 
  private:
   // Returns an upper bound of the difference between a distance in world axes and the scaled distance in mesh axes. It
-  // covers the rounding of the transformations, relative to the magnitudes involved, and of the distance to a triangle,
-  // which is 2^-30 of its size in the worst case, a sliver.
+  // covers the rounding errors of the transformations, which are relative to the magnitudes of their operands, and
+  // those of the distance to a triangle, which are at most 2^-30 of the triangle's size (the worst case is a sliver).
   static double epsilon(const NearestRequest& request, const Instance& instance) {
     const Transform& transform = instance.transform;
     return 0x1p-26 * (max_component(abs(request.point)) + max_component(abs(transform.translation)) +
@@ -206,11 +209,12 @@ class TrianglesNear {
   const PlacedTriangles placed_;
   InstanceRows& rows_;
   const double epsilon_;
-  mutable float farthest_ = -1;  // distance from which limit_ was computed
+  mutable float farthest_ = -1;  // value of rows_.farthest() from which limit_ was computed
   mutable double limit_ = 0;
 };
 
-// Visitor of the triangles of one instance, which measures to their placed bounds: CONSERVATIVE.
+// Visitor of the triangles of one instance for CONSERVATIVE queries: computes the distance to the bounds of each
+// triangle in world axes.
 class PlacedBoundsNear {
  public:
   PlacedBoundsNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
@@ -294,7 +298,7 @@ std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const N
 Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
   const Vec3d point = request.point;
   const bool conservative = request.precision == Precision::kConservative;
-  // Computes relative to the point, which avoids cancellation far from the world's origin.
+  // Computes with coordinates relative to `point`, which avoids cancellation far from the world's origin.
   if (row.object) {
     Shape shape = row.object_shape();
     if (conservative) return nearest_in(point, bounds_of(shape)) - point;

@@ -1,9 +1,10 @@
-// Nearest objects and instances, or triangles of instances, to one point in a snapshot, ascending by (distance, id,
-// triangle). Free functions; any thread, with a QueryTask of its own.
+// Search for the objects and instances, or triangles of instances, that are nearest to one point, ascending by
+// (distance, id, triangle). Free functions; any thread may call them with a QueryTask of its own.
 //
-// A distance is measured in double and world axes, from the point to the stored solid or to the placed corners of the
-// triangle. It is never less than the distance to the bounds by which index structures cull, and is rounded to float
-// once. Order and max_distance compare rounded distances, so that no index structure can change a result.
+// An EXACT distance is computed in double and in world axes, from the point to the stored solid or to the triangle. It
+// is never less than the distance to the bounds by which index structures cull, and is rounded to float once. The order
+// of rows and the comparison with max_distance use the rounded distance. A search through index structures and a test
+// of all values therefore return the same rows.
 #ifndef LOCUS_CORE_QUERY_KINDS_NEAREST_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_NEAREST_QUERY_H_
 
@@ -16,9 +17,9 @@ namespace locus {
 
 struct NearestRequest {
   Vec3d point;
-  float max_distance;   // included
+  float max_distance;   // inclusive
   uint32_t count;       // maximum number of rows, at least 1
-  bool every_triangle;  // one row per triangle instead of one per instance, for its nearest triangle
+  bool every_triangle;  // true: one row per triangle; false: one row per instance, for its nearest triangle
   Source source;
   Precision precision;
 };
@@ -26,14 +27,15 @@ struct NearestRequest {
 // Returns the request of query `i` of a block.
 NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& nearest, size_t i);
 
-// Returns the nearest rows in order: t is the distance, and triangle the nearest one of an instance. Objects are
-// searched at `moment`, which the rows borrow. Cost: the nodes and cells within the distance of the last row, and O(log
-// count) for each row kept.
+// Returns the nearest rows in order. Hit::t is the distance, and Hit::triangle the nearest triangle of an instance
+// (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow. Cost: the
+// nodes and cells that are no farther than the last row, and O(log count) for each row inserted.
 std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
                              const Filter& filter);
 
-// Returns the vector from the request's point to the nearest point of the row's object or triangle, or of its bounds
-// with kConservative. Zero inside a solid. Recomputed from the stored primitive.
+// Returns the vector from request.point to the nearest point of the row's object or triangle, or, with kConservative,
+// of its bounds. The vector is zero if request.point lies inside. Recomputes it from the stored object or triangle,
+// since a Hit does not store it.
 Vec3d nearest_offset(const NearestRequest& request, const Hit& row);
 
 }  // namespace locus

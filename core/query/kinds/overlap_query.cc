@@ -11,12 +11,13 @@
 namespace locus {
 namespace {
 
-// Verdict on an object from its stored position alone: it overlaps, it does not, or its exact shape has to decide.
+// Result of a test that uses only an object's stored position and bounds. kUndecided: the exact shape must be tested.
 enum class Verdict { kOverlaps, kDisjoint, kUndecided };
 
-// Bounds of an object: it extends at most `extent` from its position and contains the ball of radius `inner_radius`
-// around it. The true position is at most `displacement_bound` away from `position`, which includes an epsilon for the
-// rounding of the exact predicates and of the comparisons with these bounds.
+// Bounds of an object's solid. The solid extends at most `extent` from the object's true position and contains the ball
+// of radius `inner_radius` around the true position. The true position is at most `displacement_bound` away from
+// `position`. The displacement bound includes an epsilon for rounding in the exact tests and in the comparisons with
+// these bounds.
 struct ObjectBounds {
   Vec3d position;
   double inner_radius;
@@ -59,7 +60,7 @@ struct BallShape {
   static bool overlaps_triangle(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
 };
 
-// Operations on a box, likewise.
+// Operations on a box, with the same members as BallShape.
 struct BoxShape {
   using World = Obbd;
   using Mesh = Obbf;
@@ -76,7 +77,7 @@ struct BoxShape {
   static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
   static Verdict verdict(const Obbd& box, const ObjectBounds& object) {
-    // Largest distance outside one of the box's sides; negative inside.
+    // Largest signed distance of the object's position from a side plane of the box; negative inside the box.
     const double outside = max_component(abs(box.rotation.to_local(object.position - box.center)) - box.half);
     if (outside > object.extent + object.displacement_bound) return Verdict::kDisjoint;
     return outside < -object.displacement_bound ? Verdict::kOverlaps : Verdict::kUndecided;
@@ -84,11 +85,12 @@ struct BoxShape {
   static bool overlaps_triangle(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
 };
 
-// Returns the region of the grid that the search for objects visits.
+// Returns the region of the grid in which to search for objects.
 template <class Kind>
 GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
   const typename Kind::WorldRegion region(shape);
-  // An EXACT ball must meet the objects themselves; all other queries meet their bounds.
+  // Only an EXACT ball allows a search of the ball alone. A CONSERVATIVE query also finds objects of which it meets
+  // only the bounds, and a box is searched by its bounds.
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 
@@ -114,7 +116,7 @@ class ObjectRows {
  private:
   bool overlaps(const GridRef& object) const {
     const bool exact = options_.precision == Precision::kExact;
-    if (exact) {  // decides most objects without their shape and without a lookup in the next tick
+    if (exact) {  // decides most objects without computing their shape at this time
       const Verdict verdict = Kind::verdict(shape_, object_bounds(object, moment_.displacement_bound(object)));
       if (verdict != Verdict::kUndecided) return verdict == Verdict::kOverlaps;
     }
@@ -130,13 +132,15 @@ class ObjectRows {
   FoundObjects& found_;
 };
 
-// Rows of one instance: one row, or one row per triangle found. Triangles are offered in storage order.
+// Adapter that adds the rows of one instance to a LowestRows: one row, or one row per triangle found. Triangles must be
+// offered in storage order.
 class InstanceRows {
  public:
   InstanceRows(const Instance& instance, const OverlapOptions& options, LowestRows& rows)
       : instance_(instance), detail_(options.detail), max_results_(options.max_results), rows_(rows) {}
 
-  // Offers triangles. Returns false if the instance needs no more of them: later ones would not be kept.
+  // Offers triangles that overlap the query. Returns false if the search of this instance can stop, because later
+  // triangles would add no rows.
   bool offer(absl::Span<const uint32_t> triangles) {
     if (detail_ == StaticDetail::kInstances) {
       if (!triangles.empty()) rows_.offer(hit_on(instance_, 0));
@@ -157,7 +161,7 @@ class InstanceRows {
   size_t found_ = 0;
 };
 
-// Exact test of one ball or box against triangles of one instance.
+// Exact test of one ball or box against single triangles of one instance.
 template <class Kind>
 class ExactTest {
  public:
@@ -179,7 +183,7 @@ class ExactTest {
   const LoosePlacedTriangles placed_;
 };
 
-// Visitor of the triangles of one instance: EXACT, without kernels.
+// Visitor of the triangles of one instance for EXACT queries that do not use the kernels.
 template <class Kind>
 class ExactTriangles {
  public:
@@ -200,8 +204,9 @@ class ExactTriangles {
   InstanceRows rows_;
 };
 
-// Visitor of the triangles of one instance by their placed bounds: CONSERVATIVE. It also reports triangles that the
-// exact test finds although their placed bounds miss the shape, because the exact test rounds to the mesh's floats.
+// Visitor of the triangles of one instance for CONSERVATIVE queries: tests the bounds of each triangle in world axes.
+// Because the exact test rounds to floats in mesh axes, it may find a triangle whose bounds the shape misses. Such a
+// triangle is reported as well, so that a CONSERVATIVE result contains every EXACT row.
 template <class Kind>
 class PlacedBounds {
  public:
@@ -250,7 +255,8 @@ class InstanceSearch {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
-    // This test is part of the verdict, since the tree over instances may cull by it.
+    // A shape overlaps an instance only if it overlaps the instance's bounds: the tree over instances may cull by these
+    // bounds, so the result must include their test.
     if (!region_.overlaps(instance.bounds)) return true;
     InstanceRows rows(instance, options_, rows_);
     if (options_.precision == Precision::kConservative) {
@@ -284,7 +290,8 @@ class InstanceSearch {
       task_.work().nodes += search.nodes();
       task_.work().tests += search.tests();
       more = rows.offer({triangles, found});
-      // Counts triangles that were found without a test as well, so that the stop is polled often enough.
+      // Also counts the triangles of subtrees inside the region, which are found without a test, so that the stop is
+      // polled often enough.
       more = task_.count_tests(search.tests() + found) && more;
     }
   }
@@ -299,7 +306,7 @@ class InstanceSearch {
   LowestRows& rows_;
 };
 
-// Returns the rows of instances and objects together, in order and at most max_results.
+// Merges the rows of instances with the found objects: ascending by id, at most options.max_results rows.
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();

@@ -1,5 +1,5 @@
-// Overlap of one ball or box with a snapshot: rows of objects, and of instances or their triangles, ascending by id.
-// Free functions; any thread, with a QueryTask of its own.
+// Search for the objects, and the instances or their triangles, that overlap one ball or box. Rows ascend by id. Free
+// functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus {
 
-// Settings of a block that its overlap queries share.
+// Settings of a block that apply to each of its overlap queries.
 struct OverlapOptions {
   Source source;
   Precision precision;
@@ -19,17 +19,18 @@ struct OverlapOptions {
   Id after_id;
 };
 
-// Returns the options of a block, with its default of max_results.
+// Returns the options of a block. A max_results of 0 becomes limits::kDefaultMaxResults.
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
-// Answer one ball or box in world axes, with objects at `moment`. The answer borrows `moment`, and found objects from
-// `task` until its next query. Cost: the nodes, cells and primitives that meet the region, and the sorting of the rows.
+// Answer one ball or box query, given in world axes. Objects are searched as of `moment`, which the answer borrows.
+// OverlapAnswer::objects belongs to `task` and is valid until its next query. Cost: the nodes, cells and primitives
+// that meet the region, and the sorting of the rows.
 OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
                        const Filter& filter);
 OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter);
 
-// Return the region of the grid of objects that such a query searches.
+// Return the region of the grid of objects that run_ball() or run_box() searches; for QueryTask::walk_regions().
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options);
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
 

@@ -1,8 +1,9 @@
-// World axis-aligned bounds of an instance's triangles. PlacedTriangles returns the bounds that decide CONSERVATIVE
-// queries. LoosePlacedTriangles returns wider bounds, which are part of the verdict of EXACT rays, balls and boxes: the
-// exact tests run in mesh axes and floats, and must not report a triangle far from its position in the world.
+// Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
+// PlacedTriangles. EXACT rays, balls and boxes must also meet the wider bounds of LoosePlacedTriangles: the exact tests
+// run in mesh axes and in floats, and without this condition they could report a triangle far from its position in the
+// world.
 //
-// Both classes are immutable and borrow the instance; any number of threads may use one.
+// Both classes are immutable and borrow the instance; any number of threads may share one object.
 #ifndef LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
 #define LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
 
@@ -31,10 +32,10 @@ inline Aabbd grown_around(const Corners& corners, double epsilon) {
   return grown(bounds, epsilon);
 }
 
-// Tight bounds: of the corners placed in double, grown by about 2^-40 of the magnitudes of the translation and of the
-// scaled mesh. Both count, since the translation may cancel the offset of a mesh that lies far from its own origin. The
-// bounds lie within Instance::bounds, which are grown by twice as much, so a triangle's bounds alone determine its t,
-// distance and point.
+// Tight bounds: the box around the corners, which are transformed to world axes in double, grown by about 2^-40 of the
+// sum of the magnitudes of the translation and of the scaled mesh. The sum covers a mesh far from its own origin, whose
+// offset the translation cancels. The bounds lie within Instance::bounds, which are grown by twice as much. So the t,
+// distance and point of a CONSERVATIVE row depend only on the triangle's bounds, not on those of the instance.
 class PlacedTriangles {
  public:
   explicit PlacedTriangles(const Instance& instance)
@@ -48,8 +49,8 @@ class PlacedTriangles {
   }
   Aabbd bounds_of_corners(const Corners& corners) const { return grown_around(corners, epsilon_); }
 
-  // Returns bounds that contain bounds_of_triangle() of every triangle within `box`, a box in mesh axes: grown at least
-  // twice as much.
+  // Returns bounds in world axes that contain bounds_of_triangle() of every triangle within `box`, which is in mesh
+  // axes. They are grown by twice the epsilon of a triangle's bounds.
   Aabbd bounds_of_box(const Aabbf& box) const { return grown(bounds_to_world(transform_, box), 2 * epsilon_); }
 
  private:
@@ -59,12 +60,12 @@ class PlacedTriangles {
   double epsilon_;
 };
 
-// Wide bounds: of the placed corners, grown by an epsilon that covers all rounding errors of the exact tests, including
-// the transformation into mesh axes and one rounding to float there.
+// Wide bounds: the box around the corners in world axes, grown by an epsilon that covers all rounding errors of the
+// exact tests, including the transformation into mesh axes and one rounding to float there.
 class LoosePlacedTriangles {
  public:
-  // `query_extent`: the largest coordinate or length of the query that the bounds are tested against; 0 if that test
-  // grows the bounds itself.
+  // `query_extent` is the largest coordinate or length of the query that is tested against the bounds. It increases the
+  // epsilon. Pass 0 if that test grows the bounds itself.
   explicit LoosePlacedTriangles(const Instance& instance, double query_extent = 0)
       : transform_(instance.transform),
         extent_(magnitude(instance.bounds) + query_extent),
@@ -76,10 +77,11 @@ class LoosePlacedTriangles {
     return grown_around(corners_of(transform_, triangle), epsilon_);
   }
 
-  // Returns whether a query of `size` around `center`, in mesh axes, that overlaps a triangle there is certain to
-  // overlap bounds_of_triangle() in world axes. Rounding centre and size to float moves the query by less than 2^-24
-  // sqrt(3) of their magnitude. If that is at most twice extent_, the error is at most half of epsilon_. The other half
-  // covers the transformation back to world axes.
+  // Returns whether the test of bounds_of_triangle() can be omitted: whether a query of `size` around `center`, in mesh
+  // axes, that overlaps a triangle is certain to overlap the triangle's bounds in world axes. Rounding center and size
+  // to float moves the query by less than 2^-24 sqrt(3) of their magnitude. If this magnitude, scaled to world axes, is
+  // at most 2 * extent_, the error is at most half of epsilon_. The other half covers the transformation back to world
+  // axes.
   bool bounds_follow(Vec3d center, double size) const {
     return transform_.scale * (max_component(abs(center)) + size) <= 2 * extent_;
   }
@@ -88,8 +90,8 @@ class LoosePlacedTriangles {
   static constexpr double kRelativeEpsilon = 0x1p-21;
   static constexpr double kPlacementEpsilon = 0x1p-40;
 
-  // Returns the magnitude that scales the rounding error of placing a vertex. It is large if the translation cancels
-  // the offset of a mesh that lies far from its own origin.
+  // Returns the magnitude to which the rounding error of a vertex's transformation to world axes is relative. It is
+  // much larger than the result if the translation cancels the offset of a mesh that lies far from its own origin.
   static double placement_magnitude(const Instance& instance) {
     return max_component(abs(instance.transform.translation)) +
            double{instance.transform.scale} * magnitude(instance.mesh->bounds());

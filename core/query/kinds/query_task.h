@@ -1,9 +1,9 @@
-// Context of the queries of one chunk: the snapshot, the filters of its queries, the work budget of the batch, and its
-// stop. For the query kinds.
+// Context in which the queries of one chunk run: the snapshot, searches of its indexes, filters, and the work budget
+// and cancellation of the batch. For the implementations of all kinds of queries.
 //
 // Threads: a QueryTask belongs to one thread; the tasks of a batch share one BatchControl, which is thread-safe.
-// Invariants: ended() and BatchControl::stopped() never become false again; a task has reported at most the work that
-// it counted.
+// Invariants: once true, ended() and BatchControl::stopped() stay true; a task has reported at most the work that it
+// counted.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_TASK_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TASK_H_
 
@@ -45,16 +45,18 @@ class Filter {
   absl::Span<const uint64_t> ignored_ids_;
 };
 
-// Work budget and stop of one batch, shared by its threads. Thread-safe.
+// Work budget and cancellation of one batch, shared by all threads that work on it. Thread-safe.
 class BatchControl {
  public:
+  // `max_work` 0 = no limit. `stop` may be empty; a status from it that is not OK stops the batch.
   BatchControl(uint64_t max_work, std::function<absl::Status()> stop) : max_work_(max_work), stop_(std::move(stop)) {}
 
-  // Adds `work` to the work done and polls the stop. Returns false if the batch ends: stopped, or out of work.
+  // Adds `work` to the work done and calls `stop`. Returns false if the batch must end, because it was stopped or its
+  // work budget is used up.
   bool report_work(uint64_t work);
   // Returns whether the work budget is used up.
   bool out_of_work() const { return max_work_ != 0 && done_.load(std::memory_order_relaxed) >= max_work_; }
-  // Returns the status that stopped the batch, or OK. Only after all threads have finished.
+  // Returns the status that stopped the batch, or OK. Call it only after all threads have finished.
   absl::Status status() const { return status_; }
   bool stopped() const { return stopped_.load(std::memory_order_acquire); }
 
@@ -77,32 +79,34 @@ class QueryTask {
   const SceneSnapshot& snapshot() const { return snapshot_; }
   Work& work() { return work_; }
 
-  // Counts one primitive test; called before each. Returns false if the query ends here, truncated.
+  // Counts one primitive test; call it before each test. Returns false if the query must end now with a truncated
+  // result.
   bool count_test() {
     if (++tests_ % limits::kTestsBetweenChecks != 0) return !ended_;
     return check();
   }
-  // Counts many tests at once, like count_test().
+  // Counts `tests` primitive tests at once. Returns the same as count_test().
   bool count_tests(uint64_t tests) {
     const uint64_t before = tests_ / limits::kTestsBetweenChecks;
     tests_ += tests;
     return tests_ / limits::kTestsBetweenChecks == before ? !ended_ : check();
   }
-  // Reports the work since the last call and polls budget and stop. Returns !ended().
+  // Reports the work since the last report to the BatchControl, which checks budget and stop. Returns !ended().
   bool check();
   bool ended() const { return ended_; }
 
-  // Returns the vector kernels for exact hits of rays in meshes; null if the processor has none, or with brute force.
+  // Returns the vector kernels for EXACT rays in meshes, or null if the processor supports none or the task uses brute
+  // force.
   const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
 
-  // Returns the collector of the objects of ball and box queries, reused by one query after another.
+  // Returns the collector of found objects, which successive ball and box queries reuse.
   FoundObjects& found_objects() { return found_objects_; }
 
   // Returns whether ball and box queries may use the vector kernels.
   bool uses_region_kernels() const { return !brute_force_; }
 
-  // Call the visitor for every candidate in an index: those that the index structure finds, or all values with brute
-  // force, which serves to verify the structures.
+  // Call the visitor for every value of `index` that may match: the values that the index structure finds, or, with
+  // brute force, all values.
   template <class Index, class Visitor>
   void visit_ray(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs, Visitor& visitor) {
     if (brute_force_)
@@ -125,7 +129,7 @@ class QueryTask {
       index.visit_nearest(point, visitor, work_);
   }
 
-  // Call the visitor for every candidate among the scene's objects at `moment`.
+  // Call the visitor for every object at `moment` that may match, or, with brute force, for all objects.
   template <class Visitor>
   void visit_objects_on_ray(const SceneAtTime& moment, const SlabRay<double>& slabs, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
@@ -158,8 +162,9 @@ class QueryTask {
     };
     moment.visit_asked(bounds, work_, search, visit);
   }
-  // Makes visit_objects_in_region() take its regions from one walk over the regions of queries [begin, end), in order.
-  // The walk prefetches the memory of the next regions while one is visited.
+  // Starts a RegionWalk over the grid regions of queries [begin, end). From then on, visit_objects_in_region() must be
+  // called once for each of these queries, in order, and takes its region from the walk instead of the visitor. While
+  // one region is visited, the walk prefetches the memory of the following ones.
   void walk_regions(size_t begin, size_t end, const std::function<GridRegion(size_t)>& region_of) {
     LOCUS_DCHECK_LT(begin, end);
     walk_.emplace(begin, end, region_of);
@@ -184,7 +189,7 @@ class QueryTask {
   std::optional<RegionWalk> walk_;  // set by walk_regions()
   FoundObjects found_objects_;
   uint64_t tests_ = 0;          // counted by count_test() and count_tests()
-  uint64_t reported_work_ = 0;  // part of work_ that control_ knows
+  uint64_t reported_work_ = 0;  // part of work_ that was reported to control_
   bool ended_ = false;
 };
 

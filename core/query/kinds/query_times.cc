@@ -27,7 +27,7 @@ std::string explanation(const SceneSnapshot& snapshot) {
   return "";
 }
 
-// Returns the error for a time outside the history.
+// Returns the error for a time outside the history. `entry` is its index in the as_of columns of `field`.
 absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std::string& field, size_t entry) {
   Refusal refusal;
   refusal.reason = Reason::kOutOfRange;

@@ -1,5 +1,5 @@
-// Effective times of the queries of a block: its as_of columns, resolved in the history that a snapshot keeps.
-// Immutable; borrows from the snapshot; any thread.
+// Effective times of the queries of a block: its as_of columns, resolved in the history that the snapshot retains.
+// Immutable, so any thread may use it; borrows from the snapshot.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 
@@ -13,12 +13,13 @@
 
 namespace locus {
 
-// Invariant: scenes_ has one entry per query or one for all; times_ and clamped_ have as many, or none if the block has
-// no as_of_ticks.
+// Invariant: scenes_ has one entry per query, or one entry for all queries; times_ and clamped_ have the same number of
+// entries, or none if the block has no as_of_ticks.
 class QueryTimes {
  public:
-  // Resolves the times of `block`, which has passed check_batch(). If the block does not clamp, a time outside the
-  // history is OUT_OF_RANGE with a message that names `field`.as_of_ticks, the entry and the kept ticks.
+  // Resolves the times of `block`, which has passed check_batch(). `field` is the block's name in errors. Returns
+  // OUT_OF_RANGE for a time outside the history unless the block clamps; the error names `field`.as_of_ticks, the index
+  // of the entry and the retained ticks.
   static absl::StatusOr<QueryTimes> resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
                                             const std::string& field);
 
@@ -29,7 +30,7 @@ class QueryTimes {
     LOCUS_DCHECK(asks_past());
     return times_[entry_of(query)];
   }
-  // Returns whether the block has as_of_ticks and queries; otherwise all queries see the latest state.
+  // Returns whether the block has queries and as_of_ticks. If not, all queries see the snapshot's latest state.
   bool asks_past() const { return !times_.empty(); }
   // Returns whether a query asked for a time outside the history. Precondition: asks_past().
   bool clamped(size_t query) const {

@@ -49,7 +49,7 @@ class ObjectVisitor {
   HitCollector& collector_;
 };
 
-// Visitor of instances, for rays that the kernels do not search.
+// Visitor of instances for rays that the vector kernels do not trace.
 class InstanceVisitor {
  public:
   InstanceVisitor(QueryTask& task, const RayRequest& request, const Filter& filter, HitCollector& collector)
@@ -64,7 +64,8 @@ class InstanceVisitor {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(instance)) return true;
-    // This test is part of the verdict and bounds t from below, since the tree over instances may cull by it.
+    // A ray hits an instance only if it enters the instance's bounds, and no hit has a lower t than this entry: the
+    // tree over instances may cull by these bounds, so the result must include their test.
     const std::optional<float> nearest = entry(slabs_, instance.bounds);
     if (!nearest) return true;
     trace_instance(task_, request_, slabs_, instance, *nearest, collector_);
@@ -79,14 +80,14 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-// Returns whether the vector kernels search the instances for the rays of `block`.
+// Returns whether the vector kernels trace the rays of `block` through the instances.
 bool uses_kernels(const QueryTask& task, const QueryBlock& block) {
   return block.precision == Precision::kExact && block.source != Source::kDynamic && task.ray_kernels() != nullptr;
 }
 
 Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
 
-// Returns the cull relative to the stored counter-clockwise winding.
+// Converts `cull` from the scene's `winding` to the counter-clockwise winding in which triangles are stored.
 Cull stored_cull(Cull cull, Winding winding) {
   if (winding == Winding::kCounterClockwise || cull == Cull::kNone) return cull;
   return cull == Cull::kBack ? Cull::kFront : Cull::kBack;

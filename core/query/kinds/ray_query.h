@@ -1,5 +1,5 @@
-// Rays against a snapshot: static instances first, whose hits shorten the ray, then moving objects. Free functions; any
-// thread, with a QueryTask of its own.
+// Intersection of rays with a snapshot: first with static instances, whose hits limit how far the ray continues, then
+// with moving objects. Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 
@@ -29,24 +29,24 @@ struct RayRequest {
 RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i);
 
 struct RayAnswer {
-  absl::InlinedVector<Hit, 1> hits;  // kFirst and kAny: at most one; kAll: ascending
-  bool truncated = false;            // kAll: there were more hits; any mode: the batch ended first
+  absl::InlinedVector<Hit, 1> hits;  // kFirst and kAny: at most one; kAll: in the order of nearer()
+  bool truncated = false;            // kAll: more hits exist; any mode: the batch ended before the search
 };
 using RayAnswers = std::vector<RayAnswer>;
 
 // Answers queries [begin, end) of a block. The answers borrow `times`. One call for many rays is faster than many
-// calls.
+// calls, because the kernels trace many rays together.
 RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryTimes& times,
                     Winding winding, size_t begin, size_t end);
 
-// Surface at a hit: weights of the second and third vertex, and the unit normal of the triangle's front or of the
-// object's outside.
+// Surface at a hit: barycentric weights of the triangle's second (u) and third (v) vertex, and the unit normal of the
+// triangle's front side or of the object's outside.
 struct Surface {
   float u = 0, v = 0;
   Vec3d normal;
 };
-// Returns the surface at a hit of an EXACT ray, recomputed from the stored primitive; zeros for misses and
-// CONSERVATIVE.
+// Returns the surface at a hit of an EXACT ray, recomputed from the stored object or triangle. All values are zero for
+// a miss and for a CONSERVATIVE ray.
 Surface surface_at(const RayRequest& request, const Hit& hit, Winding winding);
 
 }  // namespace locus

@@ -27,10 +27,11 @@ void copy(Vec3f from, float* to) {
   for (int axis = 0; axis < 3; ++axis) to[axis] = from[axis];
 }
 
-// Returns an upper bound of the error of rounding `value` to float.
+// Returns an upper bound of the rounding error of `value`, a double rounded to float.
 float epsilon(float value) { return std::abs(value) * 0x1p-22f + std::numeric_limits<float>::min(); }
 
-// Visitor that collects the indices of overlapping triangles, until the output is full. For processors without kernels.
+// Visitor that writes the indices of overlapping triangles to an array, until one does not fit. For regions that no
+// kernel supports.
 template <class Shape>
 class Collector {
  public:
@@ -65,7 +66,7 @@ class Collector {
   bool full_ = false;
 };
 
-// Run of find_triangles(): answers regions in order, up to kMaxRegions in one call of the kernels.
+// State of one find_triangles() call. Answers the regions in order, up to kMaxRegions of them in one call of a kernel.
 template <class Shape>
 class BatchSearch {
  public:
@@ -84,7 +85,7 @@ class BatchSearch {
   }
 
  private:
-  // Returns how many of the next regions one kernel can answer together; 0 if none supports the next region.
+  // Returns how many of the next regions one kernel can answer in one call; 0 if no kernel supports the next region.
   size_t next_for_one_kernel() const {
     if (active_region_kernels() == nullptr) return 0;
     const bool first_rotated = rotated(shapes_[done_]);

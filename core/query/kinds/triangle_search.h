@@ -1,6 +1,7 @@
-// Triangles of a mesh that a ball or a box in mesh axes overlaps, found by the vector kernels: their indices in the
-// uploaded index list, in storage order, with the verdicts of ball_overlaps() and box_overlaps(). find_triangles()
-// answers many regions in one call. TriangleSearch answers one region in steps, so that the caller can stop in between:
+// Search by the vector kernels for the triangles of a mesh that overlap a ball or a box in mesh axes. Returns indices
+// of triangles in the uploaded mesh, in storage order. The results equal those of ball_overlaps() and box_overlaps().
+// find_triangles() answers many regions in one call. TriangleSearch answers one region in steps, so that the caller can
+// stop in between:
 //
 //   if (TriangleSearch<Ballf>::served(tree, ball)) {
 //     TriangleSearch<Ballf> search(tree, ball);
@@ -25,7 +26,8 @@ namespace locus {
 KernelBall kernel_region(const Ballf& ball);
 KernelBox kernel_region(const Obbf& box);
 
-// Return the double predicate of a region, for triangles that the kernels cannot decide in float.
+// Return the overlap test of a region in double, which the kernels call for triangles that they cannot decide in float.
+// Borrows the region.
 RegionJudge judge_of(const Ballf& ball);
 RegionJudge judge_of(const Obbf& box);
 
@@ -35,8 +37,8 @@ inline auto kernel_for(const Obbf& box) {
   return box.rotation == Rotation{} ? active_region_kernels()->box : active_region_kernels()->turned_box;
 }
 
-// Return the largest distance of a region from the origin of mesh axes. The kernels support up to kMaxRegionReach for
-// the sum of this and the tree's magnitude.
+// Return an upper bound of the largest |coordinate| of a region. The kernels support a region if the sum of this bound
+// and the tree's magnitude is at most kMaxRegionReach.
 inline float extent_of(const Ballf& ball) { return max_component(abs(ball.center)) + ball.radius; }
 inline float extent_of(const Obbf& box) {
   return max_component(abs(box.center)) + box.half.x + box.half.y + box.half.z;
@@ -61,9 +63,9 @@ class TriangleSearch {
 
   // Returns whether all triangles have been returned.
   bool over() const { return visit_.over(); }
-  // Writes the next triangle indices and returns their count, which may be less than `room`, even 0, before the search
-  // is over. `room` is at least kMinRegionRoom; any of it may be overwritten. Returns after about kMaxRegionTests
-  // tests.
+  // Writes the next triangle indices to `triangles` and returns their number. Each call stops after about
+  // kMaxRegionTests tests, so a number below `room`, even 0, does not mean that the search is over. `room` is the
+  // length of `triangles`, at least kMinRegionRoom; entries behind the returned ones may be overwritten.
   size_t next(uint32_t* triangles, size_t room) {
     LOCUS_DCHECK(!over());
     LOCUS_DCHECK_GE(room, size_t{kMinRegionRoom});
@@ -73,7 +75,8 @@ class TriangleSearch {
     LOCUS_DCHECK_LE(visit_.found, room);
     return visit_.found;
   }
-  // Return the cost of the last next(): nodes opened, triangles tested, and how many of these needed the predicates.
+  // Return the cost of the last next(): nodes opened, triangles tested, and the number of these that were decided in
+  // double.
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }
   uint32_t judged() const { return visit_.judged; }
@@ -85,10 +88,10 @@ class TriangleSearch {
   RegionVisit visit_;
 };
 
-// Answers regions in order, with or without kernels: writes the count of each region to `counts` and its triangle
-// indices to `triangles`, one region behind another. Returns the number of regions answered: all of them unless
-// `triangles` is too short. A length of tree.size() + kMinRegionRoom per region is always sufficient. `counts` has one
-// entry per region.
+// Finds the triangles of many regions, answered in order, with or without kernels. Writes the number of triangles of
+// each region to `counts`, and their indices to `triangles`, one region behind another. Returns the number of regions
+// answered: all of them unless `triangles` is too short. A length of tree.size() + kMinRegionRoom per region is always
+// sufficient. `counts` has one entry per region.
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Ballf> balls, absl::Span<uint32_t> counts,
                       absl::Span<uint32_t> triangles);
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Obbf> boxes, absl::Span<uint32_t> counts,

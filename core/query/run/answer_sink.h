@@ -13,7 +13,7 @@
 
 namespace locus {
 
-// Effective time of each query.
+// Output arrays of the effective time of each query: its tick, and the fraction of the way to the next tick.
 struct TimeSpans {
   uint64_t* ticks;
   float* fractions;
@@ -23,18 +23,20 @@ class AnswerSink {
  public:
   virtual ~AnswerSink() = default;
 
-  // Appends `rows` rows to each column of a block in `columns`. The pointers stay valid until more rows of the same
-  // block are added. Rows are uninitialized; the caller writes all of them unless the batch ends with an error.
+  // Appends `rows` uninitialized rows to each of the `columns` of block number `block`, and returns pointers to the
+  // first of them. The pointers stay valid until more rows of the same block are added. The caller writes all rows
+  // unless the batch ends with an error.
   virtual RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) = 0;
-  // Appends one byte per query: 0 or 1.
+  // Appends one byte per query, in which the caller writes 1 for a hit and 0 for a miss.
   virtual char* add_hits(size_t block, size_t queries) = 0;
-  // Appends the number of rows of each query.
+  // Appends one entry per query, in which the caller writes the number of rows of the query.
   virtual uint32_t* add_counts(size_t block, size_t queries) = 0;
-  // Appends indices of truncated queries, ascending.
+  // Appends entries in which the caller writes the indices of truncated queries, ascending.
   virtual uint32_t* add_truncated(size_t block, size_t queries) = 0;
-  // Appends the effective time of each query.
+  // Appends entries in which the caller writes the effective time of each query.
   virtual TimeSpans add_times(size_t block, size_t queries) = 0;
-  // Appends indices of queries that asked for a time outside the history and got the nearest kept time, ascending.
+  // Appends entries in which the caller writes the indices, ascending, of queries that asked for a time outside the
+  // history and got the nearest retained time.
   virtual uint32_t* add_clamped(size_t block, size_t queries) = 0;
 };
 

@@ -16,7 +16,7 @@ constexpr size_t kChunkQueries = 256;
 
 size_t max_chunk_queries(const QueryBlock& block) {
   const auto* const lookup = std::get_if<LookupColumns>(&block.kind);
-  // Groups are looked up in one pass over all objects.
+  // All groups of a block are looked up in one scan of all objects, so the block is not divided into chunks.
   return lookup != nullptr && !lookup->groups.empty() ? limits::kMaxQueries : kChunkQueries;
 }
 
@@ -99,7 +99,8 @@ Progress BatchRun::work(uint64_t nanoseconds) {
   const uint64_t work_time_before = timing.start;
   while (true) {
     end_chunk(chunk, run(*chunk));
-    // Requires CPU time as well as wall time: a thread that lost its core in between has not worked yet.
+    // Both wall time and CPU time must have reached the limit: a thread that was preempted has not yet worked for its
+    // share of time.
     const bool time_is_up =
         !options_.clock || (now() - start >= nanoseconds && work_time() - work_time_before >= nanoseconds);
     const MutexLock lock(mutex_);
@@ -115,8 +116,9 @@ Progress BatchRun::work(uint64_t nanoseconds) {
   }
 }
 
-// Queries that are in no chunk yet wait while many chunks exist. The first chunk never waits, since all others are
-// written out after it.
+// Limits the number of chunks, and so the memory of rows that wait to be written out: a new chunk may begin below
+// kMaxChunks chunks, the remainder of a split chunk below twice as many. The first chunk in batch order may always
+// begin, since all others are written out after it.
 bool BatchRun::can_begin() const {
   if (control_.stopped()) return false;
   if (!unstarted_.empty()) return chunks_.size() < 2 * kMaxChunks || unstarted_.front() == chunks_.begin();
@@ -223,7 +225,7 @@ void BatchRun::write_counted(const Chunk& chunk) {
   const uint32_t bytes = row_bytes(columns);
   uint64_t free_bytes = free_bytes_.load(std::memory_order_relaxed);
   uint32_t* const counts = answer_.add_counts(chunk.block, chunk.rows.counts.size());
-  size_t first = 0, row = 0;  // rows [first, row) of the chunk are kept but not copied yet
+  size_t first = 0, row = 0;  // rows [first, row) of the chunk fit the reply and are not copied yet
   const auto copy = [&] {
     if (row != first) copy_rows(chunk.rows, first, row - first, answer_.add_rows(chunk.block, columns, row - first));
   };

@@ -1,11 +1,11 @@
 // Execution of a checked batch against one snapshot, in chunks that any threads may take. For the scheduler, which
-// decides how long each thread works on which batch. The result is a function of snapshot and batch alone: the
-// assignment of chunks to threads, their sizes and the order in which they finish change no byte of it, unless max_work
-// ends the batch.
+// decides how long each thread works on which batch. The result depends only on the snapshot and the batch: the sizes
+// of chunks, their assignment to threads and the order in which they finish do not change any byte of it, unless
+// max_work ends the batch.
 //
-// Threads: any number of threads may call work() at once; all other members only before the first or after the last
-// call. Memory: rows wait to be written out in order in about 2 * kMaxChunks chunks at most; each holds at most a
-// reply's worth.
+// Threads: any number of threads may call work() at once. All other members may be called only before the first or
+// after the last call of work(). Memory: at most about 2 * kMaxChunks chunks have rows that wait to be written out in
+// batch order, and the rows of each chunk are limited by the size of a reply.
 //
 // Invariants: chunks_ covers consecutive queries in batch order, from the first query that is not written out to
 // (next_block_, next_query_). Every chunk is unstarted, running or done; active_threads_ is the number of running
@@ -35,29 +35,30 @@
 namespace locus {
 
 struct RunOptions {
-  // Polled every limits::kTestsBetweenChecks primitive tests, from any thread; a status that is not OK ends the batch
-  // with that status. [never ends]
+  // Polled every limits::kTestsBetweenChecks primitive tests, from any thread. A status that is not OK ends the batch
+  // with that status. If empty, the batch is never stopped.
   std::function<absl::Status()> stop;
-  // Wall clock in nanoseconds with any origin, read before and after each chunk, from any thread. [without it work()
-  // runs one chunk per call]
+  // Wall clock in nanoseconds with any origin, read before and after each chunk, from any thread. If empty, each call
+  // of work() runs one chunk.
   std::function<uint64_t()> clock;
   // CPU time of the calling thread in nanoseconds. May be expensive: it is read about twice for each call of work() and
-  // for each block that the call works on. [clock; without both, times are 0]
+  // for each block that the call works on. If empty, `clock` is used instead; without both, all times are 0.
   std::function<uint64_t()> work_clock;
-  // Tests every value instead of searching the index structures, in order to verify them. Same results, different cost.
+  // Makes queries test every value instead of searching the index structures. Serves to verify the structures: the
+  // results must be the same, only the cost differs.
   bool brute_force = false;
 };
 
 // Cost of queries, summed over all threads. Not part of the result.
 struct QueryCost {
   Work work;
-  uint64_t nanoseconds = 0;  // by RunOptions::work_clock
+  uint64_t nanoseconds = 0;  // measured by RunOptions::work_clock
 };
 
 class BatchRun {
  public:
-  // Maximum number of chunks that are running, or done and waiting for an earlier chunk. Remainders of chunks that were
-  // split count as well and may double it.
+  // Maximum number of chunks that are running, or are done and wait until an earlier chunk is written out. The
+  // remainders of split chunks count as well, and may raise the number to twice this maximum.
   static constexpr size_t kMaxChunks = 16;
 
   // Prepares the execution of `batch`, which has passed check_batch(): resolves its times and allocates dense rows in
@@ -66,8 +67,8 @@ class BatchRun {
   static absl::StatusOr<std::unique_ptr<BatchRun>> prepare(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                                            RunOptions options, AnswerSink& answer);
 
-  // Runs chunks until about `nanoseconds` have passed or no chunk may be started. Writes out finished chunks as far as
-  // they are in order.
+  // Runs chunks until about `nanoseconds` have passed or no chunk may be started. Writes finished chunks to the
+  // AnswerSink in batch order, up to the first chunk that is not finished.
   Progress work(uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
   // Returns OK, or the status of RunOptions::stop, in which case `answer` must be discarded. Valid once work() has
@@ -89,7 +90,7 @@ class BatchRun {
     const size_t queries;
     const size_t max_chunk_queries;
     BlockOutput output;
-    QueryCost cost;  // work of the chunks that are written out; nanoseconds of all chunks
+    QueryCost cost;  // work: of chunks written out; nanoseconds: of all chunks
   };
   // Consecutive queries of one block: [begin, end).
   struct Chunk {
@@ -111,27 +112,30 @@ class BatchRun {
 
   // Checks the invariants of the class comment; O(kMaxChunks).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
-  // Checks that the query `begin` of `block` is the next one in batch order after [.., end) of block `before`.
+  // Checks that, in batch order, no query lies between query `end` - 1 of block `before` and query `begin` of block
+  // `block`.
   void check_adjacent(size_t before, size_t end, size_t block, size_t begin) const;
 
   // Returns whether a chunk may be started now.
   bool can_begin() const LOCUS_REQUIRES(mutex_);
-  // Takes the first unstarted chunk, or cuts a new one. Precondition: can_begin().
+  // Starts the first unstarted chunk, or, if there is none, a new chunk of the next queries that are in no chunk.
+  // Precondition: can_begin().
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
   Chunks::iterator pop_unstarted() LOCUS_REQUIRES(mutex_);
-  // Cuts the queries from `reached` on off `chunk`, into an unstarted chunk right behind it.
+  // Moves the queries of `chunk` from `reached` on into a new, unstarted chunk directly behind it.
   void split(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
   void skip_empty_blocks() LOCUS_REQUIRES(mutex_);
-  // Answers the queries of `chunk`, or the first of them if they turn out to be expensive. Returns the first query that
-  // is not answered.
+  // Answers the queries of `chunk` in order, and stops early if they turn out to be expensive. Returns the index of the
+  // first query that is not answered.
   size_t run(Chunk& chunk);
-  // Marks a chunk as done, and writes out unless another thread is writing.
+  // Marks a chunk as done; queries from `reached` on, if any, become a new chunk. Then calls write_out() if the first
+  // chunk is done and no other thread writes.
   void end_chunk(Chunks::iterator chunk, size_t reached) LOCUS_EXCLUDES(mutex_);
-  // Writes out chunks in order, up to the first one that is not done.
+  // Removes chunks from the front of chunks_ and writes them to the AnswerSink, up to the first one that is not done.
   void write_out() LOCUS_EXCLUDES(mutex_);
   void write(const Chunk& chunk);
   void write_counted(const Chunk& chunk);
-  // Returns the progress for a thread that leaves work(); kDone once.
+  // Returns the progress that work() reports to its caller. Returns kDone only once.
   Progress progress() LOCUS_REQUIRES(mutex_);
   uint64_t now() const { return options_.clock ? options_.clock() : 0; }
   TimingSpan begin_timing(size_t block) const { return {block, work_time()}; }

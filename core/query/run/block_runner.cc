@@ -10,13 +10,13 @@
 namespace locus {
 namespace {
 
-// Work after which a chunk is split: about a tenth of a millisecond.
+// Work, in units of work_done(), after which a chunk is split; takes about 0.1 ms.
 constexpr uint64_t kChunkWork = 16'384;
-// Target work of one call of the kernels, which cannot be interrupted.
+// Target work of one call of the ray kernels, in units of work_done(). Limited because a call cannot be interrupted.
 constexpr uint64_t kCallWork = 65'536;
-// Limits of the number of rays per call. The maxima bound a call whose rays are unexpectedly expensive: at 4,096
-// triangles per ray, a full call takes 3 ms, or twice that if its rays keep many hits. Twice as many per call would not
-// be measurably faster.
+// Limits of the number of rays per call of the ray kernels. The maxima bound the duration of a call whose rays are
+// unexpectedly expensive: with 4,096 triangle tests per ray, a call with the maximum number of rays takes 3 ms, or 6 ms
+// in mode kAll, whose rays retain many hits. Twice as many rays per call would not be measurably faster.
 constexpr uint64_t kMinRaysPerCall = 8, kMaxRaysPerCall = 128, kMaxRaysOfManyHits = 64;
 
 }  // namespace
@@ -37,7 +37,7 @@ size_t BlockRunner::run(size_t begin, size_t end) {
   LOCUS_DCHECK_LE(end, query_count(block_));
   task_.check();
   const size_t reached = std::visit([&](const auto& kind) { return run_queries(kind, begin, end); }, block_.kind);
-  task_.check();  // reports the rest of the work, so that many small chunks use up a budget like a large one
+  task_.check();  // reports the remaining work, so that small chunks use up the budget as well
   LOCUS_DCHECK_LT(begin, reached);
   LOCUS_DCHECK_LE(reached, end);
   check_invariants(begin, reached);
@@ -65,7 +65,7 @@ template <class Columns, class RegionOf>
 void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {
   if (block_.source == Source::kStatic || !RegionWalk::pays(task_.snapshot().objects.grid())) return;
   const OverlapOptions options = overlap_options(block_, columns.detail);
-  // A copy: the walk calls it while later queries run, when the caller's function object is gone.
+  // Copies `region_of`: the walk calls it while later queries run, when the caller's function object no longer exists.
   task_.walk_regions(begin, end, [region_of, options](size_t i) { return region_of(i, options); });
 }
 
@@ -89,13 +89,14 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
   return end;
 }
 
-// Writes the rows of query `i` from row `row` on. Computes surfaces only if their columns are returned, which is rare.
+// Writes the hits of query `i` to the columns `to`, from row `row` on. Computes surfaces only if the block returns a
+// column that needs them, which is rare.
 void BlockRunner::write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
                              size_t row) {
   for (size_t k = 0; k < hits.size(); ++k) write_row(hits[k], to, row + k);
   if (to.uvs == nullptr && to.normals == nullptr && to.points == nullptr) return;
   const Winding winding = task_.snapshot().winding;
-  // A miss has zero surface columns, so its request is not needed.
+  // The surface columns of a miss are zero, so its request is not needed.
   const bool is_miss = hits.empty() || hits.front().id == kNoId;
   const RayRequest request = is_miss ? RayRequest() : ray_request(block_, rays, winding, i);
   for (size_t k = 0; k < hits.size(); ++k) write_surface(request, block_.frame, hits[k], winding, to, row + k);
@@ -152,8 +153,8 @@ size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end
   return end;
 }
 
-// Sets the number of rays so that the next call takes about kCallWork if its rays cost as much as the last ones. Grows
-// at most fourfold.
+// Sets the number of rays of the next kernel call so that the call takes about kCallWork, assuming the same work per
+// ray as in the last call, in which `rays` rays took `work`. The number grows at most fourfold.
 void BlockRunner::adapt_rays_per_call(size_t rays, uint64_t work) {
   LOCUS_DCHECK_GT(rays, size_t{0});
   const bool many_hits = std::get<RayColumns>(block_.kind).mode == RayMode::kAll;
@@ -203,7 +204,8 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   count_rows(kept, kept < rows.size(), i);
 }
 
-// Looks up all groups of the block in one pass over the objects, which serves all consecutive queries at the same time.
+// Looks up all groups of the block in one scan of the objects, at the effective time of query `i`. Does nothing if the
+// last lookup was at the same time, so that consecutive queries with equal times share one lookup.
 void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
   const bool same = groups_query_ && (!times_.asks_past() || times_.time(*groups_query_) == times_.time(i));
   if (same || task_.ended()) return;

@@ -1,8 +1,9 @@
-// Runs consecutive queries of one block on one thread. Dense rows and bytes go directly into the reply's columns;
-// counted rows are collected in columns of the runner, since their positions depend on the chunks before.
+// Runner of consecutive queries of one block on one thread. Writes dense rows and bytes directly into the reply's
+// columns. Collects counted rows in memory of its own, since their positions in the reply depend on how many rows the
+// earlier chunks have.
 //
-// Threads: a runner belongs to one thread. Invariant: the runner keeps at most max_rows_ rows, and one count per query
-// that was run if the block is counted.
+// Threads: a runner belongs to one thread. Invariant: the runner has at most max_rows_ counted rows, and, for a counted
+// block, one row count for each query that was run.
 #ifndef LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 #define LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 
@@ -20,27 +21,28 @@ namespace locus {
 // Output columns of a block, and the state that its chunks share.
 struct BlockOutput {
   RowSpans rows;         // dense blocks: rows of all queries
-  char* hits = nullptr;  // byte blocks: bytes of all queries
+  char* hits = nullptr;  // byte blocks: one byte per query of the block
   // Number of rays for the next call of the kernels. Throughput grows with it, but a call cannot be interrupted.
   std::atomic<uint32_t> rays_per_call{64};
 };
 
 class BlockRunner {
  public:
-  // Borrows all arguments. Rows beyond `max_bytes` of columns are dropped and their queries listed as truncated: later
-  // rows would not fit the reply either.
+  // Borrows all arguments. `max_bytes` is the free space of the reply: counted rows that exceed it could not be written
+  // out, so they are dropped and their queries listed as truncated.
   BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, BlockOutput& output,
               uint64_t max_bytes);
 
   // Answers queries [begin, end) in order, or fewer if they turn out to be expensive, but at least one. Returns the
-  // first query that is not answered. Precondition: begin < end. Called once.
+  // index of the first query that is not answered. Precondition: begin < end. Call it once.
   size_t run(size_t begin, size_t end);
 
-  // Returns the collected counts and rows (counted blocks) and the truncated queries as indices into the block.
+  // Returns the row counts and rows of a counted block, and, for any block, the indices of truncated queries in the
+  // block.
   CollectedRows take_rows() { return std::move(result_); }
 
  private:
-  // Checks the class invariants after the answers to queries [begin, reached).
+  // Checks the class invariants after queries [begin, reached) were answered.
   void check_invariants(size_t begin, size_t reached) const;
   template <class Columns>
   size_t run_queries(const Columns& columns, size_t begin, size_t end);
@@ -58,7 +60,8 @@ class BlockRunner {
   void append_runs(const OverlapAnswer& answer, size_t i);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);
   void count_rows(size_t rows, bool cut, size_t i);
-  // Returns the work so far, in units that do not depend on the machine.
+  // Returns the work so far as the number of nodes, cells, tests and rows, which does not depend on the speed of the
+  // machine.
   uint64_t work_done() const;
   // Returns whether the remaining queries should become a chunk of their own.
   bool should_split() const;
@@ -72,7 +75,7 @@ class BlockRunner {
   const ColumnSet columns_;
   const uint64_t max_rows_;
   uint64_t rows_ = 0;
-  // Result of a lookup of all groups, at the time of query groups_query_.
+  // Result of the last lookup of all groups, at the effective time of query groups_query_.
   absl::flat_hash_map<Group, OverlapAnswer> groups_;
   std::optional<size_t> groups_query_;
   CollectedRows result_;

@@ -1,5 +1,5 @@
-// Rows that one chunk of a batch collects until those before it are written: columns in vectors, and which queries were
-// truncated. Plain data.
+// Rows of one chunk of a batch, stored until all earlier chunks are written out: one vector per column, and the indices
+// of truncated queries. Plain data.
 #ifndef LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_
 #define LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_
 
@@ -18,7 +18,8 @@ struct CollectedRows : ColumnArrays<ColumnVector> {
   std::vector<uint32_t> truncated;  // indices of truncated queries, ascending
 };
 
-// Appends `rows` uninitialized rows to each column of `columns`; the pointers stay valid until the next call.
+// Appends `rows` uninitialized rows to each column of `columns`, and returns pointers to the first of them. The
+// pointers stay valid until the next call.
 inline RowSpans add_rows(CollectedRows& collected, ColumnSet columns, size_t rows) {
   RowSpans spans;
   for_each_column_array([&](const auto& array) {
