@@ -6,7 +6,7 @@
 namespace locus::server {
 namespace {
 
-// Collects the scenes that have records in a batch; ignores all other entries.
+// Collects the scenes that have log records in a batch; ignores all other writes.
 class SceneCollector final : public rocksdb::WriteBatch::Handler {
  public:
   SceneCollector(uint32_t log_family, absl::flat_hash_set<SceneKey>& scenes)
@@ -49,7 +49,8 @@ rocksdb::WalFilter::WalProcessingOption WalWatch::LogRecordFound(unsigned long l
   next_write_ = first + batch.Count();
   if (gap_end_ != 0) {
     SceneCollector collector(log_family_, after_gap_);
-    batch.Iterate(&collector).PermitUncheckedError();  // after an error the scenes collected so far are still correct
+    batch.Iterate(&collector)
+        .PermitUncheckedError();  // after an error, the scenes collected before it are still correct
   }
   return WalProcessingOption::kContinueProcessing;
 }
