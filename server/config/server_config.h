@@ -100,10 +100,10 @@ struct ServerConfig {
   bool insecure = false;
 };
 
-// Returns the value of an environment variable, or nullopt if it is not set.
+// Function that returns the value of an environment variable, or nullopt if the variable is not set.
 using Environment = std::function<std::optional<std::string>(const std::string&)>;
 
-// Returns a variable of the process's own environment.
+// Returns the value of a variable in the environment of this process. An Environment.
 std::optional<std::string> process_environment(const std::string& name);
 
 // Command that runs instead of the server: `locusd check` or `locusd repair`, for a data directory that no daemon is

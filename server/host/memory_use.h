@@ -27,7 +27,7 @@ struct UpdateCost {
 // Returns the cost of a batch whose form is not checked yet: its lists may have any length.
 UpdateCost cost_of(const UpdateBatch& batch);
 
-// Returns the peak bytes of an upload, from its first column to the built tree.
+// Returns the peak memory in bytes of an upload, from its first column to the built tree.
 uint64_t upload_cost(uint32_t vertices, uint32_t triangles);
 
 // Returns the size in bytes of the new set of instances that results from applying `change` to `statics`. Returns 0 for

@@ -29,7 +29,7 @@ class IoWaker;
 // One event loop over one completion queue, with the list of its calls.
 class IoLoop final : private EventSource, public EventLoop {
  public:
-  // A call that lives on this loop.
+  // Interface of a call that lives on this loop.
   class ActiveCall {
    public:
     // Called on the loop when the server begins to drain.

@@ -17,8 +17,8 @@ using std::chrono::steady_clock;
 
 namespace {
 
-// Estimated work below which a query batch does not hand the lead of its IO loop to another thread, because waking a
-// thread would cost more than the wait.
+// Estimated work below which a query batch does not hand the lead of its IO loop to another thread, because waking that
+// thread to wait for events would cost more.
 constexpr uint64_t kShortNanoseconds = 30'000;
 
 }  // namespace

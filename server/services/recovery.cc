@@ -125,8 +125,8 @@ class Recovery {
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
     ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));
-    // The limit on pinned memory is an option of this daemon; the stored value is that of the daemon that created the
-    // scene.
+    // Overwrite the stored limit on pinned memory, which is that of the daemon that created the scene, by the option of
+    // this daemon.
     spec.pinned_bytes = host_.config.pinned_limit;
     stored.spec = encode_spec(spec);
     if (stored.copied || (spec.durability == Durability::kMemory && !log_.closed_in_order())) {

@@ -16,10 +16,9 @@ namespace locus::server {
 namespace {
 
 constexpr auto kPollInterval = std::chrono::milliseconds(100);
-constexpr uint64_t kBatchOverhead = 128;  // bytes that RocksDB adds to each record of a batch
-constexpr uint64_t kBytesBetweenPolls = uint64_t{8}
-                                        << 20;          // bytes written after which the free disk space is read again
-constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;  // disk space that a recovery needs beside the memory tables
+constexpr uint64_t kBatchOverhead = 128;                    // bytes that RocksDB adds to each record of a batch
+constexpr uint64_t kBytesBetweenPolls = uint64_t{8} << 20;  // bytes written between two polls of free space
+constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;      // disk space that a recovery needs beside the memory tables
 
 absl::Status too_large(uint64_t bytes) {
   return refuse_limit("entries", "record_bytes", static_cast<double>(UpdateLog::kMaxRecordBytes),

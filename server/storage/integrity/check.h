@@ -36,7 +36,7 @@ struct MeshReport {
 
 struct DirectoryReport {
   std::string damage;            // reason why nothing is readable
-  std::string catalogue_damage;  // reason why scenes or meshes may be missing below or, though deleted, be listed
+  std::string catalogue_damage;  // reason why scenes or meshes may be missing below, or deleted ones present
   bool closed_in_order = false;
   std::vector<SceneReport> scenes;  // sorted by name
   std::vector<MeshReport> meshes;   // sorted by name

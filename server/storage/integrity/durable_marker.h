@@ -35,7 +35,7 @@ struct SceneMarker {
 };
 
 struct DurableMarker {
-  uint64_t write_number = 0;      // incremented by each write: the slot with the higher one is newer
+  uint64_t write_number = 0;      // incremented by each write: the slot with the higher number is newer
   bool closed = false;            // the log was closed in order: no write followed this marker
   uint64_t catalogue = 0;         // generation of the catalogue; 0 until the database is created
   SceneKey next_scene = 1;        // next free scene key

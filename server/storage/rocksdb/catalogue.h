@@ -45,8 +45,8 @@ class Catalogue {
   // Returns the value of a row without its checksum, nothing if there is no such row.
   std::optional<absl::string_view> find(absl::string_view key) const;
 
-  // Adds to `batch` the rows of `change`, the new totals, and all rows that a failed change touched, as they should be.
-  // The caller writes the batch and then calls apply(change) if that succeeded, otherwise fail(change).
+  // Adds to `batch` the rows of `change`, the current state of every row that a failed change touched, and the new
+  // totals. The caller writes the batch and then calls apply(change) if that succeeded, otherwise fail(change).
   void add_to(rocksdb::WriteBatch& batch, rocksdb::ColumnFamilyHandle* meta, const CatalogueChange& change) const;
   void apply(const CatalogueChange& change);
   void fail(const CatalogueChange& change);

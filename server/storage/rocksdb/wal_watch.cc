@@ -49,8 +49,7 @@ rocksdb::WalFilter::WalProcessingOption WalWatch::LogRecordFound(unsigned long l
   next_write_ = first + batch.Count();
   if (gap_end_ != 0) {
     SceneCollector collector(log_family_, after_gap_);
-    batch.Iterate(&collector)
-        .PermitUncheckedError();  // after an error, the scenes collected before it are still correct
+    batch.Iterate(&collector).PermitUncheckedError();  // after an error the scenes collected so far are still correct
   }
   return WalProcessingOption::kContinueProcessing;
 }
