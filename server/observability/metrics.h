@@ -63,7 +63,7 @@ struct RpcCounts {
 struct QueryCounts {
   uint64_t queries = 0;
   Work work;
-  LatencyCounts latency;  // processor time a block
+  LatencyCounts latency;  // processor time of each block
 };
 
 // Reason of a refusal and the limit that it names; the limit may be empty.
