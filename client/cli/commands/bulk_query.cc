@@ -52,7 +52,7 @@ class BulkQueryRun {
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     absl::Status status = ask_all();
     // After an error of the input, still wait for the answers to the batches already sent. After an error of the
-    // server, do not: the stream has ended.
+    // server, do not: only answers before an error are written.
     while (!refused_ && !in_flight_.empty()) status.Update(write_front());
     answers_.end();
     hide_rows(context_);

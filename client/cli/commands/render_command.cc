@@ -69,7 +69,7 @@ absl::Status check_line(const RenderOptions& options) {
 }
 
 // Returns the bounds of what the picture shows: one object or instance (--at), or the whole scene. Sets
-// options.cast.revision to the scene's current revision, at which all rays are then queried.
+// options.cast.revision to the scene's current revision.
 absl::StatusOr<Aabbd> find_target(RenderOptions& options, const client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.cast.scene));
   options.cast.revision = {scene.epoch(), scene.revision()};

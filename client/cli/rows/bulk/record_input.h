@@ -34,7 +34,7 @@ class RecordInput {
 
   // Reads the next record. With `pause_at`, returns kPause if no data is available by that time. Returns
   // INVALID_ARGUMENT for a record of more than kMaxRecordBytes or an unclosed quote, or the error of ByteInput::read().
-  // The message does not contain the input's name and line: the caller adds name() and line().
+  // The caller must add name() and line() to the message of INVALID_ARGUMENT, which contains neither.
   absl::StatusOr<Arrival> next(Record& record, std::optional<Clock::time_point> pause_at);
 
   const std::string& name() const { return input_.name(); }
