@@ -33,7 +33,7 @@ struct ViewAxes {
 };
 
 struct Camera {
-  Vec3d eye;  // world
+  Vec3d eye;  // position in world coordinates
   ViewAxes axes;
   Projection projection = Projection::kPerspective;
   // Half the height of the image in world units: at distance 1 from the eye for perspective, at any distance for
@@ -43,8 +43,8 @@ struct Camera {
 
 struct CameraRay {
   Vec3f origin;  // relative to the eye; 0 in perspective projection
-  // Direction whose component along the view is 1, so that a hit's t is its depth: the distance from the eye's plane in
-  // world units.
+  // Direction, scaled so that its component along the view's forward axis is 1. The t of a hit is therefore its depth:
+  // the distance in world units from the plane through the eye perpendicular to the view.
   Vec3f direction;
 };
 

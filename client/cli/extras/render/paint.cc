@@ -10,7 +10,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kMaxHaze = 0.45;  // haze at the furthest hit, as a fraction of the light
+constexpr double kMaxHaze = 0.45;  // share of haze in the colour of the furthest hit
 constexpr Light kHaze = {0.09, 0.12, 0.18};
 
 template <class ColourOfPixel>
