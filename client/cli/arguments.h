@@ -1,5 +1,5 @@
-// Values of options as typed on a command line: triples, quaternions, ids. For the option parser, which reads any type
-// through operator>>. Plain data. Reading sets failbit unless the whole text has the expected form.
+// Types for option values as typed on a command line: triples, quaternions, ids. The option parser (CLI11) reads a
+// value through operator>>, which sets failbit unless the whole text has the expected form. Plain data.
 #ifndef LOCUS_CLIENT_CLI_ARGUMENTS_H_
 #define LOCUS_CLIENT_CLI_ARGUMENTS_H_
 
@@ -31,13 +31,13 @@ struct Number64 {
 std::istream& operator>>(std::istream& in, Triple& triple);
 std::istream& operator>>(std::istream& in, Quaternion& quaternion);
 std::istream& operator>>(std::istream& in, Number64& number);
-// Write a default value for the help text.
+// Write a value in the form that is read, so that the help text can show an option's default.
 std::ostream& operator<<(std::ostream& out, const Triple& triple);
 std::ostream& operator<<(std::ostream& out, const Quaternion& quaternion);
 std::ostream& operator<<(std::ostream& out, const Number64& number);
 
 std::vector<uint64_t> values_of(const std::vector<Number64>& numbers);
-// Narrows values to 32 bits. Precondition: the parser checked them with fits_32_bits().
+// Narrows values to 32 bits. Precondition: every value fits, which fits_32_bits() checks at parsing.
 std::vector<uint32_t> values32_of(const std::vector<Number64>& numbers);
 std::vector<float> floats_of(const std::vector<double>& numbers);
 std::vector<float> floats_of(const std::vector<Triple>& triples);

@@ -10,7 +10,8 @@
 namespace locus::cli {
 namespace {
 
-// Prefix of a validator's name, which stores the words: CLI11 never prints the name and returns it on request.
+// Prefix of the validator's name. The allowed words are stored in that name: CLI11 never prints it, and choices_of()
+// reads it back.
 constexpr char kName[] = "choices:";
 
 }  // namespace
@@ -30,7 +31,7 @@ CLI::Validator choices(const std::vector<std::string>& words) { return translate
 std::vector<std::string> choices_of(CLI::Option& option) {
   for (int i = 0;; ++i) {
     const CLI::Validator* validator = nullptr;
-    try {  // an exception is CLI11's only sign for the end of the list
+    try {  // CLI11 reports the end of the list only by an exception
       validator = option.get_validator(i);
     } catch (const CLI::OptionNotFound&) {
       return {};

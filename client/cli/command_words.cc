@@ -41,7 +41,7 @@ OptionWords words_of(CLI::Option& option) {
   return words;
 }
 
-// Appends the options of `app` and of its option groups. CLI11 keeps a group as a subcommand without a name.
+// Appends the options of `app` and of its option groups, which CLI11 represents as subcommands without a name.
 void add_options(CLI::App& app, CommandWords& words) {
   for (CLI::Option* option : app.get_options()) {
     const bool help_of_group = app.get_name().empty() && option == app.get_help_ptr();

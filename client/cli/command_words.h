@@ -1,5 +1,5 @@
-// The parser's commands and options as plain data, from which shell completions and manual pages are written. They are
-// read from the parser itself, so that these texts always agree with the program. Plain data; throws nothing.
+// Commands and options of the command-line parser as plain data, from which shell completions and manual pages are
+// written. They are read from the parser itself, so that these texts always agree with the program. Throws nothing.
 #ifndef LOCUS_CLIENT_CLI_COMMAND_WORDS_H_
 #define LOCUS_CLIENT_CLI_COMMAND_WORDS_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus::cli {
 
-// Kind of an option's value, as far as a shell can complete it.
+// Kind of an option's value; decides how a shell completes it.
 enum class ValueKind { kAnything, kChoice, kListOfChoices, kFile, kScene, kAddress };
 
 struct OptionWords {
@@ -19,7 +19,7 @@ struct OptionWords {
   ValueKind kind = ValueKind::kAnything;
   std::vector<std::string> choices = {};  // allowed words of kChoice and kListOfChoices
   std::string description = {};
-  std::string default_text = {};  // empty if there is none, or the description states it
+  std::string default_text = {};  // empty if the option has no default, or its description states the default
   bool required = false;
   bool repeatable = false;
 };
@@ -27,18 +27,18 @@ struct OptionWords {
 struct CommandWords {
   std::string path = {};  // "locus query ray"
   std::string description = {};
-  std::string footer = {};  // last part of the help: notes and examples
+  std::string footer = {};  // text after the options in the help: notes and examples
   std::vector<OptionWords> options = {};
   std::vector<OptionWords> positionals = {};
   std::vector<CommandWords> commands = {};
 };
 
-// Returns all commands and options of `app` except hidden ones (those in the group ""). Options keep the order in which
-// the help shows them. The name of the value selects its kind: FILE, OUT, DIRECTORY, BACKUP and DATA_DIR are files,
-// SCENE is a scene, ADDRESS is a server.
+// Returns all commands and options of `app` except hidden ones (CLI11's group ""). Options have the order of the help
+// text. ValueKind is derived from the value's name: FILE, OUT, DIRECTORY, BACKUP and DATA_DIR are files, SCENE is a
+// scene, ADDRESS is a server.
 CommandWords words_of(CLI::App& app);
 
-// Returns the command's option called `name` (with its dashes); null if it has none.
+// Returns the command's option called `name` (including its dashes), or null if the command has no such option.
 const OptionWords* find_option(const CommandWords& command, const std::string& name);
 
 }  // namespace locus::cli

@@ -1,5 +1,5 @@
-// The commands, one function each: it adds the command's options, help and examples to `parent`, and a callback that
-// runs the command through `context` once the line is parsed. `context` must outlive the parser.
+// Functions that add the commands to the parser. Each one adds a command's options, help and examples to `parent`, and
+// a callback that runs the command through `context` after the line was parsed. `context` must outlive the parser.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_H_
 
@@ -32,8 +32,9 @@ void add_health_command(CLI::App& parent, Context& context);
 void add_version_command(CLI::App& parent, Context& context);
 void add_completion_command(CLI::App& parent, Context& context);
 
-// Runs `run(options, context)`, which returns an absl::Status, if `command` was chosen. Does nothing if lines are only
-// checked (Lines::kScriptCheck).
+// Sets the parser callback of `command`, which CLI11 calls if the line chose this command: it runs `run(options,
+// context)`, which returns an absl::Status. While a script is only checked (Lines::kScriptCheck), the callback does
+// nothing.
 template <class Options, class Run>
 void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {
@@ -41,8 +42,9 @@ void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Contex
   });
 }
 
-// Like run_when_chosen(), for a command without side effects before Context::connect(). If lines are only checked, the
-// command runs up to connect(), which fails, so that options that exclude each other are reported.
+// Sets the callback like run_when_chosen(), for a command that has no side effects before Context::connect(). While a
+// script is only checked, `run` is called too. It then ends at connect(), which fails, so only usage errors (for
+// example options that exclude each other) are reported.
 template <class Options, class Run>
 void run_or_check_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {

@@ -1,5 +1,5 @@
 // State shared by all commands: output streams, global options, and the connection, which is opened on first use and
-// kept. Commands use no globals, so that one process can run many lines. Not thread-safe.
+// then reused. Commands use no globals, so that one process can run many lines. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_CONTEXT_H_
 #define LOCUS_CLIENT_CLI_CONTEXT_H_
 
@@ -25,11 +25,12 @@ struct GlobalOptions {
   Format format = Format::kTable;
 };
 
-// Choice whether to write progress lines, which overwrite themselves, to `err`.
+// Choice whether to write progress lines to `err`. A progress line overwrites itself, so it suits only a terminal.
 enum class Progress { kSilent, kLive };
 
-// Source of the lines that run through a context. A script has one connection, chosen before it starts. While a script
-// is checked, its commands are parsed and nothing is sent.
+// Source of the lines that run through a context: the program's own command line, a script, or the check of a script
+// before it runs. The check parses every line but sends nothing. A script's connection is chosen before the script
+// starts.
 enum class Lines { kProgram, kScript, kScriptCheck };
 
 class Context {
@@ -42,26 +43,28 @@ class Context {
   std::ostream& err() { return err_; }
   Progress progress() const { return progress_; }
 
-  // Returns the connection to options().address, and connects on the first call. Errors: UNAVAILABLE, with a message
-  // for people, if no server answers; a usage error while a batch is open, since no other request may be sent then;
-  // CANCELLED if lines are only checked.
+  // Returns the connection to options().address; the first call opens it. Errors: UNAVAILABLE, with advice, if no
+  // server answers; a usage error while a batch is open, since no other request may be sent then; CANCELLED if lines
+  // are only checked.
   absl::StatusOr<client::Client*> connect();
 
-  // Writes to the output in the chosen format.
+  // Writes `report` to out() in the format of options().
   void write(const Report& report);
 
-  // Makes write() keep a copy of each report for take_report(), for scripts that use its values.
+  // Makes write() store each report for take_report(). For scripts, which use the values of reports.
   void keep_reports() { keeps_reports_ = true; }
   bool keeps_reports() const { return keeps_reports_; }
-  // Returns the last report written since the previous call, once; null if there was none.
+  // Returns the last report that write() stored, and releases it, so that the next call returns null. Null also if
+  // write() was not called since the previous call.
   std::shared_ptr<const Report> take_report() { return std::move(kept_); }
 
-  // Returns the scene of lines that name none. Empty: every line must name one.
+  // Returns the scene used by lines that name none. If it is empty, every line must name its scene.
   const std::string& default_scene() const { return default_scene_; }
   void use_scene(std::string scene) { default_scene_ = std::move(scene); }
 
-  // Returns the revision of the last acknowledged change to `scene` made through this context; none before the first.
-  // Queries without a view of their own ask for at least this revision, so that they see the changes of earlier lines.
+  // Returns the revision of the last acknowledged change that was made to `scene` through this context, or none before
+  // the first one. Queries without --at-least and --exactly ask for at least this revision, so that they see the
+  // changes of earlier lines.
   std::optional<client::Revision> own(const std::string& scene) const;
   void remember_own(const std::string& scene, client::Revision revision) { own_[scene] = revision; }
   void forget_own(const std::string& scene) { own_.erase(scene); }
@@ -69,10 +72,11 @@ class Context {
   Lines lines() const { return lines_; }
   void set_lines(Lines lines) { lines_ = lines; }
 
-  // Returns the batch that `begin` opened, if any: update commands add to it instead of sending their own batch.
+  // Returns the batch that a script's `begin` opened, or none. While it is open, update commands add to it instead of
+  // sending a batch of their own.
   std::optional<PendingBatch>& pending_batch() { return pending_batch_; }
 
-  // Sets the outcome of the command that ran.
+  // Stores the result of the command that ran, for outcome().
   void finish(absl::Status outcome) { outcome_ = std::move(outcome); }
   const absl::Status& outcome() const { return outcome_; }
 

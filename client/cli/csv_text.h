@@ -1,8 +1,8 @@
-// Rows as csv (RFC 4180, with a line feed at the end of a line): for the report stream. Functions without state.
+// Rows as csv text (RFC 4180, but lines end with a line feed only). For the report stream. Functions without state.
 //
-// The keys of a row decide its columns: a key that names a vector is split (`normal.x,normal.y,normal.z`, `uv.u,uv.v`,
-// `rotation.x` .. `rotation.w`), any other key is one column. Values do not matter, so that the header is the same for
-// every result. Other lists and objects are one cell of JSON.
+// Only the keys of a row decide its columns, never its values, so that the header is the same for every result. A key
+// that names a vector is split (`normal.x,normal.y,normal.z`, `uv.u,uv.v`, `rotation.x` .. `rotation.w`); any other key
+// is one column. Lists and objects under such a key are one cell of JSON.
 #ifndef LOCUS_CLIENT_CLI_CSV_TEXT_H_
 #define LOCUS_CLIENT_CLI_CSV_TEXT_H_
 
@@ -16,8 +16,9 @@ namespace locus::cli {
 // Returns the header line, without a line feed.
 std::string csv_header(const std::vector<std::string>& keys);
 
-// Returns the line of one row, without a line feed. Null and absent values are empty cells. A text is quoted if it has
-// a comma, a quote, a line break or a blank at either end, or if it is empty, which distinguishes it from null.
+// Returns the line of one row, without a line feed. Null and absent values are empty cells. A text is quoted if it
+// contains a comma, a quote or a line break or has a blank at either end. The empty text is quoted too, which
+// distinguishes it from null.
 std::string csv_line(const Json& row, const std::vector<std::string>& keys);
 
 }  // namespace locus::cli

@@ -5,7 +5,7 @@ namespace {
 
 constexpr char kSceneArgument[] = "SCENE";
 
-// Returns whether `argument` is an option whose value is the next argument.
+// Returns whether `argument` is a global option whose value is the next argument.
 bool takes_next(const CLI::App& app, const std::string& argument) {
   const CLI::Option* const option = app.get_option_no_throw(argument);
   return option != nullptr && option->get_items_expected_max() > 0;

@@ -1,5 +1,5 @@
-// The default scene, used by lines that name none: set by `use` in a script, or by the environment's LOCUS_SCENE. For
-// commands with an argument SCENE, and for run_line(). Functions without state.
+// Default scene, which replaces a missing SCENE argument. It is set by `use` in a script, or by the environment
+// variable LOCUS_SCENE. For commands with the argument SCENE, and for run_line(). Functions without state.
 #ifndef LOCUS_CLIENT_CLI_DEFAULT_SCENE_H_
 #define LOCUS_CLIENT_CLI_DEFAULT_SCENE_H_
 
@@ -11,11 +11,12 @@
 
 namespace locus::cli {
 
-// Adds the required positional SCENE. It must be the command's first positional, and is the only one that may be
-// omitted if there is a default scene.
+// Adds the required positional argument SCENE. It must be the command's first positional, since with_scene() inserts
+// the default scene directly after the command's name.
 CLI::Option& add_scene_argument(CLI::App& command, std::string& scene);
 
-// Returns `arguments` with `scene` inserted as the SCENE of the command they name; none if that command takes no SCENE.
+// Returns `arguments` with `scene` inserted directly after the name of the command; none if that command has no
+// argument SCENE.
 std::optional<std::vector<std::string>> with_scene(const CLI::App& app, const std::vector<std::string>& arguments,
                                                    const std::string& scene);
 

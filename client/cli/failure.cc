@@ -17,7 +17,8 @@ constexpr char kToldPayload[] = "locus/told";
 
 std::string name_of(v1::Reason reason) { return std::string(absl::StripPrefix(v1::Reason_Name(reason), "REASON_")); }
 
-// Returns the hint for a server's reason; empty if only the status code decides (see hint_of_code()).
+// Returns the hint for a reason that the server gave; empty if the hint depends only on the status code (see
+// hint_of_code()).
 std::string hint_of_reason(v1::Reason reason, absl::string_view message) {
   switch (reason) {
     case v1::REASON_NOT_FOUND:

@@ -1,4 +1,4 @@
-// Errors on the command line: exit codes for scripts, error lines, and hints that say what to do next. Functions
+// Errors on the command line: exit codes for scripts, error lines, and hints that suggest the next step. Functions
 // without state.
 #ifndef LOCUS_CLIENT_CLI_FAILURE_H_
 #define LOCUS_CLIENT_CLI_FAILURE_H_
@@ -15,31 +15,32 @@ namespace locus::cli {
 
 enum class ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kUnreachable = 3, kDenied = 4, kNotFound = 5 };
 
-// Returns the error of a wrongly written command that the parser accepted; it exits with kUsage.
+// Returns a usage error, with exit code kUsage: for a command line that the parser accepted but that makes no sense.
 absl::Status usage_error(absl::string_view message);
 
-// Marks an error as already printed: run_line() does not print it again, but it still decides the exit code.
+// Marks an error as already printed. run_line() then does not print it again, but the exit code still depends on it.
 absl::Status told(absl::Status status);
 bool is_told(const absl::Status& status);
 
-// Returns the name of an error: USAGE, the server's reason without "REASON_", or the status code if the server gave no
-// reason.
+// Returns the name of an error: USAGE for a usage error, else the server's reason without "REASON_", or the status
+// code's name if the server gave no reason.
 std::string failure_name(const absl::Status& status);
 // Returns whether failure_name() can return `name`.
 bool is_failure_name(const std::string& name);
 
-// Returns `status` with `place: ` before its message; code and payloads stay.
+// Returns `status` with "PLACE: " prepended to its message; code and payloads are kept.
 absl::Status with_place(const absl::Status& status, absl::string_view place);
 
 ExitCode exit_code_of(const absl::Status& status);
 
 // Writes a line "error: ..." and, if there is a hint, a line "hint: ...". With json and ndjson, writes one object on
-// one line instead: {"error": {"code", "message", "reason", "field", "index", "limit", "hint"}}. Entries without a
-// value are omitted.
+// one line instead: {"error": {"code", "message", "reason", "field", "index", "limit", "hint"}}. Keys without a value
+// are omitted.
 void write_failure(std::ostream& err, Format format, const absl::Status& status);
 
-// Returns OK if no item of the batch was refused. Otherwise returns an error with the number of refused items and the
-// reason of the first: NOT_FOUND if all listed items have unknown ids, else FAILED_PRECONDITION.
+// Returns OK if the server refused no item of the batch. Otherwise returns an error that contains the number of refused
+// items and the reason of the first one. The code is NOT_FOUND if all items that the ack lists have unknown ids, else
+// FAILED_PRECONDITION.
 absl::Status refused_items(const v1::UpdateAck& ack);
 
 }  // namespace locus::cli

@@ -1,9 +1,9 @@
-// Reports, the only form in which commands write answers. A report has a head (facts about the whole answer) and rows,
-// and is printed as an aligned table, as one JSON document, as one JSON object per line, or as csv. Plain data and
+// Reports: the only form in which commands write answers. A report has a head (facts about the whole answer) and rows.
+// It is printed as an aligned table, as one JSON document, as one JSON object per line, or as csv. Plain data and
 // functions without state. Rows that arrive one after another are written through client/cli/report_stream.h.
 //
-// In JSON, ids, groups, tags and epochs are strings, since they use all 64 bits; revisions, ticks and counts are
-// numbers; a miss and infinity are null.
+// In JSON, ids, groups, tags and epochs are strings, since many JSON readers round 64-bit integers; revisions, ticks
+// and counts are numbers; a miss and infinity are null.
 #ifndef LOCUS_CLIENT_CLI_OUTPUT_H_
 #define LOCUS_CLIENT_CLI_OUTPUT_H_
 
@@ -17,7 +17,7 @@
 
 namespace locus::cli {
 
-// JSON value whose objects keep the order in which keys were added.
+// JSON value whose objects preserve the order in which keys were added.
 using Json = nlohmann::ordered_json;
 
 enum class Format { kTable, kJson, kNdjson, kCsv };
@@ -26,9 +26,9 @@ struct Report {
   Json head = Json::object();
   std::string rows_name;  // key of the rows in a JSON document; empty = a report without rows
   std::vector<Json> rows;
-  std::string no_rows = "nothing";  // text of a table without rows
-  // Columns of a table and of csv. Empty: the keys of the first row, in csv the keys of all rows. Set it if there may
-  // be no rows, so that csv still has its header.
+  std::string no_rows = "nothing";  // text printed instead of a table that has no rows
+  // Columns of a table and of csv. If empty, a table uses the keys of the first row, and csv uses the keys of all rows.
+  // Set it if the report may have no rows, so that csv still has its header.
   std::vector<std::string> keys = {};
 };
 
@@ -39,9 +39,11 @@ struct Report {
 //   csv:    a header and one line per row, without the head; without rows_name, a header and one line with the head
 void write_report(std::ostream& out, Format format, const Report& report);
 
-// Returns JSON on one line. Bytes that are not UTF-8 are replaced, since a server's text may have any bytes.
+// Returns `value` as JSON on one line. Bytes that are not UTF-8 are replaced, since a text from a server may contain
+// any bytes.
 std::string json_line(const Json& value);
-// Returns the text of a table cell: yes or no for booleans, "-" for null, commas between the entries of a list.
+// Returns the text of a table cell: "yes" or "no" for a boolean, "-" for null, and a list's entries separated by
+// commas.
 std::string table_cell(const Json& value);
 
 // Returns an id, group, tag or epoch as a string.

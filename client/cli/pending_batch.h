@@ -1,8 +1,8 @@
-// Update batch that collects the changes of several lines, so that they become one revision. For `begin` ... `commit`
-// in scripts and the commands between them. Not thread-safe.
+// Update batch that collects the changes of several lines of a script, so that they become one revision. For `begin`
+// ... `commit` and the commands between them. Not thread-safe.
 //
-// Invariant: the batch has the same effect as its lines run one by one. The server applies removes, then inserts, then
-// moves, then relabels, so the lines about one object must come in that order; others are refused.
+// Invariant: the batch has the same effect as running its lines one by one. The server applies removes, then inserts,
+// then moves, then relabels, so the lines about one object must come in that order; add() refuses others.
 #ifndef LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 #define LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 
@@ -22,11 +22,12 @@ class PendingBatch {
     if (tick) batch_.set_tick(*tick);
   }
 
-  // Adds the changes of a line. Returns a usage error, and adds nothing, if the line names another scene or a tick,
-  // differs in upsert, has float positions in a frame, or has a change that the server would apply in another order.
+  // Adds the changes of one line of the script. Returns a usage error, and adds nothing, if the line names a scene
+  // other than scene(), sets a tick, differs from earlier lines in `upsert`, has float positions relative to a frame,
+  // or has a change that the server would apply before one of an earlier line.
   absl::Status add(const std::string& scene, const v1::UpdateBatch& line);
 
-  // Returns the scene of the lines; empty before the first add().
+  // Returns the scene that all lines name; empty before the first add().
   const std::string& scene() const { return scene_; }
   const v1::UpdateBatch& batch() const { return batch_; }
 
@@ -40,7 +41,7 @@ class PendingBatch {
 
   std::string scene_;
   v1::UpdateBatch batch_;
-  std::map<uint64_t, Step> last_step_;  // last step of each id named so far
+  std::map<uint64_t, Step> last_step_;  // last kind of change to each id so far
 };
 
 }  // namespace locus::cli

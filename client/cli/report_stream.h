@@ -1,5 +1,5 @@
-// Writer of a report whose rows arrive one after another: facts known before the rows, the rows, and facts known after
-// them, in any format. For answers too large to hold in memory; write_report() uses it, too. Not thread-safe.
+// Writer of a report whose rows arrive one after another, in any format: facts known before the rows, the rows, and
+// facts known only after them. For answers too large to hold in memory; write_report() uses it, too. Not thread-safe.
 //
 // Call order: begin() once, then add() for each row, then end() once.
 #ifndef LOCUS_CLIENT_CLI_REPORT_STREAM_H_
@@ -19,7 +19,7 @@ struct ReportShape {
   std::string rows_name;            // key of the rows in a JSON document
   std::vector<std::string> keys;    // columns of a table and of csv; empty = the keys of the first row
   std::string no_rows = "nothing";  // text of a table without rows
-  // Number of rows that a table holds back to find the widths of its columns. Longer cells of later rows break the
+  // Number of rows that a table buffers to compute the widths of its columns. A longer cell in a later row breaks the
   // alignment.
   size_t width_rows = std::numeric_limits<size_t>::max();
 };
@@ -29,11 +29,11 @@ class ReportStream {
   // Borrows `out`, which must outlive the stream.
   ReportStream(std::ostream& out, Format format, ReportShape shape);
 
-  // Begins the report with `head`, facts known before the rows. json writes them at once, a table below its rows; csv
-  // and ndjson omit them.
+  // Begins the report. `head` contains facts known before the rows: json writes them at once, a table writes them below
+  // its rows, csv and ndjson omit them.
   void begin(const Json& head);
   void add(const Json& row);
-  // Ends the report with `tail`, facts known only after the last row.
+  // Ends the report. `tail` contains facts known only after the last row; they are written as those of `head`.
   void end(const Json& tail = Json::object());
 
  private:
@@ -46,7 +46,7 @@ class ReportStream {
   ReportShape shape_;
   Json head_ = Json::object();
   size_t rows_ = 0;
-  std::vector<std::vector<std::string>> held_;  // lines of a table, up to width_rows rows
+  std::vector<std::vector<std::string>> held_;  // buffered lines of a table, until there are width_rows of them
   std::vector<size_t> widths_;
 };
 

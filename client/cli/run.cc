@@ -34,17 +34,18 @@ LOCUS_SCENE names the scene of commands that are given none.
 `locus COMMAND --help` shows a command's options and examples. `source <(locus completion bash)` lets the shell complete
 lines of locus; zsh and fish have theirs.)";
 
-// Result of a line whose command did not run: a help text (code 0) or an error of the parser.
+// Result of a line that the parser did not run: a help text (code 0) or a parser error.
 struct Refusal {
   int code = 0;
   std::string out;
   std::string err;
-  std::string message;           // parser's message, without advice
+  std::string message;           // the parser's message alone, without the advice that `err` also has
   bool lacks_something = false;  // a required option or argument is missing
   bool wrong_value = false;
 };
 
-// Parses and runs one line. CLI11 expects its arguments in reverse order and throws its errors, which end here.
+// Parses one line and runs its command. Returns none if the command ran. CLI11 expects the arguments in reverse order
+// and reports errors by exceptions, which are caught here.
 std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::string>& arguments) {
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
@@ -64,8 +65,8 @@ std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::strin
   return std::nullopt;
 }
 
-// Parses and runs a line. If a required argument is missing, retries with the default scene: CLI11 checks required
-// arguments before it runs a command, so the first attempt ran nothing.
+// Parses and runs a line. If a required argument is missing, retries with the default scene inserted. This is safe
+// because CLI11 checks required arguments before it runs a command, so the first attempt had no effect.
 std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app;
   build_cli(app, context);
@@ -78,7 +79,8 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
   return parse_and_run(second, *longer);
 }
 
-// Refuses --address and --timeout in a script, whose connection is chosen once, before `run`.
+// Makes the parser refuse --address and --timeout, and ignore their environment variables. For lines of a script: they
+// all use one connection, whose options are given on the command line of `locus`, before `run`.
 void restrict_to_script(CLI::App& app) {
   for (const char* name : {"--address", "--timeout"}) {
     app.get_option(name)->envname("")->check([name](const std::string&) {
@@ -87,7 +89,8 @@ void restrict_to_script(CLI::App& app) {
   }
 }
 
-// Returns the parser's message. If no command was found, appends the line, since the parser does not quote it.
+// Returns the parser's message. If no command was recognized, appends the line, since the parser's message does not
+// quote it.
 std::string in_words(const Refusal& refusal, const std::vector<std::string>& arguments) {
   if (refusal.message != CLI::RequiredError::Subcommand(1).what()) return refusal.message;
   constexpr size_t kShownBytes = 60;
@@ -163,8 +166,8 @@ absl::Status run_script_line(const std::vector<std::string>& arguments, Context&
   context.finish(absl::OkStatus());
   const std::optional<Refusal> refusal = run_with_default_scene(arguments, context);
   context.options() = before;
-  // While lines are only checked, a placeholder of an unknown value may be invalid, or may conflict with other options:
-  // ignore errors of such lines.
+  // While a script is only checked, a value may be a placeholder, which can be invalid or conflict with other options.
+  // Ignore errors of lines with placeholders.
   const bool guessed = context.lines() == Lines::kScriptCheck && has_unknown(arguments);
   if (!refusal) return guessed ? absl::OkStatus() : context.outcome();
   if (refusal->code != 0) {

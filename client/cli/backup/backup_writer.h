@@ -1,4 +1,5 @@
-// Writer of a server's backup to a directory, with its file SHA256SUMS. For `locus backup`. Not thread-safe.
+// Writer of a server's backup to a directory. Adds the file SHA256SUMS with the checksums of all files. For `locus
+// backup`. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_BACKUP_WRITER_H_
 #define LOCUS_CLIENT_CLI_BACKUP_BACKUP_WRITER_H_
 
@@ -15,12 +16,12 @@
 
 namespace locus::cli {
 
-// Callback for progress, with the bytes done so far and the total.
+// Callback for progress; receives the number of bytes done so far and the total.
 using BackupProgress = std::function<void(uint64_t done, uint64_t total)>;
 
 class BackupWriter final : public client::BackupSink {
  public:
-  // Borrows the directory. Precondition: PartialDirectory::make() was not called.
+  // Borrows the directory. Precondition: PartialDirectory::make() was not called on it; begin() calls it.
   BackupWriter(PartialDirectory& directory, BackupProgress progress);
 
   absl::Status begin(const client::BackupSize& announced) override;
@@ -28,7 +29,7 @@ class BackupWriter final : public client::BackupSink {
   absl::Status add(absl::string_view bytes) override;
   absl::Status end_file(const client::BackupFile& file) override;
 
-  // Adds SHA256SUMS and renames the directory to its target. Call it after the last file.
+  // Adds SHA256SUMS and renames the directory to its final name. Call it after the last end_file().
   absl::Status finish();
 
  private:

@@ -1,5 +1,5 @@
-// The file SHA256SUMS of a backup, in the format of coreutils, so that `sha256sum -c SHA256SUMS` checks a backup
-// without locus. Plain data and functions without state.
+// Contents of the file SHA256SUMS of a backup, in the format of coreutils, so that `sha256sum -c SHA256SUMS` checks a
+// backup without locus. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_CHECKSUMS_H_
 #define LOCUS_CLIENT_CLI_BACKUP_CHECKSUMS_H_
 
@@ -21,11 +21,11 @@ struct Checksum {
   bool operator==(const Checksum&) const = default;
 };
 
-// Returns one line per file: its hash in lower case, two spaces, its path.
+// Returns one line per file: its hash in lower case hexadecimal, two spaces, its path.
 std::string checksum_text(const std::vector<Checksum>& checksums);
 
-// Parses exactly the format of checksum_text(), so that every changed byte is noticed. DATA_LOSS naming the line for
-// any other text, for a path that leads out of the backup and for a repeated path.
+// Parses only texts in exactly the format of checksum_text(), so that any changed byte of the file is noticed. Returns
+// DATA_LOSS that names the line for any other text, for a path that leads out of the backup, and for a repeated path.
 absl::StatusOr<std::vector<Checksum>> parse_checksums(absl::string_view text);
 
 }  // namespace locus::cli

@@ -9,9 +9,9 @@
 
 namespace locus::cli {
 
-// Returns the error "cannot DOING PATH: ...", with advice for common causes. `error` is an errno: NOT_FOUND for ENOENT,
-// RESOURCE_EXHAUSTED for a full disk, else FAILED_PRECONDITION. Missing file permissions are not PERMISSION_DENIED,
-// which is reserved for denials by the server.
+// Returns the error "cannot DOING PATH: ...", with advice for common causes. `error` is the errno of the failed call.
+// The code is NOT_FOUND for ENOENT, RESOURCE_EXHAUSTED for a full disk, else FAILED_PRECONDITION. Missing file
+// permissions are not PERMISSION_DENIED, because that code is reserved for denials by the server.
 absl::Status file_error(absl::string_view doing, const std::string& path, int error);
 
 }  // namespace locus::cli

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Access for the owner only, since scenes may be secret.
+// File modes that give access to the owner only, since a scene's data may be confidential.
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kFileMode = 0600;
 
@@ -129,7 +129,7 @@ absl::Status PartialDirectory::keep() {
     RETURN_IF_ERROR(sync_folder(absl::StrCat(partial_, "/", folder)));
   }
   RETURN_IF_ERROR(sync_folder(partial_));
-  // rename() replaces an empty directory and fails if anything else exists at the target.
+  // rename() replaces an empty directory at the target, and fails if anything else exists there.
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) return file_error("make", target_, errno);
   made_ = false;
   return sync_folder(fs::path(target_).parent_path().string());

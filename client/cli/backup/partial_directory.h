@@ -1,8 +1,8 @@
-// Directory that appears complete or not at all: it is created and filled as TARGET.partial, and renamed to TARGET when
-// all its files are synced to disk. For backups and restored data directories. Not thread-safe.
+// Directory that appears either complete or not at all. It is created and filled as TARGET.partial, and renamed to
+// TARGET after all its files were synced to disk. For backups and restored data directories. Not thread-safe.
 //
-// Invariant: TARGET does not change before keep(). The destructor removes TARGET.partial unless keep() renamed it; a
-// process that is killed leaves it behind.
+// Invariant: TARGET does not change before keep(). The destructor removes TARGET.partial unless keep() has renamed it;
+// a process that is killed leaves TARGET.partial behind.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_PARTIAL_DIRECTORY_H_
 #define LOCUS_CLIENT_CLI_BACKUP_PARTIAL_DIRECTORY_H_
 
@@ -15,7 +15,7 @@
 
 namespace locus::cli {
 
-// Choice of what may exist at the target: nothing, or nothing but an empty directory.
+// Rule for what may exist at the target beforehand: nothing, or at most an empty directory.
 enum class TargetRule { kNothing, kNothingOrEmpty };
 
 class PartialDirectory {
@@ -30,19 +30,21 @@ class PartialDirectory {
   const std::string& target() const { return target_; }
   const std::string& partial() const { return partial_; }
 
-  // Returns FAILED_PRECONDITION if the target breaks the rule or TARGET.partial exists.
+  // Returns FAILED_PRECONDITION if what exists at the target violates the rule, or if TARGET.partial exists.
   absl::Status check() const;
-  // Calls check() and creates TARGET.partial, accessible to its owner only. RESOURCE_EXHAUSTED if the disk has less
-  // than `bytes` free bytes.
+  // Calls check() and creates TARGET.partial, accessible to its owner only. Returns RESOURCE_EXHAUSTED if less than
+  // `bytes` bytes are free on the disk.
   absl::Status make(uint64_t bytes);
 
-  // Creates the file `path` and its folders, and opens it for write(). Only one file is open at a time. `path` must be
-  // relative, valid (BackupPaths in client/lib/backup.h) and new. The file is synced to disk by close_file().
+  // Creates the file `path` and its parent folders, and opens it for write(). Only one file is open at a time. `path`
+  // must be relative, valid (BackupPaths in client/lib/backup.h) and not created before. close_file() syncs the file to
+  // disk.
   absl::Status open_file(const std::string& path);
   absl::Status write(absl::string_view bytes);
   absl::Status close_file();
 
-  // Syncs the folders and renames the directory to the target. Precondition: no file is open.
+  // Completes the directory: syncs its folders to disk and renames TARGET.partial to TARGET, after which the destructor
+  // removes nothing. Preconditions: make() succeeded, and no file is open.
   absl::Status keep();
 
  private:
@@ -52,7 +54,7 @@ class PartialDirectory {
   const std::string partial_;
   const TargetRule rule_;
   bool made_ = false;
-  std::set<std::string> folders_;  // created folders, relative paths
+  std::set<std::string> folders_;  // folders created by open_file(), relative paths
   int file_ = -1;                  // descriptor of the open file; -1 = none
   std::string file_path_;
 };

@@ -1,4 +1,4 @@
-// Progress line of a backup or a restore, written if the context's progress is live.
+// Progress line of a backup or a restore; written only if the context's progress is live.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
 #define LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
 
@@ -11,12 +11,13 @@
 
 namespace locus::cli {
 
-// Writer of the progress line. Borrows the context, which must outlive it; it must outlive the result of progress().
+// Writer of the progress line. Borrows the context, which must outlive it. The callback from progress() borrows this
+// object.
 class ProgressLine {
  public:
   ProgressLine(std::string doing, Context& context) : doing_(std::move(doing)), context_(context) {}
 
-  // Returns the callback that updates the line; empty if progress is not live.
+  // Returns the callback that rewrites the line, or an empty function if progress is not live.
   BackupProgress progress() const {
     if (context_.progress() != Progress::kLive) return {};
     return [this](uint64_t done, uint64_t total) {

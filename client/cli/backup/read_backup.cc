@@ -25,10 +25,11 @@ namespace fs = std::filesystem;
 
 constexpr size_t kReadBytes = size_t{1} << 20;
 constexpr size_t kNamedProblems = 5;
-// Maximum size of SHA256SUMS: one line for each file that a backup may have.
+// Maximum size of SHA256SUMS: one line for each of the maximum number of files, of 64 hexadecimal digits, two spaces,
+// the path and a line feed.
 constexpr uint64_t kMaxChecksumBytes = client::kMaxBackupFiles * (client::kMaxBackupPathLength + 67);
 
-// Damage found in a backup: the first few files by name, and a count.
+// Damage found in a backup: counts the damaged files and names the first kNamedProblems of them.
 class Problems {
  public:
   void add(absl::string_view path, absl::string_view what) {
@@ -48,7 +49,7 @@ class Problems {
   size_t count_ = 0;
 };
 
-// Reads a file and passes its bytes to `take`, until the end or until `take` fails.
+// Reads a file in chunks and passes each chunk to `take`, until the file ends or `take` returns an error.
 absl::Status read_file(const std::string& path, absl::FunctionRef<absl::Status(absl::string_view)> take) {
   const int file = open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
   if (file < 0) return file_error("read", path, errno);
@@ -84,7 +85,7 @@ absl::StatusOr<std::vector<Checksum>> read_checksums(const std::string& backup) 
       absl::StrCat("the backup ", backup, " is damaged: ", checksums.status().message(), "; take another backup"));
 }
 
-// Returns the sizes of all files below `backup` except SHA256SUMS, by relative path.
+// Returns the size of every file below `backup` except SHA256SUMS, by relative path.
 absl::StatusOr<std::map<std::string, uint64_t>> list_files(const std::string& backup, Problems& problems) {
   std::map<std::string, uint64_t> sizes;
   std::error_code why;
@@ -114,7 +115,8 @@ struct Contents {
   uint64_t bytes = 0;
 };
 
-// Returns the files that are listed and exist. Adds every other file, listed or existing, to `problems`.
+// Returns the files that are both listed in SHA256SUMS and present in the backup. Adds every file that is only listed
+// or only present to `problems`.
 absl::StatusOr<Contents> find_files(const std::string& backup, Problems& problems) {
   ASSIGN_OR_RETURN(const std::vector<Checksum> checksums, read_checksums(backup));
   ASSIGN_OR_RETURN(auto sizes, list_files(backup, problems));

@@ -1,4 +1,4 @@
-// Verification of a backup by its SHA256SUMS, with an optional copy. For `locus restore`. Functions without state.
+// Verification of a backup against its SHA256SUMS, with an optional copy. For `locus restore`. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_READ_BACKUP_H_
 #define LOCUS_CLIENT_CLI_BACKUP_READ_BACKUP_H_
 
@@ -11,9 +11,10 @@
 
 namespace locus::cli {
 
-// Reads every file of the directory `backup` once and verifies its hash. With `copy`, on which make() was not called,
-// writes all files except SHA256SUMS to it; the caller then calls keep(). DATA_LOSS naming the first few files that are
-// missing, changed or not listed; with `copy`, reading ends at the first of them. NOT_FOUND if there is no backup.
+// Reads every file of the directory `backup` once and verifies its hash. If `copy` is not null, writes all files except
+// SHA256SUMS to it; the caller must not have called make() on it, and calls keep() afterwards. Returns DATA_LOSS that
+// names the first few files that are missing, changed or not listed; with `copy`, reading ends at the first such file.
+// Returns NOT_FOUND if there is no backup.
 absl::StatusOr<client::BackupSize> read_backup(const std::string& backup, PartialDirectory* copy,
                                                const BackupProgress& progress);
 

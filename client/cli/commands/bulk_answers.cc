@@ -10,8 +10,8 @@
 namespace locus::cli {
 namespace {
 
-constexpr size_t kWidthRows = 1000;          // rows of a table that decide the widths of its columns
-constexpr uint64_t kListedTruncated = 1000;  // maximum of indices listed; all are counted
+constexpr size_t kWidthRows = 1000;          // rows from which a table computes its column widths
+constexpr uint64_t kListedTruncated = 1000;  // maximum number of row indices in the report
 
 absl::Status no_fit() { return absl::DataLossError("the server's answer does not fit the question"); }
 
@@ -70,7 +70,8 @@ void BulkAnswers::note(const v1::QueryResult& result) {
     report_.begin(head);
     first_revision_ = result.revision();
   }
-  // With `follow`, answers may arrive out of the order of their revisions: keep the newest.
+  // With `follow`, an answer may have an older revision than an answer before it: keep the newest revision and its
+  // tick.
   if (!revision_ || result.revision() > revision_->revision) tick_ = result.tick();
   if (!revision_ || result.revision() > revision_->revision) revision_ = {result.epoch(), result.revision()};
   if (!result.has_work()) return;

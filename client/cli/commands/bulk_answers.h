@@ -1,4 +1,4 @@
-// Writer of the answers to bulk queries, as one report, while they arrive. For bulk_query.cc. Not thread-safe.
+// Writer that prints the answers to bulk queries as one report while they arrive. For bulk_query.cc. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_ANSWERS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_ANSWERS_H_
 
@@ -20,20 +20,20 @@ struct BulkQuery;
 
 class BulkAnswers {
  public:
-  // Borrows `query` and `context`. With `follow` answers may have different revisions; the report then shows the first
-  // and the newest.
+  // Borrows `query` and `context`. With `follow`, answers may have different revisions, and the report shows the first
+  // and the newest one.
   BulkAnswers(const BulkQuery& query, bool follow, Context& context);
 
-  // Appends the answer to `sent`, whose blocks have these frames. DATA_LOSS if the answer does not match the query,
-  // UNKNOWN if the output cannot be written.
+  // Appends the rows of `result`, the answer to the message whose rows are `sent` and whose blocks have the frames
+  // `frames`. Returns DATA_LOSS if the answer does not match the query, UNKNOWN if the output cannot be written.
   absl::Status write(const v1::QueryResult& result, const SentRows& sent, const std::vector<client::Double3>& frames);
 
-  // Completes the report; does nothing if there was no answer.
+  // Completes the report. Does nothing if no answer was written.
   void end();
 
   // Returns the newest revision among the answers; none before the first answer.
   std::optional<client::Revision> revision() const { return revision_; }
-  // Returns the number of answered rows of the input.
+  // Returns the number of input rows that were answered so far.
   uint64_t rows() const { return rows_; }
 
  private:
@@ -51,7 +51,7 @@ class BulkAnswers {
   uint64_t rows_ = 0;
   uint64_t truncated_ = 0;
   size_t clamped_ = 0;
-  Json truncated_rows_ = Json::array();  // indices of the first truncated queries
+  Json truncated_rows_ = Json::array();  // row indices of the first truncated queries
   v1::Work work_;
   bool has_work_ = false;
 };

@@ -43,15 +43,16 @@ class BulkQueryRun {
       : query_(query), options_(options), bulk_(bulk), context_(context), answers_(query, bulk.follow, context) {}
 
   absl::Status run() {
-    // While a script is checked, do not open the input: an earlier line may create it, and a pipe can be read only
-    // once.
+    // While a script is only checked, do not open the input: an earlier line may create the file, and a pipe can be
+    // read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, query_.schema));
     ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
     reader_ = reader.get();
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     absl::Status status = ask_all();
-    // After a wrong row, still wait for the answers to earlier batches; after an error of the server, do not.
+    // After an error of the input, still wait for the answers to the batches already sent. After an error of the
+    // server, do not: only answers before an error are written.
     while (!refused_ && !in_flight_.empty()) status.Update(write_front());
     answers_.end();
     hide_rows(context_);
@@ -73,7 +74,7 @@ class BulkQueryRun {
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
       ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
-      // For an input without rows, send an empty batch to check that the scene exists and to get its revision.
+      // If the input has no rows, send one empty batch, which checks that the scene exists and returns its revision.
       if (batch.rows() > 0 || (end == BatchEnd::kEnd && !asked)) {
         asked = true;
         RETURN_IF_ERROR(send(batch));
@@ -83,7 +84,7 @@ class BulkQueryRun {
     }
   }
 
-  // Sends the batch in as many messages as its blocks need.
+  // Sends the rows of `batch`, in several messages if they need more blocks than a message may have.
   absl::Status send(const RowBatch& batch) {
     size_t begin = 0;
     do {
@@ -111,7 +112,8 @@ class BulkQueryRun {
     }
   }
 
-  // Adds the rows from `begin` on as blocks, up to kMaxBlocks. Returns the first row that was not added.
+  // Adds the rows from index `begin` on to `message`, one block for each run of rows with the same frame, until the
+  // message has kMaxBlocks blocks. Returns the index of the first row that was not added.
   size_t add_blocks(const RowBatch& batch, size_t begin, InFlight& message, client::QueryBuilder& builder) const {
     message.sent.first_row = batch.first_row + begin;
     const size_t first = begin;
@@ -130,7 +132,8 @@ class BulkQueryRun {
     return begin;
   }
 
-  // Writes the answers that are ready. If the input has no more data for now, waits for all answers.
+  // Writes the answers at the front of the queue that have arrived. If the input has no more data for now, waits for
+  // all answers instead, so that a pipe gets them.
   absl::Status write_answers(BatchEnd end) {
     while (!in_flight_.empty()) {
       if (end == BatchEnd::kFull &&

@@ -1,13 +1,14 @@
-// Queries whose rows are read from a file or a pipe, in batches, with answers in the order of the input. For the query
-// commands. Keeps at most kBulkWindow batches and their answers in memory, however long the input is.
+// Runner of queries whose rows are read from a file or a pipe: sends them in batches and writes the answers in the
+// order of the input. For the query commands. Holds at most kBulkWindow batches and their answers in memory, however
+// long the input is.
 //
-// All rows are answered at one revision: the view of the first batch is given by the options, and every later batch
-// asks `exactly` for the revision of the first answer. A scene keeps a bounded number of revisions; when that revision
-// is dropped, the run ends with OUT_OF_RANGE, after the answers so far. With `follow`, each batch asks for the newest
-// revision instead, and at least for the newest one received so far.
+// Without `follow`, all rows are answered at one revision: the first batch has the view that the options select, and
+// every later batch asks `exactly` for the revision of the first answer. The server retains a bounded number of
+// revisions; when it drops this one, the run ends with OUT_OF_RANGE after the answers received so far. With `follow`,
+// each batch is answered at the newest revision, at least the newest one received so far.
 //
-// A row's answer does not depend on the other rows of its batch, because its frame is a function of its own position
-// (frame_of).
+// The answer to a row does not depend on the other rows of its batch, because the row's frame is a function of its own
+// position (frame_of).
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_QUERY_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_QUERY_H_
 
@@ -28,36 +29,38 @@ struct BlockRows {
   const RowBatch& batch;
   RowSpan rows;
   client::Double3 frame;
-  std::vector<float> offsets;  // 3 per row: field 0 of the schema, relative to the frame
+  std::vector<float> offsets;  // 3 per row: the position (field 0 of the schema) relative to `frame`
 };
 
-// Parts of a bulk query that depend on the kind of query.
+// Properties of a bulk query that depend on the kind of query.
 struct BulkQuery {
-  RowSchema schema;  // its first field is the position
+  RowSchema schema;  // field 0 must be the position
   RowLayout layout;
   std::string rows_name;
   bool any = false;  // rays in mode ANY: rows have only `hit`
   std::function<void(const BlockRows& rows, client::QueryBuilder& builder)> add_block;
 };
 
-// Returns the frame for a position: the origin if every coordinate is exactly a float, else the nearest corner of a
-// grid of spacing 16,384, so that rounding the offset to float changes it by less than 0.0005.
+// Returns the frame to use for a position. It is the origin if every coordinate is exactly representable as a float.
+// Otherwise it is the nearest point of a grid of spacing 16,384, so that rounding the offset to float moves the
+// position by less than 0.0005.
 client::Double3 frame_of(double x, double y, double z);
 
-// Appends the fields that rows of every kind of query may have: mask and ignore_group.
+// Appends the fields that every kind of query has, mask and ignore_group, to the schema.
 void add_filter_fields(const QueryOptions& options, RowSchema& schema);
-// Sets the block's columns of these fields; `first` is the index of the first one in the schema.
+// Sets the columns for mask and ignore_group of a block. `first` is the index of mask in the schema; ignore_group
+// follows it.
 template <class Block>
 void apply_filter_columns(const QueryOptions& options, const BlockRows& rows, size_t first, Block& block) {
   block.masks(bits_column(rows.batch.columns[first], rows.rows, client::kEveryMask, values32_of(options.masks)));
   block.ignore_groups(id_column(rows.batch.columns[first + 1], rows.rows, 0, values_of(options.ignore_groups)));
 }
 
-// Returns a usage error for query options that cannot be used with rows from an input.
+// Returns a usage error for query options that cannot be combined with rows from an input.
 absl::Status check(const QueryOptions& options, const BulkOptions& bulk);
 
-// Reads rows, asks and writes answers until the input ends. Errors of the input name its line. After any error the
-// answers before it are written, and the message says how many rows were answered.
+// Reads rows, sends queries and writes answers until the input ends. The message of an input error names its line.
+// After any error, the answers before it have been written, and the message contains the number of answered rows.
 absl::Status run_bulk_query(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk,
                             Context& context);
 

@@ -36,8 +36,8 @@ class BulkUpdateRun {
       : update_(update), scene_(scene), bulk_(bulk), context_(context) {}
 
   absl::Status run() {
-    // While a script is checked, do not open the input: an earlier line may create it, and a pipe can be read only
-    // once.
+    // While a script is only checked, do not open the input: an earlier line may create the file, and a pipe can be
+    // read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, update_.schema));
     const absl::StatusOr<client::Client*> client = context_.connect();
@@ -47,7 +47,7 @@ class BulkUpdateRun {
     options.max_in_flight = static_cast<int>(kBulkWindow);
     stream_ = (*client)->update_stream(scene_, options);
     absl::Status status = send_all();
-    // Also after an error, wait for the acks of all batches in flight, since the report counts them.
+    // Even after an error, wait for the acks of all batches in flight, since the report counts their items.
     while (!timed_out_ && !in_flight_.empty()) status.Update(take_front());
     write_totals();
     if (!status.ok()) return in_words(status, absl::StrCat(status.message(), "; ", what_was_done()));
@@ -66,7 +66,7 @@ class BulkUpdateRun {
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
       ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
-      // For an input without rows, send an empty batch to check that the scene exists and to get its revision.
+      // If the input has no rows, send one empty batch, which checks that the scene exists and returns its revision.
       if (batch.rows() > 0 || (end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty())) {
         RETURN_IF_ERROR(send(batch));
       }
@@ -172,7 +172,7 @@ class BulkUpdateRun {
   RowReader* reader_ = nullptr;
   std::unique_ptr<client::UpdateStream> stream_;
   std::deque<InFlight> in_flight_;
-  bool timed_out_ = false;  // an ack did not arrive in time: do not wait for others
+  bool timed_out_ = false;  // an ack did not arrive in time, so other acks are not waited for
   std::optional<ReportStream> errors_;
   std::string first_refused_;
   bool all_unknown_ = true;

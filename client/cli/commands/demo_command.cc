@@ -1,5 +1,5 @@
-// `locus demo`: a level and ten thousand moving objects, with clients that query them, and a check of every kind of
-// answer.
+// `locus demo`: uploads a level, moves ten thousand objects in it while clients query them, and checks answers to every
+// kind of query.
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -36,7 +36,7 @@ struct DemoOptions {
   std::string compare;
 };
 
-// Table of the demo's results, with the count of wrong answers.
+// Table of the demo's results; counts wrong answers.
 class DemoTable {
  public:
   void add(const std::string& what, Json rest) {
@@ -58,7 +58,7 @@ class DemoTable {
     wrong_ += wrong;
     all_wrong_ += wrong;
   }
-  // Adds a row of a check without a load.
+  // Adds a row for a check that has no load figures.
   void add_check(const std::string& what, uint64_t checked, uint64_t wrong) {
     all_wrong_ += wrong;
     add(what, {{"rate_per_s", nullptr},
@@ -135,7 +135,8 @@ absl::Status check_leaks(const client::Client& client, const DemoOptions& option
   return absl::OkStatus();
 }
 
-// Returns a batch of all four kinds of query, large enough that the server splits it into chunks.
+// Returns a batch with one block of each of the demo's four kinds of query, large enough that the server splits the
+// batch into chunks.
 v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
   DemoRandom random(seed);
   v1::QueryBatch mixed;
@@ -143,7 +144,8 @@ v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
   return mixed;
 }
 
-// Builds the same scene on a second server and compares: at the same tick, both must answer with the same bytes.
+// Builds the same scene on the server options.compare and sends both servers the same batch. At the same tick, the
+// answers of both must be equal byte for byte.
 absl::Status check_other(const client::Client& client, const DemoOptions& options, const ImportedLevel& level,
                          const DemoWorld& world, uint64_t tick, DemoTable& table) {
   ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> other, client::Client::connect(options.compare));

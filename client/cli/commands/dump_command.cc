@@ -14,14 +14,15 @@ namespace locus::cli {
 namespace {
 
 constexpr char kRowsName[] = "things";
-constexpr size_t kWidthRows = 1000;  // rows of a table that decide the widths of its columns
+constexpr size_t kWidthRows = 1000;  // rows from which a table computes its column widths
 
 struct DumpOptions {
   std::string scene;
   ViewOptions view;
 };
 
-// Dumps a scene. Rows are written as they arrive, except in a script that keeps reports: there they are collected.
+// Dumps a scene. Rows are written as they arrive. In a script whose later lines can use them
+// (Context::keeps_reports()), they are collected in one report instead.
 absl::Status dump(const DumpOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.view));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());

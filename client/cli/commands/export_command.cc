@@ -32,8 +32,8 @@ absl::Status check(const ExportOptions& options) {
   return check(options.view);
 }
 
-// Returns the recentre translation for the scene's current bounds. The dump may have another revision; its things are
-// then only approximately centred.
+// Returns the translation that recentres the scene, computed from its current bounds. The dump that follows may have a
+// newer revision; it is then centred only approximately.
 absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.scene));
   if (!scene.has_min() || !scene.has_max()) return std::array<double, 3>{};
@@ -41,7 +41,8 @@ absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options
                      {scene.max().x(), scene.max().y(), scene.max().z()});
 }
 
-// Adds a node to `file` for each thing to export. Returns the head of the report: file, scene, epoch and revision.
+// Reads the scene and adds each object and instance to export to `file`. Returns the head of the report: file, scene,
+// epoch and revision.
 absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file, client::Client& client,
                                 Context& context) {
   Json head = {{"file", options.out}, {"scene", options.scene}};

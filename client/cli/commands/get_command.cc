@@ -31,7 +31,8 @@ const std::vector<v1::Column>& columns() {
   return columns;
 }
 
-// Returns a batch with a block of ids and a block of groups, each only if requested.
+// Returns a batch with a block of the requested ids, then a block of the requested groups. A block is omitted if
+// nothing is requested for it.
 v1::QueryBatch batch_of(const GetOptions& options, const Context& context) {
   client::QueryBuilder builder;
   see_own(options.scene, context, builder);
@@ -47,7 +48,8 @@ v1::QueryBatch batch_of(const GetOptions& options, const Context& context) {
   return builder.build();
 }
 
-// Returns the requested ids that the first block (one row per id) does not have.
+// Returns the requested ids that do not exist. The first block has one row for each requested id; the row of a missing
+// id has id 0.
 std::vector<uint64_t> missing_ids(const GetOptions& options, const v1::QueryResult& result) {
   std::vector<uint64_t> missing;
   if (options.ids.empty()) return missing;

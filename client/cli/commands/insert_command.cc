@@ -34,7 +34,8 @@ struct InsertOptions {
   bool upsert = false;
 };
 
-// Returns a usage error unless the measures match the shape; to the parser all of them are optional.
+// Returns a usage error unless exactly the measures of the shape are given, since the parser treats all measures as
+// optional.
 absl::Status check_measures(const InsertOptions& options) {
   struct Measure {
     const char* name;
@@ -77,7 +78,7 @@ v1::UpdateBatch batch_of(const InsertOptions& options) {
   return builder.build();
 }
 
-// Indices of the fields of bulk rows.
+// Indices of the fields in the schema of bulk rows.
 enum InsertField : size_t { kId, kAt, kRadius, kHalf, kAxis, kRotation, kLayers, kGroup, kTag, kShape };
 
 const std::vector<std::string>& shapes() {
@@ -133,7 +134,7 @@ absl::Status check_row(const InsertOptions& options, const RowBatch& batch, size
   return absl::OkStatus();
 }
 
-// Adds rows of one shape as one Insert.
+// Adds these rows, which have the same shape, to the update as one Insert.
 void add_rows(const InsertOptions& options, const RowBatch& batch, RowSpan rows, client::UpdateBuilder& builder) {
   const std::vector<RowColumn>& columns = batch.columns;
   const std::vector<uint64_t> ids = id_column(columns[kId], rows, 0, {});

@@ -88,7 +88,7 @@ absl::Status remove(const MeshOptions& options, Context& context) {
   return absl::OkStatus();
 }
 
-// Adds a subcommand that takes the name of one mesh.
+// Adds a subcommand whose argument is the name of one mesh.
 template <class Run>
 CLI::App& add_one(CLI::App& parent, Context& context, const std::string& name, const std::string& description,
                   const std::shared_ptr<MeshOptions>& options, Run run) {

@@ -1,5 +1,5 @@
-// Placement of an imported or generated level: creates the scene if requested, uploads each mesh and places one
-// instance of each. For the import and generate commands.
+// Placement of an imported or generated level: creates the scene if requested, uploads each mesh, and places one
+// instance of each mesh. For the import and generate commands.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_MESH_PLACEMENT_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_MESH_PLACEMENT_H_
 
@@ -17,18 +17,18 @@ namespace locus::cli {
 struct PlacementOptions {
   std::string scene;
   bool create = false;
-  std::string mesh;  // name of the uploaded mesh; empty = the names of the level
+  std::string mesh;  // name for the uploaded mesh; empty = the names in the level
   Triple at;
   Number64 id;  // id of the first instance, the next ones get the following ids; 0 = the server chooses
   std::vector<Number64> layers;
   std::vector<Number64> groups;
 };
 
-// Adds the options that both commands have, except --scene.
+// Adds the options that both commands have. Does not add SCENE.
 void add_placement_options(CLI::App& command, PlacementOptions& options);
 
-// Uploads all meshes and places them by one atomic change, each at the level's recentre translation plus `at`. Writes a
-// row per mesh, and progress to the context's error stream if progress is live.
+// Uploads all meshes, then places an instance of each in one atomic change, at the level's recentre translation plus
+// `at`. Writes a report with a row per mesh, and progress to the context's error stream if progress is live.
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context);
 
 }  // namespace locus::cli

@@ -29,11 +29,11 @@ client::MoveKind kind_of(const MoveOptions& options) {
   return options.teleport ? client::MoveKind::kTeleport : client::MoveKind::kContinuous;
 }
 
-// Indices of the fields of bulk rows.
+// Indices of the fields in the schema of bulk rows.
 enum MoveField : size_t { kId, kTo, kRotation };
 
-// Returns the update for these rows. Rows with and without a rotation go to different Moves, since one Move has
-// rotations for all of its objects or for none.
+// Returns the update for the rows of `batch`. Rows with a rotation and rows without one go to different Moves, since a
+// Move has rotations either for all of its objects or for none.
 v1::UpdateBatch batch_of_rows(const MoveOptions& options, const RowBatch& batch) {
   client::UpdateBuilder builder;
   if (options.tick) builder.tick(*options.tick);

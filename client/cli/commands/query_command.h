@@ -1,4 +1,5 @@
-// Subcommands of `locus query`, one file per kind of query. Internal to commands/; other code uses commands.h.
+// Subcommands of `locus query`, one source file per kind of query. Internal to commands/; other code includes
+// commands.h.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_QUERY_COMMAND_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_QUERY_COMMAND_H_
 
@@ -17,10 +18,11 @@ void add_query_ball(CLI::App& parent, Context& context);
 void add_query_box(CLI::App& parent, Context& context);
 void add_query_nearest(CLI::App& parent, Context& context);
 
-// Asks a batch of one block and returns the result. DATA_LOSS if the result has another number of blocks.
+// Sends a batch of one block and returns the result. Returns DATA_LOSS if the result does not have exactly one block.
 absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::QueryBuilder& builder, Context& context);
 
-// Asks a batch of one block and writes its rows, in `layout`, under the key `rows_name`.
+// Sends a batch of one block and writes the rows of its result in this layout. `rows_name` is the key of the list of
+// rows in JSON.
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context);
 

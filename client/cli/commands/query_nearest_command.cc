@@ -21,7 +21,7 @@ struct NearestOptions {
   v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
 };
 
-// Returns the layout of the rows: distance and id always, then the requested columns.
+// Returns the layout of the report's rows: distance (column T) and id always, then the requested columns.
 RowLayout layout_of(const NearestOptions& options) {
   RowLayout layout = {.query = "query", .columns = {v1::COLUMN_T, v1::COLUMN_ID}};
   std::vector<v1::Column> more = options.query.columns;

@@ -19,8 +19,8 @@ const NamedValues<v1::Column>& column_names() {
   return names;
 }
 
-// Returns whether `value` is exactly a float. True for values that are not finite, so that they are sent in the
-// position and the server's error names the position, not the frame.
+// Returns whether `value` is exactly representable as a float. Also returns true for NaN and infinity: they are then
+// sent as a position and not as the frame, so that the server's error names the position.
 bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
 
 void add_filter_options(CLI::App& command, QueryOptions& options) {

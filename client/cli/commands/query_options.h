@@ -1,4 +1,4 @@
-// Options that every kind of query has, and the frame of its positions. For the query commands.
+// Options that every kind of query has, and the choice of a frame for its positions. For the query commands.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_QUERY_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_QUERY_OPTIONS_H_
 
@@ -33,22 +33,24 @@ struct QueryOptions {
   bool explain = false;
 };
 
-// Adds SCENE and the shared options.
+// Adds the argument SCENE and the options shared by all queries.
 void add_query_options(CLI::App& command, QueryOptions& options);
 
-// Adds --detail, for ball, box and nearest.
+// Adds the option --detail, for the commands ball, box and nearest.
 void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
 
-// Returns a usage error for options that exclude each other.
+// Returns a usage error if options exclude each other.
 absl::Status check(const QueryOptions& options);
 
-// Makes the batch ask for at least the last revision of `scene` acknowledged to this context, if any.
+// Makes the batch ask for at least the last revision of `scene` that was acknowledged through this context, if any, so
+// that it sees the caller's own changes.
 void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder);
 
-// Sets the batch's view, work budget and explain flag. Without --at-least and --exactly, the view is that of see_own().
+// Sets the batch's view, work budget and explain flag from the options. Without --at-least and --exactly, calls
+// see_own().
 void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder);
 
-// Sets the shared options of a block: all except its kind and columns.
+// Sets the options of a block that every kind of query has. The caller sets the block's kind and columns.
 template <class Block>
 void apply_to_block(const QueryOptions& options, Block& block) {
   block.source(options.source)
@@ -61,8 +63,9 @@ void apply_to_block(const QueryOptions& options, Block& block) {
   apply_to_block(options.past, block);
 }
 
-// Positions of a query as floats relative to a frame. The frame is the origin if every coordinate is exactly a float,
-// else the first position, so that coordinates that are large or not exact in float keep their precision.
+// Positions of a query as float offsets from a frame. The frame is the origin if every coordinate is exactly
+// representable as a float. Otherwise it is the first position, so that positions far from the origin do not lose
+// precision.
 struct FramedPositions {
   client::Double3 frame;
   std::vector<float> offsets;

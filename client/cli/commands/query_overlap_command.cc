@@ -29,7 +29,7 @@ struct BoxOptions {
   v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
 };
 
-// Returns the columns to request and show: always ids, and triangles if each row is a triangle.
+// Returns the columns to request and show: ids always, and triangles if the detail makes each row a triangle.
 std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail detail) {
   std::vector<v1::Column> columns = {v1::COLUMN_ID};
   if (detail == v1::STATIC_DETAIL_TRIANGLES || detail == v1::STATIC_DETAIL_TRIANGLES_SORTED) {
@@ -39,7 +39,8 @@ std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail
   return columns;
 }
 
-// Indices of the fields of bulk rows.
+// Indices of the fields in the schemas of bulk rows. kBallFilter and kBoxFilter are the first of the fields shared by
+// all queries (add_filter_fields).
 enum BallField : size_t { kBallAt, kRadius, kBallFilter };
 enum BoxField : size_t { kBoxAt, kHalf, kRotation, kBoxFilter };
 
@@ -133,7 +134,7 @@ absl::Status query_box(const BoxOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
-// Adds the options of overlap queries: --detail, --after-id, and those of all queries.
+// Adds the options of an overlap query: --detail, --after-id, and those of all queries.
 template <class Options>
 void add_overlap_options(CLI::App& command, Options& options) {
   add_detail_option(command, options.detail);

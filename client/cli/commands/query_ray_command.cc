@@ -39,8 +39,8 @@ absl::Status report_any(const RayOptions& options, client::QueryBuilder& builder
   return absl::OkStatus();
 }
 
-// Returns the layout of the rows: t and id always, since they distinguish a hit from a miss, then the requested
-// columns.
+// Returns the layout of the report's rows: t and id always, since they distinguish a hit from a miss, then the
+// requested columns.
 RowLayout layout_of(const RayOptions& options) {
   RowLayout layout = {.query = "ray", .columns = {v1::COLUMN_T, v1::COLUMN_ID}};
   layout.dense = options.mode == v1::RAY_MODE_FIRST;

@@ -21,9 +21,9 @@
 namespace locus::cli {
 namespace {
 
-constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // 28 bytes per ray, 52 with its work
+constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // memory: 28 bytes per ray, 52 with its work
 constexpr ImageSize kDefaultSize = {960, 540};
-constexpr ImageSize kDefaultHeatSize = {480, 270};  // reporting its work makes a ray several times dearer
+constexpr ImageSize kDefaultHeatSize = {480, 270};  // smaller: reporting its work makes a ray several times slower
 
 enum class Show { kShaded, kDepth, kNormals, kIds };
 enum class Heat { kNone, kWork, kNodes, kCells, kTests };
@@ -32,7 +32,7 @@ enum class Samples { kOne = 1, kFour = 4 };
 struct RenderOptions {
   std::string out;
   CameraOptions camera;
-  ImageSize size;  // 0 = a default
+  ImageSize size;  // 0 = kDefaultSize or kDefaultHeatSize
   Show show = Show::kShaded;
   Heat heat = Heat::kNone;
   Samples samples = Samples::kOne;
@@ -41,7 +41,7 @@ struct RenderOptions {
   CastOptions cast;
 };
 
-// Returns the number of rays per pixel and axis.
+// Returns the number of rays along each side of a pixel: a pixel has the square of it.
 uint32_t rays_a_side(const RenderOptions& options) { return options.samples == Samples::kFour ? 2 : 1; }
 
 ImageSize picture_size(const RenderOptions& options) {
@@ -52,7 +52,8 @@ ImageSize picture_size(const RenderOptions& options) {
 absl::StatusOr<ImageSize> ray_image_size(const RenderOptions& options) {
   const ImageSize size = picture_size(options);
   const uint64_t rays_a_pixel = uint64_t{rays_a_side(options)} * rays_a_side(options);
-  // No overflow: both sides have 32 bits, and the second product is computed only if the first is small.
+  // The products cannot overflow: width and height have 32 bits, and the second product is computed only if the first
+  // is small.
   if (size.pixels() > kMaxRenderRays || size.pixels() * rays_a_pixel > kMaxRenderRays) {
     return usage_error(absl::StrCat("--size ", size.width, "x", size.height, " with --samples ", rays_a_pixel,
                                     " takes more rays than a picture may have (", kMaxRenderRays,
@@ -67,7 +68,8 @@ absl::Status check_line(const RenderOptions& options) {
   return check_png_path(options.out);
 }
 
-// Returns the bounds of the thing or scene to show. Sets the revision at which all rays are asked.
+// Returns the bounds of what the picture shows: one object or instance (--at), or the whole scene. Sets
+// options.cast.revision to the scene's current revision.
 absl::StatusOr<Aabbd> find_target(RenderOptions& options, const client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.cast.scene));
   options.cast.revision = {scene.epoch(), scene.revision()};
@@ -95,7 +97,7 @@ std::vector<double> heat_of(const RayImage& image, Heat heat) {
   return values;
 }
 
-// Paints the requested picture. Adds the values that its colours stand for to `head`.
+// Paints the requested kind of picture. Adds the range of values that its colours represent to `head`.
 Picture paint(const RenderOptions& options, const RayImage& image, const Camera& camera, Json& head) {
   if (options.heat != Heat::kNone) {
     const std::vector<double> values = heat_of(image, options.heat);
@@ -145,7 +147,7 @@ Json head_of(const RenderOptions& options, const Camera& camera, const CastResul
   return head;
 }
 
-// Returns the callback that updates the progress line, at most every 100 ms.
+// Returns the callback that updates the progress line, at most once in 100 ms.
 CastProgress progress_line(const RenderOptions& options, uint64_t rays, Context& context) {
   if (context.progress() == Progress::kSilent) return {};
   return [&context, rays, out = options.out, last = absl::InfinitePast()](uint64_t done) mutable {

@@ -47,7 +47,8 @@ struct RunOptions {
   bool dry_run = false;
 };
 
-// Reads a script. Stops once more than kMaxScriptBytes are read, so that the caller can refuse a longer one.
+// Reads a whole script. Stops after more than kMaxScriptBytes, which is enough for the caller to refuse the script as
+// too long.
 absl::StatusOr<std::string> read_all(std::istream& in, const std::string& name) {
   std::string text;
   std::vector<char> part(size_t{1} << 16);

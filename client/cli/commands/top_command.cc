@@ -20,7 +20,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kTimeout{5000};
-// Escape sequence: cursor to the upper left corner, then clear the screen.
+// Escape sequence that moves the cursor to the upper left corner and clears the screen.
 constexpr const char* kClearScreen = "\x1b[H\x1b[2J";
 
 struct TopOptions {
@@ -41,8 +41,8 @@ absl::StatusOr<Scraped> scrape(const TopOptions& options) {
   return Scraped{steady_clock::now(), std::move(samples)};
 }
 
-// Guard that blocks SIGINT, SIGTERM and SIGHUP during its lifetime, so that they end the loop in wait() and do not kill
-// the program in the middle of a line.
+// Guard that blocks SIGINT, SIGTERM and SIGHUP during its lifetime. The signals then end the loop through wait(),
+// instead of killing the program in the middle of a line.
 class EndSignals {
  public:
   EndSignals() {
@@ -54,7 +54,7 @@ class EndSignals {
   EndSignals(const EndSignals&) = delete;
   EndSignals& operator=(const EndSignals&) = delete;
 
-  // Waits `seconds`. Returns false as soon as one of the signals arrives.
+  // Sleeps for `seconds`. Returns true after that time, or false as soon as one of the blocked signals arrives.
   bool wait(double seconds) const {
     const timespec time = {static_cast<time_t>(seconds), static_cast<long>((seconds - std::floor(seconds)) * 1e9)};
     return sigtimedwait(&ending_, nullptr, &time) < 0;

@@ -1,5 +1,5 @@
-// Options that select the kinds of things to read from a scene, and the revision. For commands that read all of a
-// scene. Plain data and functions without state.
+// Options that select objects, instances or both, and a revision. For commands that read a whole scene. Plain data and
+// functions without state.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_VIEW_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_VIEW_OPTIONS_H_
 
@@ -23,17 +23,17 @@ struct ViewOptions {
   Number64 epoch;
 };
 
-// Adds --objects, --instances, --at-least, --exactly, --epoch.
+// Adds the options --objects, --instances, --at-least, --exactly and --epoch.
 void add_view_options(CLI::App& command, ViewOptions& options);
 
-// Returns the things to read: all of them if both flags or none are given.
+// Returns which things to read: both kinds if both flags or neither is given.
 Things things_of(const ViewOptions& options);
 
-// Returns a usage error for options that exclude each other.
+// Returns a usage error if options exclude each other.
 absl::Status check(const ViewOptions& options);
 
-// Returns a request for everything in a scene. Without --at-least and --exactly, the revision is at least that of the
-// last change acknowledged to the context.
+// Returns a request to dump the whole scene. Without --at-least and --exactly, the revision is at least that of the
+// last change acknowledged through this context.
 v1::DumpSceneRequest dump_request(const std::string& scene, const ViewOptions& options, const Context& context);
 
 }  // namespace locus::cli

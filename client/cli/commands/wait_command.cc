@@ -43,7 +43,8 @@ Report report_of(const v1::Scene& scene) {
   return report;
 }
 
-// Polls the scene, at growing intervals, since instances take from milliseconds to minutes to build.
+// Polls the scene until no change of instances is being built and options.revision, if given, is reached. The interval
+// grows, since a build takes from milliseconds to minutes.
 absl::Status wait(const WaitOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const absl::Time end = absl::Now() + absl::Seconds(options.seconds);

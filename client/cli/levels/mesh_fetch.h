@@ -1,5 +1,5 @@
-// Download of a server's mesh into memory, with a progress line. For commands that write meshes to files. A function
-// without state.
+// Download of a mesh from the server into memory, with a progress line. For commands that write meshes to files. A
+// function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_MESH_FETCH_H_
 #define LOCUS_CLIENT_CLI_LEVELS_MESH_FETCH_H_
 

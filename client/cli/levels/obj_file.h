@@ -1,4 +1,4 @@
-// Writing a mesh as a Wavefront OBJ file, for looking at generated levels in other programs. A function without state.
+// Writer of a mesh as a Wavefront OBJ file, for viewing generated levels in other programs. A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_OBJ_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_OBJ_FILE_H_
 
@@ -8,8 +8,8 @@
 
 namespace locus::cli {
 
-// Writes coordinates as the shortest decimals that read back as the same floats, and each part as a group. The caller
-// checks the stream for errors.
+// Writes the mesh to `out`. Coordinates are written as the shortest decimals that parse to the same floats, and each
+// part becomes a group. The caller checks the stream for errors.
 void write_obj(std::ostream& out, const ImportedMesh& mesh);
 
 }  // namespace locus::cli

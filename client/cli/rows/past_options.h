@@ -1,5 +1,5 @@
-// Options of queries about the past: the time, and the treatment of times outside the history. For the query and get
-// commands. Plain data and functions without state.
+// Options of queries about the past: the times, and the handling of times outside the recorded history. For the query
+// and get commands. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_ROWS_PAST_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_ROWS_PAST_OPTIONS_H_
 
@@ -14,7 +14,8 @@
 
 namespace locus::cli {
 
-// Time given as "12" or "12+0.5": a tick and a fraction of the way to the next. Reading sets failbit on other texts.
+// Time given as "12" or "12+0.5": a tick, and a fraction of the way to the next tick. operator>> sets failbit for any
+// other text.
 struct AsOf {
   uint64_t tick = 0;
   float fraction = 0;
@@ -27,11 +28,11 @@ struct PastOptions {
   v1::OutsideHistory outside = v1::OUTSIDE_HISTORY_UNSPECIFIED;
 };
 
-// Adds --as-of and --outside.
+// Adds the options --as-of and --outside.
 void add_past_options(CLI::App& command, PastOptions& options);
 
 std::vector<uint64_t> ticks_of(const std::vector<AsOf>& times);
-// Returns the fractions of the times; empty if all are 0.
+// Returns the fraction of each time; empty if all fractions are 0, which is the default of the request.
 std::vector<float> fractions_of(const std::vector<AsOf>& times);
 
 template <class Block>
@@ -39,7 +40,8 @@ void apply_to_block(const PastOptions& options, Block& block) {
   block.as_of(ticks_of(options.as_of), fractions_of(options.as_of)).outside_history(options.outside);
 }
 
-// Returns the effective time of each query, in the form of --as-of.
+// Returns the time at which each query was answered, in the form of --as-of. It differs from the requested time if that
+// was clamped.
 Json resolved_json(const v1::BlockResult& block);
 
 }  // namespace locus::cli

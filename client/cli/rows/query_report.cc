@@ -21,7 +21,8 @@ Json point_json(const ResultRows& rows, size_t row, const client::Double3& frame
 
 Json triangle_json(uint32_t triangle) { return triangle == client::kNoTriangle ? Json() : Json(triangle); }
 
-// Adds a column of a row to `json`: null for a miss, and for a column that the reply does not have.
+// Sets the key or keys of `column` in `json`, the report's row for row `row` of the answer. The value is null for a
+// miss, and for a column that the answer does not contain.
 void add_column(const ResultRows& rows, size_t row, bool hit, v1::Column column, const client::Double3& frame,
                 Json& json) {
   const auto add = [&](const char* key, bool present, const auto& value) {

@@ -1,5 +1,5 @@
-// The things (objects and instances) of a dumped scene, one by one, and as rows. For the dump and export commands.
-// Plain data and functions without state.
+// Objects and instances ("things") of a dumped scene, one by one, and as rows of a report. For the dump and export
+// commands. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
 
@@ -17,7 +17,7 @@ namespace locus::cli {
 
 enum class ThingKind { kPoint, kBall, kBox, kCapsule, kInstance };
 
-// Object or instance of a scene.
+// Object or instance of a scene. Fields that do not apply to its kind have their defaults.
 struct SceneThing {
   ThingKind kind = ThingKind::kPoint;
   uint64_t id = 0;
@@ -32,24 +32,25 @@ struct SceneThing {
   uint64_t tag = 0;
 };
 
-// Returns "point", "ball", "box" or "capsule"; empty for an instance.
+// Returns the name of an object's shape: "point", "ball", "box" or "capsule". Returns an empty string for an instance.
 std::string shape_name(ThingKind kind);
 
-// Calls `take` with each thing of a message of a dump, objects before instances, until it fails. DATA_LOSS if a column
-// does not have one entry per id.
+// Calls `take` for each thing in one message of a dump, objects before instances. Stops at the first error of `take`
+// and returns it. Returns DATA_LOSS if a column does not have one entry per id.
 absl::Status for_each_thing(const v1::DumpSceneResponse& message,
                             const std::function<absl::Status(const SceneThing&)>& take);
 
-// Choice of the things that a command reads.
+// Choice of the things that a command reads: all, only objects or only instances.
 enum class Things { kAll, kObjects, kInstances };
 bool is_among(Things things, ThingKind kind);
 
-// Returns the keys of rows, in order: id, shape or mesh, at, rotation, scale, radius, half, axis, layers, group, tag.
-// They have the names of the insert command's options where it has them, so that rows of objects can be inserted. Rows
-// of both kinds of things begin with kind: "object" or "instance".
+// Returns the keys of thing_row(), in order: id, shape or mesh, at, rotation, scale, radius, half, axis, layers, group,
+// tag. They are named like the options of the insert command, so that the rows of objects can be inserted again. With
+// Things::kAll the first key is kind, "object" or "instance".
 const std::vector<std::string>& thing_keys(Things things);
 
-// Returns the row of a thing, without the keys that its kind does not have.
+// Returns `thing` as a row of a report. `things` is the choice for the whole report: with kAll the row begins with the
+// key kind. Keys that do not apply to the thing's kind are absent, for example radius for a box.
 Json thing_row(const SceneThing& thing, Things things);
 
 }  // namespace locus::cli

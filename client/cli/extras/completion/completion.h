@@ -1,7 +1,7 @@
-// Completion scripts for shells, generated from the command-line parser. A script holds a table with a line for each
-// command, option and positional argument, and shell functions that read it. The shell computes the candidates without
-// running the program, except for scene names: these it requests from the server that the command line names, with a
-// timeout of one second. Functions without state.
+// Completion scripts for shells, generated from the command-line parser. A script consists of a table, with a line for
+// each command, option and positional argument, and shell functions that read the table. The shell computes the
+// candidates without running the program, except for scene names: the script runs the program to request these from the
+// server that the command line names, with a timeout of one second. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_COMPLETION_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_COMPLETION_H_
 
@@ -13,7 +13,7 @@ namespace locus::cli {
 
 enum class Shell { kBash, kZsh, kFish };
 
-// Returns the script that completes command lines of `program`. Subcommands may be nested to any depth; a subcommand
+// Returns the script that completes command lines of `program`. Subcommands may be nested to any depth. A subcommand
 // also accepts the options of all commands above it.
 std::string completion_script(const CommandWords& program, Shell shell);
 

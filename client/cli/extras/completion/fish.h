@@ -1,4 +1,5 @@
-// Completion script for fish, whose language is not that of sh. Internal to the completion scripts.
+// Completion script for fish, which needs its own functions because its language differs from that of sh. Internal to
+// the completion scripts.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_FISH_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_FISH_H_
 
@@ -8,7 +9,7 @@
 
 namespace locus::cli {
 
-// Returns the whole script.
+// Returns the whole script that completes `program`.
 std::string fish_script(const CommandWords& program);
 
 }  // namespace locus::cli

@@ -1,5 +1,5 @@
-// Completion scripts for bash and zsh, which share shell functions in the language of sh. Internal to the completion
-// scripts.
+// Completion scripts for bash and zsh, which share shell functions written in the language of sh. Internal to the
+// completion scripts.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_POSIX_SHELLS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_POSIX_SHELLS_H_
 
@@ -9,7 +9,7 @@
 
 namespace locus::cli {
 
-// Returns the whole script for bash or zsh.
+// Return the whole script that completes `program`.
 std::string bash_script(const CommandWords& program);
 std::string zsh_script(const CommandWords& program);
 

@@ -9,7 +9,7 @@
 namespace locus::cli {
 namespace {
 
-// Returns the description on one line without tabs, as the table needs it.
+// Returns the description with line breaks and tabs replaced by spaces, since both separate entries of the table.
 std::string short_text(const std::string& description) {
   return absl::StrReplaceAll(description, {{"\n", " "}, {"\t", " "}});
 }
@@ -37,7 +37,7 @@ std::string line(const std::string& kind, const std::string& word, const std::st
   return absl::StrCat(kind, "\t", word, "\t", value, "\t", short_text(text));
 }
 
-// Appends a line for each name of each option.
+// Appends a line for each name of each option to `lines`.
 void add_option_lines(const std::vector<OptionWords>& options, std::vector<std::string>& lines) {
   for (const OptionWords& option : options) {
     for (const std::string& name : option.names) {
@@ -46,7 +46,8 @@ void add_option_lines(const std::vector<OptionWords>& options, std::vector<std::
   }
 }
 
-// Returns the command's own options, then those of the commands above, except options whose name the command redefines.
+// Returns the options that `command` accepts: its own ones, then those of the commands above it except options that it
+// redefines under the same name.
 std::vector<OptionWords> options_in_reach(const CommandWords& command, const std::vector<OptionWords>& above) {
   std::vector<OptionWords> options = command.options;
   for (const OptionWords& option : above) {
@@ -55,7 +56,8 @@ std::vector<OptionWords> options_in_reach(const CommandWords& command, const std
   return options;
 }
 
-// Appends the entry of `command` and of all commands below it. The recursion is as deep as the parser's commands.
+// Appends the table entries of `command` and of all commands below it. The depth of the recursion is bounded by the
+// depth of the program's commands.
 void add_entries(const CommandWords& command, const std::vector<OptionWords>& above, std::vector<TableEntry>& table) {
   TableEntry entry{command.path, {}};
   for (const CommandWords& below : command.commands) {

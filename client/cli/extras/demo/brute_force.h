@@ -1,5 +1,6 @@
-// Brute-force query evaluation: tests every triangle and every object with the server's predicates, without its index
-// structures. The server's answers must equal these bit for bit. Immutable; threads may share one.
+// Reference evaluation of queries by brute force: tests every triangle and every object with the server's predicates,
+// but without its index structures. The server's answers must equal these bit for bit. Immutable; threads may share one
+// object.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_BRUTE_FORCE_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_BRUTE_FORCE_H_
 
@@ -15,7 +16,7 @@
 
 namespace locus::cli {
 
-// Mesh placed in the scene, with its triangles in mesh axes.
+// Mesh placed in the scene, with its triangles in the mesh's own axes.
 struct CheckedInstance {
   uint64_t id;
   Transform transform;
@@ -45,15 +46,15 @@ struct OverlapRow {
 
 class BruteForce {
  public:
-  // Borrows both arguments.
+  // Borrows both vectors, which must outlive this object.
   BruteForce(const std::vector<CheckedInstance>& instances, const std::vector<CheckedObject>& objects)
       : instances_(instances), objects_(objects) {}
 
-  // Returns the answer to a ray query in mode FIRST with default options and unlimited length. Mode ANY reports a hit
-  // if and only if the returned id is not 0.
+  // Returns the answer to a ray query in mode FIRST with default options and without a maximum length. For a query in
+  // mode ANY the answer is a hit if and only if the returned id is not 0.
   FirstHit first(Vec3d origin, Vec3d direction) const;
-  // Return the answer to an overlap query with detail TRIANGLES_SORTED: ascending rows (instance, triangle) and
-  // (object, no triangle).
+  // Return the answer to an overlap query with detail TRIANGLES_SORTED, in ascending order: a row (instance, triangle)
+  // for each overlapping triangle, and a row (object, 0xFFFFFFFF) for each overlapping object.
   std::vector<OverlapRow> ball(const Balld& ball) const;
   std::vector<OverlapRow> box(const Obbd& box) const;
 

@@ -1,4 +1,5 @@
-// Level of `locus demo`: uploaded to a server and placed there, and kept in memory for checking answers.
+// Level of `locus demo`. It is uploaded to a server and placed in a scene, and also kept in memory for checking
+// answers.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
 
@@ -14,14 +15,14 @@ namespace locus::cli {
 
 struct DemoLevel {
   std::vector<CheckedInstance> instances;
-  Aabbd bounds;  // world
+  Aabbd bounds;  // world bounds of all instances
   uint64_t triangles = 0;
 };
 
-// Returns the level with its meshes placed as create_level() places them: mesh i is instance i + 1.
+// Returns `level` with its meshes placed as create_level() places them: mesh i becomes instance i + 1.
 DemoLevel place_level(const ImportedLevel& level);
 
-// Creates `scene` on the server with the level in it. An existing scene of that name is deleted first.
+// Creates `scene` on the server and places the level's meshes in it. Deletes an existing scene of that name first.
 absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level);
 
 }  // namespace locus::cli

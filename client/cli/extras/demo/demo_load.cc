@@ -23,7 +23,7 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// First error of several threads. Thread-safe.
+// Holder of the first error that any of several threads reports. Thread-safe.
 class FirstError {
  public:
   void report(const absl::Status& status) {
@@ -40,8 +40,8 @@ class FirstError {
   absl::Status status_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Sampler of a run of unknown length: keeps every stride-th batch. When there are too many samples, it drops every
-// second one and doubles the stride.
+// Sampler of batches from a run of unknown length: stores every stride-th batch. When there are more than kSamplesAKind
+// samples, it drops every second one and doubles the stride, so that the samples stay evenly spread.
 class Sampler {
  public:
   explicit Sampler(std::vector<Sample>& samples) : samples_(samples) {}
@@ -61,7 +61,7 @@ class Sampler {
   size_t stride_ = 1;
 };
 
-// Sends one batch of each kind in turn, waiting for each answer, until `done` is set.
+// Sends one batch of each kind in turn, each after the answer to the one before, until `done` is set.
 absl::Status ask(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                  const std::vector<DemoKind>& kinds, const std::atomic<bool>& done, LoadResult& result) {
   const std::unique_ptr<client::QueryStream> stream = client.query_stream(options.scene);
@@ -90,7 +90,7 @@ absl::Status check_ack(const v1::UpdateAck& ack) {
   return absl::InternalError(absl::StrCat(ack.refused(), " moves of a tick were refused"));
 }
 
-// Sends one batch of moves each tick, at the tick rate, and waits for all acks.
+// Sends a batch that moves every object each tick, at options.ticks_a_second, and then waits for all acks.
 absl::Status write(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                    LoadResult& result) {
   const std::unique_ptr<client::UpdateStream> stream = client.update_stream(options.scene);

@@ -1,4 +1,4 @@
-// Load generator of `locus demo`: a writer that moves every object each tick, and clients that query concurrently.
+// Load generator of `locus demo`: one thread moves every object each tick while others send queries.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
 
@@ -24,12 +24,12 @@ struct Sample {
   v1::QueryResult result;
 };
 
-// Measurements of one kind of query, or of the updates.
+// Measurements of one kind of query, or of all updates.
 struct LoadFigures {
-  uint64_t items = 0;  // queries asked or objects moved
+  uint64_t items = 0;  // number of queries sent, or of objects moved
   uint64_t found = 0;
-  std::vector<double> milliseconds;  // latency of each batch
-  std::vector<Sample> samples;       // bounded number of batches, spread evenly over the whole run
+  std::vector<double> milliseconds;  // latency of each batch, in ms
+  std::vector<Sample> samples;       // some batches, spread evenly over the run; a bounded number
 
   double percentile(double fraction) const;
 };
@@ -42,8 +42,8 @@ struct LoadResult {
   uint64_t last_tick = 0;
 };
 
-// Runs until all ticks are acked. The calling thread sends the moves; two more threads query. Returns the first error
-// of any of them.
+// Runs the load until all ticks are acknowledged. The calling thread sends the moves, two more threads send queries.
+// Returns the first error of any of these threads.
 absl::StatusOr<LoadResult> run_load(const client::Client& client, const DemoWorld& world, const LoadOptions& options);
 
 }  // namespace locus::cli

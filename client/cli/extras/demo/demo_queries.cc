@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr uint32_t kMaxRows = 65536;  // rows a query; the maximum reply size truncates earlier
+constexpr uint32_t kMaxRows = 65536;  // per query; more than fit in a reply, whose size truncates first
 
 client::Float3 float3(Vec3f v) { return {v.x, v.y, v.z}; }
 
@@ -118,7 +118,8 @@ bool DemoChecker::same_rows(const std::vector<OverlapRow>& wanted, const v1::Blo
   const auto query = static_cast<size_t>(i);
   const absl::Span<const uint64_t> ids = overlaps->ids(query);
   const absl::Span<const uint32_t> triangles = overlaps->triangles(query);
-  // A reply truncated for its size is marked as such, and holds the first rows.
+  // A reply that would be too large is truncated: it contains the first rows of the query, which is marked as
+  // truncated.
   const bool cut = overlaps->rows().truncated(query);
   if (ids.size() != triangles.size() || ids.size() > wanted.size() || (!cut && ids.size() != wanted.size()))
     return false;

@@ -1,5 +1,5 @@
-// Query batches of `locus demo`, and the check of their answers by brute force. Functions without state, and a checker
-// that is not thread-safe.
+// Query batches of `locus demo`, and a checker that compares their answers with brute force. Functions without state,
+// and a checker that is not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
 
@@ -18,18 +18,18 @@ namespace locus::cli {
 enum class DemoKind { kFirst, kAny, kBalls, kBoxes };
 inline constexpr std::array<DemoKind, 4> kDemoKinds = {DemoKind::kFirst, DemoKind::kAny, DemoKind::kBalls,
                                                        DemoKind::kBoxes};
-// Returns the name of the kind in the printed table.
+// Returns the name that the printed table shows for this kind.
 std::string name_of(DemoKind kind);
 
-// Returns a batch of one block with `count` random queries within the world.
+// Returns a batch of one block with `count` random queries inside the world's bounds.
 v1::QueryBatch demo_batch(DemoKind kind, const DemoWorld& world, DemoRandom& random, int count);
 
-// Returns the number of queries that found at least one object or triangle.
+// Returns the number of queries of the block that found at least one object or triangle.
 uint64_t count_found(const v1::BlockResult& block);
 
 class DemoChecker {
  public:
-  // Borrows both arguments.
+  // Borrows both arguments, which must outlive the checker.
   DemoChecker(const std::vector<CheckedInstance>& instances, const DemoWorld& world)
       : instances_(instances), world_(world) {}
 
@@ -37,8 +37,8 @@ class DemoChecker {
     uint64_t checked = 0;
     uint64_t differences = 0;
   };
-  // Checks the first `max_queries` queries of a batch made by demo_batch() against the state at the answer's tick:
-  // every id, triangle and distance must be equal, bit for bit.
+  // Compares the answers to the first `max_queries` queries of `batch`, which demo_batch() made, with brute force on
+  // the objects at the tick of `result`. Every id, triangle and distance must be equal bit for bit.
   Outcome check(DemoKind kind, const v1::QueryBatch& batch, const v1::QueryResult& result, int max_queries);
 
  private:
@@ -48,7 +48,7 @@ class DemoChecker {
   const std::vector<CheckedInstance>& instances_;
   const DemoWorld& world_;
   std::vector<CheckedObject> objects_;
-  std::optional<uint64_t> tick_;  // tick of the state in objects_
+  std::optional<uint64_t> tick_;  // tick to which objects_ belongs
 };
 
 }  // namespace locus::cli

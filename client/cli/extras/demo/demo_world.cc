@@ -9,7 +9,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr float kInset = 0.98f;  // share of the level's extent in which objects move, inside its outermost walls
+constexpr float kInset = 0.98f;  // objects move within this fraction of the level's extent, inside its walls
 
 Quaternion random_rotation(DemoRandom& random) {
   for (;;) {
@@ -18,8 +18,8 @@ Quaternion random_rotation(DemoRandom& random) {
   }
 }
 
-// Returns the position at `tick` of a point that bounces between -half and half. It is computed from the tick directly,
-// so that rounding errors do not accumulate.
+// Returns the position at `tick` of a point that moves between -half and half and reverses at both ends. It is computed
+// directly from the tick, so that rounding errors do not accumulate from tick to tick.
 float bounce(float start, float velocity, uint64_t tick, float half) {
   if (half <= 0) return 0;
   const double period = 4.0 * half;

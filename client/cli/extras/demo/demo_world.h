@@ -1,5 +1,5 @@
-// Moving objects of `locus demo`. The pose of an object is a pure function of its index and the tick, so that any
-// answer can be checked against the state at its tick. Immutable after construction.
+// Moving objects of `locus demo`. An object's pose is a pure function of its index and the tick, so that every answer
+// can be checked against the objects at its tick. Immutable after construction.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_WORLD_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_WORLD_H_
 
@@ -17,19 +17,19 @@ class DemoWorld {
  public:
   static constexpr uint64_t kFirstObjectId = 1'000'000;
 
-  // Creates `objects` objects that move within `bounds`, the world bounds of the level.
+  // Creates `objects` objects that move within `bounds`, the bounds of the level in world coordinates.
   DemoWorld(const Aabbd& bounds, uint32_t objects, uint64_t seed);
 
   const Aabbd& bounds() const { return bounds_; }
-  // Returns the origin of float positions in updates and queries.
+  // Returns the frame of all updates and queries: the origin of their float positions.
   Vec3d frame() const { return frame_; }
   uint32_t size() const { return static_cast<uint32_t>(objects_.size()); }
   uint64_t id(uint32_t index) const { return kFirstObjectId + index; }
 
-  // Returns the object as the server stores it at `tick`.
+  // Returns object `index` as the server stores it at `tick`.
   Shape shape(uint32_t index, uint64_t tick) const;
 
-  // Returns the batch that clears the scene and inserts all objects at tick 0.
+  // Returns the batch that removes all objects of the scene and inserts all objects of this world at tick 0.
   v1::UpdateBatch inserts() const;
   // Returns the batch that moves all objects to their positions at `tick`.
   v1::UpdateBatch moves(uint64_t tick) const;

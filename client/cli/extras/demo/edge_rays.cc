@@ -14,7 +14,7 @@ using Corner = std::array<float, 3>;
 
 Corner key_of(Vec3f v) { return {v.x, v.y, v.z}; }
 
-// Edge and the third vertices of its triangles.
+// Edge of a mesh, and for each triangle at the edge its third vertex.
 struct Edge {
   Vec3f from, to;
   std::vector<Vec3f> opposite;
@@ -38,12 +38,13 @@ std::vector<Edge> shared_edges(const std::vector<Triangle>& triangles) {
   return shared;
 }
 
-// Returns the unit direction from the edge towards `point`, perpendicular to the edge, or nullopt for slivers.
+// Returns the unit direction from the edge towards `point`, perpendicular to the edge. Returns nullopt if the triangle
+// of the edge and `point` is a sliver.
 std::optional<Vec3d> across(const Edge& edge, Vec3f point) {
   const Vec3d along = to_double(edge.to) - to_double(edge.from);
   const Vec3d to_point = to_double(point) - to_double(edge.from);
   const double length = std::sqrt(squared_length(along));
-  // Refuse edges that are as short as the rounding error of the ray.
+  // Refuse edges as short as the rounding error of a ray.
   if (length <= 1e-5 * max_component(abs(to_double(edge.from)))) return std::nullopt;
   const Vec3d unit = along * (1 / length);
   const Vec3d rest = to_point - unit * dot(to_point, unit);
@@ -57,8 +58,8 @@ struct Aim {
   Vec3d away;  // offset of the ray's origin from the target
 };
 
-// Chooses a target on the edge and an origin in front of both triangles, from which they lie on different sides of the
-// edge. Returns nullopt if there is none.
+// Chooses a target on the edge and an origin for a ray to it. The origin lies in front of both triangles at the edge,
+// and as seen from it the triangles lie on different sides of the edge. Returns nullopt if there is no such origin.
 std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const std::optional<Vec3d> left = across(edge, edge.opposite[0]);
   const std::optional<Vec3d> right = across(edge, edge.opposite[1]);
@@ -72,10 +73,11 @@ std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const Vec3d jitter = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
   away = normalized(away) + jitter;
   if (random.unit() < 0.5f) away = -away;
-  // Require that the triangles lie on different sides of the edge in this view, neither of them nearly edge-on.
+  // Require that, as seen from the origin, the triangles lie on different sides of the edge and neither is nearly
+  // edge-on.
   const Vec3d front = cross(along * (1 / length), normalized(away));
   if (!(dot(front, *left) * dot(front, *right) < -0.05)) return std::nullopt;
-  const double weight = 0.02 + 0.96 * random.unit();  // keeps the target off the end points by more than rounding
+  const double weight = 0.02 + 0.96 * random.unit();  // keeps the target away from the edge's end points
   return Aim{to_double(edge.from) + along * weight, away * (length * (0.1 + 2 * random.unit()))};
 }
 
@@ -87,7 +89,7 @@ EdgeRays aim_at_edges(const std::vector<Triangle>& triangles, size_t count, uint
   EdgeRays rays;
   const std::vector<Edge> edges = shared_edges(triangles);
   DemoRandom random(seed);
-  // Limits the loop for a mesh that has only slivers.
+  // Bound the loop, since it would not end for a mesh of slivers only.
   const size_t tries = 20 * count;
   for (size_t i = 0; !edges.empty() && i < tries && rays.size() < count; ++i) {
     const std::optional<Aim> aimed = aim(edges[i % edges.size()], random);

@@ -1,5 +1,5 @@
-// Test rays aimed at edges shared by two triangles, where fast intersectors can miss both. The origins lie in front of
-// the edge, so that every ray must hit one of its triangles.
+// Test rays aimed at edges shared by two triangles: a fast intersector with rounding errors can miss both triangles
+// there. The origin of a ray lies in front of both triangles, so the ray must hit one of them.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 
@@ -10,8 +10,8 @@
 
 namespace locus::cli {
 
-// Rays as interleaved x, y, z in mesh axes. The target point on the edge is at t = 1: every ray must have a hit with t
-// <= 1 + kEdgeAllowance.
+// Rays as interleaved x, y, z in mesh axes. The target on the edge is at t = 1, so every ray must have a hit at t <= 1
+// + kEdgeAllowance.
 struct EdgeRays {
   std::vector<float> origins;
   std::vector<float> directions;
@@ -19,11 +19,12 @@ struct EdgeRays {
   size_t size() const { return origins.size() / 3; }
 };
 
-// Tolerance in t for rounding of the target to float, at the flattest angle of incidence that aim_at_edges() uses.
+// Tolerance in t for the rounding of the target to float, large enough for the flattest angle of incidence that
+// aim_at_edges() chooses.
 inline constexpr float kEdgeAllowance = 1e-3f;
 
-// Returns `count` rays, distributed in turn over all edges shared by exactly two triangles that are not slivers.
-// Returns fewer only if hardly any edge qualifies.
+// Returns `count` rays, distributed in turn over all edges that are shared by exactly two triangles, neither of them a
+// sliver. Returns fewer rays only if hardly any edge is suitable.
 EdgeRays aim_at_edges(const std::vector<Triangle>& triangles, size_t count, uint64_t seed);
 
 }  // namespace locus::cli

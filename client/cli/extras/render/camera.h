@@ -1,9 +1,9 @@
-// Camera of a picture, and the ray through each of its pixels. For `locus render`. Plain data and functions without
-// state; threads may share a camera.
+// Camera of a picture, and the ray through the centre of each pixel. For `locus render`. Plain data and functions
+// without state; threads may share a camera.
 //
-// The rays are bit-identical on every machine: they are computed in double with +, -, *, / and square roots only, and
-// rounded to float once. The tangent of the angle of view is rounded to float immediately, which hides differences
-// between math libraries.
+// The rays are bit-identical on every machine: they are computed in double with only +, -, *, / and square roots, and
+// rounded to float once. Math libraries differ in tangents, so the tangent of the angle of view is rounded to float
+// immediately, which hides the difference.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_H_
 
@@ -25,7 +25,7 @@ struct ImageSize {
 
 enum class Projection { kPerspective, kOrthographic };
 
-// Axes of the view: unit vectors, perpendicular to each other; right, up, -forward are right-handed.
+// Axes of the view: perpendicular unit vectors. The system (right, up, -forward) is right-handed.
 struct ViewAxes {
   Vec3d right;
   Vec3d up;
@@ -33,28 +33,30 @@ struct ViewAxes {
 };
 
 struct Camera {
-  Vec3d eye;  // world
+  Vec3d eye;  // position in world coordinates
   ViewAxes axes;
   Projection projection = Projection::kPerspective;
-  // Half the image's height: at distance 1 (perspective), or in world units at any distance (orthographic).
+  // Half the height of the image in world units: at distance 1 from the eye for perspective, at any distance for
+  // orthographic projection.
   double half_height = 1;
 };
 
 struct CameraRay {
-  Vec3f origin;  // relative to the eye; 0 in perspective
-  // Direction whose component along the view is 1, so that a hit's t is its depth: the distance from the eye's plane in
-  // world units.
+  Vec3f origin;  // relative to the eye; 0 in perspective projection
+  // Direction, scaled so that its component along the view's forward axis is 1. The t of a hit is therefore its depth:
+  // the distance in world units from the plane through the eye perpendicular to the view.
   Vec3f direction;
 };
 
-// Returns the axes of a view along `forward` with `up` upward in the image; both may have any length. INVALID_ARGUMENT
-// if either is zero or not finite, or if they are parallel within 1e-6.
+// Returns the axes of a view in direction `forward` in which `up` points upward in the image. Both vectors may have any
+// length. Returns INVALID_ARGUMENT if either is zero or not finite, or if they are parallel (sine of their angle below
+// 1e-6).
 absl::StatusOr<ViewAxes> view_axes(Vec3d forward, Vec3d up);
 
-// Returns half the image's height at distance 1 for a vertical angle of view of 0 < degrees < 180.
+// Returns half the image's height at distance 1 for a vertical angle of view of `degrees`, 0 < degrees < 180.
 double half_height_of(double degrees);
 
-// Returns the ray through the centre of a pixel. Row 0 is the uppermost.
+// Returns the ray through the centre of a pixel. Row 0 is the uppermost row.
 CameraRay ray_through(const Camera& camera, const ImageSize& size, uint32_t column, uint32_t row);
 
 }  // namespace locus::cli

@@ -15,11 +15,11 @@ namespace locus::cli {
 namespace {
 
 constexpr double kSceneMargin = 1.04;
-constexpr double kThingMargin = 2;  // wider than a scene's, to show the surroundings of one object
+constexpr double kThingMargin = 2;  // wider than kSceneMargin, to show the object's surroundings
 
 Vec3d vector_of(const Triple& triple) { return {triple.x, triple.y, triple.z}; }
 
-// Returns the view axes. Without --up, the z axis points up, or the y axis if the view is along z.
+// Returns the axes of a view along `forward`. Without --up, z points upward, or y if the view is along z.
 absl::StatusOr<ViewAxes> axes_of(const CameraOptions& options, Vec3d forward) {
   absl::StatusOr<ViewAxes> axes = view_axes(forward, options.up ? vector_of(*options.up) : Vec3d{0, 0, 1});
   if (!axes.ok() && !options.up) axes = view_axes(forward, {0, 1, 0});

@@ -1,4 +1,5 @@
-// Camera options of `locus render`, and the camera that they describe. Plain data and functions without state.
+// Options of `locus render` that describe the camera, and the camera made from them. Plain data and functions without
+// state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_OPTIONS_H_
 
@@ -20,20 +21,20 @@ struct CameraOptions {
   std::optional<Triple> direction = std::nullopt;
   std::optional<Triple> up = std::nullopt;
   double degrees = 45;
-  std::optional<double> orthographic = std::nullopt;  // units from the lower to the upper edge; 0 = as the target needs
+  std::optional<double> orthographic = std::nullopt;  // image height in world units; 0 = chosen to fit
   std::optional<Number64> at = std::nullopt;
 };
 
-// Reads a size such as "640x360". Sets failbit on any other form and on a side of 0.
+// Parses a size such as "640x360". Sets failbit on any other form, and if either side is 0.
 std::istream& operator>>(std::istream& in, ImageSize& size);
 
 void add_camera_options(CLI::App& command, CameraOptions& options);
 
-// Returns a usage error for options that contradict each other or give no direction. Needs no server.
+// Returns a usage error if options contradict each other or leave the view without a direction. Sends nothing.
 absl::Status check(const CameraOptions& options);
 
-// Returns the camera described by the options. `target` is the non-empty bounding box to be framed. Usage error if the
-// view has no direction or --up is parallel to it.
+// Returns the camera that the options describe. `target` is the bounding box to be framed, which must not be empty.
+// Returns a usage error if the view has no direction or --up is parallel to it.
 absl::StatusOr<Camera> camera_of(const CameraOptions& options, const Aabbd& target, const ImageSize& size);
 
 }  // namespace locus::cli

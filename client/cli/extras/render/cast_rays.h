@@ -1,5 +1,5 @@
-// Query of a picture's rays: one ray a pixel, sent in batches over a query stream with a bounded number in flight. For
-// `locus render`.
+// Sender of a picture's rays: queries one ray per pixel, in batches over a query stream with a bounded number of
+// batches in flight. For `locus render`.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAST_RAYS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAST_RAYS_H_
 
@@ -15,13 +15,14 @@
 
 namespace locus::cli {
 
-// Choice of the revisions at which the rays are answered.
+// Choice of the revision or revisions at which the rays are answered.
 enum class Moment {
-  kOne,   // all rays at the given revision; fails if the server drops it meanwhile
-  kLive,  // each batch at the latest revision, which is the given one or newer
+  kOne,   // all rays at CastOptions::revision; fails if the server drops it meanwhile
+  kLive,  // each batch at the latest revision, at least CastOptions::revision
 };
 
-// Choice of reporting each ray's work. kReported makes every ray a block of its own, which costs several times more.
+// Choice whether the server reports the work of each ray. With kReported every ray is a block of its own, which costs
+// several times more.
 enum class WorkReport { kNone, kReported };
 
 struct CastOptions {
@@ -36,18 +37,18 @@ struct CastOptions {
 
 struct CastResult {
   RayImage image;
-  // Oldest and newest revision of the answers (equal for Moment::kOne), and the latest tick.
+  // Oldest and newest revision of the answers (equal with Moment::kOne), and the newest tick.
   uint64_t first_revision = 0;
   uint64_t last_revision = 0;
   uint64_t tick = 0;
 };
 
-// Callback for progress, called from time to time in the caller's thread with the number of rays answered so far.
+// Callback for progress. It is called from time to time in the caller's thread with the number of rays answered so far.
 using CastProgress = std::function<void(uint64_t done)>;
 
-// Casts all rays and blocks until every ray is answered. Errors: the server's; OUT_OF_RANGE, with an explanation, for a
-// revision that the server no longer keeps; DATA_LOSS for an answer whose columns do not match the request. Memory: 28
-// bytes a pixel, 52 with the work.
+// Sends all rays and blocks until every ray is answered. Returns the errors of the server; for a revision that the
+// server has dropped, OUT_OF_RANGE with an explanation; DATA_LOSS if the columns of an answer do not match the request.
+// Memory: 28 bytes per pixel, 52 with the work.
 absl::StatusOr<CastResult> cast_rays(const client::Client& client, const Camera& camera, const ImageSize& size,
                                      const CastOptions& options, const CastProgress& progress = {});
 

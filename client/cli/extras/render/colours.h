@@ -1,5 +1,5 @@
-// Colours for values and for ids. For the painters. Functions without state; bit-identical on every machine: they use
-// no libm function but the square root.
+// Colours for values and for ids. For the painters. Functions without state, bit-identical on every machine, since the
+// only libm function that they use is the square root.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_COLOURS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_COLOURS_H_
 
@@ -9,7 +9,7 @@
 
 namespace locus::cli {
 
-// Linear light, 0 .. 1 a component; it may be added and averaged.
+// Colour in linear light, each component 0 .. 1. Unlike stored colours, it may be added and averaged.
 struct Light {
   double red = 0, green = 0, blue = 0;
 
@@ -17,18 +17,20 @@ struct Light {
   friend Light operator*(Light a, double s) { return {a.red * s, a.green * s, a.blue * s}; }
 };
 
-// Convert between light and stored colours with a gamma of 2, close to sRGB's. Light is clamped to 0 .. 1.
+// Convert between linear light and stored colours with a gamma of 2, which is close to that of sRGB. Light is clamped
+// to 0 .. 1.
 Colour colour_of(Light light);
 Light light_of(Colour colour);
 
-// Return a colour from dark to bright for 0 <= x <= 1 (x is clamped; NaN is 0), from a perceptually uniform map that is
-// readable by the colour-blind: linear interpolation of ten points of viridis, for distances, or of inferno, for costs.
-// Source: Smith and van der Walt, the colour maps of matplotlib 2.0 (2015, CC0).
+// Return the colour for x from a colour map that goes from dark at 0 to bright at 1. x is clamped to 0 .. 1; NaN counts
+// as 0. The maps are perceptually uniform and readable by the colour-blind: ten points of viridis (for distances) or of
+// inferno (for costs), interpolated linearly. Source: Smith and van der Walt, the colour maps of matplotlib 2.0 (2015,
+// CC0).
 Colour viridis(double x);
 Colour inferno(double x);
 
-// Returns a hue for an id, 0 <= hue < 1: the fractional part of id / golden ratio (Knuth, The Art of Computer
-// Programming 3, 1998, 6.4), so that consecutive ids have clearly different hues.
+// Returns the hue of an id, 0 <= hue < 1: the fractional part of id / golden ratio, so that consecutive ids have
+// clearly different hues. Source: Knuth, The Art of Computer Programming 3, 1998, 6.4.
 double hue_of(uint64_t id);
 
 // Converts hue, saturation and value, each 0 .. 1, to light. Source: Smith, Color gamut transform pairs, 1978.

@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kSmallestExtent = 1e-9;  // relative to the magnitude of the coordinates
+constexpr double kSmallestExtent = 1e-9;  // relative to the coordinates' magnitude; below it a box counts as a point
 
 std::array<Vec3d, 8> corners_of(const Aabbd& box) {
   std::array<Vec3d, 8> corners;
@@ -18,8 +18,9 @@ std::array<Vec3d, 8> corners_of(const Aabbd& box) {
   return corners;
 }
 
-// Maxima over all corners of a box, in the view's axes relative to the box's centre: of x - w z (right) and -x - w z
-// (left), likewise for y (up, down), and of -z (near).
+// Maxima over all corners of a box. A corner is (x, y, z) in the view's axes (right, up, forward) relative to the box's
+// centre, and w is the slope of the view's edge. `right` is the maximum of x - w z, `left` of -x - w z, `up` and `down`
+// likewise for y, and `near` is the maximum of -z.
 struct Reach {
   double right = -std::numeric_limits<double>::infinity();
   double left = right, up = right, down = right, near = right;

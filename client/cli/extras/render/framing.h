@@ -1,5 +1,5 @@
-// Placement of a camera that frames a box: the nearest position from which all of the box is in the picture. For
-// `locus render` without --eye. Functions without state.
+// Placement of a camera at the nearest position from which the whole of a box is in the picture. For `locus render`
+// without --eye. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_FRAMING_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_FRAMING_H_
 
@@ -8,22 +8,23 @@
 
 namespace locus::cli {
 
-// Projection of a camera, without its position.
+// Properties of a camera other than its position and axes.
 struct Lens {
   Projection projection = Projection::kPerspective;
-  double half_height = 1;  // as Camera::half_height; orthographic: 0 = as the box needs
+  double half_height = 1;  // as Camera::half_height; orthographic: 0 = chosen to fit the box
   double aspect = 1;       // width / height of the image
-  double margin = 1.05;    // ratio of the picture's size to the box's
+  double margin = 1.05;    // ratio of the picture's size to the size of the box in it
 };
 
-// Returns the unit direction of a view obliquely from above, about 35 degrees downward. `up` must not be zero. With z
-// up, the view is towards +x, +y and -z.
+// Returns the unit direction of a view obliquely from above, about 35 degrees downward. `up` must not be zero. If `up`
+// is z, the view is towards +x, +y and -z.
 Vec3d three_quarter_view(Vec3d up);
 
 // Returns the camera with these axes and this lens that is nearest to `bounds` and shows all of it. `bounds` must not
-// be empty. A box without extent is treated as a box of side 1. Method: in the view's axes each corner (x, y, depth z)
-// requires |x - ex| <= w (z - ez) of the eye (ex, ey, ez). The maxima of x - w z and of -x - w z over all corners bound
-// the eye from both sides; it can be nearest halfway between these bounds.
+// be empty. A box without extent is treated as a box of side 1. Method: a corner at (x, y) and depth z in the view's
+// axes is visible from the eye (ex, ey, ez) if |x - ex| <= w (z - ez), with w the slope of the view's edge, and
+// likewise for y. So the maxima of x - w z and of -x - w z over all corners bound the eye from both sides, and the eye
+// is nearest to the box if it is halfway between the two bounds.
 Camera frame_box(const Aabbd& bounds, const ViewAxes& axes, const Lens& lens);
 
 }  // namespace locus::cli

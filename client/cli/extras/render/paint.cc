@@ -10,7 +10,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kMaxHaze = 0.45;  // at the furthest hit
+constexpr double kMaxHaze = 0.45;  // share of haze in the colour of the furthest hit
 constexpr Light kHaze = {0.09, 0.12, 0.18};
 
 template <class ColourOfPixel>
@@ -21,7 +21,7 @@ Picture paint_each(const ImageSize& size, const ColourOfPixel& colour) {
   return picture;
 }
 
-// Returns the base colour of the object or instance at a pixel, before shading.
+// Returns the colour, before shading, of the object or instance that is hit at a pixel.
 Light material_of(const RayImage& image, size_t pixel) {
   const double hue = hue_of(image.ids[pixel]);
   return image.hit_object(pixel) ? light_of_hue(hue, 0.9, 0.95) : light_of_hue(hue, 0.08, 0.6);
@@ -54,15 +54,17 @@ class Shader {
     return colour_of(Light{0.012, 0.020, 0.040} * (1 - down) + Light{0.055, 0.075, 0.110} * down);
   }
 
-  // Returns the light attenuated by distance, so that near and far surfaces differ where they overlap in the picture.
+  // Returns `light` mixed with haze in proportion to the distance t, so that near and far surfaces differ in colour
+  // where they overlap in the picture.
   Light hazy(Light light, float t) const {
     const double range = depths_.max - depths_.min;
     const double haze = range > 0 ? kMaxHaze * (double{t} - depths_.min) / range : 0;
     return light * (1 - haze) + kHaze * haze;
   }
 
-  // Returns the strength of the highlight: the 32nd power of the cosine between the normal and the half vector of lamp
-  // and eye. Source: Blinn, Models of Light Reflection for Computer Synthesized Pictures, 1977.
+  // Returns the strength of the highlight: the 32nd power of the cosine of the angle between the normal and the half
+  // vector of the directions to the lamp and the eye. Source: Blinn, Models of Light Reflection for Computer
+  // Synthesized Pictures, 1977.
   double gloss(Vec3d normal, Vec3d view) const {
     const double cosine = std::max(0.0, dot(normal, normalized(lamp_ - view)));
     double power = cosine;
@@ -70,8 +72,8 @@ class Shader {
     return power;
   }
 
-  // Returns the factor that darkens edges: below 1 if a neighbouring pixel shows another object behind this one, or a
-  // sharp bend of the surface.
+  // Returns the factor by which a pixel is darkened if it is at an edge: below 1 if a neighbouring pixel shows a
+  // surface further behind, or if the surface bends sharply there.
   double edge(size_t pixel, uint32_t column, uint32_t row) const {
     double factor = 1;
     const uint32_t width = image_.size.width;
@@ -91,7 +93,7 @@ class Shader {
   const RayImage& image_;
   const Camera& camera_;
   const ValueScale depths_;
-  const Vec3d lamp_;  // unit direction to the lamp
+  const Vec3d lamp_;  // unit vector in the direction of the lamp
 };
 
 double value_at(std::vector<double>& values, double share) {

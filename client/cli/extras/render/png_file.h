@@ -1,4 +1,4 @@
-// Writing of pictures as PNG files. For `locus render`. Functions without state.
+// Writer of pictures as PNG files. For `locus render`. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_PNG_FILE_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_PNG_FILE_H_
 
@@ -9,11 +9,12 @@
 
 namespace locus::cli {
 
-// Returns FAILED_PRECONDITION if the path does not end in .png, its folder does not exist, or it is a folder. Call it
-// before computing a picture.
+// Returns FAILED_PRECONDITION if `path` does not end in .png, if it is a folder, or if its parent folder does not
+// exist. Call it before the picture is computed, which takes long.
 absl::Status check_png_path(const std::string& path);
 
-// Writes a PNG with 8 bits a channel, sRGB, and replaces an existing file. FAILED_PRECONDITION if it cannot be written.
+// Writes a PNG in sRGB with 8 bits per channel. Replaces an existing file. Returns FAILED_PRECONDITION if the file
+// cannot be written.
 absl::Status write_png(const std::string& path, const Picture& picture);
 
 }  // namespace locus::cli

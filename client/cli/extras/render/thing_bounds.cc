@@ -13,11 +13,11 @@ namespace locus::cli {
 namespace {
 
 constexpr int kSections = 16;
-constexpr int kCuts = kSections - 1;  // cuts of each side
+constexpr int kCuts = kSections - 1;  // number of cuts that are tested for each side
 constexpr int kSides = 6;             // lower and upper side of each axis: side = 2 axis + (1 if upper)
-constexpr int kMaxRounds = 16;        // 16 to this power exceeds the resolution of doubles
-constexpr double kFlat = 1e-4;        // extent relative to the longest side below which a box is flat
-constexpr double kWidening = 1e-6;    // covers the rounding of slabs to float when they are sent
+constexpr int kMaxRounds = 16;        // enough: 16 to this power exceeds the resolution of doubles
+constexpr double kFlat = 1e-4;        // a box is flat along an axis if extent / longest side is less
+constexpr double kWidening = 1e-6;    // relative to the longest side; more than the rounding of slabs to float
 
 absl::Status not_found(const std::string& scene, uint64_t id, absl::string_view why) {
   return absl::NotFoundError(absl::StrCat("scene ", scene, " has no object or instance ", id, why));
@@ -33,7 +33,8 @@ absl::Status check_there(const client::Client& client, const std::string& scene,
   return result.blocks(0).ids(0) == id ? absl::OkStatus() : not_found(scene, id, "");
 }
 
-// Returns the slab of the box between a side and one of its cuts. Cut c is (c + 1) / 16 of the extent from the side.
+// Returns the slab of `box` between side `side` and its cut `cut`. Cut c is (c + 1) / 16 of the box's extent inward
+// from the side.
 Aabbd slab_of(const Aabbd& box, int side, int cut) {
   const int axis = side / 2;
   Aabbd slab = box;
@@ -46,8 +47,8 @@ Aabbd slab_of(const Aabbd& box, int side, int cut) {
   return slab;
 }
 
-// Returns for each slab of `box`, ordered by side and cut, whether the thing overlaps it. Slabs are sent relative to
-// the box's centre, so that float precision increases as the box shrinks.
+// Returns for each slab of `box`, ordered by side and then by cut, whether the object or instance `id` overlaps it.
+// Slabs are sent relative to the box's centre, so that float precision increases as the box shrinks.
 absl::StatusOr<std::vector<bool>> ask_slabs(const client::Client& client, const std::string& scene,
                                             const client::Revision& revision, uint64_t id, const Aabbd& box) {
   const Vec3d frame = (box.min + box.max) * 0.5;
@@ -84,7 +85,8 @@ Aabbd widened(const Aabbd& box) {
   return {box.min - Vec3d{epsilon, epsilon, epsilon}, box.max + Vec3d{epsilon, epsilon, epsilon}};
 }
 
-// Returns the box with each side moved inward past the slabs that the thing does not overlap.
+// Returns the box with each side moved inward past the slabs that the thing does not overlap, then widened by
+// kWidening. `reached` is the result of ask_slabs().
 Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   Aabbd result = box;
   for (int side = 0; side < kSides; ++side) {
@@ -98,8 +100,8 @@ Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   return widened(result);
 }
 
-// Returns whether some side moved inward by a slab. Axes along which the box is nearly flat are ignored, since widening
-// cancels their progress.
+// Returns whether another round is worthwhile: whether the last one shrank the box along some axis by more than half a
+// slab (1/32 of its extent). Axes along which the box is flat are ignored, since widened() undoes their progress.
 bool moved(const Aabbd& before, const Aabbd& after) {
   const Vec3d old_extent = before.extent(), new_extent = after.extent();
   for (int axis = 0; axis < 3; ++axis) {

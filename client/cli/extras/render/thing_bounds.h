@@ -1,5 +1,5 @@
-// World bounds of one object or instance ("thing"), found by queries: the protocol returns its position, but not its
-// extent. For `locus render --at`.
+// World bounds of one object or instance ("thing"), determined by queries, since the protocol returns the position of a
+// thing but not its extent. For `locus render --at`.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_THING_BOUNDS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_THING_BOUNDS_H_
 
@@ -13,12 +13,12 @@
 
 namespace locus::cli {
 
-// Returns outer bounds of the object or instance `id` at `revision`, which the server must still keep. They lie within
-// `scene_bounds` and are too wide on each side by at most a twelfth of the thing's extent along that axis. NOT_FOUND if
-// the scene has no such id, or if queries cannot see it (layers 0). Method: 16-way section search for each side, with
-// box queries that report whether the thing overlaps a slab; `after_id` = id - 1 and `max_results` = 1 restrict the
-// answer to its id. Cost: one batch of 90 boxes a round; one or two rounds for a thing as large as the scene, one more
-// for each factor of 16 by which it is smaller; at most 16 rounds.
+// Returns outer bounds of the object or instance `id` at `revision`, which the server must still retain. The bounds lie
+// within `scene_bounds`; on each side they exceed the thing by at most a twelfth of its extent along that axis. Returns
+// NOT_FOUND if the scene has no such id, or if the thing is hidden from queries (layers 0). Method: 16-way section
+// search for each side, with box queries that report whether the thing overlaps a slab; `after_id` = id - 1 and
+// `max_results` = 1 restrict each answer to this id. Cost: a batch of 90 boxes per round; one or two rounds for a thing
+// as large as the scene, one more for each factor of 16 by which it is smaller; at most 16 rounds.
 absl::StatusOr<Aabbd> thing_bounds(const client::Client& client, const std::string& scene,
                                    const client::Revision& revision, uint64_t id, const Aabbd& scene_bounds);
 

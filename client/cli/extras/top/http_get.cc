@@ -11,7 +11,7 @@ namespace {
 
 size_t take(char* data, size_t size, size_t count, void* body) {
   auto& text = *static_cast<std::string*>(body);
-  // If the callback accepts fewer bytes than it was given, libcurl aborts the transfer.
+  // If this callback returns fewer bytes than it was given, libcurl aborts the transfer.
   if (text.size() + size * count > kMaxPageBytes) return 0;
   text.append(data, size * count);
   return size * count;

@@ -1,5 +1,5 @@
-// HTTP GET of one page with a maximum size and a timeout. The only user of libcurl. A function without state, to be
-// called by one thread at a time.
+// HTTP GET of one page, with a maximum size and a timeout. The only user of libcurl. A function without state, but it
+// must be called by one thread at a time.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TOP_HTTP_GET_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_TOP_HTTP_GET_H_
 
@@ -13,7 +13,7 @@ namespace locus::cli {
 
 inline constexpr size_t kMaxPageBytes = 16u << 20;
 
-// Returns the body of http://`address``path`, with `address` as host:port. Follows no redirection and uses no proxy.
+// Returns the body of http://`address``path`; `address` is host:port. Follows no redirection and uses no proxy. Returns
 // UNAVAILABLE if there is no answer within `timeout`, FAILED_PRECONDITION for a status other than 200,
 // RESOURCE_EXHAUSTED for a body beyond kMaxPageBytes, INVALID_ARGUMENT for a malformed address.
 absl::StatusOr<std::string> http_get(const std::string& address, const std::string& path,

@@ -12,7 +12,8 @@ bool is_name(char c, bool first) {
   return absl::ascii_isalpha(c) || c == '_' || c == ':' || (!first && absl::ascii_isdigit(c));
 }
 
-// Reader of one line: each member consumes a token at the front of the line if it is present.
+// Tokenizer of one line. Each member function consumes its token from the front of the rest of the line if it is
+// present.
 class Line {
  public:
   explicit Line(absl::string_view text) : rest_(text) {}
@@ -33,7 +34,7 @@ class Line {
 
   void skip_spaces() { rest_ = absl::StripLeadingAsciiWhitespace(rest_); }
 
-  // Consumes a quoted string including both quotes and appends its unescaped text to `value`.
+  // Consumes a quoted string, including both quotes, and appends its unescaped text to `value`.
   bool quoted(std::string* value) {
     if (!take('"')) return false;
     while (!rest_.empty()) {
@@ -69,7 +70,7 @@ bool read_labels(Line& line, MetricSample* sample) {
   return true;
 }
 
-// Reads a value, optionally followed by a timestamp in milliseconds.
+// Parses a sample's value, which may be followed by a timestamp in milliseconds; the timestamp is ignored.
 bool read_value(absl::string_view text, double* value) {
   const std::vector<absl::string_view> words = absl::StrSplit(text, absl::ByAnyChar(" \t"), absl::SkipEmpty());
   if (words.empty() || words.size() > 2 || !absl::SimpleAtod(words[0], value)) return false;

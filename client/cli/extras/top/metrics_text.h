@@ -1,5 +1,5 @@
-// Parser of Prometheus's text format into plain data. The text comes from an untrusted server, so everything is checked
-// and bounded. Functions without state.
+// Parser of the Prometheus text format into plain data. The text comes from an untrusted server, so its syntax is
+// checked and its size is bounded. Functions without state.
 //
 // Source: Prometheus documentation, "Exposition formats", text-based format version 0.0.4.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TOP_METRICS_TEXT_H_
@@ -17,19 +17,19 @@ namespace locus::cli {
 
 inline constexpr size_t kMaxMetricSamples = 200'000;
 inline constexpr size_t kMaxMetricLineBytes = 4096;
-inline constexpr size_t kMaxMetricLabels = 16;  // labels of one sample
+inline constexpr size_t kMaxMetricLabels = 16;  // maximum number of labels of one sample
 
 struct MetricSample {
   std::string name;
   std::vector<std::pair<std::string, std::string>> labels;
   double value = 0;
 
-  // Returns the value of a label, or an empty string if the sample does not have it.
+  // Returns the value of the label `key`, or an empty string if the sample does not have it.
   absl::string_view label(absl::string_view key) const;
 };
 
-// Returns every sample, in order; comments and timestamps are ignored. INVALID_ARGUMENT naming the line if the text is
-// not in the format, RESOURCE_EXHAUSTED if it exceeds the maxima above.
+// Returns all samples in the order of the text; ignores comments and timestamps. Returns INVALID_ARGUMENT that names
+// the line if the text is not in the format, or RESOURCE_EXHAUSTED if it exceeds a maximum above.
 absl::StatusOr<std::vector<MetricSample>> parse_metrics(absl::string_view text);
 
 }  // namespace locus::cli

@@ -12,9 +12,9 @@ namespace locus::cli {
 namespace {
 
 using Samples = std::vector<MetricSample>;
-using Key = std::pair<std::string, std::string>;  // name and value of a label
+using Key = std::pair<std::string, std::string>;  // name and value of one label
 
-// Returns the values of metric `name` by the value of `label`, summed over the other labels.
+// Returns the values of the metric `name`, keyed by the value of `label` and summed over all other labels.
 std::map<std::string, double> by_label(const Samples& samples, absl::string_view name, absl::string_view label) {
   std::map<std::string, double> sums;
   for (const MetricSample& sample : samples)
@@ -34,7 +34,7 @@ double at(const std::map<std::string, double>& values, const std::string& key) {
   return found == values.end() ? 0 : found->second;
 }
 
-// Returns an integral value as a JSON integer, any other rounded to three decimals, or null if it is not finite.
+// Returns `value` as a JSON integer if it is integral, else rounded to three decimals, or null if it is not finite.
 Json number(double value) {
   constexpr double kExactIntegers = 9007199254740992.0;
   if (!std::isfinite(value)) return nullptr;
@@ -47,7 +47,7 @@ Json rate(double before, double now, double seconds) {
   return number(std::round((now - before) / seconds * 10) / 10);
 }
 
-// Histogram: count of durations up to each upper bound, in seconds.
+// Histogram: maps each bucket's upper bound in seconds to the number of durations up to it.
 using Buckets = std::map<double, double>;
 
 Buckets buckets_of(const Samples& samples, absl::string_view name, const Key& of) {
@@ -69,8 +69,8 @@ Buckets minus(const Buckets& now, const Buckets& before) {
   return rest;
 }
 
-// Returns a quantile in milliseconds, interpolated linearly within its bucket as Prometheus's histogram_quantile()
-// does. Returns null for an empty histogram.
+// Returns the quantile `share` (0 .. 1) in milliseconds, interpolated linearly within its bucket as Prometheus's
+// histogram_quantile() does. Returns null for an empty histogram.
 Json quantile_ms(const Buckets& buckets, double share) {
   constexpr double kMsASecond = 1000;
   if (buckets.empty() || buckets.rbegin()->second <= 0) return nullptr;

@@ -16,7 +16,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "columns are written as they lie in memory");
 
-// Constants of the specification.
+// Constants of the glTF specification: the header's magic number and version, and the types of the two chunks.
 constexpr uint32_t kMagic = 0x46546C67;
 constexpr uint32_t kVersion = 2;
 constexpr uint32_t kJsonChunk = 0x4E4F534A;
@@ -42,8 +42,8 @@ Json place_json(const std::string& name, const GlbPlace& place) {
   return node;
 }
 
-// Returns a bright colour that depends only on `name`, so that a name has one colour in all files. Method: the bytes of
-// a Fowler, Noll, Vo hash (FNV-1a).
+// Returns a bright colour that depends only on `name`, so that a material has the same colour in all files. Method: the
+// bytes of a Fowler, Noll, Vo hash (FNV-1a) of the name.
 Json colour_of(const std::string& name) {
   uint32_t hash = 2166136261u;
   for (const char byte : name) hash = (hash ^ static_cast<uint8_t>(byte)) * 16777619u;
@@ -58,7 +58,7 @@ void put(std::ostream& out, uint32_t value) { out.write(reinterpret_cast<const c
 }  // namespace
 
 GlbWriter::GlbWriter(const std::string& root_name, UpAxis up) : root_({{"name", root_name}}) {
-  // The matrix is stored by columns. It keeps x, turns y to -z and z to y.
+  // Matrix in column order that rotates z-up coordinates to y-up ones: x stays x, y becomes -z, z becomes y.
   if (up == UpAxis::kZ) root_["matrix"] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
 }
 
@@ -125,7 +125,8 @@ Json GlbWriter::add_primitive(const ImportedMesh& mesh, size_t first_index, size
 }
 
 absl::Status GlbWriter::set_mesh(size_t mesh_index, const ImportedMesh& mesh) {
-  // Lower bound of the file's size, checked before copying: vertices that several parts share are copied for each part.
+  // Check the size before copying. `bytes` is a lower bound of the file's size, since vertices that several parts share
+  // are copied once for each of these parts.
   const uint64_t bytes = bytes_.size() + (mesh.vertices.size() + mesh.indices.size()) * sizeof(float) + kFrameBytes;
   if (bytes > kMaxExportBytes) return too_large(bytes);
   renumbered_.assign(mesh.vertices.size() / 3, kNoVertex);

@@ -1,10 +1,13 @@
-// Writer of a glTF 2.0 scene in its binary form (GLB), collected in memory and written at once. For the exporter.
-// Source: Khronos Group, glTF 2.0 Specification, 2021 (ISO/IEC 12113:2022). One writer, one file, one thread.
+// Writer of a glTF 2.0 scene in its binary form (GLB). The scene is collected in memory and written at once. For the
+// exporter. One writer writes one file in one thread. Source: Khronos Group, glTF 2.0 Specification, 2021 (ISO/IEC
+// 12113:2022).
 //
-// assimp 5.2.5, which reads such files for the importer, can also write them, but it alters the scene: it drops
-// transforms within 0.01 of the identity and merges vertices nearer than 1e-5. It also needs 400 bytes a triangle.
+// assimp 5.2.5, with which the importer reads such files, can also write them, but it alters the scene: it drops
+// transforms within 0.01 of the identity and merges vertices nearer than 1e-5. It also needs 400 bytes of memory per
+// triangle.
 //
-// Invariants: every accessor lies within the one buffer; node 0 is the root and holds every other top-level node.
+// Invariants: every accessor lies within the file's single buffer; node 0 is the root, and every other top-level node
+// is its child.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_GLB_WRITER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_GLB_WRITER_H_
 
@@ -22,30 +25,30 @@
 
 namespace locus::cli {
 
-// Transform of a node relative to its parent: scale, then rotation (quaternion x, y, z, w), then translation.
+// Transform from a node's coordinates to its parent's: scale, then rotation (quaternion x, y, z, w), then translation.
 struct GlbPlace {
   std::array<float, 3> translation{};
   std::array<float, 4> rotation{0, 0, 0, 1};
   std::array<float, 3> scale{1, 1, 1};
 };
 
-// Upward axis of the scene's coordinates. glTF files are y up.
+// Upward axis of the scene's coordinates. glTF requires y up, so z-up scenes get a rotation at the root.
 enum class UpAxis { kY, kZ };
 
 class GlbWriter {
  public:
   explicit GlbWriter(const std::string& root_name, UpAxis up);
 
-  // Returns the index of a new mesh. set_mesh() must fill it before write().
+  // Returns the index of a new, empty mesh. set_mesh() must fill it before write().
   size_t reserve_mesh();
-  // Copies the mesh to a reserved index. Each part gets its own vertices and a material of the part's name; unused
-  // vertices are left out. RESOURCE_EXHAUSTED if the file would exceed kMaxExportBytes.
+  // Copies `mesh` into the reserved mesh `mesh_index`. Each part gets its own copy of the vertices that it uses, and a
+  // material of the part's name. Returns RESOURCE_EXHAUSTED if the file would exceed kMaxExportBytes.
   absl::Status set_mesh(size_t mesh_index, const ImportedMesh& mesh);
 
-  // Adds a node under the root that draws the mesh of index `mesh`. `extras` are properties that editors show with the
-  // node. RESOURCE_EXHAUSTED beyond kMaxExportNodes.
+  // Adds a node under the root that draws the mesh of index `mesh`. `extras` are glTF's application-specific
+  // properties, which editors show with the node. Returns RESOURCE_EXHAUSTED beyond kMaxExportNodes.
   absl::Status add_node(const std::string& name, const GlbPlace& place, size_t mesh, const Json& extras);
-  // Mesh drawn within a group; `place` is relative to the group.
+  // Mesh drawn by a child node of a group; `place` is relative to the group.
   struct Child {
     size_t mesh = 0;
     GlbPlace place;
@@ -56,9 +59,9 @@ class GlbWriter {
 
   size_t node_count() const { return node_count_; }
 
-  // Writes a temporary file next to `path` and renames it, so that `path` is never a partial file. Requires that every
-  // reserved mesh is set. Returns the file's size in bytes. FAILED_PRECONDITION if the path cannot be written,
-  // RESOURCE_EXHAUSTED as above.
+  // Writes a temporary file next to `path` and renames it, so that `path` never contains a partial file. Precondition:
+  // every reserved mesh is set. Returns the file's size in bytes, FAILED_PRECONDITION if the path cannot be written, or
+  // RESOURCE_EXHAUSTED beyond kMaxExportBytes.
   absl::StatusOr<uint64_t> write(const std::string& path) const;
 
  private:

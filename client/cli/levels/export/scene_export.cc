@@ -23,13 +23,13 @@ Json facts_of(const SceneThing& thing) {
 
 std::string object_name(const SceneThing& thing) { return absl::StrCat("object ", thing.id); }
 
-// Returns the shortest rotation from +z to `axis`, whose length is `length`, not 0.
+// Returns the shortest rotation from +z to the direction of `axis`. `length` is the length of `axis`, not 0.
 std::array<float, 4> rotation_to(const std::array<float, 3>& axis, double length) {
   const double x = axis[0] / length;
   const double y = axis[1] / length;
   const double w = 1 + axis[2] / length;
   const double norm = std::sqrt(x * x + y * y + w * w);
-  if (norm < 1e-6) return {1, 0, 0, 0};  // axis is -z: a half turn about any horizontal axis
+  if (norm < 1e-6) return {1, 0, 0, 0};  // axis is -z: a half turn about x (any horizontal axis would do)
   return {static_cast<float>(-y / norm), static_cast<float>(x / norm), 0, static_cast<float>(w / norm)};
 }
 
@@ -92,7 +92,8 @@ absl::Status SceneExport::add_shape(const SceneThing& thing, Part part, const st
   return writer_.add_node(object_name(thing), place, mesh, facts_of(thing));
 }
 
-// Adds a tube and two domes, since scaling one mesh cannot give capsules of all proportions.
+// Adds a capsule as a group of a tube and two domes. A single capsule mesh is not enough, since scaling it cannot give
+// capsules of all proportions.
 absl::Status SceneExport::add_capsule(const SceneThing& thing) {
   const std::array<float, 3>& axis = thing.size;
   const double length = std::sqrt(double{axis[0]} * axis[0] + double{axis[1]} * axis[1] + double{axis[2]} * axis[2]);

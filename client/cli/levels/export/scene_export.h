@@ -1,8 +1,8 @@
-// Conversion of a scene's objects and instances ("things") to nodes and meshes of a GLB file. For the export command.
-// One exporter, one file, one thread.
+// Converter of a scene's objects and instances ("things") to nodes and meshes of a GLB file. For the export command.
+// One object exports one file in one thread.
 //
-// An instance draws its mesh, which is written once. An object draws the unit shape of its kind, scaled. A size of 0 is
-// drawn as kMinDrawnSize, since editors cannot handle a scale of 0.
+// The node of an instance draws its mesh, which is written once. The node of an object draws the unit shape of its
+// kind, scaled. A size of 0 is drawn as kMinDrawnSize, since editors cannot handle a scale of 0.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 
@@ -22,9 +22,9 @@ inline constexpr float kMinDrawnSize = 1e-6f;
 // Half extent of the marker that is drawn for a point.
 inline constexpr float kPointMarkSize = 0.05f;
 
-// Returns the translation to subtract from every position before it is rounded to float. It is the centre of the
-// bounds, rounded to whole units, if the centre is further from the origin than 8 times the longest side (as for
-// imports), else zero.
+// Returns the translation to subtract from every position before it is rounded to float. If the centre of the bounds is
+// further from the origin than 8 times their longest side (the importers' rule), it is the centre rounded to whole
+// units, else zero.
 std::array<double, 3> recentre_of(const std::array<double, 3>& min, const std::array<double, 3>& max);
 
 class SceneExport {
@@ -32,13 +32,14 @@ class SceneExport {
   SceneExport(const std::string& name, UpAxis up, const std::array<double, 3>& recentre)
       : writer_(name, up), recentre_(recentre) {}
 
-  // Adds the node of an object or instance, named `object 7` or `instance 3 (mesh)`, with its id, group, tag and layers
-  // as extras. RESOURCE_EXHAUSTED beyond kMaxExportNodes.
+  // Adds the node of an object or instance, named `object 7` or `instance 3 (mesh)`. The node's extras are id, group,
+  // tag and layers. Returns RESOURCE_EXHAUSTED beyond kMaxExportNodes.
   absl::Status add(const SceneThing& thing);
 
-  // Returns the names of the meshes that the added instances draw, in order of first use.
+  // Returns the names of the meshes that the added instances draw, in order of first use. set_mesh() must be called for
+  // each of them before the file is written.
   const std::vector<std::string>& meshes() const { return mesh_names_; }
-  // Sets the triangles of a mesh in meshes(). Errors as GlbWriter::set_mesh().
+  // Sets the triangles of a mesh whose name is in meshes(). Errors as GlbWriter::set_mesh().
   absl::Status set_mesh(const std::string& name, const ImportedMesh& mesh);
 
   size_t things() const { return things_; }

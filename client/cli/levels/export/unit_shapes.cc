@@ -20,7 +20,8 @@ void add_ring(ImportedMesh& mesh, double radius, double z) {
   }
 }
 
-// Adds the triangles between two rings that start at vertices `low` and `high`; ring `high` has the larger z.
+// Adds the band of triangles between two rings of vertices, the first of which are `low` and `high`. Ring `high` has
+// the larger z.
 void add_band(ImportedMesh& mesh, uint32_t low, uint32_t high) {
   for (uint32_t sector = 0; sector < kSectors; ++sector) {
     const uint32_t next = (sector + 1) % kSectors;
@@ -40,8 +41,8 @@ void add_fan(ImportedMesh& mesh, uint32_t ring, uint32_t pole, End end) {
   }
 }
 
-// Adds the rings of a ball from latitude step `lowest` up to the last step below the pole, then the pole. A step is 90
-// degrees / kSteps; step 0 is the equator.
+// Adds the upper part of a unit ball: a ring of vertices for each latitude step from `lowest` on, then the pole, and
+// the triangles between them. A step is 90 degrees / kSteps; step 0 is the equator.
 void add_upper_part(ImportedMesh& mesh, int lowest) {
   constexpr int kSteps = kShapeSectors / 4;
   for (int step = lowest; step < kSteps; ++step) {
@@ -86,7 +87,7 @@ ImportedMesh unit_tube() {
 ImportedMesh unit_box() {
   ImportedMesh mesh;
   mesh.name = "box";
-  // Bits of a corner's index: bit 0 selects the side in x, bit 1 in y, bit 2 in z.
+  // In the index of a corner, bit 0 selects the side in x, bit 1 in y, bit 2 in z.
   for (uint32_t corner = 0; corner < 8; ++corner)
     add_vertex(mesh, (corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
   mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,

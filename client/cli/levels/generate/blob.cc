@@ -15,9 +15,9 @@ constexpr double kDent = (kMaxBlobRadius - kMinBlobRadius) * 0.5;
 constexpr double kDentDistance = 0.5;  // wavelength of the noise, relative to the radius
 constexpr int kOctaves = 4;
 
-// Vertex numbering of a subdivided octahedron. Its vertices are the integer points with |x| + |y| + |z| = f, numbered
-// ring by ring from z = -f to z = f. The ring at height z has 4 k points, k = f - |z|, counter-clockwise from +x. The
-// two poles are rings of one point.
+// Vertex numbering of an octahedron whose edges are divided into f = `frequency` segments. The vertices are the integer
+// points with |x| + |y| + |z| = f, numbered ring by ring from z = -f to z = f. The ring at height z has 4 k points with
+// k = f - |z|, counter-clockwise from +x. The two poles are rings of one point.
 class Octahedron {
  public:
   explicit Octahedron(int64_t frequency) : f_(frequency) {}
@@ -25,8 +25,8 @@ class Octahedron {
   int64_t frequency() const { return f_; }
   int64_t ring_size(int64_t z) const { return std::max<int64_t>(4 * (f_ - std::abs(z)), 1); }
 
-  // Returns the index of the vertex `step` steps along side `side` of the ring at z. The last vertex of a side is the
-  // first of the next side.
+  // Returns the index of the vertex that is `step` steps along side `side` (0 .. 3) of the ring at height z. The last
+  // vertex of a side is the first vertex of the next side.
   uint32_t vertex(int64_t z, int64_t side, int64_t step) const {
     const int64_t k = f_ - std::abs(z);
     return static_cast<uint32_t>(first_of_ring(z) + (k == 0 ? 0 : (side * k + step) % (4 * k)));
@@ -34,10 +34,10 @@ class Octahedron {
 
  private:
   int64_t first_of_ring(int64_t z) const {
-    const int64_t below = z + f_;  // rings below this one
+    const int64_t below = z + f_;  // number of rings below this one
     if (below == 0) return 0;
     if (z <= 0) return 1 + 2 * below * (below - 1);
-    const int64_t above = f_ - z;  // rings above this one
+    const int64_t above = f_ - z;  // number of rings above this one
     return 4 * f_ * f_ + 2 - (above == 0 ? 1 : 1 + 2 * above * (above + 1));
   }
 
@@ -66,7 +66,7 @@ void append_vertex(const std::array<double, 3>& lattice, uint64_t seed, Imported
   for (const double part : direction) mesh.vertices.push_back(static_cast<float>(part * radius));
 }
 
-// Appends the strip of triangles between one side of the ring at z and the ring above it.
+// Appends the strip of triangles between side `side` of the ring at height z and the same side of the ring at z + 1.
 void append_strip(const Octahedron& octahedron, int64_t z, int64_t side, ImportedMesh& mesh) {
   const int64_t low = octahedron.frequency() - std::abs(z);
   const int64_t high = octahedron.frequency() - std::abs(z + 1);

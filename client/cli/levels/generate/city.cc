@@ -11,11 +11,11 @@ namespace {
 
 constexpr uint64_t kBoxTriangles = 12;
 
-// All lengths are integers in half metres, so that every coordinate lies on the lattice.
-constexpr int64_t kLotPitch = 48;      // lot and street together
-constexpr int64_t kMinWidth = 10;      // of a building
-constexpr int64_t kWidthChoices = 27;  // so the widest leaves a street of 12
-constexpr int64_t kMinHeight = 6;      // of a step
+// All lengths are integers in half metres, so that every coordinate is a multiple of 0.5 m and exact in float.
+constexpr int64_t kLotPitch = 48;      // distance from a lot to the next: lot and street
+constexpr int64_t kMinWidth = 10;      // minimum width of a building
+constexpr int64_t kWidthChoices = 27;  // number of widths; the widest leaves a street of 12
+constexpr int64_t kMinHeight = 6;      // minimum height of a step (a box of a building)
 constexpr int64_t kHeightChoices = 55;
 constexpr int64_t kGroundDepth = 4;
 constexpr int64_t kMaxSteps = 4;
@@ -25,7 +25,7 @@ struct Box {
 };
 
 void append_box(const Box& box, ImportedMesh& mesh) {
-  // Bits of a corner's index: bit 0 selects the side in x, bit 1 in y, bit 2 in z.
+  // In the index of a corner, bit 0 selects the side in x, bit 1 in y, bit 2 in z.
   constexpr std::array<uint8_t, 36> kCorners = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
                                                 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
   const auto first = static_cast<uint32_t>(mesh.vertices.size() / 3);
@@ -38,7 +38,7 @@ void append_box(const Box& box, ImportedMesh& mesh) {
   for (uint8_t corner : kCorners) mesh.indices.push_back(first + corner);
 }
 
-// Returns the number of boxes on each lot; their sum is `boxes`.
+// Returns the number of boxes on each lot. The sum of these numbers is `boxes`.
 std::vector<uint8_t> plan_lots(uint64_t boxes, SplitMix64& random) {
   std::vector<uint8_t> lots;
   while (boxes > 0) {
@@ -50,8 +50,8 @@ std::vector<uint8_t> plan_lots(uint64_t boxes, SplitMix64& random) {
   return lots;
 }
 
-// Appends a building of `steps` boxes to the lot with minimum corner `lot`. Each box but the first is inset on all
-// sides.
+// Appends a building of `steps` boxes, one on top of the other, to the lot with minimum corner `lot`. Each box is
+// narrower on all sides than the box below it.
 void append_building(std::array<int64_t, 2> lot, uint8_t steps, SplitMix64& random, ImportedMesh& mesh) {
   Box box;
   for (size_t axis = 0; axis < 2; ++axis) {

@@ -1,4 +1,4 @@
-// Generator of a city of boxes, for trying the server without a level file and for tests that need known geometry. A
+// Generator of a city of boxes. For trying the server without a level file, and for tests that need known geometry. A
 // function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_CITY_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_CITY_H_
@@ -12,13 +12,13 @@ namespace locus::cli {
 inline constexpr uint64_t kMinCityTriangles = 12;
 inline constexpr uint64_t kMaxCityTriangles = uint64_t{1} << 27;
 
-// Returns a ground slab whose top is z = 0 and box buildings on square lots around the origin; a third of them are
-// towers of two to four boxes that touch face to face. Units are metres, z is up. Each box is 12 consecutive triangles
-// over 8 consecutive vertices of its own, closed and counter-clockwise seen from outside. The slab comes first. All
-// coordinates are multiples of 0.5, so they are exact in float and many faces are coplanar. Parts: "ground" and
-// "buildings". The mesh has at most `triangles` triangles and more than triangles - 12, but never fewer than the slab's
-// 12 nor more than kMaxCityTriangles. Equal arguments give equal bytes on every machine. Cost: linear, about 160 bytes
-// a box.
+// Returns a ground slab whose top is at z = 0, and box buildings on square lots around the origin. A third of the
+// buildings are towers of two to four boxes that touch face to face. Units are metres, z is up. Each box is 12
+// consecutive triangles over 8 consecutive vertices of its own, closed and counter-clockwise seen from outside. The
+// slab is the first box. All coordinates are multiples of 0.5, so they are exact in float, and many faces are coplanar.
+// Parts: "ground" and "buildings". The mesh has at most `triangles` triangles and more than triangles - 12, but never
+// fewer than the slab's 12 nor more than kMaxCityTriangles. Equal arguments give equal bytes on every machine. Cost:
+// linear; memory: about 160 bytes per box.
 ImportedMesh generate_city(uint64_t triangles, uint64_t seed);
 
 }  // namespace locus::cli

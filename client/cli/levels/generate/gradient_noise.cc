@@ -15,8 +15,8 @@ uint64_t hash(const Cell& corner, uint64_t seed) {
   return value;
 }
 
-// Returns the dot product of `offset` and a gradient that `hash` selects among the directions from a cube's centre to
-// the midpoints of its twelve edges.
+// Returns the dot product of `offset` and a gradient vector. `hash` selects the gradient among the twelve directions
+// from a cube's centre to the midpoints of its edges.
 double slope(uint64_t hash, const std::array<double, 3>& offset) {
   const uint64_t edge = (hash >> 32) * 12 >> 32;
   const uint64_t axis = edge / 4;

@@ -8,15 +8,15 @@
 
 namespace locus::cli {
 
-// Returns gradient noise: -1 to 1, zero at integer coordinates, twice differentiable. Coordinates must be within -2^31
-// .. 2^31. Source: Perlin, Improving Noise, 2002 (its twelve gradients and its fifth-degree blend), with a hash instead
-// of its permutation table.
+// Returns gradient noise at `point`: a value in -1 .. 1, zero at integer coordinates, twice differentiable. Coordinates
+// must be within -2^31 .. 2^31. Source: Perlin, Improving Noise, 2002 (its twelve gradients and its fifth-degree
+// blend), with a hash instead of the permutation table.
 double gradient_noise(const std::array<double, 3>& point, uint64_t seed);
 
-// Returns the weighted mean of `octaves` layers of noise, -1 to 1. The first layer has the given wavelength; each
-// further one has half the wavelength and half the weight of the one before. Source: Musgrave, Kolb, Mace, The
-// Synthesis and Rendering of Eroded Fractal Terrains, 1989. `wavelength` is a power of two, `octaves` at least 1. Cost:
-// eight hashes an octave.
+// Returns the weighted mean of `octaves` layers of gradient noise, in -1 .. 1. The first layer has wavelength
+// `wavelength`, a power of two. Each further layer has half the wavelength and half the weight of the one before.
+// `octaves` is at least 1. Source: Musgrave, Kolb, Mace, The Synthesis and Rendering of Eroded Fractal Terrains, 1989.
+// Cost: eight hashes per octave.
 double fractal_noise(const std::array<double, 3>& point, double wavelength, int octaves, uint64_t seed);
 
 }  // namespace locus::cli

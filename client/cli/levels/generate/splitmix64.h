@@ -1,5 +1,5 @@
 // Small deterministic random number generator with equal results on every machine. For generators and tests; not
-// cryptographic. One object, one thread.
+// cryptographic. Each object is used by one thread.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_SPLITMIX64_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_SPLITMIX64_H_
 
@@ -22,10 +22,11 @@ class SplitMix64 {
     return z ^ (z >> 31);
   }
 
-  // Returns an integer uniform over 0 ... bound - 1, with a bias below bound / 2^32. `bound` must not be 0.
+  // Returns an integer in 0 .. bound - 1. The distribution is uniform except for a bias below bound / 2^32. `bound`
+  // must not be 0.
   constexpr uint32_t below(uint32_t bound) { return static_cast<uint32_t>(((next() >> 32) * bound) >> 32); }
 
-  // Returns a number uniform over 0 <= x < 1, a multiple of 2^-53.
+  // Returns a multiple of 2^-53, uniformly distributed over 0 <= x < 1.
   constexpr double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
 
  private:

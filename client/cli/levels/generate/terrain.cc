@@ -9,7 +9,7 @@ namespace locus::cli {
 namespace {
 
 constexpr double kHillDistance = 256;
-constexpr int kOctaves = 7;  // the shortest wavelength is 4 m
+constexpr int kOctaves = 7;  // so the shortest wavelength is 256 m / 2^6 = 4 m
 
 }  // namespace
 

@@ -7,7 +7,7 @@
 
 namespace locus::cli {
 
-// Returns the largest r with r * r <= n. n is at most 2^62.
+// Returns the largest r with r * r <= n. Precondition: n <= 2^62.
 constexpr uint64_t whole_root(uint64_t n) {
   uint64_t root = 0;
   for (uint64_t bit = uint64_t{1} << 31; bit != 0; bit >>= 1)

@@ -1,4 +1,4 @@
-// Entry point of the importers: reads a file into meshes that are ready for upload. For the import command. Functions
+// Entry point of the importers: reads a file into meshes that are ready for upload. For the import command. A function
 // without state; any number of threads may import at once.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
@@ -11,22 +11,24 @@
 namespace locus::cli {
 
 struct ImportOptions {
-  // The level inside a .pk3, for example "maps/delta.bsp" or just "delta". Empty takes the first in alphabetical order.
+  // Level to read from a .pk3 archive, for example "maps/delta.bsp" or just "delta". Empty selects the first in
+  // alphabetical order.
   std::string entry;
-  // Each 3 x 3 Bezier patch of a Quake 3 level becomes this many squared quads. From 1 to kMaxPatchSubdivisions.
+  // Number of segments along each side of a 3 x 3 Bezier patch of a Quake 3 level: the patch becomes this number
+  // squared of quads. From 1 to kMaxPatchSubdivisions.
   int patch_subdivisions = 6;
-  // Multiplies every coordinate. Above 0 and finite. A Quake 3 unit is about 0.0254 m.
+  // Factor for every coordinate; must be finite and above 0. A Quake 3 unit is about 0.0254 m.
   double scale = 1;
 };
 
 // Reads OBJ, PLY, STL, glTF, GLB, BSP (Quake 3) or PK3, chosen by the file's extension (case-insensitive). Node
 // transforms and the scale are baked into the vertices, polygons are triangulated, equal vertices are merged, axes are
-// kept as in the file. Triangles keep the file's order, and zero-area triangles are kept. A file whose bounding box is
-// far from the origin (its centre further than 8 times its longest side) is recentred: every mesh is moved by one
-// shared translation in double before rounding to float, and `recentre` is the inverse translation. Errors: NOT_FOUND
-// (no such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty file, bad option), RESOURCE_EXHAUSTED (a
-// limit of import_limits.h). Each message suggests a remedy. Cost: the file is read once and held in memory, with about
-// 60 bytes for each of its vertices.
+// kept as in the file. Triangles keep the file's order, and zero-area triangles are kept. If the centre of the bounding
+// box is further from the origin than 8 times the box's longest side, the level is recentred: every mesh is moved by
+// one shared translation in double before rounding to float, and ImportedLevel::recentre is the inverse translation.
+// Errors: NOT_FOUND (no such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty file, bad option),
+// RESOURCE_EXHAUSTED (a limit of import_limits.h). Each message suggests a remedy. Cost: the file is read once and held
+// in memory, plus about 60 bytes for each of its vertices.
 absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportOptions& options);
 
 }  // namespace locus::cli

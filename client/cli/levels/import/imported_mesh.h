@@ -1,6 +1,6 @@
-// Result of every importer and generator: meshes in the exact layout of an upload. Plain data. Invariants, kept by the
-// importers and generators: finite coordinates, every index below the vertex count, parts in ascending order of their
-// first triangle.
+// Result of every importer and generator: meshes in the exact layout of an upload. Plain data. Invariants, which the
+// importers and generators establish: coordinates are finite, every index is below the number of vertices, and parts
+// are in ascending order of their first triangle.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORTED_MESH_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORTED_MESH_H_
 
@@ -11,7 +11,8 @@
 
 namespace locus::cli {
 
-// Named range of triangles: from first_triangle up to the next part's first triangle, or to the end of the mesh.
+// Named range of triangles of a mesh: from first_triangle up to the next part's first_triangle, or to the end of the
+// mesh.
 struct MeshPart {
   std::string name;
   uint32_t first_triangle = 0;
@@ -20,15 +21,15 @@ struct MeshPart {
 struct ImportedMesh {
   std::string name;
   std::vector<float> vertices;    // interleaved x, y, z of each vertex: 3 V values
-  std::vector<uint32_t> indices;  // three vertex indices a triangle, counter-clockwise seen from outside: 3 T values
+  std::vector<uint32_t> indices;  // three vertex indices per triangle, counter-clockwise seen from outside: 3 T values
   std::vector<MeshPart> parts;
 };
 
 struct ImportedLevel {
   std::vector<ImportedMesh> meshes;
-  std::array<double, 3> recentre{};  // translation of every instance that restores the file's coordinates
+  std::array<double, 3> recentre{};  // translation to place every mesh with, so that it has the file's coordinates
   std::string source_format;         // "OBJ", "PLY", "STL", "glTF", "GLB" or "Quake 3 BSP"
-  std::vector<std::string> notes;    // one sentence each, for the user, about anything skipped, chosen or changed
+  std::vector<std::string> notes;    // sentences for the user about anything that was skipped, chosen or changed
 };
 
 }  // namespace locus::cli

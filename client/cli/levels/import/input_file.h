@@ -1,5 +1,5 @@
-// Reading of whole input files under a size limit, and the parts of a file name that the importers use. Functions
-// without state.
+// Reader of whole input files under a size limit, and functions that return the parts of a file name. For the
+// importers. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_INPUT_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_INPUT_FILE_H_
 
@@ -18,11 +18,11 @@ std::string lower_extension(absl::string_view path);
 // Returns the file name without its folder and extension: "Delta" for "maps/Delta.BSP".
 std::string file_stem(absl::string_view path);
 
-// Returns OK if the path is a readable regular file of 1 to max_bytes bytes, else NOT_FOUND, INVALID_ARGUMENT or
+// Returns OK if the path is a readable regular file of 1 to `max_bytes` bytes, else NOT_FOUND, INVALID_ARGUMENT or
 // RESOURCE_EXHAUSTED.
 absl::Status check_input_file(const std::string& path, uint64_t max_bytes);
 
-// Calls check_input_file() and returns the bytes of the file.
+// Calls check_input_file() and returns the whole content of the file.
 absl::StatusOr<std::string> read_input_file(const std::string& path, uint64_t max_bytes);
 
 }  // namespace locus::cli

@@ -16,8 +16,8 @@
 namespace locus::cli {
 namespace {
 
-// Ratio of distance to size above which a level is recentred: at 8, float coordinates from the origin lose three of
-// their 24 bits.
+// Ratio of a level's distance from the origin to its size above which the level is recentred. At ratio 8, float
+// coordinates relative to the origin lose three of their 24 bits.
 constexpr double kFarRatio = 8;
 
 std::array<double, 3> choose_recentre(const std::array<double, 3>& min, const std::array<double, 3>& max) {
@@ -31,7 +31,8 @@ std::array<double, 3> choose_recentre(const std::array<double, 3>& min, const st
   return distance > kFarRatio * extent ? centre : std::array<double, 3>{};
 }
 
-// Merger of equal vertices: gives each distinct position one index, in order of first use.
+// Map from positions to vertex indices. Gives each distinct position one index, in order of first use, so that equal
+// vertices are merged.
 class VertexWelder {
  public:
   uint32_t index_of(const std::array<float, 3>& position) {
@@ -92,7 +93,7 @@ absl::StatusOr<LevelBuilder::Box> LevelBuilder::bounds() const {
   for (uint32_t index : indices_) {
     const std::array<double, 3>& position = positions_[index];
     for (size_t axis = 0; axis < 3; ++axis) {
-      // The comparison is negated so that NaN is refused too.
+      // Negate the comparison so that NaN is refused too.
       if (!(std::abs(position[axis]) <= kMaxImportCoordinate)) {
         return absl::InvalidArgumentError(
             absl::StrCat("vertex ", index, " is at (", position[0], ", ", position[1], ", ", position[2],

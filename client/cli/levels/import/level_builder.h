@@ -1,5 +1,6 @@
-// Builder of one upload-ready mesh from the triangles of one file, collected in double. For the importers. One builder,
-// one file, one thread. Invariant: every index added is below the number of vertices added.
+// Builder of one upload-ready mesh from the triangles of one file. Coordinates are collected in double and rounded
+// once. For the importers. Each builder is used by one thread. Invariant: every index added is below the number of
+// vertices added.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 
@@ -21,11 +22,13 @@ class LevelBuilder {
   // Creates an empty builder. `scale` multiplies every added coordinate.
   explicit LevelBuilder(double scale) : scale_(scale) {}
 
-  // Begins a part: triangles added from now on belong to it. The name of the last part continues that part. Parts
-  // without triangles are dropped. After kMaxImportParts parts, all further triangles belong to the last one.
+  // Begins a part, to which the triangles added from now on belong. If `name` is the name of the last part, that part
+  // is continued. Parts without triangles are dropped. After kMaxImportParts parts, all further triangles belong to the
+  // last part.
   void begin_part(absl::string_view name);
 
-  // Returns RESOURCE_EXHAUSTED if adding this many vertices and triangles would exceed a limit. Call it before adding.
+  // Returns RESOURCE_EXHAUSTED if adding this many vertices and triangles would exceed a limit. Call it before adding
+  // them, since the functions below do not check.
   absl::Status ensure_room(size_t vertices, size_t triangles) const;
 
   // Adds a vertex and returns its index.
@@ -36,9 +39,9 @@ class LevelBuilder {
   size_t vertex_count() const { return positions_.size(); }
   size_t triangle_count() const { return indices_.size() / 3; }
 
-  // Returns the level with one mesh. Recentres it if its bounds are far from the origin, rounds once to float, merges
-  // equal vertices and drops unused ones. INVALID_ARGUMENT if there is no triangle, or if a used coordinate is not
-  // finite and within kMaxImportCoordinate. Linear.
+  // Returns the level with its single mesh. Recentres it if its bounds are far from the origin, rounds coordinates once
+  // to float, merges equal vertices and drops unused ones. Returns INVALID_ARGUMENT if there is no triangle, or if a
+  // used coordinate is not finite or exceeds kMaxImportCoordinate. Cost: linear.
   absl::StatusOr<ImportedLevel> finish(std::string name) &&;
 
  private:

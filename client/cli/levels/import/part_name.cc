@@ -12,14 +12,15 @@ uint8_t byte_at(absl::string_view text, size_t i) { return static_cast<uint8_t>(
 
 bool is_continuation(absl::string_view text, size_t i) { return i < text.size() && (byte_at(text, i) & 0xC0) == 0x80; }
 
-// Returns the length in bytes of the UTF-8 character at i, or 0 if it is not valid.
+// Returns the length in bytes of the UTF-8 character that begins at index `i`, or 0 if no valid character begins there.
 size_t character_length(absl::string_view text, size_t i) {
   const uint8_t lead = byte_at(text, i);
   if (lead < 0x80) return 1;
   if (lead < 0xC2 || lead > 0xF4 || !is_continuation(text, i + 1)) return 0;
   if (lead < 0xE0) return 2;
   const uint8_t second = byte_at(text, i + 1);
-  // The second byte identifies overlong forms, surrogates and characters beyond U+10FFFF.
+  // Check the range of the second byte, by which overlong forms, surrogates and characters beyond U+10FFFF are
+  // recognized.
   if ((lead == 0xE0 && second < 0xA0) || (lead == 0xED && second > 0x9F)) return 0;
   if ((lead == 0xF0 && second < 0x90) || (lead == 0xF4 && second > 0x8F)) return 0;
   if (!is_continuation(text, i + 2)) return 0;

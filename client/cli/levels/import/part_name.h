@@ -1,4 +1,4 @@
-// Cleaning of names from untrusted files, so that they can be sent and printed. A function without state.
+// Sanitizing of names from untrusted files, so that they can be sent and printed. A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_PART_NAME_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_PART_NAME_H_
 
@@ -8,8 +8,8 @@
 
 namespace locus::cli {
 
-// Returns the name, truncated to kMaxPartNameBytes at a character boundary. Control characters are replaced by '_'. If
-// the name is not valid UTF-8, which a protobuf string must be, every byte outside ASCII is replaced by '_'.
+// Returns `raw` truncated to kMaxPartNameBytes at a character boundary, with control characters replaced by '_'. If
+// `raw` is not valid UTF-8, which a protobuf string must be, every byte outside ASCII is replaced by '_'.
 std::string clean_part_name(absl::string_view raw);
 
 }  // namespace locus::cli

@@ -41,7 +41,7 @@ absl::Status damaged(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat("damaged PLY: ", what, "; export the mesh again"));
 }
 
-// Returns the size of a scalar type, or 0 if the type is unknown.
+// Returns the size in bytes of a scalar type, or 0 if the type is unknown.
 size_t type_bytes(absl::string_view type) {
   constexpr std::pair<absl::string_view, size_t> kTypes[] = {
       {"char", 1},  {"uchar", 1},   {"int8", 1},   {"uint8", 1},  {"short", 2}, {"ushort", 2},
@@ -128,14 +128,14 @@ uint64_t read_count(absl::string_view bytes, size_t width, PlyEncoding encoding)
   return count;
 }
 
-// Removes one row of the element from the front of the body. Returns false if the body is too short.
+// Removes one row of `element` from the front of `body`. Returns false if the body ends within the row.
 bool skip_row(const PlyElement& element, PlyEncoding encoding, absl::string_view& body) {
   for (const PlyProperty& property : element.properties) {
     uint64_t count = 1;
     if (property.count_bytes > 0) {
       if (body.size() < property.count_bytes) return false;
       count = read_count(body, property.count_bytes, encoding);
-      // A negative list length is invalid.
+      // Refuse a negative list length.
       if (property.count_is_signed && count >> (8 * property.count_bytes - 1) != 0) return false;
       body.remove_prefix(property.count_bytes);
     }
@@ -148,7 +148,7 @@ bool skip_row(const PlyElement& element, PlyEncoding encoding, absl::string_view
 absl::Status check_binary_body(const PlyHeader& header, absl::string_view body) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty()) continue;
-    // Every row takes at least one byte, so the loop ends at the end of the body even if the declared count is larger.
+    // A row takes at least one byte, so this loop ends at the end of the body even if the declared count is larger.
     for (uint64_t row = 0; row < element.count; ++row) {
       if (!skip_row(element, header.encoding, body)) {
         return damaged(absl::StrCat("the file ends within ", element.name, "[", row, "] of ", element.count));
@@ -158,7 +158,7 @@ absl::Status check_binary_body(const PlyHeader& header, absl::string_view body) 
   return absl::OkStatus();
 }
 
-// Checks that the body has a line for each element of each kind.
+// Checks that the body has at least one non-empty line for each declared element.
 absl::Status check_ascii_body(const PlyHeader& header, absl::string_view body) {
   uint64_t lines = 0;
   for (const absl::string_view line : absl::StrSplit(body, '\n')) {

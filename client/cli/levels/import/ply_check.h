@@ -1,5 +1,6 @@
-// Check of a PLY file before assimp reads it. assimp 5.2 reads a triangle strip as a single face, and fills a truncated
-// body with stale data instead of refusing it. For the scene importer. Functions without state.
+// Check of a PLY file before assimp reads it. The check is needed because assimp 5.2 reads a triangle strip as a single
+// face, and fills a truncated body with stale data instead of refusing it. For the scene importer. A function without
+// state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_PLY_CHECK_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_PLY_CHECK_H_
 
@@ -10,9 +11,9 @@
 
 namespace locus::cli {
 
-// Verifies that the body of the PLY file is complete, and returns the number of faces that its header declares, to be
-// compared with the number that assimp reads. INVALID_ARGUMENT for a damaged header, triangle strips or a body that
-// ends early, naming the element. The bytes are untrusted. Linear.
+// Verifies that the body of the PLY file is complete. Returns the number of faces that the header declares; the caller
+// must compare it with the number that assimp reads. Returns INVALID_ARGUMENT that names the element for a damaged
+// header, triangle strips or a truncated body. The bytes are untrusted. Cost: linear.
 absl::StatusOr<uint64_t> check_ply(absl::string_view bytes);
 
 }  // namespace locus::cli

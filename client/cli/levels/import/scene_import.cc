@@ -25,7 +25,7 @@
 namespace locus::cli {
 namespace {
 
-// Affine transform as a 3 x 4 matrix by rows; the fourth column is the translation.
+// Affine transform as a 3 x 4 matrix. Column 3 of each row is the translation.
 struct Affine {
   std::array<std::array<double, 4>, 3> rows{};
 
@@ -64,7 +64,8 @@ absl::Status refusal(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat(what, "; export the file again or convert it to GLB"));
 }
 
-// Parses the file. The parser throws on some damaged files and on exhausted memory; its exceptions become errors here.
+// Parses the file with assimp. assimp throws on some damaged files and on exhausted memory; this function converts its
+// exceptions to errors.
 absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const std::string& path) {
   const aiScene* scene = nullptr;
   try {
@@ -78,7 +79,7 @@ absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const std::stri
 }
 
 // Checks that coordinates are finite and indices in range. Call it before triangulation, which does not check indices;
-// for some formats the parser does not check them either.
+// neither does assimp's parser for some formats.
 absl::Status check_mesh(const aiMesh& mesh, size_t index) {
   const std::string name = absl::StrCat("mesh ", index, " (", mesh.mName.C_Str(), ")");
   for (size_t v = 0; v < mesh.mNumVertices; ++v) {
@@ -118,7 +119,8 @@ FaceCounts count_faces(const aiScene& scene) {
   return counts;
 }
 
-// Returns the number of faces that a PLY header declares, or nullopt for other formats, which declare none.
+// Returns the number of faces that the header of a PLY file declares. Returns nullopt for other formats, which do not
+// declare it.
 absl::StatusOr<std::optional<uint64_t>> declared_faces(const std::string& path) {
   if (lower_extension(path) != ".ply") return std::nullopt;
   ASSIGN_OR_RETURN(const std::string bytes, read_input_file(path, kMaxImportFileBytes));
@@ -159,8 +161,8 @@ std::string part_name(const aiNode& node, const aiMesh& mesh) {
   return absl::StrCat(node_name, "/", mesh_name);
 }
 
-// Adds the meshes of all nodes in depth-first order. Uses an explicit stack, since the untrusted file decides the depth
-// of the tree.
+// Adds the meshes of all nodes in depth-first order. Uses an explicit stack instead of recursion, since the untrusted
+// file decides the depth of the tree.
 absl::Status add_nodes(const aiScene& scene, LevelBuilder& builder) {
   std::vector<std::pair<const aiNode*, Affine>> stack;
   stack.emplace_back(scene.mRootNode, Affine::from(scene.mRootNode->mTransformation));
@@ -210,7 +212,7 @@ void add_notes(const FaceCounts& found, uint64_t triangles_left, ImportedLevel& 
 }  // namespace
 
 absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const ImportOptions& options) {
-  // Check before parsing: the parser reads out of bounds on some files that this check refuses.
+  // Check before parsing: assimp reads out of bounds on some files that this check refuses.
   ASSIGN_OR_RETURN(const std::optional<uint64_t> declared, declared_faces(path));
   Assimp::Importer importer;
   ASSIGN_OR_RETURN(const aiScene* const parsed, parse(importer, path));

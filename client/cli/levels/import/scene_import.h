@@ -1,5 +1,5 @@
-// Import of OBJ, PLY, STL, glTF and GLB files: assimp parses a file; this code checks the result and bakes the node
-// transforms. For import_file(). A function without state. Only scene_import.cc includes assimp.
+// Import of OBJ, PLY, STL, glTF and GLB files. assimp parses a file; this code checks the result and bakes the node
+// transforms into the vertices. For import_file(). A function without state. Only scene_import.cc includes assimp.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_SCENE_IMPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_SCENE_IMPORT_H_
 
@@ -12,8 +12,9 @@
 namespace locus::cli {
 
 // Returns one mesh named after the file, with a part for each mesh of each node in depth-first order. Node transforms
-// are multiplied in double. Under a mirroring transform the triangles' vertex order is reversed, so that their outside
-// stays outside. Points and lines are dropped and counted in a note. INVALID_ARGUMENT includes the parser's message.
+// are multiplied in double. Under a mirroring transform the vertex order of triangles is reversed, so that they stay
+// counter-clockwise seen from outside. Points and lines are dropped and counted in a note. The message of
+// INVALID_ARGUMENT contains that of assimp.
 absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const ImportOptions& options);
 
 }  // namespace locus::cli

@@ -51,7 +51,7 @@ absl::StatusOr<size_t> ByteInput::read(absl::Span<char> buffer) {
 bool ByteInput::ready_within(std::chrono::milliseconds wait) const {
   struct pollfd poll_of = {.fd = descriptor_, .events = POLLIN, .revents = 0};
   const int ready = poll(&poll_of, 1, static_cast<int>(wait.count()));
-  return ready != 0;  // an error counts as ready: read() will name it
+  return ready != 0;  // an error counts as ready: the next read() reports it
 }
 
 }  // namespace locus::cli

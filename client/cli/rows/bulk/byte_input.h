@@ -1,5 +1,5 @@
-// A file, a pipe or standard input, read in chunks: for inputs that are too large for memory or never end. Not
-// thread-safe.
+// Input of bytes from a file, a pipe or standard input, read in chunks. For inputs that do not fit in memory or never
+// end. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
 
@@ -14,8 +14,9 @@ namespace locus::cli {
 
 class ByteInput {
  public:
-  // Opens `path`. "-" is standard input, which stays open and is called "stdin" in messages. NOT_FOUND if the path does
-  // not exist, INVALID_ARGUMENT if it cannot be read. Opening a named pipe waits for its writer.
+  // Opens `path`. "-" is standard input, which the destructor does not close and which is called "stdin" in messages.
+  // Returns NOT_FOUND if the path does not exist, INVALID_ARGUMENT if it cannot be read. Opening a named pipe blocks
+  // until a writer opens it.
   static absl::StatusOr<ByteInput> open(const std::string& path);
   ~ByteInput();
   ByteInput(ByteInput&& other) noexcept;
@@ -23,10 +24,12 @@ class ByteInput {
   ByteInput(const ByteInput&) = delete;
   ByteInput& operator=(const ByteInput&) = delete;
 
-  // Waits for data, reads at most buffer.size() bytes and returns their count, 0 at the end. UNKNOWN if reading fails.
+  // Waits for data, reads at most buffer.size() bytes and returns the number of bytes read, 0 at the end of the input.
+  // Returns UNKNOWN if reading fails.
   absl::StatusOr<size_t> read(absl::Span<char> buffer);
 
-  // Returns whether read() has data within `wait`. True at the end and after an error, too.
+  // Waits at most `wait` for data. Returns whether read() would return at once; this is also true at the end of the
+  // input and after an error.
   bool ready_within(std::chrono::milliseconds wait) const;
 
   const std::string& name() const { return name_; }

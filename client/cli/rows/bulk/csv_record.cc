@@ -9,8 +9,8 @@
 namespace locus::cli {
 namespace {
 
-// Reads a quoted field, with `rest` just after its opening quote, and moves `rest` just after the closing one. Returns
-// false if there is no closing quote.
+// Reads a quoted field. `rest` begins just after the opening quote and is advanced to just after the closing quote.
+// Returns false if there is no closing quote.
 bool take_quoted(absl::string_view& rest, std::string& field) {
   field.clear();
   while (true) {

@@ -1,5 +1,6 @@
-// The fields of one csv record (RFC 4180). For the row reader; a function without state. Debian's readers for C and C++
-// do not fit: libcsv does not bound the size of a field, and fast-cpp-csv-parser has no line breaks in quotes.
+// Splitting of one csv record (RFC 4180) into fields. For the row reader; a function without state. Debian's csv
+// libraries for C and C++ are unsuitable: libcsv does not bound the size of a field, and fast-cpp-csv-parser does not
+// support line breaks in quotes.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_CSV_RECORD_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_CSV_RECORD_H_
 
@@ -12,8 +13,8 @@
 namespace locus::cli {
 
 // Splits `record`, given without its line end, at the commas outside quotes, and removes the quotes. Blanks around an
-// unquoted field are dropped. INVALID_ARGUMENT for a quote that does not open or close a field; `fields` then has the
-// fields before it. An empty record is one empty field.
+// unquoted field are dropped. Returns INVALID_ARGUMENT for a quote in the middle of a field; `fields` then contains the
+// fields before it. An empty record has one empty field.
 absl::Status split_csv_record(absl::string_view record, std::vector<std::string>& fields);
 
 }  // namespace locus::cli

@@ -1,4 +1,5 @@
-// Rows from csv records: the first record names the columns. For the row reader. Not thread-safe.
+// Parser of csv records into rows. The first record is the header, which names the columns. For the row reader. Not
+// thread-safe.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_CSV_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_CSV_ROWS_H_
 
@@ -19,17 +20,18 @@ class CsvRows {
   explicit CsvRows(const RowSchema& schema) : schema_(schema) {}
 
   bool has_header() const { return !slots_.empty(); }
-  // Reads the header. INVALID_ARGUMENT for a column that is unknown, repeated or missing, or also given by an option.
+  // Parses the header. Returns INVALID_ARGUMENT for a column that is unknown, repeated, missing, or also given by an
+  // option.
   absl::Status read_header(absl::string_view record);
-  // Appends one row; an empty cell means that the value is not given. INVALID_ARGUMENT for a wrong number of fields or
-  // a wrong value.
+  // Appends one row to `batch`. An empty cell means that the value is not given. Returns INVALID_ARGUMENT for a wrong
+  // number of fields or a wrong value.
   absl::Status read_row(absl::string_view record, uint64_t line, RowBuilder& builder, RowBatch& batch);
 
  private:
   absl::Status check_complete() const;
 
   const RowSchema& schema_;
-  std::vector<Slot> slots_;  // field of each column
+  std::vector<Slot> slots_;  // schema field of each csv column; empty before the header
   std::vector<std::string> fields_;
 };
 

@@ -10,7 +10,8 @@
 namespace locus::cli {
 namespace {
 
-// SAX handler: the parser calls it for each token. A call that returns false ends the parse with `status_` set.
+// Handler of the JSON parser's events, one call per token. A call that returns false ends parsing and has set
+// `status_`.
 class RowHandler final : public nlohmann::json_sax<nlohmann::json> {
  public:
   RowHandler(const RowSchema& schema, RowBuilder& builder) : schema_(schema), builder_(builder) {}
@@ -71,7 +72,8 @@ class RowHandler final : public nlohmann::json_sax<nlohmann::json> {
   }
   bool parse_error(std::size_t position, const std::string& /*token*/,
                    const nlohmann::detail::exception& error) override {
-    // Error 406 is a number out of the range of double; all others are syntax errors.
+    // Error 406 of the parser means that a number is out of the range of double. All its other errors are syntax
+    // errors.
     return refuse(error.id == 406 ? absl::StrCat(name(), ": the number at column ", position, " is beyond any double")
                                   : absl::StrCat("no JSON at column ", position));
   }

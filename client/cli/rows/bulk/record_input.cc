@@ -39,8 +39,9 @@ absl::StatusOr<Arrival> RecordInput::next(Record& record, std::optional<Clock::t
   return Arrival::kRecord;
 }
 
-// Scans for the end of a record. Returns whether [begin_, scanned_) is a complete record with its line end. A quote
-// within quotes is written twice, so the parity of the quotes decides whether a position is inside quotes.
+// Scans for the end of a record. Returns true if [begin_, scanned_) is a complete record including its line end. A
+// quote within a quoted field is written twice, so the parity of the quotes so far decides whether a line break is
+// quoted.
 bool RecordInput::find_end() {
   while (scanned_ < buffer_.size()) {
     const char c = buffer_[scanned_++];

@@ -1,5 +1,5 @@
-// Splits an input into records: lines, or csv records, which may have line breaks in quotes. For the row readers. Keeps
-// one chunk of the input and at most one record in memory. Not thread-safe.
+// Input split into records: lines, or csv records, which may contain quoted line breaks. For the row readers. Holds one
+// chunk of the input and at most one record in memory. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_RECORD_INPUT_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_RECORD_INPUT_H_
 
@@ -32,13 +32,13 @@ class RecordInput {
 
   RecordInput(ByteInput input, RecordForm form) : input_(std::move(input)), form_(form) {}
 
-  // Reads the next record. With `pause_at`, returns kPause if the input has no data by then. Errors: INVALID_ARGUMENT
-  // for a record over kMaxRecordBytes or a quote that is not closed, without the input's name, or the error of read().
-  // line() is the line of the error.
+  // Reads the next record. With `pause_at`, returns kPause if no data is available by that time. Returns
+  // INVALID_ARGUMENT for a record of more than kMaxRecordBytes or an unclosed quote, or the error of ByteInput::read().
+  // The caller must add name() and line() to the message of INVALID_ARGUMENT, which contains neither.
   absl::StatusOr<Arrival> next(Record& record, std::optional<Clock::time_point> pause_at);
 
   const std::string& name() const { return input_.name(); }
-  // Returns the line where the record of the last call of next() begins, also if the call failed.
+  // Returns the line where the record of the last call of next() begins, from 1, even if that call failed.
   uint64_t line() const { return line_; }
 
  private:

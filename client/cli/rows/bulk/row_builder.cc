@@ -23,7 +23,7 @@ bool holds_integer(FieldKind kind) {
   return kind == FieldKind::kId || kind == FieldKind::kBits || kind == FieldKind::kWord;
 }
 
-// Truncates `text` for an error message and quotes it.
+// Returns `text` in quotes, truncated to kShownBytes, for an error message.
 std::string quoted_excerpt(absl::string_view text) {
   if (text.size() <= kShownBytes) return absl::StrCat("'", absl::CEscape(text), "'");
   return absl::StrCat("'", absl::CEscape(text.substr(0, kShownBytes)), "...'");
@@ -48,10 +48,10 @@ std::optional<uint64_t> read_integer(absl::string_view text) {
   return parse_exactly<uint64_t>(text, 10);
 }
 
-// Returns why `value` is not allowed for the kind; empty if it is allowed.
+// Returns the reason why `value` is not allowed for this kind of field; empty if it is allowed.
 std::string fault_of(FieldKind kind, double value) {
   if (kind == FieldKind::kDistance) {
-    return value >= 0 ? "" : absl::StrCat(value, " is not 0 or more");  // also for NaN
+    return value >= 0 ? "" : absl::StrCat(value, " is not 0 or more");  // NaN is refused, too
   }
   if (!std::isfinite(value)) return absl::StrCat(value, " is not finite");
   if (kind == FieldKind::kCoordinate && std::abs(value) > limits::kMaxCoordinate) {

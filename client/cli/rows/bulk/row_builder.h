@@ -1,7 +1,7 @@
 // Builder that appends rows to a batch, value by value, and validates every value of the untrusted input. For the csv
 // and ndjson readers. Not thread-safe.
 //
-// Invariant: the batch has only complete, valid rows; a row with an error leaves it unchanged.
+// Invariant: the batch contains only complete, valid rows; a row with an error leaves the batch unchanged.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_BUILDER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_BUILDER_H_
 
@@ -23,14 +23,15 @@ class RowBuilder {
   // Returns an empty batch with the schema's columns.
   RowBatch empty_batch(uint64_t first_row) const;
 
-  // Begins a row without values.
+  // Begins a new row, without values.
   void start();
-  // Sets one value of the row, from text or from a number in JSON. `slot` must name a part if the field has parts.
-  // Errors are INVALID_ARGUMENT with the column and the value: "dir.y: 'abc' is no number".
+  // Sets one value of the current row, from text or from a JSON number. If the field is a vector, `slot` must select
+  // one of its parts. Errors are INVALID_ARGUMENT and name the column and the value: "dir.y: 'abc' is no number".
   absl::Status put_text(const Slot& slot, absl::string_view text);
   absl::Status put_number(const Slot& slot, double value);
   absl::Status put_integer(const Slot& slot, uint64_t value);
-  // Appends the row. INVALID_ARGUMENT if a required field or a part of a vector is missing.
+  // Appends the current row to `batch`. Returns INVALID_ARGUMENT if a required field or a part of a vector is missing.
+  // `line` is the row's line in the input.
   absl::Status finish(uint64_t line, RowBatch& batch);
 
  private:

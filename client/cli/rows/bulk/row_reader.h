@@ -1,5 +1,5 @@
-// Reader of a csv or ndjson input, batch by batch. For the commands that accept rows; the only entry to this folder's
-// readers. Not thread-safe. Keeps at most one batch and one chunk of the input in memory.
+// Reader of csv or ndjson rows, batch by batch. For the commands that accept rows; the only entry to the readers in
+// this folder. Not thread-safe. Holds at most one batch and one chunk of the input in memory.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 
@@ -19,7 +19,8 @@ namespace locus::cli {
 
 enum class RowFormat { kCsv, kNdjson };
 
-// Time after the first row of a batch from which on the batch ends as soon as the input has no data ready.
+// Maximum time to collect a batch while the input is slow, counted from the batch's first row: after this time the
+// batch ends as soon as no data is ready.
 inline constexpr std::chrono::milliseconds kRowPause{50};
 
 enum class BatchEnd {
@@ -28,7 +29,7 @@ enum class BatchEnd {
   kEnd,    // the input has ended
 };
 
-// Behaviour of a reader before the first row of a batch: wait for it, or return kPause after kRowPause.
+// Behaviour while the batch is still empty: wait for the first row, or return kPause after kRowPause.
 enum class Patience { kWait, kPause };
 
 class RowReader {
@@ -37,8 +38,9 @@ class RowReader {
   RowReader(const RowReader&) = delete;
   RowReader& operator=(const RowReader&) = delete;
 
-  // Reads the next rows, at most `max_rows`, into `batch`. A batch may be empty at the end of the input and with
-  // Patience::kPause. The message of an error is "FILE:LINE: REASON"; do not use the batch or the reader after it.
+  // Reads the next rows, at most `max_rows`, into `batch`. The batch can be empty at the end of the input, and with
+  // Patience::kPause. The message of an error is "FILE:LINE: REASON"; after an error neither the batch nor the reader
+  // may be used.
   absl::StatusOr<BatchEnd> next(size_t max_rows, Patience patience, RowBatch& batch);
 
   const RowSchema& schema() const { return schema_; }
@@ -53,7 +55,7 @@ class RowReader {
   RecordInput input_;
   RowBuilder builder_;
   CsvRows csv_;
-  uint64_t rows_ = 0;  // rows of all batches so far
+  uint64_t rows_ = 0;  // number of rows in all batches so far
 };
 
 }  // namespace locus::cli

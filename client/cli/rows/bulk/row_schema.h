@@ -1,7 +1,7 @@
-// Schema of a bulk input: the columns that it may have; and a batch of its rows, stored in columns. For the row readers
-// and the commands that read rows. Plain data, and one lookup.
+// Schema of a bulk input (the columns that it may have), and a batch of rows, stored by column. For the row readers and
+// the commands that read rows. Plain data and lookups by name.
 //
-// Columns have the names of the commands' options without the leading dashes, with `_` or `-` inside: from, dir, max_t.
+// A column has the name of the command's option without the leading dashes, with `_` or `-` inside: from, dir, max_t.
 // The parts of a vector are from.x, from.y, from.z in csv; ndjson also allows "from": [x, y, z].
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_SCHEMA_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_SCHEMA_H_
@@ -20,16 +20,16 @@ namespace locus::cli {
 enum class FieldKind {
   kCoordinate,  // |x| <= 1e9, stored as double
   kFloat,       // within the finite range of float
-  kDistance,    // 0 or more, infinity included
+  kDistance,    // float, 0 or more; +infinity is allowed
   kId,          // unsigned, 64 bits
   kBits,        // unsigned, 32 bits
-  kWord,        // one of Field::words, stored as its index there
+  kWord,        // one of Field::words, stored as its index in that list
 };
 
 struct Field {
   std::string name;
   FieldKind kind = FieldKind::kFloat;
-  std::string parts = {};  // "xyz" or "xyzw" for a vector, empty for one value
+  std::string parts = {};  // names of a vector's parts, "xyz" or "xyzw"; empty for one value
   std::vector<std::string> aliases = {};
   bool required = false;
   std::string option = {};  // option that sets the value for all rows; then the input must not have the column
@@ -40,23 +40,25 @@ struct Field {
 
 using RowSchema = std::vector<Field>;
 
-// Index of a field, and of a part of it. Without a part, the name of a vector stands for all of its parts.
+// Position of a value: the index of a field in the schema and, for one part of a vector, the index of the part. Without
+// `part` it means the whole field.
 struct Slot {
   size_t field = 0;
   std::optional<size_t> part = std::nullopt;
 };
 
-// Returns the slot that `name` names; none if the schema has no such field or part.
+// Returns the slot with this name, for example "from.x" or "from"; none if the schema has no such field or part.
 std::optional<Slot> find_slot(const RowSchema& schema, absl::string_view name);
 
-// Returns the name of a slot: "from.x" for a part, "from" for all of the field.
+// Returns the name of a slot: "from.x" for one part, "from" for the whole field.
 std::string slot_name(const RowSchema& schema, const Slot& slot);
 
-// Returns the names of all columns in csv, for messages: "from.x, from.y, ...".
+// Returns the names of all csv columns of the schema, for messages: "from.x, from.y, ...".
 std::string known_columns(const RowSchema& schema);
 
-// Values of one field for all rows of a batch. Either `numbers` (Field::size() entries per row) or `integers` is
-// filled, depending on the kind. A row without the field has zeros there and 0 in `given`.
+// Values of one field for all rows of a batch. The field's kind decides whether `numbers` (Field::size() entries per
+// row) or `integers` (one entry per row) is filled. For a row without a value the entries are 0, and so is its entry in
+// `given`.
 struct RowColumn {
   std::vector<double> numbers;
   std::vector<uint64_t> integers;
@@ -69,7 +71,7 @@ struct RowColumn {
 struct RowBatch {
   std::vector<RowColumn> columns;  // one per field of the schema
   std::vector<uint64_t> lines;     // line of the input where each row begins, from 1
-  uint64_t first_row = 0;          // number of rows of the input before this batch
+  uint64_t first_row = 0;          // index of the batch's first row in the whole input
 
   size_t rows() const { return lines.size(); }
 };

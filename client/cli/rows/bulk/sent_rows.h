@@ -1,5 +1,5 @@
-// Lines of the input that a sent batch was made from, so that an error of the server about an item can name its line.
-// For the commands that send rows. Plain data and one lookup.
+// Lines of the input from which a sent batch was made, so that the line of an item can be found that the server's error
+// names. For the commands that send rows. Plain data and lookups.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 
@@ -14,17 +14,17 @@
 namespace locus::cli {
 
 struct SentRows {
-  uint64_t first_row = 0;           // index in the input of the first row
-  std::vector<uint64_t> lines;      // line of each row
+  uint64_t first_row = 0;           // index of the first row in the whole input, from 0
+  std::vector<uint64_t> lines;      // line of each row, from 1
   std::vector<size_t> list_starts;  // first row of each of the batch's lists (blocks, inserts, moves)
 
   size_t rows() const { return lines.size(); }
 
-  // Returns the line of entry `index` of the list that `field` names ("moves[3].ids", "blocks[0].rays.directions",
-  // "remove_ids"); none if that is not a row.
+  // Returns the line of entry `index` of the list that `field`, a path from a server's error, names ("moves[3].ids",
+  // "blocks[0].rays.directions", "remove_ids"); none if that entry does not belong to a row.
   std::optional<uint64_t> line_of(absl::string_view field, size_t index) const;
 
-  // Returns the first and last line as "17" or "17-8208"; empty without rows.
+  // Returns the range of the batch's lines for messages, as "17" or "17-8208"; empty if the batch has no rows.
   std::string line_range() const;
 };
 

@@ -3,7 +3,8 @@
 namespace locus::cli {
 
 PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const PatchPoint& c, int step, int steps) {
-  // The end points are returned unchanged, so that evaluating across the patch adds no rounding on its border.
+  // Return end points unchanged, so that points on a patch's border are not affected by rounding in the direction
+  // across it.
   if (step == 0) return a;
   if (step == steps) return c;
   const double rest = steps - step;
@@ -13,7 +14,7 @@ PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const Pa
   const double weight_sum = static_cast<double>(steps) * steps;
   PatchPoint point;
   for (size_t axis = 0; axis < 3; ++axis) {
-    // The terms of the end points are added first: that sum commutes, so the reversed curve rounds identically.
+    // Add the terms of the end points first. That sum is commutative, so the reversed curve is rounded identically.
     point[axis] = ((a[axis] * weight_a + c[axis] * weight_c) + b[axis] * weight_b) / weight_sum;
   }
   return point;
@@ -26,7 +27,7 @@ PatchGrid tessellate_patch(std::span<const PatchPoint> controls, size_t width, s
   grid.height = (height - 1) / 2 * steps + 1;
   grid.points.reserve(grid.width * grid.height);
   for (size_t y = 0; y < grid.height; ++y) {
-    // A row shared by two patches is evaluated in the first, at step `steps`.
+    // A row of points shared by two patches is evaluated as the last row (step `steps`) of the first patch.
     const size_t patch_y = y == 0 ? 0 : (y - 1) / steps;
     const int step_y = static_cast<int>(y - patch_y * steps);
     for (size_t x = 0; x < grid.width; ++x) {

@@ -12,7 +12,7 @@ namespace locus::cli {
 
 using PatchPoint = std::array<double, 3>;
 
-// Grid of width x height points, row by row.
+// Grid of width x height points, stored row by row.
 struct PatchGrid {
   size_t width = 0;
   size_t height = 0;
@@ -20,15 +20,15 @@ struct PatchGrid {
 };
 
 // Returns the point at parameter step / steps, 0 <= step <= steps, of the quadratic Bezier curve with control points a,
-// b, c. If the control points are floats, the result is bit for bit equal to the point of the reversed curve at steps -
-// step: the products are exact, and only the symmetric sum rounds.
+// b, c. If the control points are floats, the result is bit for bit equal to the point at steps - step of the reversed
+// curve c, b, a: the products are exact in double, and only a commutative sum is rounded.
 PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const PatchPoint& c, int step, int steps);
 
-// Tessellates a grid of width x height control points (both odd, at least 3, row by row; neighbouring 3 x 3 patches
-// share a row or column) with subdivisions^2 quads for each 3 x 3 patch. A point on the border of a 3 x 3 patch is
-// computed from that border's three control points only. So two patches with equal border control points meet exactly,
-// even if one stores them in reverse order. Source of the method: Farin, Curves and Surfaces for CAGD, 2002 (tensor
-// product patches).
+// Tessellates a grid of width x height control points (both odd and at least 3, stored row by row), which consists of 3
+// x 3 patches; neighbouring patches share a row or column. Each patch becomes subdivisions^2 quads. A point on the
+// border of a patch is computed only from the three control points of that border, so two patches with equal border
+// control points meet exactly, even if one stores them in reverse order. Source of the method: Farin, Curves and
+// Surfaces for CAGD, 2002 (tensor product patches).
 PatchGrid tessellate_patch(std::span<const PatchPoint> controls, size_t width, size_t height, int subdivisions);
 
 }  // namespace locus::cli

@@ -26,7 +26,7 @@ constexpr size_t kTextureNameBytes = 64;
 constexpr size_t kVertexBytes = 44;
 constexpr size_t kFaceBytes = 104;
 
-// Reads a little-endian integer, independent of the machine's byte order.
+// Returns the little-endian integer at offset `at`, independent of the machine's byte order.
 uint32_t read_u32(absl::string_view bytes, size_t at) {
   uint32_t value = 0;
   for (size_t i = 0; i < 4; ++i) value |= uint32_t{static_cast<uint8_t>(bytes[at + i])} << (8 * i);
@@ -100,7 +100,7 @@ absl::Status read_meshverts(const Lumps& lumps, BspFile& file) {
   return absl::OkStatus();
 }
 
-// Returns whether first + count <= size. The sum is computed in 64 bits, since it may exceed 2^32: a negative integer
+// Returns whether first + count <= size. The sum is computed in 64 bits, since it can exceed 2^32: a negative integer
 // in the file is read as a large unsigned one.
 bool is_range(uint32_t first, uint32_t count, size_t size) { return uint64_t{first} + count <= size; }
 
@@ -138,7 +138,7 @@ absl::Status check_face(size_t face_index, const BspFace& face, const BspFile& f
   if (face.texture >= file.textures.size()) {
     return damaged(kFacesLump, face_index, absl::StrCat("texture ", face.texture, " of ", file.textures.size()));
   }
-  // A billboard's geometry is never read.
+  // Skip the checks of vertices for a billboard, since its vertices are never used.
   if (face.type == BspFaceType::kBillboard) return absl::OkStatus();
   if (!is_range(face.first_vertex, face.vertex_count, file.vertices.size())) {
     return damaged(

@@ -1,6 +1,6 @@
-// Decoder of the drawn surfaces in a Quake 3 level file (IBSP version 46). For the BSP importer. Plain data and one
-// function without state. Invariants of a BspFile from parse_bsp(): every texture, vertex and meshvert index of a face
-// is in range, and every float is finite.
+// Decoder of the drawn surfaces in a Quake 3 level file (IBSP version 46). For the BSP importer. Plain data and a
+// function without state. Invariants of a BspFile returned by parse_bsp(): every texture, vertex and meshvert index of
+// a face is in range, and every float is finite.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 
@@ -34,8 +34,8 @@ struct BspFile {
   std::vector<BspFace> faces;
 };
 
-// Decodes the bytes of a whole file; they are untrusted. INVALID_ARGUMENT names the damaged lump and element. Cost:
-// linear in the file's size.
+// Decodes `bytes`, the untrusted content of a whole file. Returns INVALID_ARGUMENT that names the damaged lump and
+// element. Cost: linear in the file's size.
 absl::StatusOr<BspFile> parse_bsp(absl::string_view bytes);
 
 }  // namespace locus::cli

@@ -30,8 +30,8 @@ uint64_t triangles_of(const BspFace& face, int subdivisions) {
   return 0;
 }
 
-// Checks the total number of triangles before any is built: the faces of a small file can share the same meshverts many
-// times.
+// Checks the total number of triangles before any triangle is built. Without this check a small file could take
+// unbounded memory, since many of its faces can share the same meshverts.
 absl::Status check_triangles(const BspFile& file, int subdivisions) {
   uint64_t total = 0;
   for (size_t i = 0; i < file.faces.size(); ++i) {
@@ -45,7 +45,8 @@ absl::Status check_triangles(const BspFile& file, int subdivisions) {
 }
 
 void add_listed_triangles(const BspFile& file, const BspFace& face, LevelBuilder& builder) {
-  // The builder's first vertices are the level's, in the same order, so the level's vertex indices are valid there.
+  // The builder's first vertices are those of the level, in the same order, so the level's vertex indices are valid in
+  // the builder.
   for (size_t i = 0; i < face.meshvert_count; i += 3) {
     const uint32_t* corner = &file.meshverts[face.first_meshvert + i];
     builder.add_triangle(face.first_vertex + corner[0], face.first_vertex + corner[2], face.first_vertex + corner[1]);

@@ -1,4 +1,4 @@
-// Conversion of a Quake 3 level to a mesh. For import_file(). A function without state.
+// Converter of a Quake 3 level to a mesh. For import_file(). A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_IMPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_IMPORT_H_
 
@@ -13,9 +13,8 @@ namespace locus::cli {
 
 // Returns all drawn faces of the level, including doors and other brush models, as one mesh called `name`, in the
 // file's order. Polygons and meshes keep their triangles, patches are tessellated, billboards are skipped and counted
-// in a note. A part is a run of faces with the same texture. Front faces are clockwise in the file; their vertex order
-// is reversed.
-// INVALID_ARGUMENT for damaged bytes, RESOURCE_EXHAUSTED beyond kMaxBspTriangles.
+// in a note. Consecutive faces with the same texture form a part. Front faces are clockwise in the file, so their
+// vertex order is reversed.
 absl::StatusOr<ImportedLevel> import_bsp(absl::string_view bytes, const std::string& name,
                                          const ImportOptions& options);
 

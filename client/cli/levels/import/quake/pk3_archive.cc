@@ -99,7 +99,7 @@ absl::StatusOr<size_t> choose_level(const std::vector<LevelEntry>& levels, const
 absl::StatusOr<std::string> unpack(zip_t* archive, const LevelEntry& level, const std::string& path) {
   const std::unique_ptr<zip_file_t, CloseEntry> file(zip_fopen_index(archive, level.index, 0));
   if (file == nullptr) return unreadable(path, absl::StrCat(level.name, ": ", zip_strerror(archive)));
-  // The declared size is untrusted, so the unpacked bytes are counted.
+  // Count the unpacked bytes, since the size that the archive declares is untrusted.
   std::string bytes;
   std::array<char, 1 << 16> chunk;
   while (true) {
