@@ -30,7 +30,7 @@
 namespace locus::server {
 namespace {
 
-// Exit code after a second signal.
+// Exit code after a second SIGTERM or SIGINT.
 constexpr int kEndedAtOnce = 130;
 
 // Makes glibc keep freed memory. By default it returns the memory of large messages to the kernel each time, which
@@ -75,7 +75,7 @@ class EndingSignals {
 
  private:
   // Blocks the signals in the calling thread. It must run before any other thread starts, so that all threads inherit
-  // the mask and only this one receives the signals.
+  // the mask and only the thread of this object receives the signals.
   EndingSignals() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGTERM);
@@ -143,7 +143,7 @@ int run(const ServerConfig& config) {
     return EXIT_FAILURE;
   }
   EndingSignals& signals = EndingSignals::listen();
-  // Declared before the server, which writes to it until its end.
+  // Declared before the server, which writes to the log until the server is destroyed.
   const absl::StatusOr<std::unique_ptr<UpdateLog>> update_log = open_log(config);
   if (!update_log.ok()) {
     log(LogLevel::kError, update_log.status().message());

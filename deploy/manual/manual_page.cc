@@ -17,7 +17,7 @@ namespace {
 using cli::CommandWords;
 using cli::OptionWords;
 
-// Parts of a footer: the indented lines below "Examples:", and all other lines.
+// Footer of a command's help, split into the indented lines below "Examples:" and all other lines.
 struct Footer {
   std::string notes;
   std::vector<std::string> examples;
@@ -49,16 +49,16 @@ std::string markup_of(const OptionWords& option) {
   return absl::StrCat(absl::StrJoin(names, ", "), value.empty() ? "" : " ", value);
 }
 
-// Returns the text with one full stop at its end.
+// Returns `text` with a full stop at its end. A full stop that is there already is not doubled.
 std::string sentence(const std::string& text) { return absl::StrCat(absl::StripSuffix(text, "."), "."); }
 
-// Returns the first sentence, on one line. whatis(1) indexes it.
+// Returns the first sentence of `description` on one line, which whatis(1) indexes.
 std::string summary(const std::string& description) {
   const std::string line = absl::StrReplaceAll(description, {{"\n", " "}});
   return std::string(absl::StripSuffix(line.substr(0, line.find(". ")), "."));
 }
 
-// Returns the description as a sentence, followed by the option's choices, default and other properties.
+// Returns the option's description as a sentence, followed by its choices, default and other properties.
 std::string text_of(const OptionWords& option) {
   std::string text = sentence(option.description);
   const bool names_choices = std::all_of(option.choices.begin(), option.choices.end(), [&](const std::string& choice) {
@@ -107,7 +107,7 @@ void add_explained(const std::string& heading, const Explained& words, RoffPage&
   for (const auto& [word, text] : words) page.item(bold(word), text);
 }
 
-// Adds notes: indented lines literally, other lines as running text.
+// Adds `notes` to `page`: indented lines are printed literally, other lines as running text.
 void add_notes(const std::string& notes, RoffPage& page) {
   std::string running;
   std::vector<std::string> kept;

@@ -1,5 +1,5 @@
 // Generates manual pages from a parser's texts: one for a program and one for each of its commands. Exit statuses and
-// environment variables, which the parser does not have, are given as a Manual. For write_manual.cc.
+// environment variables, which the parser does not have, are given as a Manual. Used by write_manual.cc.
 #ifndef LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 #define LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 
@@ -11,7 +11,7 @@
 
 namespace locus::manual {
 
-// Pairs of a term and its explanation.
+// List of pairs: a term and its explanation.
 using Explained = std::vector<std::pair<std::string, std::string>>;
 
 // Properties that all pages of a program share.

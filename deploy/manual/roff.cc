@@ -59,7 +59,8 @@ RoffPage& RoffPage::heading(const std::string& name) {
 
 namespace {
 
-// Returns escaped running text in which long words may break after a comma. Hyphenation is off.
+// Returns `line` escaped for running text. Words of more than 30 characters may break after a comma, because
+// hyphenation is off.
 std::string running(const std::string& line) {
   constexpr size_t kLongWord = 30;
   std::vector<std::string> words = absl::StrSplit(escaped(line), ' ');

@@ -17,7 +17,8 @@
 namespace locus::server {
 namespace {
 
-// Returns the numbers of the lines of the file that set the option, such as "3" or "3,7"; empty if there are none.
+// Returns the numbers of the lines in the file `path` that set the option `name`, as text such as "3" or "3,7"; empty
+// if no line does.
 std::string lines_that_set(const std::string& path, const std::string& name) {
   std::ifstream file(path);
   std::string lines;
@@ -29,16 +30,17 @@ std::string lines_that_set(const std::string& path, const std::string& name) {
   return lines;
 }
 
-// Returns the option's value as text. The parser was built over the options in use, so it shows them as its defaults.
+// Returns the option's value as text. The parser was built over `config`, which holds the values in use, so CLI11 shows
+// these values as the defaults of the options.
 std::string value_of(const CLI::Option& option, const ServerConfig& config) {
   if (option.get_expected_max() == 0) return config.insecure ? "true" : "false";  // the only flag without a value
   const std::string text = option.get_default_str();
-  absl::string_view list = text;  // several values stand in brackets
+  absl::string_view list = text;  // CLI11 prints several values as a list in brackets
   if (absl::ConsumePrefix(&list, "[") && absl::ConsumeSuffix(&list, "]")) return std::string(list);
   return text;
 }
 
-// Options that are set by flags, and the file that a flag or the environment names.
+// Names of the options that are set by flags, and the path of the config file that a flag or the environment names.
 struct Given {
   std::vector<std::string> flags;
   std::string file;

@@ -22,13 +22,13 @@ struct ConfigValue {
   std::string place;  // the flag, the variable, path:line, or empty for a default
 };
 
-// Returns every option, in the order of the help. `arguments` are as for read_invocation(). Returns INVALID_ARGUMENT
-// with the text that the daemon would print, if it would refuse to run.
+// Returns every option, in the order of the help. `arguments` are as for read_invocation(). If the daemon would refuse
+// to run, returns INVALID_ARGUMENT with the text that it would print.
 absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::string>& arguments,
                                                         const Environment& environment);
 
-// Returns the same for options that have been read and checked: `config` is what `arguments` and `environment` result
-// in. A command among the arguments is ignored.
+// Returns every option, as config_origins() does, for options that have already been read and checked: `config` is the
+// result of reading `arguments` and `environment`. Ignores a command among the arguments.
 std::vector<ConfigValue> config_values(const std::vector<std::string>& arguments, const Environment& environment,
                                        const ServerConfig& config);
 

@@ -20,7 +20,7 @@ namespace locus::server {
 namespace {
 
 constexpr const char* kGroups = "/sys/fs/cgroup";
-// Maximum depth of nested groups; deeper ones are not read.
+// Maximum nesting depth of control groups. More deeply nested groups are not read.
 constexpr int kMaxDepth = 64;
 
 // Returns the words of a file's first line; none if it cannot be read.
@@ -48,9 +48,10 @@ std::optional<uint32_t> cores_of(std::optional<uint64_t> quota, std::optional<ui
   return static_cast<uint32_t>(std::min(cores, 65536.0));
 }
 
-// Calls `visit` with the folder of the group and of each group above it, the topmost last.
+// Calls `visit` with the folder of the control group `group` below `top`, then with the folder of each group above it,
+// ending with `top`.
 void climb(const std::string& top, std::string group, const std::function<void(const std::string&)>& visit) {
-  if (absl::StrContains(group, "..")) group.clear();  // outside of the file system that this process sees
+  if (absl::StrContains(group, "..")) group.clear();  // it lies outside of the groups that this process sees
   for (int depth = 0; depth < kMaxDepth && group.size() > 1; ++depth) {
     visit(absl::StrCat(top, group));
     group.resize(std::min(group.find_last_of('/'), group.size() - 1));
@@ -80,7 +81,7 @@ CgroupLimits read_cgroup_limits(const std::string& root) {
   CgroupLimits limits;
   const std::string groups = root + kGroups;
   std::ifstream file(root + "/proc/self/cgroup");
-  // Lines are `number:controllers:group`; version 2 has the number 0 and no controllers.
+  // Each line is `number:controllers:group`. The line of version 2 has the number 0 and no controllers.
   for (std::string line; std::getline(file, line);) {
     const std::vector<std::string> parts = absl::StrSplit(line, absl::MaxSplits(':', 2));
     if (parts.size() != 3) continue;

@@ -11,7 +11,7 @@
 namespace locus::server {
 
 struct CgroupLimits {
-  std::optional<uint32_t> cores;         // quota / period, rounded up to whole cores, at least 1
+  std::optional<uint32_t> cores;         // CPU quota / period, rounded up to whole cores, at least 1
   std::optional<uint64_t> memory_bytes;  // minimum over the group and all groups above it
 };
 
@@ -25,7 +25,7 @@ struct Machine {
   uint64_t memory_bytes = 0;  // memory of the machine, or of the control group if that is less
 };
 
-// Returns the cores of the affinity mask, at most the cores of the group's quota, and the memory.
+// Returns the number of cores in the affinity mask, but at most the cores of the control group's quota, and the memory.
 Machine read_machine();
 
 }  // namespace locus::server

@@ -7,16 +7,16 @@
 
 namespace locus::server {
 
-inline constexpr size_t kMaxLabelledScenes = 100;       // scenes with their own label in /metrics; the rest is one sum
-inline constexpr size_t kMaxRefusalNames = 64;          // pairs of reason and limit that /metrics counts separately
-inline constexpr uint32_t kHttpThreads = 2;             // threads that answer, one connection each
-inline constexpr uint32_t kMaxHttpWaiting = 16;         // connections that wait for such a thread
+inline constexpr size_t kMaxLabelledScenes = 100;  // scenes with their own label in /metrics; the others are summed
+inline constexpr size_t kMaxRefusalNames = 64;     // pairs of reason and limit that /metrics counts separately
+inline constexpr uint32_t kHttpThreads = 2;        // threads that answer requests; each serves one connection at a time
+inline constexpr uint32_t kMaxHttpWaiting = 16;    // accepted connections that wait for one of these threads
 inline constexpr uint32_t kMaxHttpRequestBytes = 8192;  // request line and headers
 inline constexpr uint32_t kHttpTimeoutMs = 2000;        // for reading a request, and for writing its answer
 inline constexpr size_t kMaxRequestIdLength = 64;       // characters of a caller's x-request-id
-inline constexpr uint32_t kMaxHealthWatchers = 32;      // each occupies a thread
+inline constexpr uint32_t kMaxHealthWatchers = 32;      // Watch calls of the health service; each occupies a thread
 inline constexpr uint32_t kMaxSlowQueryMs = 3'600'000;  // maximum of --slow-query-ms
-inline constexpr uint32_t kMaxSlowQueryLines = 10;      // lines a second; the rest is only counted
+inline constexpr uint32_t kMaxSlowQueryLines = 10;      // log lines a second; further slow queries are only counted
 
 }  // namespace locus::server
 

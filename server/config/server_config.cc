@@ -159,15 +159,15 @@ void describe(CLI::App& app) {
   app.allow_config_extras(CLI::config_extras_mode::error);
 }
 
-// Parses the arguments, which CLI11 expects in reverse order.
+// Parses `arguments` with `app`. Reverses them first, because CLI11 expects them in reverse order.
 void parse(CLI::App& app, std::vector<std::string> arguments) {
   std::reverse(arguments.begin(), arguments.end());
   app.parse(std::move(arguments));
 }
 
-// Returns the arguments with options of the environment added as flags. In CLI11 a file wins over the environment; here
-// the environment must win. So this parses the flags alone, and adds every option that no flag sets but the environment
-// does; the file then only sets the remaining ones.
+// Returns `arguments` with options of the environment added as flags. In CLI11 the file wins over the environment; here
+// the environment must win. So this parses the flags alone, and adds every option that the environment sets and no flag
+// does; the file then only sets the remaining options.
 std::vector<std::string> with_environment(const std::vector<std::string>& arguments, const Environment& environment) {
   ServerConfig ignored;
   std::string ignored_file;
@@ -190,7 +190,7 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
   return all;
 }
 
-// Sets the options that the operator left at 0 according to the machine.
+// Replaces the options `threads` and `memory_limit` by defaults for this machine if the operator left them at 0.
 void follow_machine(ServerConfig& config) {
   const Machine machine = read_machine();
   if (config.threads == 0) config.threads = std::min(machine.cores, limits::kMaxThreads);
@@ -259,7 +259,7 @@ Invocation help(const std::vector<std::string>& arguments) {
   build_parser(app, config);
   Invocation invocation;
   add_maintenance(app, invocation.maintenance);
-  // Show the help of the named command, if there is one.
+  // If the arguments name a command, show the help of that command instead of the daemon's.
   const CLI::App* asked = &app;
   for (const CLI::App* command : app.get_subcommands({}))
     if (std::find(arguments.begin(), arguments.end(), command->get_name()) != arguments.end()) asked = command;

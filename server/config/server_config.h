@@ -44,13 +44,13 @@ struct ServerConfig {
   // acknowledged update waits for that disk.
   std::string data_dir;
 
-  // Bytes of a scene's updates in the log after which a snapshot of the scene replaces them; for a scene that is larger
-  // itself, its size. Lower it for a faster start and a smaller directory; raise it if the disk has little bandwidth
-  // left beside the updates.
+  // Size in bytes of a scene's updates in the log after which a snapshot of the scene replaces them. For a scene larger
+  // than this, the size of the scene is used instead. Lower it for a faster start and a smaller directory; raise it if
+  // the updates leave the disk little bandwidth for snapshots.
   uint64_t snapshot_after = limits::kSnapshotAfterBytes;
 
-  // Threads that may work on one query batch, the caller's own included; 0 = the cores this process may use, by its
-  // affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
+  // Threads that may work on one query batch, the caller's own included; 0 = one for each core that this process may
+  // use by its affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
   uint32_t threads = 0;
 
   // Priority of the threads that work on large query batches, relative to the threads that talk to clients and apply
@@ -100,19 +100,19 @@ struct ServerConfig {
   bool insecure = false;
 };
 
-// Returns the value of an environment variable, or nullopt if it is not set.
+// Function that returns the value of an environment variable, or nullopt if the variable is not set.
 using Environment = std::function<std::optional<std::string>(const std::string&)>;
 
-// Returns a variable of the process's own environment.
+// Returns the value of a variable in the environment of this process. An Environment.
 std::optional<std::string> process_environment(const std::string& name);
 
-// Command that is not to serve: `locusd check` or `locusd repair`, for a data directory that no daemon is using, or
-// `locusd config`.
+// Command that runs instead of the server: `locusd check` or `locusd repair`, for a data directory that no daemon is
+// using, or `locusd config`.
 struct Maintenance {
   enum class Task : uint8_t { kCheck, kRepair, kShowConfig };
   Task task = Task::kCheck;
-  std::string directory;  // of check and repair
-  bool json = false;      // of config
+  std::string directory;  // data directory, for check and repair
+  bool json = false;      // whether to print JSON, for config
 };
 
 // Parsed command line: run with `config`, do `maintenance`, or, if neither is set, print `text` and end with

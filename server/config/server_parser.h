@@ -1,5 +1,5 @@
-// The parser of locusd's command line and file: for server_config.cc, which parses with it, and for the manual, which
-// is generated from it. The rest of the server only sees a ServerConfig. Functions without state.
+// The parser of locusd's command line and config file. server_config.cc parses with it, and the manual is generated
+// from it. The rest of the server only sees a ServerConfig. Functions without state.
 #ifndef LOCUS_SERVER_CONFIG_SERVER_PARSER_H_
 #define LOCUS_SERVER_CONFIG_SERVER_PARSER_H_
 
@@ -19,7 +19,8 @@ void build_parser(CLI::App& app, ServerConfig& config);
 // `app`.
 void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen);
 
-// Returns whether an empty environment variable sets the option to the empty string. For other options it is ignored.
+// Returns whether an empty environment variable sets the option to the empty string. For other options an empty
+// variable is ignored.
 bool may_be_empty(const std::string& option);
 
 // Returns the environment variable of an option: "drain-grace-s" is set by LOCUS_DRAIN_GRACE_S.

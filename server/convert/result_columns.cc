@@ -12,7 +12,7 @@ T* grow(google::protobuf::RepeatedField<T>& column, size_t entries) {
   return column.mutable_data() + before;
 }
 
-// Accessors of the protocol's fields for the arrays of kColumnArrays, in that order.
+// Accessors of the fields of v1::BlockResult that hold the arrays of kColumnArrays, in the same order.
 constexpr auto kFields = std::make_tuple([](v1::BlockResult& to) { return to.mutable_t(); },          //
                                          [](v1::BlockResult& to) { return to.mutable_ids(); },        //
                                          [](v1::BlockResult& to) { return to.mutable_triangles(); },  //
@@ -26,7 +26,7 @@ constexpr auto kFields = std::make_tuple([](v1::BlockResult& to) { return to.mut
                                          [](v1::BlockResult& to) { return to.mutable_rotations(); });
 static_assert(std::tuple_size_v<decltype(kFields)> == std::tuple_size_v<decltype(kColumnArrays)>);
 
-// Calls visit(array, field) for each array of a result and its field of the protocol.
+// Calls visit(array, field) for each array of a result and the protocol's field for it.
 template <class Visit, size_t... kIndices>
 void for_each_field(const Visit& visit, std::index_sequence<kIndices...>) {
   (visit(std::get<kIndices>(kColumnArrays), std::get<kIndices>(kFields)), ...);

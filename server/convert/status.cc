@@ -7,7 +7,8 @@
 namespace locus::server {
 namespace {
 
-// Maximum bytes of a text. Peers refuse metadata of more than 8 KiB in total, and it contains the message three times.
+// Maximum size in bytes of an error's text. Peers refuse metadata of more than 8 KiB in total, and the metadata of a
+// refused call contains the text three times.
 constexpr size_t kMaxText = 1024;
 constexpr uint32_t kDrainRetryMs = 1000;
 constexpr uint32_t kRecoveryRetryMs = 200;

@@ -50,7 +50,8 @@ struct Host {
     options.clock = &thread_nanoseconds;
     return options;
   }
-  // With a log, more threads than cores pay off: they wait for the disk, and one sync serves all that wait.
+  // Returns the options of the update queue. With a log it has more threads than cores, because they mostly wait for
+  // the disk, and batches that wait at the same time share one sync.
   static UpdateQueueOptions queue_options(const ServerConfig& config, const UpdateLog* log) {
     UpdateQueueOptions options;
     options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
@@ -75,7 +76,7 @@ struct Host {
   AdmissionLimiter health_watchers{kMaxHealthWatchers};
   AdmissionLimiter backups{limits::kMaxBackups};
   Drain drain;
-  std::atomic<bool> recovering{false};  // the scenes of the log are being recovered
+  std::atomic<bool> recovering{false};  // true while the scenes of the log are being recovered
 };
 
 }  // namespace locus::server

@@ -11,12 +11,13 @@
 namespace locus::server {
 namespace {
 
-// Inserting or moving an object copies its cell and its path in the tree of ids.
+// Peak bytes for each item of a batch: inserting or moving an object copies its cell and its path in the tree of ids.
 constexpr uint64_t kBytesAnItem = 700;
 constexpr uint64_t kBytesABatch = 16384;
-// Peak memory of the columns, as a multiple of their size: they grow by doubling while they arrive.
+// Peak memory of an upload's columns, as a multiple of their size: they grow by doubling while they arrive.
 constexpr uint64_t kUploadTimesColumns = 3;
-// Bytes a triangle for the build: the copy ordered by triangle, temporary memory, the tree and its additional data.
+// Peak bytes for each triangle while the tree is built: the copy ordered by triangle, temporary memory, the tree and
+// its additional data.
 constexpr uint64_t kBytesATriangle = 180;
 constexpr uint64_t kBytesAnInstance = 1024;
 

@@ -17,7 +17,8 @@
 namespace locus::server {
 namespace {
 
-// Initialises civetweb, which counts its users in the process.
+// Initialises civetweb for the lifetime of this object. Several objects may exist, because civetweb counts its
+// initialisations.
 class Library {
  public:
   Library() { mg_init_library(MG_FEATURES_DEFAULT); }
@@ -67,8 +68,8 @@ struct HttpServer::Context {
     if (running != nullptr) stop();
   }
 
-  // Ends civetweb's threads. They check for the end every two seconds and at each connection, so this connects until
-  // they have ended.
+  // Ends civetweb's threads. They check whether they must end only every two seconds and after each connection, so this
+  // opens connections until all threads have ended.
   void stop() {
     const std::future<void> stopped = std::async(std::launch::async, mg_stop, running);
     while (stopped.wait_for(std::chrono::milliseconds(5)) != std::future_status::ready) {

@@ -33,7 +33,7 @@ constexpr uint64_t latency_bound(size_t range) {
 // Returns the range of a duration: the first whose latency_bound() is not below it, or kLatencyBounds if there is none.
 constexpr size_t latency_range(uint64_t nanoseconds) {
   if (nanoseconds <= latency_bound(0)) return 0;
-  const uint64_t below = nanoseconds - 1;  // because a bound belongs to the range below it
+  const uint64_t below = nanoseconds - 1;  // a duration equal to a bound belongs to the range below that bound
   const auto octave = static_cast<uint32_t>(std::bit_width(below)) - 1;
   const size_t half = below >> (octave - 1) & 1;
   return std::min<size_t>(kLatencyBounds, 2 * (octave - kLowestOctave) + half + 1);

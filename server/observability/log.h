@@ -20,7 +20,7 @@ struct LogField {
   std::string value;
 };
 
-// Sets level and format. Before it is called, events from `warning` on are written as text.
+// Sets the level and the format. Before this is called, events of level `warning` and above are written as text.
 void start_logging(LogLevel level, LogFormat format);
 
 // Returns whether events of this level are written.
@@ -39,7 +39,8 @@ class LogScope {
   LogScope(const LogScope&) = delete;
   LogScope& operator=(const LogScope&) = delete;
 
-  // Returns the ids of this thread's innermost scope; empty without a scope. For passing them to another thread.
+  // Returns the ids of this thread's innermost scope, for passing them to another thread. They are empty without a
+  // scope.
   static TraceContext current();
 
  private:

@@ -16,7 +16,7 @@ namespace locus::server {
 
 enum class MetricKind : uint8_t { kCounter, kGauge, kHistogram };
 
-// Pairs of a label's name, a constant of this program, and its value, which may be any text.
+// List of pairs: a label's name, which is a constant of this program, and the label's value, which may be any text.
 using MetricLabels = std::vector<std::pair<std::string, std::string>>;
 
 class MetricPage {

@@ -72,7 +72,7 @@ void CallMetrics::record_refusal(const absl::Status& status) {
   const bool room = refusals_.size() < kMaxRefusalNames || refusals_.contains(name);
   if (!room) name = {kOther, kOther};
   ++refusals_[std::move(name)];
-  LOCUS_DCHECK_LE(refusals_.size(), kMaxRefusalNames + 1);  // and "_other"
+  LOCUS_DCHECK_LE(refusals_.size(), kMaxRefusalNames + 1);  // one more for "_other"
 }
 
 MetricCounts CallMetrics::read() const {

@@ -19,7 +19,7 @@
 namespace locus::server {
 namespace {
 
-// Local ends of the connections that are counted: TCP ports and paths of unix sockets.
+// Addresses whose connections are counted: local TCP ports and paths of unix sockets.
 struct Ends {
   std::set<uint16_t> ports;
   std::set<std::string> paths;
@@ -39,7 +39,7 @@ Ends ends_of(const std::vector<std::string>& addresses) {
   return ends;
 }
 
-// Returns whether `fd` is a connected socket at one of the ends; a listening socket is not connected.
+// Returns whether `fd` is a connected socket whose local address is in `ends`. Listening sockets are not counted.
 bool is_connection(int fd, const Ends& ends) {
   sockaddr_storage name{};
   socklen_t length = sizeof name;
@@ -108,7 +108,7 @@ uint64_t resident_bytes() {
 }
 
 ProcessFigures read_process(const std::vector<std::string>& addresses) {
-  // Indices counted from the field after the name, which is field 3 in proc(5).
+  // Indices into fields_after_name(), whose first field is field 3 in proc(5).
   constexpr size_t kThreads = 17;
   constexpr size_t kStart = 19;
   ProcessFigures process;

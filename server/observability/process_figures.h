@@ -1,5 +1,5 @@
-// Measurements of this process, read from the system for /metrics: those that Prometheus's client libraries have in
-// common, and the open connections. Functions without state; any thread.
+// Measurements of this process, read from the system for /metrics: the measurements that all of Prometheus's client
+// libraries have, and the number of open connections. Functions without state; any thread.
 #ifndef LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
 #define LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
 
@@ -21,11 +21,11 @@ struct ProcessFigures {
   double start_seconds = 0;  // since 1970
 };
 
-// Returns the bytes of the process that are in memory now. One read of /proc.
+// Returns the process's resident memory in bytes. Costs one read of /proc.
 uint64_t resident_bytes();
 
-// Reads all figures. `addresses` are texts for parse_listen_address(); invalid ones are ignored. A figure that cannot
-// be read is 0. O(open files), two system calls each.
+// Reads all figures. `addresses` are the addresses whose connections are counted, as texts for parse_listen_address();
+// invalid ones are ignored. A figure that cannot be read is 0. O(open files), two system calls each.
 ProcessFigures read_process(const std::vector<std::string>& addresses);
 
 // Adds the figures to the page.

@@ -69,7 +69,7 @@ std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& sc
     }
   }
   if (!other.name.empty()) shown.push_back(other);
-  LOCUS_DCHECK_LE(shown.size(), max_ + 1);  // and the sum of the others
+  LOCUS_DCHECK_LE(shown.size(), max_ + 1);  // one more for the sum of the others
   check_invariants();
   return shown;
 }

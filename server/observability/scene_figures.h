@@ -32,15 +32,15 @@ struct SceneFigures {
 };
 
 // The set of scenes that have a label. Invariant: at most `max` scenes. A scene keeps its label until it is deleted, so
-// that its time series continues; a free label goes to the first scene in order of names.
+// that its time series continues. A free label goes to the scene without a label whose name sorts first.
 class SceneLabels {
  public:
   static constexpr const char* kOther = "_other";
 
   explicit SceneLabels(size_t max) : max_(max) {}
 
-  // Updates the labels and returns the figures of the labelled scenes, then the sum of the others, named kOther, if
-  // there are any. `scenes` must be all scenes, each once, in order of names.
+  // Updates the labels. Returns the figures of the labelled scenes and then, if there are other scenes, the sum of
+  // their figures under the name kOther. `scenes` must be all scenes, each once, sorted by name.
   std::vector<SceneFigures> label(const std::vector<SceneFigures>& scenes);
 
  private:

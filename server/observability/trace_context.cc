@@ -12,7 +12,7 @@
 namespace locus::server {
 namespace {
 
-constexpr size_t kTraceparentLength = 55;  // of version 00
+constexpr size_t kTraceparentLength = 55;  // length of a traceparent of version 00
 constexpr size_t kMaxTraceparentLength = 128;
 
 bool is_hex(absl::string_view text) {
@@ -57,8 +57,8 @@ uint64_t next_request_number() {
 
 std::string request_id_of(uint64_t number) {
   static const uint64_t kSeed = random_seed();
-  // A bijection, so that different numbers have different ids. Source: Steele et al., "Fast splittable pseudorandom
-  // number generators" (2014).
+  // Mixes the number by a bijection, so that different numbers have different ids. Source: Steele et al., "Fast
+  // splittable pseudorandom number generators" (2014).
   uint64_t z = kSeed + number * 0x9e3779b97f4a7c15;
   z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
   z = (z ^ z >> 27) * 0x94d049bb133111eb;

@@ -20,11 +20,12 @@ struct TraceContext {
 // Returns whether `text` has 1 to kMaxRequestIdLength letters, digits and the characters . _ -
 bool is_request_id(absl::string_view text);
 
-// Returns whether `text` is version-trace-parent-flags in lower-case hexadecimal, with a version other than ff and a
-// trace and parent other than zeros. Versions above 00 may have more after a hyphen, up to 128 characters in total.
+// Returns whether `text` is version-trace-parent-flags in lower-case hexadecimal, with a version other than ff, and
+// with a trace and a parent that are not all zeros. With a version above 00, more characters may follow after a hyphen,
+// up to 128 in total.
 bool is_traceparent(absl::string_view text);
 
-// Returns a number that is unique in this process. A few nanoseconds.
+// Returns a number that is unique in this process. Takes a few nanoseconds.
 uint64_t next_request_number();
 
 // Returns the number as 16 hexadecimal digits that are unique in this process and, because they include a random seed,

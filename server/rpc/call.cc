@@ -16,9 +16,9 @@ using std::chrono::system_clock;
 
 constexpr const char* kSceneMetadata = "x-scene";
 constexpr uint32_t kBusyRetryMs = 100;
-// A waiting thread checks this often whether its call has ended.
+// Interval at which a waiting thread checks whether its call has ended.
 constexpr milliseconds kWaitSlice{50};
-// Time that readers have to release a revoked snapshot.
+// Time that readers have to release a revoked snapshot before wait_for_readers() calls revoke_overdue_readers().
 constexpr milliseconds kReadersMayTake{1000};
 constexpr std::chrono::hours kNoDeadline{24 * 365};
 

@@ -1,6 +1,6 @@
-// One call as the services see it: its metadata, its deadline, and whether it still wants an answer. serve() is the
-// frame around every call on gRPC's synchronous threads: it admits the call, checks that the server is serving, maps
-// the error, counts and logs.
+// One call as the services see it: its metadata, its deadline, and whether its caller still waits for an answer.
+// serve() is the frame around every call on gRPC's synchronous threads: it admits the call, checks that the server is
+// serving, converts the error, counts and logs.
 //
 // Threads: a Caller may be used from any thread while the call lasts, except trace().
 #ifndef LOCUS_SERVER_RPC_CALL_H_
@@ -28,8 +28,8 @@ uint64_t nanoseconds_since(SteadyTime start);
 // The caller's side of one call. Refers to `context`, which must outlive it.
 class Caller {
  public:
-  // `gone`, if not null, becomes true when the caller gives up. Calls on completion queues must pass it, because their
-  // `context` may not be asked whether it is cancelled.
+  // `gone`, if not null, becomes true when the caller gives up. Calls on completion queues must pass it, because
+  // IsCancelled() of their `context` may not be called.
   Caller(const Host& host, const grpc::ServerContextBase& context, const std::atomic<bool>* gone = nullptr);
 
   // Returns OK while the call should continue; otherwise CANCELLED, DEADLINE_EXCEEDED, or UNAVAILABLE (DRAINING) when
@@ -38,8 +38,8 @@ class Caller {
 
   // Returns the call's deadline; a year from now for a call without one.
   SteadyTime deadline() const { return deadline_; }
-  // Returns until when this call may wait for a revision: its deadline, or limits::kDefaultWaitMs from now for a call
-  // without one. Each message of a stream waits for at most limits::kDefaultWaitMs.
+  // Returns the time until which this call may wait for a revision: its deadline, or limits::kDefaultWaitMs from now if
+  // it has none. A message of a stream waits until the deadline too, but never longer than limits::kDefaultWaitMs.
   SteadyTime wait_until(bool stream) const;
 
   // Returns INVALID_ARGUMENT (MALFORMED) if the metadata `x-scene` is present and names another scene.
@@ -68,14 +68,15 @@ inline constexpr const char* kRequestIdMetadata = "x-request-id";
 // Checks the scene's name and the metadata x-scene, then returns the scene. Errors name `field`.
 absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field);
 
-// Pins the snapshot that `view` names, after waiting for it until `until` at most. Wakes up at once when the revision
-// is published or the scene is deleted, and within 50 ms when the call ends or the server drains (then UNAVAILABLE,
-// DRAINING).
+// Waits until `until` at most for the revision that `view` names, and pins its snapshot. Wakes up at once when the
+// revision is published or the scene is deleted, and within 50 ms when the call ends or the server drains (then
+// UNAVAILABLE, DRAINING).
 absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
 
-// Waits until the readers whose snapshots of the scene are revoked have released them. Calls
-// Scene::revoke_overdue_readers() if that takes longer than a second. Polls `stop` every 50 ms and returns its status
-// if that is not OK; at the call's deadline, returns the scene's own status, which names the limit pinned_bytes.
+// Waits until every reader whose snapshot of the scene was revoked has released it. Calls
+// Scene::revoke_overdue_readers() repeatedly once that has taken longer than a second. Polls `stop` every 50 ms and
+// returns its status if it is not OK; but instead of DEADLINE_EXCEEDED it returns the error of the scene, which names
+// the limit pinned_bytes.
 absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
 
 // Returns UNAVAILABLE while the server recovers its scenes from the disk, or drains.
@@ -89,12 +90,12 @@ grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
                    const std::function<absl::Status(const Caller&)>& body,
                    WhileClosed while_closed = WhileClosed::kRefuse);
 
-// Returns whether the status of a refused message ends the whole stream: because the caller ended the call, or because
-// the server drains.
+// Returns whether `status`, of a refused message, must end the whole stream: because the caller ended the call, its
+// deadline passed, or the server drains.
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
-// Counts a call, or one message of a stream, that was answered with `status`. Logs a line at debug level if that is a
-// refusal.
+// Counts a call, or one message of a stream, that was answered with `status`. Logs a line at debug level if `status` is
+// not OK.
 void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived);
 
 }  // namespace locus::server

@@ -1,4 +1,4 @@
-// The call of a message, as seen by the work on that message. The work begins on the call's IO loop and must call
+// Interface between a message's call and the work on the message. The work begins on the call's IO loop and must call
 // answered() there exactly once; in between it may run on any thread.
 #ifndef LOCUS_SERVER_RPC_CALL_SLOT_H_
 #define LOCUS_SERVER_RPC_CALL_SLOT_H_
@@ -12,7 +12,7 @@
 
 namespace locus::server {
 
-// A message's place in its call. See HotCall::Slot, the only implementation; this interface keeps the work on a message
+// A message's place in its call. Its only implementation is HotCall::Slot; this interface keeps the work on a message
 // independent of the templates of hot_call.h.
 class CallSlot {
  public:
@@ -25,17 +25,17 @@ class CallSlot {
   // Returns the caller. Valid while a message is being processed.
   virtual const Caller& caller() const = 0;
   virtual IoLoop& io() const = 0;
-  // Returns an id of the client, for fair shares: equal for all calls of one connection, and different for other
-  // connections as far as gRPC tells them apart.
+  // Returns an id of the client, which the scheduler uses for fair shares: equal for all calls of one connection, and
+  // different for other connections as far as gRPC can distinguish them.
   virtual uint64_t client() const = 0;
   // Returns whether the call is a stream.
   virtual bool stream() const = 0;
 
-  // Stops the call from reading further messages until this one is answered. Call it on the IO loop.
+  // Stops the call from reading further messages until this message is answered. Call it on the IO loop.
   virtual void hold() = 0;
 
-  // Ends the work on the message. Call it on the IO loop only, once a message. If `status` is OK, the response must be
-  // filled in. The slot may already serve another message when this returns.
+  // Ends the work on the message. Call it on the IO loop only, exactly once for each message. If `status` is OK, the
+  // response must be filled in. The slot may already serve another message when this returns.
   virtual void answered(absl::Status status) = 0;
 
  protected:

@@ -1,17 +1,17 @@
 // The state machine of the frequent calls (queries and updates, unary or streams) on a completion queue. A Method names
-// the types of a call and starts the work on its messages; the protocol with gRPC is here, once for all of them.
+// the types of a call and starts the work on its messages; HotCall implements the exchange with gRPC for all Methods.
 //
 // Lifetime: a call belongs to its IO loop and is used only there, so it has no locks. It waits for a caller, and lives
 // from accepted() until three conditions hold: its status was sent (finished_), gRPC has reported the end of the call
 // (gone_), and no read, no write and no message is pending. Then it deletes itself at the end of advance(). Work on a
-// message may run on any thread, but returns to the IO loop exactly once, through answered(); when the caller has gone
-// or the server drains, give_up() asks the work to answer soon. A Slot holds a message, its answer and the work on it;
-// slots outlive calls and are reused, so that steady traffic allocates no columns.
+// message may run on any thread, but returns to the IO loop exactly once, through answered(). When the caller gives up
+// or the server drains, give_up() asks the work to answer soon. A Slot holds a message, its answer and the work on it.
+// Slots outlive calls and are reused, so that steady traffic allocates no columns.
 //
-// A stream has at most kSlots messages that are being processed or wait to be written. It reads the next one when an
-// answer was written. This bounds the memory that a caller who does not read can use. Reads, one write and the work on
-// several messages proceed concurrently; answers are written as they complete, or in the order of the messages if
-// Method::kInOrder.
+// A stream has at most kSlots messages that are being processed or wait to be written. It reads the next message when
+// an answer was written, so a caller who does not read its answers can only use bounded memory. Reads, one write and
+// the work on several messages proceed concurrently. Answers are written as they complete, or in the order of the
+// messages if Method::kInOrder.
 #ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
 #define LOCUS_SERVER_RPC_HOT_CALL_H_
 
@@ -64,8 +64,8 @@ class Listener {
   friend class HotCall<Method>;
   using Slot = typename HotCall<Method>::Slot;
 
-  static constexpr int kWaiting = 4;         // calls that gRPC can accept at once
-  static constexpr size_t kSpareSlots = 16;  // maximum number of slots kept for later messages
+  static constexpr int kWaiting = 4;         // calls requested from gRPC that still wait for a caller
+  static constexpr size_t kSpareSlots = 16;  // maximum number of unused slots kept for later messages
 
   std::unique_ptr<Slot> take_slot() {
     if (spare_.empty()) return std::make_unique<Slot>(host_);
@@ -102,8 +102,8 @@ class HotCall final : private IoLoop::ActiveCall {
     void hold() override { holds_ = true; }
     void answered(absl::Status status) override { call_->answered(*this, std::move(status)); }
 
-    // Returns whether the memory kept for reuse is at most kMaxKept. Measures it only once every kLookEvery bytes of
-    // messages, because measuring is slow.
+    // Returns whether the slot may be kept for reuse: its messages hold at most kMaxKept bytes of memory. Measures this
+    // only once every kLookEvery bytes of messages, because measuring is slow; in between, returns true.
     bool fit_to_keep() {
       if (bytes_since_look_ < kLookEvery) return true;
       bytes_since_look_ = 0;
@@ -120,7 +120,7 @@ class HotCall final : private IoLoop::ActiveCall {
     Response response_;
     typename Method::Work work_;
     bool answered_ = false;
-    bool holds_ = false;  // stops the call from reading the next message
+    bool holds_ = false;  // the work called hold(): read no message before this one is answered
     SteadyTime arrived_;
     size_t bytes_since_look_ = 0;
   };
@@ -153,8 +153,8 @@ class HotCall final : private IoLoop::ActiveCall {
       listener_.io_.release();
   }
 
-  // Handles one event of the call: changes the state by `change`, then calls advance() once, when the outermost change
-  // has returned (work that answers at once nests). May delete the call.
+  // Handles one event of the call: changes the state by `change`, then calls advance(). If calls of act() nest, because
+  // work answers at once, only the outermost calls advance(). May delete the call.
   template <class Change>
   void act(const Change& change) {
     ++acting_;
@@ -216,7 +216,7 @@ class HotCall final : private IoLoop::ActiveCall {
   void read(bool ok) {
     act([this, ok] {
       reading_ = false;
-      if (no_more_) return;  // arrived after the last message that is answered
+      if (no_more_) return;  // this message was read too late: drop it
       if (!ok) {
         no_more_ = true;
         return;
@@ -342,7 +342,8 @@ class HotCall final : private IoLoop::ActiveCall {
     finishing_ = true;
     // Release the permit first: a caller that has its answer may call again at once, and must be admitted.
     permit_ = AdmissionLimiter::Permit();
-    // Only failed calls return the request id, for questions about the failure; for others it would only cost bytes.
+    // Only failed calls return the request id, with which a caller can ask about the failure. Other calls save the
+    // bytes.
     if (!end_status_.ok()) context_.AddTrailingMetadata(kRequestIdMetadata, caller_->trace().request_id);
     if constexpr (Method::kStream) {
       wire_.Finish(to_grpc(end_status_), &finished_tag_);
@@ -361,7 +362,7 @@ class HotCall final : private IoLoop::ActiveCall {
     act([this] { finished_ = true; });
   }
 
-  // Handles gRPC's report that the call is over. Before finish() it means that the caller gave up or that the deadline
+  // Handles gRPC's report that the call is over. If it comes before finish(), the caller gave up or the deadline
   // passed.
   void gone(bool) {
     act([this] {
@@ -377,7 +378,7 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Returns an id of the connection. Connections to a unix socket all have the same peer name, so each stream over one
+  // Returns an id of the connection. All connections to a unix socket have the same peer name, so there each stream
   // counts as a client of its own.
   uint64_t client() {
     if (!client_) {

@@ -18,14 +18,14 @@ constexpr uint32_t kMaxThreads = 16;
 
 }  // namespace
 
-// The waker's thread: on request it sets an alarm, which makes a loop's completion queue return.
+// Thread that sets an alarm on request, which makes the loop's completion queue return.
 class IoWaker {
  public:
   void watch(IoLoop& loop) { loops_.push_back(&loop); }
   void start() {
     thread_ = std::thread([this] { run(); });
   }
-  // Wakes the loops that have asked for it. Safe to call from any thread; takes no lock.
+  // Sets the alarms of the loops that have called interrupt(), soon. Safe to call from any thread; takes no lock.
   void wake() { calls_.post(); }
   // Ends the thread. No alarm is set afterwards.
   void stop() {
@@ -42,8 +42,8 @@ class IoWaker {
     }
   }
 
-  // Sets the loop's alarm unless one is pending already: the thread that receives the alarm also handles tags that were
-  // posted after it was set.
+  // Sets the loop's alarm if the loop wants to be woken and no alarm is pending. A pending alarm is enough, because the
+  // thread that receives it also handles tags that were posted after the alarm was set.
   static void set_alarm(IoLoop& loop) {
     if (!loop.wanted_.exchange(false) || loop.alarm_set_.exchange(true)) return;
     loop.alarm_.Set(loop.queue_.get(), gpr_inf_past(GPR_CLOCK_MONOTONIC), &loop.woken_);
@@ -97,7 +97,8 @@ void IoLoop::wait_until_empty(bool running) {
       turn();
 }
 
-// Advances the iterator before each call, because drain() may remove the call from the list.
+// Calls drain() of every active call. Advances the iterator before each call, because drain() may remove it from the
+// list.
 void IoLoop::drain_active_calls(bool) {
   for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();) (*active_call++)->drain();
 }

@@ -29,7 +29,7 @@ class IoWaker;
 // One event loop over one completion queue, with the list of its calls.
 class IoLoop final : private EventSource, public EventLoop {
  public:
-  // A call that lives on this loop.
+  // Interface of a call that lives on this loop.
   class ActiveCall {
    public:
     // Called on the loop when the server begins to drain.
@@ -44,17 +44,17 @@ class IoLoop final : private EventSource, public EventLoop {
 
   grpc::ServerCompletionQueue* queue() { return queue_.get(); }
 
-  // Counts a call that was requested from gRPC, until leave() or release() ends it. release() is for a call that gRPC
-  // reports as never accepted.
+  // Counts a call that was requested from gRPC. When such a call ends, leave() subtracts it; release() subtracts a call
+  // that gRPC reports as never accepted.
   void acquire() { expected_or_active_.fetch_add(1); }
   void release();
-  // Adds an accepted call to the list, or removes it at its end. For handlers.
+  // Adds an accepted call to the list of active calls, or removes it when it ends. Only handlers may call them.
   ActiveCalls::iterator enter(ActiveCall& call) { return active_calls_.insert(active_calls_.end(), &call); }
   void leave(ActiveCalls::iterator call);
 
-  // Returns whether no accepted call lives on this loop. For handlers.
+  // Returns whether no accepted call lives on this loop. Only handlers may call it.
   bool idle() const { return active_calls_.empty(); }
-  // Returns whether there is no accepted call and none is expected any more. Safe to call from any thread.
+  // Returns whether there is no accepted call and no requested one. Safe to call from any thread.
   bool empty() const { return expected_or_active_.load() == 0; }
 
  private:
@@ -64,7 +64,7 @@ class IoLoop final : private EventSource, public EventLoop {
   Next next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok) override;
   void interrupt() override;
 
-  // Blocks until empty(). If no threads are `running`, takes the loop's turns on the calling thread.
+  // Blocks until empty(). `running` says whether threads serve the loop; if not, calls turn() on the calling thread.
   void wait_until_empty(bool running);
   void woken(bool ok);
   void drain_active_calls(bool ok);

@@ -1,5 +1,5 @@
-// Finds out why a server cannot listen on an address, before and after gRPC tries: gRPC itself only reports failure,
-// and replaces a unix socket that another server is using. Functions without state; any thread.
+// Finds out why a server cannot listen on an address, before and after gRPC tries. gRPC itself reports only that it
+// failed, and silently replaces a unix socket that another server is using. Functions without state; any thread.
 #ifndef LOCUS_SERVER_RPC_LISTENING_H_
 #define LOCUS_SERVER_RPC_LISTENING_H_
 

@@ -15,7 +15,8 @@ namespace locus::server {
 // Invariant: the scene never changes once it is set.
 class SceneBinding {
  public:
-  // Sets the scene from the first message; later calls do nothing. Call it for every message. An error ends the stream.
+  // Sets the scene from the first message; later calls change nothing. Call it for every message. An error ends the
+  // stream.
   absl::Status bind(const Caller& caller, const std::string& scene) {
     if (!scene_.empty()) return absl::OkStatus();
     RETURN_IF_ERROR(check_scene_name(scene, "scene"));

@@ -1,4 +1,4 @@
-// Limits the number of calls in progress: each holds a Permit until it ends, and there are never more than max().
+// Limits the number of calls in progress: each call holds a Permit until it ends, and at most max() permits exist.
 //
 // Threads: every member may be called from any thread. Invariant: used() permits exist, and used() <= max().
 #ifndef LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
@@ -37,7 +37,7 @@ class AdmissionLimiter {
 
   explicit AdmissionLimiter(uint32_t max) : max_(max) {}
 
-  // Returns a permit, an empty one if the limiter is full. Never waits.
+  // Returns a permit, which is empty if the limiter is full. Never waits.
   Permit enter() LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     if (used_ >= max_) return Permit();

@@ -1,5 +1,5 @@
-// Queue of numbered background jobs: changes of a scene's instances. Jobs of one key run one after another in the order
-// of their numbers; jobs of different keys run concurrently on a few threads.
+// Queue of numbered background jobs, used for changes of a scene's instances. Jobs of one key run one after another in
+// the order of their numbers; jobs of different keys run concurrently on a few threads.
 //
 // Threads: every member may be called from any thread. Invariant: at most one job of a key runs, and jobs of a key
 // never overtake each other.
@@ -36,7 +36,7 @@ class ChangeQueue {
   // Returns the number of waiting and running jobs of the key.
   uint32_t pending(uint64_t key) const LOCUS_EXCLUDES(mutex_);
 
-  // Drops the key's counter once its jobs have ended. For keys that are never used again.
+  // Drops the counter of the key's job numbers once its jobs have ended. For keys that are never used again.
   void forget(uint64_t key) LOCUS_EXCLUDES(mutex_);
 
  private:

@@ -9,14 +9,15 @@
 namespace locus::server {
 namespace {
 
-// Fixed cost of a block.
+// Fixed cost of a block, in nanoseconds, in addition to its queries.
 constexpr double kBlockNanoseconds = 500;
-// Estimates before the first measurement: measured in scenes of 100,000 triangles and 10,000 objects. In the order of
-// CostKind.
+// Nanoseconds of a query before the first measurement, indexed by CostKind. From scenes of 100,000 triangles and 10,000
+// objects.
 constexpr std::array<double, 8> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000};
 constexpr double kMin = 1, kMax = 1e12;
 constexpr size_t kProbes = 8;
-// Number of queries for which a measurement would have weight 1, before clamping.
+// A measurement of n queries has the weight n / kForgetQueries in the new estimate, clamped to kMinWeight ..
+// kMaxWeight.
 constexpr double kForgetQueries = 2048;
 constexpr double kMinWeight = 1.0 / 64, kMaxWeight = 0.5;
 

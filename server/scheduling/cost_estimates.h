@@ -1,8 +1,9 @@
 // Estimated cost of a query by scene and kind, in nanoseconds of one thread, learned from finished work. Estimates
 // decide where and when a batch runs and whether it is admitted; they never change an answer.
 //
-// Threads: every member may be called from any thread and none takes a lock; if two threads learn at once, one result
-// may be lost. Memory is fixed: the entry of one scene may be replaced by another's; its next estimate is the default.
+// Threads: every member may be called from any thread and none takes a lock. If two threads learn at once, one of the
+// two measurements may be lost. Memory is fixed: the entry of one scene may be replaced by that of another scene; the
+// next estimate for the replaced scene is then the default.
 #ifndef LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 #define LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 
@@ -22,13 +23,15 @@ class CostEstimates {
  public:
   static constexpr size_t kEntries = 16384;
 
-  // Returns the estimate for one query of the block. `scene` is any id of the scene, such as its epoch.
+  // Returns the estimate for one query of the block. `scene` is any number that identifies the scene, such as its
+  // epoch.
   double nanoseconds_a_query(uint64_t scene, const QueryBlock& block) const;
 
   // Returns the estimate for a whole batch.
   uint64_t nanoseconds(uint64_t scene, const QueryBatch& batch) const;
 
-  // Updates the estimate: all queries of the block took `nanoseconds` together. The weight grows with their number.
+  // Updates the estimate from a measurement: all queries of the block took `nanoseconds` together. The weight of the
+  // measurement grows with the number of queries.
   void learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds);
 
  private:
@@ -37,10 +40,11 @@ class CostEstimates {
     uint32_t tag;
   };
   static Slot slot_of(uint64_t scene, const QueryBlock& block);
-  // Returns the index of the slot's entry; if there is none, of the entry that learn() may replace.
+  // Returns the index of the slot's entry. If there is none, returns the index of the entry that learn() may replace,
+  // so the caller must compare the entry's tag.
   size_t find(const Slot& slot) const;
 
-  // Entries of a hash table: tag in the upper 32 bits, nanoseconds as a float in the lower; 0 = empty.
+  // Entries of a hash table: a tag in the upper 32 bits, nanoseconds as a float in the lower 32 bits; 0 = empty.
   std::array<std::atomic<uint64_t>, kEntries> entries_{};
 };
 

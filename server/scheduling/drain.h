@@ -33,7 +33,7 @@ class Drain {
 
   bool draining() const { return draining_.load(); }
   bool ended() const { return ended_.load(); }
-  // Returns a flag for work that polls for its end.
+  // Returns a flag that becomes true when the grace period is over, for work that polls whether it must stop.
   const std::atomic<bool>* ended_flag() const { return &ended_; }
 
   void begin() LOCUS_EXCLUDES(mutex_);

@@ -10,7 +10,8 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// Maximum sleep without a timer. Small enough that a source's clock conversions cannot overflow.
+// Maximum time that a thread sleeps, also without a timer. Small enough that a source's clock conversions cannot
+// overflow.
 constexpr std::chrono::hours kLongest{1};
 
 }  // namespace
@@ -25,7 +26,7 @@ void EventLoop::post(EventTag& tag) {
 }
 
 EventLoop::Timers::iterator EventLoop::at(Time time, std::function<void()> callback) {
-  // Another thread may lead and sleep past `time`.
+  // Interrupt a sleeping leader: it may sleep past `time`.
   if (asleep_.exchange(false)) source_.interrupt();
   return timers_.emplace(time, std::move(callback));
 }
@@ -61,7 +62,7 @@ std::optional<steady_clock::duration> EventLoop::acquire_lead() {
   if (ended_) return std::nullopt;
   LOCUS_DCHECK(!led_);
   led_ = true;
-  asleep_.store(true);  // set before the lock is released: at() interrupts from now on
+  asleep_.store(true);  // set before mutex_ is released: from now on at() interrupts
   if (timers_.empty()) return kLongest;
   return std::clamp<steady_clock::duration>(timers_.begin()->first - steady_clock::now(), {}, kLongest);
 }
@@ -110,7 +111,8 @@ void EventLoop::run_timers() {
   }
 }
 
-// If there was no long task, releases the lead without waking a thread: this one takes it again in its next turn.
+// Runs the deferred tasks. Hands the lead to another thread before the first long task. If there is no long task,
+// releases the lead without waking a thread, because this thread takes the lead again in its next turn.
 void EventLoop::run_deferred() {
   bool leads = true;
   while (!deferred_.empty()) {

@@ -26,7 +26,8 @@
 
 namespace locus::server {
 
-// Tag of an event: the event source or post() delivers it to the loop. Must live until it has arrived.
+// Handler of an event. post() or the event source hands it to the loop, which calls arrived(). It must not be destroyed
+// before that call.
 class EventTag {
  public:
   virtual ~EventTag() = default;
@@ -38,7 +39,7 @@ class EventTag {
   EventTag* next_ = nullptr;  // next in the list of posted tags
 };
 
-// A tag that calls a member function of its owner.
+// An EventTag that calls a member function of its owner.
 template <class Owner>
 class MemberTag final : public EventTag {
  public:
@@ -82,14 +83,15 @@ class EventLoop {
   EventLoop(const EventLoop&) = delete;
   EventLoop& operator=(const EventLoop&) = delete;
 
-  // Hands `tag` to the loop. It may arrive, and its owner be destroyed, before this returns.
+  // Hands `tag` to the loop, which calls its arrived(). That call, and the destruction of the tag, may come before this
+  // returns.
   void post(EventTag& tag);
 
   // Calls `callback` at `time`, unless it is cancelled before.
   Timers::iterator at(Time time, std::function<void()> callback);
   void cancel(Timers::iterator timer) { timers_.erase(timer); }
 
-  // Runs `work` as soon as the handler has returned.
+  // Runs `work`, without the lock, as soon as the handler that calls this has returned.
   void defer(DeferredTask& work, TaskLength length) { deferred_.push_back({&work, length}); }
 
   // Waits until this thread leads, then for an event, a posted tag or a timer, and handles it. Returns false once the
@@ -102,7 +104,8 @@ class EventLoop {
     TaskLength length;
   };
 
-  // Waits for the lead. Returns the time that the leader may sleep, nothing once the source has ended.
+  // Waits for the lead. Returns the maximum time that this thread may sleep as the leader; nothing once the source has
+  // ended.
   std::optional<std::chrono::steady_clock::duration> acquire_lead() LOCUS_EXCLUDES(mutex_);
   void release_lead() LOCUS_REQUIRES(mutex_);
   void end() LOCUS_REQUIRES(mutex_);
@@ -113,7 +116,7 @@ class EventLoop {
 
   EventSource& source_;
   std::atomic<EventTag*> posted_{nullptr};
-  std::atomic<bool> asleep_{false};  // the leader sleeps or is about to: post() must interrupt it
+  std::atomic<bool> asleep_{false};  // the leader sleeps or is about to sleep: post() must interrupt it
 
   Mutex mutex_;
   Semaphore lead_;  // wakes one of the threads that wait for the lead

@@ -1,12 +1,13 @@
 // Fair queue: entries of many clients, served so that every waiting client gets an equal share of the work, however
-// many entries it has. The client with the least work served so far is next; its entries are served in order. A client
-// that is new or returns starts at the level of the one served last (the virtual time), so an absence saves up no
-// share; a client that was served more than that is remembered while idle and resumes at its own level. Source: Goyal,
-// Vin, Cheng, Start-time Fair Queueing, 1996.
+// many entries it has. The next entry is the first one of the client that was served the least work so far. The virtual
+// time is the work that this client had received. A client that is new or returns starts at the virtual time, so it
+// gains no share by being absent. A client that received more than that is remembered while it is idle, and returns
+// with its own amount. Source: Goyal, Vin, Cheng, Start-time Fair Queueing, 1996.
 //
-// Threads: one at a time. Every operation costs O(log clients), remove() also O(entries of the client). Memory: one
-// record for each waiting client and up to kMaxIdleClients more. Invariants: every client is in exactly one of the two
-// sets, `waiting_` if it has entries, else `idle_`, under its current work served; virtual_time_ never goes back.
+// Threads: one thread at a time. Every operation costs O(log clients), remove() also O(entries of the client). Memory:
+// one record for each waiting client and up to kMaxIdleClients more. Invariants: every client is in exactly one of two
+// sets, `waiting_` if it has entries, else `idle_`, both ordered by the work served to the client; virtual_time_ never
+// decreases.
 #ifndef LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 #define LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 
@@ -26,18 +27,18 @@ namespace locus::server {
 template <class Entry>
 class FairQueue {
  public:
-  // Maximum number of idle clients that are remembered because they overdrew their share.
+  // Maximum number of idle clients that are remembered because they received more work than the virtual time.
   static constexpr size_t kMaxIdleClients = 4096;
 
   bool empty() const { return waiting_.empty(); }
-  // Returns the number of waiting and remembered clients.
+  // Returns the number of clients that wait or are remembered.
   size_t clients() const { return queues_.size(); }
 
   void push_back(uint64_t client, Entry entry) {
     activate(client).entries.push_back(std::move(entry));
     check_invariants(client);
   }
-  // Adds an entry ahead of the client's others.
+  // Adds an entry ahead of the client's other entries.
   void push_front(uint64_t client, Entry entry) {
     activate(client).entries.push_front(std::move(entry));
     check_invariants(client);
@@ -95,7 +96,7 @@ class FairQueue {
     return taken;
   }
 
-  // Checks the invariants in debug builds: O(log clients) for the given client, which need not be known.
+  // Checks the invariants, in debug builds only. Costs O(log clients): checks `client`, which need not be in the queue.
   void check_invariants(uint64_t client) const {
     if constexpr (kDebugChecks) {
       LOCUS_CHECK_EQ(waiting_.size() + idle_.size(), queues_.size());
@@ -109,14 +110,14 @@ class FairQueue {
   }
 
  private:
-  using Rank = std::pair<uint64_t, uint64_t>;  // work served to a client, the client
+  using Rank = std::pair<uint64_t, uint64_t>;  // (work served to a client, client)
 
   struct ClientQueue {
     uint64_t spent = 0;
     std::deque<Entry> entries;
   };
 
-  // Returns the queue of a client that is about to get an entry.
+  // Returns the queue of a client that is about to get an entry, and moves the client to `waiting_`.
   ClientQueue& activate(uint64_t client) {
     ClientQueue& queue = queues_[client];
     if (!queue.entries.empty()) return queue;
@@ -140,10 +141,10 @@ class FairQueue {
     idle_.erase(idle_.begin());
   }
 
-  absl::flat_hash_map<uint64_t, ClientQueue> queues_;  // by client
+  absl::flat_hash_map<uint64_t, ClientQueue> queues_;  // waiting and remembered clients
   std::set<Rank> waiting_;                             // clients with entries
   std::set<Rank> idle_;                                // clients without entries
-  uint64_t virtual_time_ = 0;                          // work served to the client served last, before it
+  uint64_t virtual_time_ = 0;                          // most work that a client had received when next() chose it
 };
 
 }  // namespace locus::server

@@ -16,7 +16,8 @@ void MemoryBudget::measure() {
   ended_since_ = 0;
 }
 
-// Overestimates: memory that work in progress has already allocated counts both as measured and as claimed.
+// Returns whether `bytes` more fit within the limit. Overestimates the memory in use, because memory that work in
+// progress has already allocated is counted twice: as measured and as claimed.
 bool MemoryBudget::fits(uint64_t bytes) const {
   const uint64_t taken = measured_ + ended_since_ + claimed_;
   return taken <= limit_ && bytes <= limit_ - taken;
@@ -25,7 +26,7 @@ bool MemoryBudget::fits(uint64_t bytes) const {
 bool MemoryBudget::make_room(uint64_t bytes) {
   if (!fits(bytes) || ended_since_ > limit_ / kStepShare) measure();
   if (fits(bytes)) return true;
-  // Releasing memory cannot help.
+  // The work alone exceeds the limit, so releasing memory cannot help.
   if (bytes > limit_) return false;
   meter_.release_memory();
   measure();
@@ -55,7 +56,7 @@ absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field,
 
 MemoryBudget::Claim MemoryBudget::claim_anyway(uint64_t bytes) {
   MutexLock lock(mutex_);
-  // The work is never refused, so an occasional measurement is enough.
+  // Work of this kind is never refused, so it is enough to measure now and then.
   if (ended_since_ > limit_ / kStepShare) make_room(bytes);
   claimed_ += bytes;
   return Claim(this, bytes);

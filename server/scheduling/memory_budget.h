@@ -1,10 +1,10 @@
-// Memory limit of the process. Work that would pass it is refused, so that the kernel does not kill the process and all
-// its scenes. The budget counts the memory that the process holds (messages, old revisions and the allocator's free
-// memory included) plus the claims of work in progress.
+// Enforces the memory limit of the process. Work that would exceed the limit is refused, so that the kernel does not
+// kill the process, and with it all scenes. The budget counts the memory that the process holds (including messages,
+// old revisions and the allocator's free memory) plus the bytes claimed by work in progress.
 //
-// Threads: every member may be called from any thread; one thread at a time calls `meter`. Cost: the process is
-// measured only after the work that ended since the last measurement amounts to a share of the limit, or if the budget
-// seems exhausted. Invariant: claimed_ is the sum of the live claims.
+// Threads: every member may be called from any thread; the functions of the Meter are called by one thread at a time.
+// Cost: the process is measured only when a claim does not seem to fit, or when the claims that ended since the last
+// measurement exceed 1 / kStepShare of the limit. Invariant: claimed_ is the sum of the live claims.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 #define LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 
@@ -22,10 +22,10 @@ class MemoryBudget {
  public:
   struct Meter {
     std::function<uint64_t()> used;        // returns the bytes that the process holds
-    std::function<void()> release_memory;  // frees what it can and returns free memory to the kernel; slow
+    std::function<void()> release_memory;  // frees old revisions and returns free memory to the kernel; slow
   };
 
-  // Claim of work in progress; released when destroyed. Must not outlive the budget.
+  // Claim of memory by work in progress; released when destroyed. Must not outlive the budget.
   class Claim {
    public:
     Claim(MemoryBudget* budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {}
@@ -42,11 +42,11 @@ class MemoryBudget {
 
   MemoryBudget(uint64_t limit, Meter meter);
 
-  // Claims `bytes`, the peak that the work may add. RESOURCE_EXHAUSTED naming `field` and the limit memory_bytes if
-  // that would pass the limit even after release_memory().
+  // Claims `bytes`, the most memory that the work may add at any time. Returns RESOURCE_EXHAUSTED, naming `field` and
+  // the limit memory_bytes, if that would exceed the limit even after release_memory().
   absl::StatusOr<Claim> claim(absl::string_view field, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
-  // Claims `bytes` for work that is never refused because it only changes existing objects. Calls release_memory() if
-  // it would pass the limit.
+  // Claims `bytes` for work that is never refused because it only changes existing objects. Now and then checks the
+  // limit, and calls release_memory() if the claim would exceed it.
   Claim claim_anyway(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
 
   uint64_t limit() const { return limit_; }
@@ -54,7 +54,7 @@ class MemoryBudget {
   uint64_t used() const LOCUS_EXCLUDES(mutex_);
 
  private:
-  // Divisor of the limit: claims that may end between two measurements.
+  // The process is measured again when claims of more than limit / kStepShare bytes have ended.
   static constexpr uint64_t kStepShare = 32;
 
   bool make_room(uint64_t bytes) LOCUS_REQUIRES(mutex_);

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kNanosecondsPerMs = 1e6;
 constexpr uint32_t kMaxRetryMs = 10'000;
-// While both classes wait, large jobs get one turn in this many.
+// While jobs of both classes wait, one turn in this many is given to a large job.
 constexpr uint64_t kLargeShare = 5;
-// Maximum number of withdrawn tickets that stay queued until their turn.
+// Maximum number of withdrawn tickets that stay queued until their turn. If there are more, all of them are removed.
 constexpr uint32_t kMaxTombstones = 256;
 
 constexpr const char* kJobLimits[kJobClasses] = {"small_batches", "large_batches"};
@@ -37,8 +37,8 @@ class QueryScheduler::Ticket {
   Ticket(QueryJob& of, uint64_t whose, uint64_t estimated, JobClass as)
       : job(of), client(whose), nanoseconds(estimated), admitted_as(as), job_class(as) {}
 
-  // Counts this thread in; returns false if the ticket was withdrawn. `state_` is the number of threads working on the
-  // job, with two bits for withdrawn and finished.
+  // Counts this thread among those that work on the job; returns false if the ticket was withdrawn. `state_` holds the
+  // number of these threads and two bits, for withdrawn and finished.
   bool begin_work() {
     uint32_t state = state_.load(std::memory_order_relaxed);
     LOCUS_DCHECK_LT(state & kWorkers, kWorkers);
@@ -47,7 +47,7 @@ class QueryScheduler::Ticket {
     return false;
   }
   void finish() { state_.fetch_or(kFinished, std::memory_order_relaxed); }
-  // Counts this thread out; returns true to the last thread of a finished job.
+  // Subtracts this thread from those that work on the job. Returns true if it was the last one and the job is finished.
   bool end_work() {
     const uint32_t before = state_.fetch_sub(1, std::memory_order_acq_rel);
     LOCUS_DCHECK_LT(0u, before & kWorkers);
@@ -64,7 +64,7 @@ class QueryScheduler::Ticket {
 
   QueryJob& job;
   const uint64_t client;
-  const uint64_t nanoseconds;  // estimated work
+  const uint64_t nanoseconds;  // estimated work of the job
   const JobClass admitted_as;
   Ticket* next = nullptr;        // next in the inbox
   std::shared_ptr<Ticket> self;  // keeps the ticket alive while the scheduler may use it
@@ -103,7 +103,7 @@ absl::StatusOr<QueryScheduler::TicketPtr> QueryScheduler::submit(QueryJob& job, 
   RETURN_IF_ERROR(admit(job_class, nanoseconds));
   auto ticket = std::make_shared<Ticket>(job, client, nanoseconds, job_class);
   ticket->self = ticket;
-  // Once it is in the inbox the job may be done at any time.
+  // Once the ticket is in the inbox, the job may be done at any time and must not be used here any more.
   Ticket* first = inbox_.load(std::memory_order_relaxed);
   do ticket->next = first;
   while (!inbox_.compare_exchange_weak(first, ticket.get(), std::memory_order_release, std::memory_order_relaxed));
@@ -115,7 +115,7 @@ absl::Status QueryScheduler::admit(JobClass job_class, uint64_t nanoseconds) {
   const auto index = static_cast<size_t>(job_class);
   Admitted& admitted = admitted_[index];
   const Admitted& other = admitted_[1 - index];
-  // Counted before the check, so that concurrent calls never pass a limit together.
+  // Count the job before checking, so that concurrent calls cannot exceed a limit together.
   const uint64_t jobs = admitted.jobs.fetch_add(1) + 1;
   const uint64_t work = admitted.nanoseconds.fetch_add(nanoseconds) + nanoseconds;
   absl::Status status = check_jobs(kJobLimits[index], options_.limits[index].jobs, jobs);
@@ -146,7 +146,7 @@ absl::Status QueryScheduler::check_work(const char* name, uint64_t limit, uint64
                      static_cast<double>(work) / kNanosecondsPerMs, retry_after_ms());
 }
 
-// Returns the time in which half of the admitted work should be done.
+// Returns the time in milliseconds in which half of the admitted work should be done, clamped to 1 .. kMaxRetryMs.
 uint32_t QueryScheduler::retry_after_ms() const {
   double work = 0;
   for (const Admitted& admitted : admitted_) work += static_cast<double>(admitted.nanoseconds.load());
@@ -263,7 +263,8 @@ QueryScheduler::Ticket* QueryScheduler::start_turn() {
     if (queue.empty()) return nullptr;
     Ticket* const ticket = queue.next(options_.turn_nanoseconds);
     if (ticket->begin_work()) {
-      // The ticket stays queued, so other threads may help. Wake one if the job is long enough.
+      // The ticket stays queued, so that other threads may work on the job too. Wake a thread if the job is long
+      // enough.
       const bool long_enough = ticket->spent > 0 || ticket->nanoseconds > options_.turn_nanoseconds;
       if (long_enough && sleepers_.load() > 0) wake_.post();
       return ticket;
@@ -284,9 +285,10 @@ bool QueryScheduler::end_turn(Ticket& ticket, Progress progress, uint64_t spent)
   return ticket.end_work();
 }
 
-// Removes the job from the queue while it has no more work to begin, until one of the threads working on it returns
-// kMore. If this is the last of these threads, the job is queued again even without kMore, because another thread's
-// kMore may have been processed before this kBegun.
+// Queues the job again, or removes it from its queue, after a turn that returned `progress`. kBegun means that no chunk
+// may be started now, so the job leaves the queue until one of the threads working on it returns kMore. The last of
+// these threads queues an unfinished job again even if it returns kBegun, because another thread's kMore may have been
+// processed before this kBegun. A small job that took too long continues as a large one.
 void QueryScheduler::requeue(Ticket& ticket, Progress progress) {
   const bool waits = !ticket.finished() && (progress == Progress::kMore || ticket.alone());
   const bool grown = ticket.job_class == JobClass::kSmall && ticket.spent > 2 * options_.small_nanoseconds;

@@ -1,7 +1,7 @@
 // Scheduler of large query batches on a few threads of low priority: small jobs before large ones, fair shares for all
-// clients, every core for one client if it is the only one. Batches estimated below a budget are run by their caller
-// instead (runs_inline()). The number of jobs and their estimated work are limited, for each class and for both
-// together; a job that does not fit is refused at once.
+// clients, and all threads for a client that is alone. Batches whose estimated work is below a budget are run by their
+// caller instead (runs_inline()). The number of jobs and their estimated work are limited, for each class and for both
+// classes together; a job that exceeds a limit is refused at once.
 //
 // Threads: every member may be called from any thread, and none ever waits for a pool thread, which may lose its core
 // at any point. Several pool threads may call a job's work() at once; then one calls done(), once.
@@ -24,12 +24,12 @@
 
 namespace locus::server {
 
-// Batch that is worked on in turns. Ends its own work if its call was cancelled or its deadline has passed.
+// Query batch that is worked on in turns. It ends its own work if its call was cancelled or its deadline has passed.
 class QueryJob {
  public:
   virtual ~QueryJob() = default;
 
-  // Works for about `nanoseconds`. Several threads may call it at once.
+  // Works for about `nanoseconds`, then returns. Several threads may call it at once.
   virtual Progress work(uint64_t nanoseconds) = 0;
 
   // Called once, after a call of work() returned kDone and all calls of it have returned. The scheduler does not use
@@ -42,24 +42,25 @@ enum class JobClass : uint8_t { kSmall, kLarge };
 inline constexpr size_t kJobClasses = 2;
 
 struct QueueLimit {
-  uint32_t jobs;         // maximum of waiting and running jobs
-  uint64_t nanoseconds;  // maximum of their estimated work; a single job is admitted however large it is
+  uint32_t jobs;         // maximum number of waiting and running jobs
+  uint64_t nanoseconds;  // maximum sum of their estimated work; one job alone is always admitted
 };
 
 struct SchedulerOptions {
   uint32_t threads = 1;
   BatchPriority priority = BatchPriority::kNice;
-  uint64_t inline_nanoseconds = 250'000;  // jobs estimated below this are not queued
+  uint64_t inline_nanoseconds = 250'000;  // jobs with less estimated work than this are not queued
   uint64_t turn_nanoseconds = 100'000;    // length of a turn, after which the next job is chosen
-  uint64_t small_nanoseconds = 400'000;   // jobs estimated up to this are small
+  uint64_t small_nanoseconds = 400'000;   // jobs with at most this estimated work are small
   // Limits of each class, by JobClass, and of both together. The work limits are multiplied by the number of threads.
   QueueLimit limits[kJobClasses] = {{1024, 500'000'000}, {1024, 2'000'000'000}};
   QueueLimit limit = {1536, 2'000'000'000};
-  // Returns nanoseconds since an arbitrary start, for the calling thread. Default: steady_nanoseconds().
+  // Returns nanoseconds since an arbitrary start, for measuring the work of the calling thread. Default:
+  // steady_nanoseconds().
   std::function<uint64_t()> clock;
 };
 
-// Counters; all but the first two only grow.
+// Counters. All but the first two never decrease.
 struct SchedulerStats {
   uint64_t jobs[kJobClasses] = {};         // waiting and running jobs
   uint64_t nanoseconds[kJobClasses] = {};  // their estimated work
@@ -77,7 +78,7 @@ class QueryScheduler {
   using TicketPtr = std::shared_ptr<Ticket>;
 
   explicit QueryScheduler(const SchedulerOptions& options);
-  // Returns once every job is done.
+  // Returns once every admitted job is done.
   ~QueryScheduler();
   QueryScheduler(const QueryScheduler&) = delete;
   QueryScheduler& operator=(const QueryScheduler&) = delete;
@@ -85,16 +86,16 @@ class QueryScheduler {
   // Returns whether the caller should run a job of this estimated work itself instead of queuing it.
   bool runs_inline(uint64_t nanoseconds) const { return nanoseconds < options_.inline_nanoseconds; }
 
-  // Runs the job on the calling thread within the inline budget. If it returns kDone, done() is not called. Otherwise
-  // the estimate was too low, and the caller submits the rest.
+  // Runs the job on the calling thread for about inline_nanoseconds. If this returns kDone, the job is complete and
+  // done() is not called. Otherwise the estimate was too low, and the caller must submit() the rest.
   Progress run_inline(QueryJob& job);
 
-  // Queues a job; done() will be called, perhaps before this returns. RESOURCE_EXHAUSTED naming the limit if the queue
-  // is full; then done() is not called.
+  // Queues a job; done() will be called, perhaps before this returns. If a queue limit is exceeded, returns
+  // RESOURCE_EXHAUSTED naming the limit; then done() is not called.
   absl::StatusOr<TicketPtr> submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
-  // Removes a job that no thread is working on: returns true, and done() is not called. Otherwise the job is being
-  // worked on or done: returns false, and done() was or will be called, soon if the job ends its own work.
+  // Removes the job if no thread is working on it: then returns true, and done() is not called. Otherwise the job is
+  // being worked on or done: returns false, and done() was called or will be, soon if the job ends its own work.
   bool withdraw(Ticket& ticket);
 
   SchedulerStats stats() const;
@@ -102,7 +103,7 @@ class QueryScheduler {
   uint32_t threads() const { return static_cast<uint32_t>(threads_.size()); }
 
  private:
-  // Admitted jobs of one class.
+  // Counters of one class. `jobs` and `nanoseconds` are those of its waiting and running jobs.
   struct Admitted {
     std::atomic<uint64_t> jobs{0}, nanoseconds{0};
     std::atomic<uint64_t> done{0}, withdrawn{0}, refused_jobs{0}, refused_work{0};
@@ -110,20 +111,22 @@ class QueryScheduler {
 
   absl::Status admit(JobClass job_class, uint64_t nanoseconds);
   absl::Status check_jobs(const char* name, uint64_t limit, uint64_t jobs) const;
-  // Checks that `work` (which includes `job_work`, the new job's) is within `limit` times the number of threads.
+  // Checks that `work`, in nanoseconds, is at most `limit` times the number of threads. `work` includes `job_work`,
+  // that of the new job, which is always admitted if it is the only one.
   absl::Status check_work(const char* name, uint64_t limit, uint64_t work, uint64_t job_work) const;
   uint32_t retry_after_ms() const;
   void release(const Ticket& ticket);
 
   void run();
-  // Waits for a ticket to work on and begins its work; returns null at the end.
+  // Waits for a ticket to work on and begins its work. Returns null once the scheduler is being destroyed and no ticket
+  // waits.
   Ticket* next();
   Ticket* start_turn() LOCUS_REQUIRES(mutex_);
   FairQueue<Ticket*>& next_class() LOCUS_REQUIRES(mutex_);
   void drain_inbox() LOCUS_REQUIRES(mutex_);
   void drop_withdrawn() LOCUS_REQUIRES(mutex_);
   void drop(Ticket& ticket) LOCUS_REQUIRES(mutex_);
-  // Charges a turn's work to the client; returns true if this was the last thread of a finished job.
+  // Ends a turn: charges `spent` nanoseconds to the client. Returns true if this was the last thread of a finished job.
   bool end_turn(Ticket& ticket, Progress progress, uint64_t spent) LOCUS_EXCLUDES(mutex_);
   void requeue(Ticket& ticket, Progress progress) LOCUS_REQUIRES(mutex_);
   FairQueue<Ticket*>& queue_of(const Ticket& ticket) LOCUS_REQUIRES(mutex_);

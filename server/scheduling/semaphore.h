@@ -16,10 +16,10 @@ class Semaphore {
   Semaphore(const Semaphore&) = delete;
   Semaphore& operator=(const Semaphore&) = delete;
 
-  // Lets one wait() return.
+  // Increments the count, which lets one wait() return.
   void post() { sem_post(&semaphore_); }
   void wait() {
-    while (sem_wait(&semaphore_) != 0) {  // a signal was handled
+    while (sem_wait(&semaphore_) != 0) {  // interrupted by a signal handler: wait again
     }
   }
 

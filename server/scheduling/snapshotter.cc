@@ -16,7 +16,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// Approximate bytes of an object in a snapshot.
+// Approximate size in bytes of an object in a snapshot.
 constexpr uint64_t kObjectBytes = 80;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Writes a snapshot of a scene when its log has grown long; the snapshot replaces the records. So a restart replays
-// little, and the disk holds little more than the scenes themselves.
+// Writes a snapshot of a scene when its log has grown long; the snapshot replaces the log's records. So a restart
+// replays few records, and the disk holds little more than the scenes themselves.
 //
 // Threads: runs a thread of low priority; stats() may be called from any thread. Updates and queries never wait for it:
 // a scene continues to change while its snapshot is written.
@@ -39,7 +39,7 @@ struct SnapshotterStats {
 
 class Snapshotter {
  public:
-  // `registry` and `log` must outlive it. Does nothing if `log` is null.
+  // Starts the thread. `registry` and `log` must outlive the snapshotter. Does nothing if `log` is null.
   Snapshotter(const Registry& registry, UpdateLog* log, SnapshotterOptions options);
   // Abandons a snapshot in progress; the previous one stays valid.
   ~Snapshotter();
@@ -50,7 +50,7 @@ class Snapshotter {
 
  private:
   void run() LOCUS_EXCLUDES(mutex_);
-  // Waits; returns false if the destructor was called meanwhile.
+  // Waits for `time`. Returns false if the destructor was called meanwhile.
   bool wait_for(std::chrono::milliseconds time) LOCUS_EXCLUDES(mutex_);
   bool ended() const LOCUS_EXCLUDES(mutex_);
   // Checks all scenes and writes the snapshots that are due; returns false at the first failure.

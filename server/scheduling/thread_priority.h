@@ -1,6 +1,6 @@
 // Priorities of threads: threads that answer large query batches run below those that serve clients and apply updates,
-// so that no flood of queries delays the rest. Each function changes the calling thread permanently. A setting that the
-// system refuses or does not know is left unchanged; only latencies get worse.
+// so that no flood of queries delays the rest. Each function changes the calling thread permanently. If the system
+// refuses a setting or does not know it, the setting is left unchanged; answers stay correct, but latencies are higher.
 #ifndef LOCUS_SERVER_SCHEDULING_THREAD_PRIORITY_H_
 #define LOCUS_SERVER_SCHEDULING_THREAD_PRIORITY_H_
 

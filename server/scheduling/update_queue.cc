@@ -13,15 +13,17 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-// Nanoseconds to apply one item, before the first measurement.
+// Estimated nanoseconds to apply one item, before the first measurement.
 constexpr double kFirstGuess = 100;
-// Fixed cost of a batch: its revision.
+// Fixed cost of a batch in nanoseconds: publishing its revision.
 constexpr uint64_t kBatchNanoseconds = 5'000;
 constexpr double kForget = 0.1;
 constexpr uint32_t kRetryAfterMs = 5;
-// Maximum of items logged with one sync: their cost is many times that of the sync, and they are applied soon.
+// Maximum number of items logged with one sync. Applying so many takes many times as long as the sync, so a larger
+// group would gain little.
 constexpr uint64_t kMaxItemsPerSync = uint64_t{1} << 15;
-// Interval for checking whether a scene's readers have ended, and the time after which overdue readers are revoked.
+// Interval at which the queue checks whether a scene's readers have released their snapshots, and the time after which
+// overdue readers are revoked.
 constexpr milliseconds kReaderPollInterval{2};
 constexpr milliseconds kReaderGrace{1000};
 
@@ -35,7 +37,8 @@ uint64_t items_of(const UpdateBatch& batch) {
 
 bool coalesces(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
 
-// Returns whether acks wait for the disk. Waiting batches are then logged together: a sync costs the same for many.
+// Returns whether the scene's acks wait for the disk. Its waiting batches are then logged together, because a sync
+// costs the same for one batch as for many.
 bool waits_for_disk(const Scene& scene) {
   return scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
 }
@@ -88,7 +91,8 @@ absl::Status UpdateQueue::refuse(const SceneQueue& scene_queue, uint64_t items) 
                      static_cast<double>(scene_queue.items + items), retry);
 }
 
-// Batches that scan all objects, or wait for the disk, never run inline.
+// Returns whether the caller may apply the batch itself. Batches that scan all objects, or whose ack waits for the
+// disk, are always queued.
 bool UpdateQueue::fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const {
   if (waits_for_disk(scene) || batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
   const double nanoseconds = static_cast<double>(items) * nanoseconds_per_item_.load(std::memory_order_relaxed);
@@ -186,7 +190,7 @@ void UpdateQueue::work_on(SceneQueue& scene_queue) {
   empty = finish(scene_queue);
 }
 
-// Takes the batches that become one revision, or that share one sync.
+// Removes from the queue the batches that become one revision or share one sync, and returns them.
 UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
   const bool coalescing = coalesces(*scene_queue.scene);
   const uint64_t max_items = coalescing                           ? limits::kMaxUpdateItems
@@ -212,8 +216,8 @@ UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
   return group;
 }
 
-// Completes and removes the batches of the group that were cancelled or whose deadline has passed. If the deadline
-// passed during a stall, the error says what the readers hold.
+// Completes and removes the batches of the group that were cancelled or whose deadline has passed. If a deadline passed
+// during a stall, the batch gets the error of the stall, which names what the readers hold.
 void UpdateQueue::drop_stopped(const SceneQueue& scene_queue, Group& group) {
   const auto stopped = [&scene_queue](PendingUpdate* update) {
     absl::Status status = update->stop();
@@ -231,7 +235,7 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
   if (group.empty()) return true;
   std::vector<const UpdateBatch*> batches;
   for (const PendingUpdate* update : group) batches.push_back(&update->batch());
-  // Does not wait for readers, which may take long.
+  // This returns DEADLINE_EXCEEDED instead of waiting for readers, because they may take long.
   absl::StatusOr<Scene::Acks> acks = apply_all(*scene_queue.scene, batches);
   if (acks.status().code() == absl::StatusCode::kDeadlineExceeded) {
     scene_queue.late = acks.status();
@@ -243,14 +247,16 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
   return true;
 }
 
-// Call before done(), so that the statistics include a batch by the time its caller sees the ack.
+// Counts applied batches. Call it before done(), so that the statistics include a batch by the time its caller sees the
+// ack.
 void UpdateQueue::count(const Scene& scene, size_t updates) {
   const MutexLock lock(mutex_);
   stats_.applied += updates;
   if (updates > 1 && coalesces(scene)) stats_.coalesced += updates - 1;
 }
 
-// Revoked readers still hold too much memory. Their scene waits; other scenes do not.
+// Queues the group again and lets its scene wait, because readers whose snapshots are revoked still hold too much
+// memory. Other scenes do not wait.
 void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
   const SteadyTime now = steady_clock::now();
   ScenePtr overdue;  // keeps the scene alive: another thread may free the SceneQueue before its readers are revoked
@@ -304,12 +310,12 @@ void UpdateQueue::learn(uint64_t items, SteadyTime start) {
   const auto spent = std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start).count();
   const double per_item = static_cast<double>(spent) / static_cast<double>(items);
   const double known = nanoseconds_per_item_.load(std::memory_order_relaxed);
-  // Few items tell little about the cost of one, because of the fixed cost of a batch.
+  // A batch of few items says little about the cost of one item, because of the fixed cost of a batch.
   const double weight = items < 64 ? 0 : kForget;
   nanoseconds_per_item_.store(known + (per_item - known) * weight, std::memory_order_relaxed);
 }
 
-// O(1): compares the counts of one SceneQueue with the totals.
+// Compares the counts of one SceneQueue with the totals. O(1).
 void UpdateQueue::check_invariants(const SceneQueue& scene_queue) const {
   if constexpr (kDebugChecks) {
     LOCUS_CHECK_LE(scene_queue.waiting.size(), stats_.updates);

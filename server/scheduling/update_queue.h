@@ -1,6 +1,7 @@
 // Queue of update batches: one bounded SceneQueue for each scene, emptied in order of arrival by one thread at a time.
-// So no thread that serves clients waits for a scene's writer or its readers. A small batch for an idle scene is
-// applied by its caller, unless the ack waits for the disk: such batches are queued, and all that wait share one sync.
+// So threads that serve clients never wait for a scene's writer or its readers. A small batch for an idle scene is
+// applied by its caller, unless its ack waits for the disk. Such batches are queued, and the waiting batches of a scene
+// share one sync.
 //
 // Threads: every member may be called from any thread; post() takes a lock that is held only briefly. Invariants: at
 // most one group of batches of a scene is being applied, and batches of a scene never overtake each other; the counts
@@ -24,7 +25,7 @@
 
 namespace locus::server {
 
-// One posted batch. Must live until done().
+// One posted batch. It must live until done() is called.
 class PendingUpdate {
  public:
   virtual ~PendingUpdate() = default;
@@ -55,14 +56,14 @@ enum class Posted : uint8_t {
 struct UpdateQueueOptions {
   uint32_t threads = 1;
   uint32_t max_updates = 256;              // maximum of batches waiting for one scene
-  uint64_t max_items = uint64_t{1} << 20;  // maximum of their items; a single batch is accepted however large it is
-  uint64_t inline_nanoseconds = 100'000;   // maximum estimated work of a batch that its caller applies
+  uint64_t max_items = uint64_t{1} << 20;  // maximum of the items of these batches; one batch alone is always accepted
+  uint64_t inline_nanoseconds = 100'000;   // maximum estimated work of a batch that is applied by its caller
 };
 
-// Counters; all but the first two only grow.
+// Counters. All but the first two never decrease.
 struct UpdateQueueStats {
   uint64_t updates = 0;         // batches waiting for all scenes
-  uint64_t items = 0;           // their items
+  uint64_t items = 0;           // items of these batches
   uint64_t applied = 0;         // batches applied
   uint64_t applied_inline = 0;  // batches applied by their caller
   uint64_t refused = 0;         // batches refused because the scene's queue was full
@@ -94,7 +95,7 @@ class UpdateQueue {
     std::deque<PendingUpdate*> waiting;
     uint64_t items = 0;
     bool busy = false;           // a thread is applying batches
-    SteadyTime retry_at = {};    // next attempt while readers stall the scene
+    SteadyTime retry_at = {};    // time of the next attempt, while readers stall the scene
     SteadyTime stalled_at = {};  // start of the stall
     absl::Status late;           // error that names what the readers hold; used by the busy thread only
   };
@@ -111,14 +112,14 @@ class UpdateQueue {
   void work_on(SceneQueue& scene_queue) LOCUS_EXCLUDES(mutex_);
   Group take_group(SceneQueue& scene_queue) LOCUS_REQUIRES(mutex_);
   void requeue(SceneQueue& scene_queue, const Group& group) LOCUS_REQUIRES(mutex_);
-  // Applies the group and calls done() of each. Returns false if the scene's readers stall it; then `group` has the
-  // batches that still wait.
+  // Applies the group and calls done() of each of its batches. Returns false if the scene's readers hold too much
+  // memory; then `group` has the batches that still wait.
   bool apply(SceneQueue& scene_queue, Group& group) LOCUS_EXCLUDES(mutex_);
   void count(const Scene& scene, size_t updates) LOCUS_EXCLUDES(mutex_);
   static void drop_stopped(const SceneQueue& scene_queue, Group& group);
   void stall(SceneQueue& scene_queue, const Group& group) LOCUS_EXCLUDES(mutex_);
-  // Ends the work of this thread. Returns the SceneQueue if it is empty; the caller frees it without the lock, since
-  // that may destroy a deleted scene.
+  // Ends this thread's work on the SceneQueue. Returns the SceneQueue if it is empty; the caller frees it without the
+  // lock, because freeing it may destroy a deleted scene.
   std::unique_ptr<SceneQueue> finish(SceneQueue& scene_queue) LOCUS_REQUIRES(mutex_);
   void learn(uint64_t items, SteadyTime start);
   void check_invariants(const SceneQueue& scene_queue) const LOCUS_REQUIRES(mutex_);
@@ -127,8 +128,8 @@ class UpdateQueue {
   mutable Mutex mutex_;
   ConditionVariable work_;
   absl::flat_hash_map<const Scene*, std::unique_ptr<SceneQueue>> scene_queues_ LOCUS_GUARDED_BY(mutex_);
-  std::deque<SceneQueue*> ready_ LOCUS_GUARDED_BY(mutex_);     // have waiting batches, not busy, each once
-  std::vector<SceneQueue*> stalled_ LOCUS_GUARDED_BY(mutex_);  // as ready_, but wait for retry_at
+  std::deque<SceneQueue*> ready_ LOCUS_GUARDED_BY(mutex_);     // not busy, with waiting batches; each once
+  std::vector<SceneQueue*> stalled_ LOCUS_GUARDED_BY(mutex_);  // like ready_, but waiting for retry_at
   UpdateQueueStats stats_ LOCUS_GUARDED_BY(mutex_);
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::atomic<double> nanoseconds_per_item_;

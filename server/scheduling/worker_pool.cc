@@ -9,8 +9,8 @@
 
 namespace locus::server {
 
-// One call of parallel_for(). A helper that starts late finds no index left and never uses `fn_`, which may be
-// destroyed by then.
+// One call of parallel_for(). A helper that starts after the loop's end finds no index left and does not use `fn_`,
+// which may be destroyed by then.
 class WorkerPool::Batch {
  public:
   Batch(size_t n, const std::function<void(size_t)>& fn) : n_(n), fn_(&fn) {}

@@ -40,7 +40,7 @@ class WorkerPool {
 
   Mutex mutex_;
   ConditionVariable work_;
-  std::deque<std::shared_ptr<Batch>> waiting_ LOCUS_GUARDED_BY(mutex_);  // one entry for each helper it could use
+  std::deque<std::shared_ptr<Batch>> waiting_ LOCUS_GUARDED_BY(mutex_);  // one entry for each helper a batch could use
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> helpers_;
 };

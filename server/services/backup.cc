@@ -31,10 +31,11 @@ namespace fs = std::filesystem;
 
 constexpr uint32_t kBackupRetryMs = 5000;
 constexpr size_t kSha256Bytes = 32;
-// Directory inside kBackupDirectory, so that files that the log leaves beside its copy are removed with it.
+// Name of the copy's directory inside kBackupDirectory. The copy has a parent directory of its own, so that files that
+// the log leaves beside the copy are removed with that parent.
 constexpr const char* kCopy = "copy";
 
-// Writes a piece to the caller; returns false to end the backup.
+// Function that writes a piece to the caller; returns false to end the backup.
 using TakeBackupPiece = std::function<bool(const v1::BackupResponse&)>;
 
 struct File {
@@ -58,7 +59,7 @@ absl::Status not_made(const fs::path& path, const std::error_code& why) {
                                    full ? "; free some of the server's disk" : "; look after the server's disk"));
 }
 
-// Removes the directory. Logs a warning if that fails.
+// Removes the directory with its contents. Logs a warning if that fails.
 void remove_tree(const fs::path& directory) {
   std::error_code why;
   fs::remove_all(directory, why);
@@ -134,7 +135,7 @@ class OpenFile {
   const int descriptor_;
 };
 
-// Sends exactly the number of bytes that the file was listed with. Returns false if `take` ended the backup.
+// Sends as many bytes of the file as list_files() reported. Returns false if `take` ended the backup.
 absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const TakeBackupPiece& take) {
   const OpenFile from(copy / file.path);
   if (!from.is_open()) return unreadable(file.path, std::strerror(errno));

@@ -13,10 +13,10 @@
 namespace locus::server {
 namespace {
 
-// A waiting call checks this often whether its caller has gone.
+// Interval at which a waiting call checks whether its caller has given up.
 constexpr std::chrono::milliseconds kCancellationCheck{50};
 
-// Result of a background change, handed to the call that waits for it. The call may have ended before.
+// Result of a background change, handed to the call that waits for it. The call may have ended before the result comes.
 class Outcome {
  public:
   void set(absl::StatusOr<InstanceChange> change) LOCUS_EXCLUDES(mutex_) {
@@ -68,7 +68,7 @@ absl::StatusOr<PlacementColumns> to_placement(const Registry& registry, const v1
 }
 
 // Chooses ids for placements without ids. With no_wait the reply carries the ids before the change is built, so they
-// are drawn here: at random, 63 bits below kChosenIdBit.
+// are drawn here: kChosenIdBit and 63 random bits below it.
 void choose_ids(v1::ChangeInstancesRequest& request) {
   std::random_device device;
   for (v1::Placement& placement : *request.mutable_place()) {
@@ -93,8 +93,8 @@ absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registr
   return owned;
 }
 
-// Checks the placements of a change as far as possible before the changes queued ahead of it are applied: applies them
-// to an empty set.
+// Checks the placements of a change before the changes queued ahead of it are applied, so only as far as that is
+// possible: applies the placements to an empty set of instances.
 absl::Status check_placements(const StaticChange& change) {
   StaticChange placements_only;
   placements_only.place = change.place;
@@ -106,7 +106,7 @@ absl::Status check_placements(const StaticChange& change) {
 
 using SharedClaim = std::shared_ptr<const MemoryBudget::Claim>;
 
-// Claims memory for the next set of instances while it is built. A change that only removes is never refused.
+// Claims memory for building the new set of instances. A change that only removes instances is never refused.
 absl::StatusOr<SharedClaim> make_room(Host& host, const Scene& scene, const StaticChange& change) {
   const uint64_t cost = change_cost(*scene.latest()->statics, change);
   if (cost == 0) return nullptr;
@@ -138,7 +138,8 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
       host.changes.submit(epoch, [&host, arrived = SteadyTime::clock::now(), scene = *scene, owned = *owned, outcome,
                                   room = *room, trace = LogScope::current()](uint64_t change_number) {
         const LogScope scope(trace);
-        // Wait without a deadline: the caller may have gone, and readers release their snapshots in any case.
+        // Wait without a deadline: the change runs even if its caller has given up, and readers release their snapshots
+        // in any case.
         (void)wait_for_readers(*scene, [] { return absl::OkStatus(); });
         absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
         if (change.ok()) host.metrics.record_instance_change(nanoseconds_since(arrived));

@@ -12,19 +12,20 @@
 namespace locus::server {
 namespace {
 
-// Upper bound of the bytes of a piece's tags, lengths and description.
+// Upper bound of the size in bytes of a piece's tags, lengths and description.
 constexpr size_t kFrameBytes = 1024;
 static_assert(limits::kMaxNameLength + sizeof(Sha256) + 64 < kFrameBytes);
 constexpr size_t kRoom = limits::kDefaultReplyBytes - kFrameBytes;
 // Bytes of a vertex or a triangle: three numbers of four bytes.
 constexpr size_t kTripleBytes = 12;
-// Upper bound of the bytes of a part: its name, its first triangle, and the tags and lengths of both and of the part.
+// Upper bound of the size in bytes of a part: its name, its first triangle, and the tags and lengths of both and of the
+// part.
 constexpr size_t kMaxPartBytes = limits::kMaxLabelLength + 16;
 static_assert(kMaxPartBytes <= kRoom);
 // Number of indices that are unpacked at a time.
 constexpr uint64_t kIndicesAtOnce = 3 << 14;
 
-// Fills pieces and passes each to `take` when it is full.
+// Builder of the pieces of a download. Passes each piece to `take` when the piece is full.
 class Pieces {
  public:
   Pieces(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) : take_(take) {
@@ -40,7 +41,8 @@ class Pieces {
     used_ += kMaxPartBytes;
   }
 
-  // Appends triples to the column of the current piece that `mutable_column` returns. Begins new pieces as needed.
+  // Appends `numbers`, which are whole triples, to the column of the current piece that `mutable_column` returns.
+  // Begins new pieces as needed.
   template <class T, class Column>
   void add(absl::Span<const T> numbers, Column mutable_column) {
     while (taken_ && !numbers.empty()) {
@@ -69,7 +71,7 @@ class Pieces {
 
   const TakeMeshPiece& take_;
   v1::DownloadMeshResponse piece_;
-  size_t used_ = 0;  // an upper bound of the bytes in the columns
+  size_t used_ = 0;  // upper bound of the size in bytes of the piece's columns
   bool taken_ = true;
 };
 
@@ -94,7 +96,7 @@ absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadM
                            grpc::ServerWriter<v1::DownloadMeshResponse>& writer) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
   ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.find_mesh(request.mesh(), "mesh"));
-  // Claim memory for the vertices, which are unpacked into a copy.
+  // Claim memory for a copy of the vertices, into which they are unpacked.
   ASSIGN_OR_RETURN(const MemoryBudget::Claim claim,
                    host.memory.claim("mesh", uint64_t{kTripleBytes} * mesh->vertex_count()));
   const uint32_t uses = host.registry.mesh_uses(mesh.get());

@@ -14,11 +14,11 @@
 
 namespace locus::server {
 
-// Writes a piece to the caller; returns false to end the download.
+// Function that writes a piece to the caller; returns false to end the download.
 using TakeMeshPiece = std::function<bool(const v1::DownloadMeshResponse&)>;
 
-// Sends the description, then parts, vertices and indices, as full pieces and at least one. Returns false if `take`
-// ended the download.
+// Sends the description, then parts, vertices and indices. Every piece but the last is full, and there is at least one.
+// Returns false if `take` ended the download.
 bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take);
 
 // Serves one DownloadMesh call. Keeps the mesh alive until its last piece is sent, even if it is deleted meanwhile.

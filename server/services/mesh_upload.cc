@@ -75,7 +75,8 @@ v1::Mesh describe_mesh(const Registry& registry, const std::string& name, MeshPt
   return to_proto(Registry::NamedMesh{name, std::move(mesh), uses});
 }
 
-// Puts known content under another name, with the parts of that name.
+// Answers the upload of a mesh whose content is already known: registers the content of `known` under `name` with
+// `parts`.
 absl::Status reuse(Host& host, const std::string& name, const std::vector<MeshPart>& parts, const StaticMesh& known,
                    v1::UploadMeshResponse* response) {
   ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.add_mesh(name, StaticMesh::share(name, parts, known)));
@@ -84,7 +85,7 @@ absl::Status reuse(Host& host, const std::string& name, const std::vector<MeshPa
   return absl::OkStatus();
 }
 
-// Refuses or answers the upload before its columns are read, if that is possible. Returns true if it is answered.
+// Refuses or answers the upload before its columns are read, if that is possible. Returns true if it has been answered.
 absl::StatusOr<bool> answer_early(Host& host, const MeshUpload& upload, v1::UploadMeshResponse* response) {
   const absl::StatusOr<MeshPtr> named = host.registry.find_mesh(upload.name(), "mesh");
   const size_t meshes = host.registry.mesh_count();

@@ -25,23 +25,23 @@ class MeshUpload {
   // Checks the first message's form and limits before anything is allocated.
   static absl::StatusOr<MeshUpload> begin(const v1::UploadMeshRequest& first);
 
-  // Appends the columns of a message, also of the first.
+  // Appends the columns of `message`, which may be the first message or a later one.
   absl::Status append(const v1::UploadMeshRequest& message);
-  // Appends a message after the first, which may only have columns.
+  // Appends the second or a later message of the upload. Such a message may contain only columns.
   absl::Status append_later(const v1::UploadMeshRequest& message);
 
   const std::string& name() const { return name_; }
   const std::optional<Sha256>& announced() const { return announced_; }
   // Returns the announced parts; none after finish().
   const std::vector<MeshPart>& parts() const { return parts_; }
-  // True for a mesh with as many vertices and triangles as were announced.
+  // Returns whether `mesh` has as many vertices and triangles as were announced.
   bool has_counts_of(const StaticMesh& mesh) const;
 
   struct Complete {
     Sha256 sha256;
     TriangleMesh mesh;
   };
-  // Checks the mesh and returns it with its hash. Leaves the upload empty.
+  // Checks that the upload is complete and correct, and returns the mesh with its hash. Leaves the upload empty.
   absl::StatusOr<Complete> finish();
 
  private:

@@ -29,7 +29,7 @@ struct QueryMethod {
   QueryService* service;
 };
 
-// Writes answers as they complete, in any order.
+// Method of StreamQueries for HotCall. It writes answers as they complete, in any order.
 struct StreamQueriesMethod {
   using Request = v1::StreamQueriesRequest;
   using Response = v1::StreamQueriesResponse;

@@ -17,7 +17,8 @@ using std::chrono::steady_clock;
 
 namespace {
 
-// Work below this estimate keeps the lead of its IO loop: waking another thread to wait for events would cost more.
+// Estimated work below which a query batch does not hand the lead of its IO loop to another thread, because waking that
+// thread to wait for events would cost more.
 constexpr uint64_t kShortNanoseconds = 30'000;
 
 }  // namespace
@@ -60,8 +61,9 @@ void QueryWork::look() {
   wait();
 }
 
-// While the server drains no update is accepted, so the revision cannot come. A message of a stream then gets an answer
-// of its own, because the stream ends only after all its messages are answered.
+// Returns the error for a batch whose revision will not be published any more, because the call has ended or because a
+// draining server accepts no updates. A draining server ends a stream only after all its messages are answered, so
+// there each message gets an error of its own.
 absl::Status QueryWork::no_longer() const {
   RETURN_IF_ERROR(slot_.caller().stop());
   if (!slot_.stream()) return draining();
@@ -105,8 +107,8 @@ void QueryWork::run() {
     absl::Status revoked = pin_->status();
     return revoked.ok() ? slot_.caller().stop() : revoked;
   };
-  // Measure processor time, not elapsed time: a thread that waits for a core would learn estimates that are too high,
-  // and its later batches would be queued for nothing.
+  // Measure processor time, not elapsed time. Otherwise a thread that waits for a core would learn estimates that are
+  // too high, and later batches would be queued needlessly.
   options.work_clock = &thread_nanoseconds;
   options.clock = &steady_nanoseconds;
   columns_.emplace(*result_, batch_.blocks.size());
@@ -122,7 +124,7 @@ void QueryWork::run_deferred() { progress_ = slot_.host().scheduler.run_inline(*
 
 void QueryWork::on_deferred_done() {
   if (progress_ == Progress::kDone) return finished(true);
-  submit(slot_.host().scheduler.options().inline_nanoseconds);  // it has used up that budget already
+  submit(slot_.host().scheduler.options().inline_nanoseconds);  // run_inline() has used up this budget already
 }
 
 void QueryWork::submit(uint64_t nanoseconds) {

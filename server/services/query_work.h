@@ -55,28 +55,29 @@ class QueryWork final : private QueryJob, private DeferredTask {
 
   // Begins the work. `batch` and `result` are borrowed until the slot is answered.
   void begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result);
-  // Asks for an answer soon: ends the wait for a revision, and withdraws a queued run if the caller has gone. A run
-  // that is being worked on notices that by itself.
+  // Asks for an answer soon: ends the wait for a revision, and withdraws a queued run if the caller has given up. A run
+  // in progress is not interrupted here, because it polls Caller::stop() itself.
   void give_up();
 
  private:
   absl::Status read(const std::string& scene, const v1::QueryBatch& batch);
   void answer(absl::Status status);
 
-  // Pins the revision that the view names and runs, or parks until it is published.
+  // Pins the revision that the view names and calls run(), or parks the batch until that revision is published.
   void look();
   void wait();
-  // Removes timer and watch. Returns whether the wait is over; false if woken() is already posted and will run.
+  // Removes the timer and the watch. Returns whether the wait is over; false if woken() was already posted and will
+  // run.
   bool end_wait();
   void woken(bool);
   // Returns the status of a parked batch that is given up: its revision will not be published any more.
   absl::Status no_longer() const;
 
   void run();
-  // Works on the batch within the inline budget, without the loop's lock.
+  // Works on the batch for about the inline budget of the scheduler, without the loop's lock.
   void run_deferred() override;
   void on_deferred_done() override;
-  // Queues the batch, or what is left of it, at the scheduler with an estimate of its work.
+  // Queues the batch, or the rest of it, at the query scheduler; `nanoseconds` is the estimate of its work.
   void submit(uint64_t nanoseconds);
   Progress work(uint64_t nanoseconds) override { return run_->work(nanoseconds); }
   void done() override;
@@ -92,12 +93,12 @@ class QueryWork final : private QueryJob, private DeferredTask {
   View view_;
   QueryBatch batch_;
   SteadyTime until_;
-  SteadyTime started_;  // begin of run(): after any wait for a revision
+  SteadyTime started_;  // start of run(): after the wait for a revision, if any
 
-  // Used while parked.
+  // Used while the batch is parked.
   std::optional<IoLoop::Timers::iterator> timer_;
   std::optional<Scene::Watch> watch_;
-  std::atomic<bool> notified_{false};  // woken() is posted
+  std::atomic<bool> notified_{false};  // woken() was posted
   MemberTag<QueryWork> woken_{*this, &QueryWork::woken};
 
   std::optional<SnapshotPin> pin_;

@@ -28,7 +28,7 @@ std::string milliseconds_since(steady_clock::time_point start) {
   return absl::StrCat(std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now() - start).count());
 }
 
-// Returns the error that calls about a damaged scene or mesh get until it is repaired or deleted.
+// Returns the error for calls that use a damaged scene or mesh, until it is repaired or deleted.
 absl::Status damaged(const char* field, const absl::Status& damage) {
   Refusal refusal;
   refusal.reason = Reason::kDamaged;
@@ -51,7 +51,7 @@ class Recovery {
     if (total_ == 0) return absl::OkStatus();
     log(LogLevel::kInfo, "recovering",
         {{"scenes", absl::StrCat(scenes.size())}, {"meshes", absl::StrCat(meshes.size())}});
-    // Meshes with equal content are recovered once, under their first name; the other names share the result.
+    // Meshes with equal content are recovered once, under the first of their names; the other names share the result.
     std::map<Sha256, std::vector<const StoredMesh*>> contents;
     for (const StoredMesh& mesh : meshes) contents[mesh.sha256].push_back(&mesh);
     std::vector<const std::vector<const StoredMesh*>*> lists;
@@ -125,7 +125,8 @@ class Recovery {
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
     ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));
-    // The limit on pinned memory is an option of this daemon, not of the daemon that created the scene.
+    // Overwrite the stored limit on pinned memory, which is that of the daemon that created the scene, by the option of
+    // this daemon.
     spec.pinned_bytes = host_.config.pinned_limit;
     stored.spec = encode_spec(spec);
     if (stored.copied || (spec.durability == Durability::kMemory && !log_.closed_in_order())) {

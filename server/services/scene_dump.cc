@@ -10,8 +10,8 @@
 namespace locus::server {
 namespace {
 
-// Objects and instances ("things") a piece. One thing takes at most the bytes of its columns, of the frame of a new
-// run, and of a mesh's name.
+// Maximum number of things (objects and instances) in a piece, and maximum size in bytes of a thing: its columns, the
+// frame of a new run, and a mesh's name.
 constexpr size_t kThingsPerPiece = 16384;
 constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
@@ -62,7 +62,8 @@ void add_shape(const Shape& shape, v1::Insert* to) {
   }
 }
 
-// Fills pieces and passes each to `take` when it is full. Neighbours of equal shape or mesh share a run of columns.
+// Builder of the pieces of a dump. Passes each piece to `take` when the piece is full. Consecutive things of equal
+// shape or mesh share a run of columns.
 class Dump {
  public:
   Dump(const SceneSnapshot& snapshot, const TakeDumpPiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
@@ -98,7 +99,8 @@ class Dump {
   }
 
  private:
-  // Passes on the piece if it is full, and counts a thing. Returns false once `take` has ended the dump.
+  // Counts one more thing of the piece, after passing the piece on if it is full. Returns false once `take` has ended
+  // the dump.
   bool make_room() {
     if (taken_ && things_ == kThingsPerPiece) {
       taken_ = take_(piece_);
@@ -150,7 +152,7 @@ absl::Status dump_scene(const Caller& caller, const v1::DumpSceneRequest& reques
                         grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
   ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(caller, request.scene(), "scene"));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
-  // A caller that reads slowly could hold the snapshot for any time, so revoking the pin cancels the call.
+  // A caller that reads slowly could hold the snapshot for any time. So if the pin is revoked, the call is cancelled.
   snapshot.on_revoke([&caller] { caller.cancel(); });
   const auto take = [&](const v1::DumpSceneResponse& piece) {
     return snapshot.status().ok() && caller.stop().ok() && writer.Write(piece);

@@ -14,10 +14,10 @@
 
 namespace locus::server {
 
-// Writes a piece to the caller; returns false to end the dump.
+// Function that writes a piece to the caller; returns false to end the dump.
 using TakeDumpPiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
-// Sends objects, then instances, each in ascending order of ids, in at least one piece. Returns false if `take` ended
+// Sends objects, then instances, each in ascending order of ids, in one or more pieces. Returns false if `take` ended
 // the dump.
 bool dump_snapshot(const SceneSnapshot& snapshot, const TakeDumpPiece& take);
 

@@ -25,7 +25,8 @@ absl::StatusOr<size_t> read_page_size(uint32_t asked) {
   return asked == 0 ? limits::kMaxPageSize : asked;
 }
 
-// Checks a page token, which is the last name of the previous page.
+// Checks a page token. A token is the last name of the previous page; `name_status` is the result of checking that
+// name.
 absl::Status check_page_token(const absl::Status& name_status) {
   if (name_status.ok()) return name_status;
   return refuse_argument(Reason::kMalformed, "page_token", {},

@@ -32,18 +32,20 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 using std::chrono::system_clock;
 
-// Threads for gRPC itself and for calls that are being refused because the limit is reached.
+// Threads for gRPC itself, and for calls that are refused because the limit on calls is reached.
 constexpr int kSpareThreads = 64;
-// gRPC's buffers may use this fraction (1/8) of the memory limit, and at least enough for a few of the largest
-// messages.
+// gRPC's buffers may use 1 / kNetworkShare of the memory limit, but at least kMinNetworkBytes, which is enough for a
+// few of the largest messages.
 constexpr uint64_t kNetworkShare = 8;
 constexpr size_t kMinNetworkBytes = size_t{256} << 20;
-// Pings that detect callers whose machine has gone; otherwise their streams would stay open for ever.
+// Interval in milliseconds between keepalive pings to clients, and maximum delay of the answer. The pings detect
+// clients whose machine is unreachable, whose streams would otherwise stay open for ever.
 constexpr int kPingEveryMs = 30'000;
 constexpr int kPingAnswerMs = 10'000;
-// Callers may ping this often, to detect that this server has gone.
+// Minimum interval in milliseconds between keepalive pings of a client, with which it detects that this server is
+// unreachable.
 constexpr int kMinPingIntervalMs = 5'000;
-// Time for the last statuses to be sent and for health watchers to end, after all calls have finished.
+// Time that gRPC has, after all calls have finished, to send the last statuses and to end the health watchers.
 constexpr milliseconds kLastWords{500};
 
 absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& config) {
@@ -57,7 +59,7 @@ absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& co
   return addresses;
 }
 
-// Returns null if no HTTP port is wanted, or if the default address is in use.
+// Starts the HTTP pages. Returns null if no HTTP port is wanted, or if the default address is in use.
 absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, Scrape& scrape) {
   if (config.http_listen.empty()) return nullptr;
   ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(config.http_listen));
@@ -70,7 +72,7 @@ absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& confi
   return nullptr;
 }
 
-// Registers server reflection, once a process. Call it before the first ServerBuilder is made.
+// Registers server reflection, once for the process. Call it before the first ServerBuilder is constructed.
 void enable_extras() {
   static const bool kDone = [] {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -83,7 +85,7 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   grpc::ResourceQuota quota("locusd");
   const int calls = static_cast<int>(config.max_calls);
   quota.SetMaxThreads(2 * calls + kSpareThreads);
-  // Bounds the memory of messages in transit. gRPC closes connections of callers that never read when it is used up.
+  // Bounds the memory of messages in transit. When it is used up, gRPC closes connections of callers that never read.
   quota.Resize(std::max(kMinNetworkBytes, static_cast<size_t>(config.memory_limit / kNetworkShare)));
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
@@ -94,7 +96,7 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
-  // Two daemons on one port would share its calls at random; make the second one fail instead.
+  // By default, two daemons could listen on one port and would share its calls at random. Make the second daemon fail.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
 }
 
@@ -114,7 +116,7 @@ struct Server::Parts {
     return {&health_service, &server_service, &scene_service, &update_service, &query_service};
   }
 
-  std::unique_ptr<IoThreads> io;  // declared first: work that ends with `host` may still post to it
+  std::unique_ptr<IoThreads> io;  // declared first, so destroyed last: work that ends with `host` may post to it
   Host host;
   Scrape scrape;
   HealthService health_service;

@@ -24,8 +24,8 @@ struct NamedLimit {
   double used = 0;
 };
 
-// Adds two limits of a queue: the number of batches that wait or run, and their estimated work in milliseconds, for all
-// threads together.
+// Adds the two limits of a queue to `all`: the number of jobs that wait or run, and the sum of their estimated work in
+// milliseconds of all threads together.
 void add_queue(const char* jobs_name, const char* work_name, const QueueLimit& limit, uint32_t threads, uint64_t jobs,
                uint64_t nanoseconds, std::vector<NamedLimit>& all) {
   constexpr double kNanosecondsAMs = 1e6;

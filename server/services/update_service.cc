@@ -29,7 +29,8 @@ struct ApplyUpdatesMethod {
   UpdateService* service;
 };
 
-// Writes answers in the order of the messages, which is the order in which they are applied.
+// Method of StreamUpdates for HotCall. It writes answers in the order of the messages, which is also the order in which
+// the batches are applied.
 struct StreamUpdatesMethod {
   using Request = v1::StreamUpdatesRequest;
   using Response = v1::StreamUpdatesResponse;

@@ -41,7 +41,8 @@ absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBat
   return posted.status();
 }
 
-// The update queue may call this before its post() returns; applied() runs after that, as a later event of the loop.
+// Posts applied() with the outcome. The update queue may call this before its post() has returned; applied() runs after
+// that, as a later event of the loop.
 void UpdateWork::done(absl::StatusOr<UpdateAck> ack) {
   outcome_ = std::move(ack);
   slot_.io().post(applied_);

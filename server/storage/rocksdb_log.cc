@@ -16,9 +16,9 @@ namespace locus::server {
 namespace {
 
 constexpr auto kPollInterval = std::chrono::milliseconds(100);
-constexpr uint64_t kBatchOverhead = 128;                    // RocksDB's bytes for each record of a batch
-constexpr uint64_t kBytesBetweenPolls = uint64_t{8} << 20;  // writes after which the free space is read again
-constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;      // disk space for a recovery, beside the memory tables
+constexpr uint64_t kBatchOverhead = 128;                    // bytes that RocksDB adds to each record of a batch
+constexpr uint64_t kBytesBetweenPolls = uint64_t{8} << 20;  // bytes written between two polls of free space
+constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;      // disk space that a recovery needs beside the memory tables
 
 absl::Status too_large(uint64_t bytes) {
   return refuse_limit("entries", "record_bytes", static_cast<double>(UpdateLog::kMaxRecordBytes),
@@ -46,7 +46,7 @@ RocksdbLog::RocksdbLog(const StorageOptions& options, OpenedDirectory opened)
       durable_marker_(std::move(opened.durable_marker)) {}
 
 RocksdbLog::~RocksdbLog() {
-  if (!background_thread_.joinable()) return;  // opening failed
+  if (!background_thread_.joinable()) return;  // opening failed: there is nothing to close
   {
     MutexLock lock(background_mutex_);
     ended_ = true;
@@ -82,7 +82,7 @@ void RocksdbLog::list_stored() {
     log_state->copied = stored.copied = found.copied;
     log_state->written = {found.last, found.running_checksum};
     log_state->synced = log_state->written;  // open_directory() synced the log before reading it
-    // If records are missing, keep the marker's sequence number as the expected one.
+    // If records are missing, keep the sequence number that the marker expects, so that the next marker expects it too.
     if (found.last < found.expected_sequence)
       log_state->synced.sequence = log_state->written.sequence = found.expected_sequence;
     scenes_.add(std::move(log_state));
@@ -122,7 +122,7 @@ absl::Status RocksdbLog::finish_opening() {
         next_scene_ = std::max(next_scene_, ByteReader(absl::string_view(key).substr(1)).big_u64() + 1);
       LOCUS_CHECK(batch.Delete(database_->meta(), key).ok());
     }
-    // Older programs must not open the directory from here on: they cannot read the records that follow.
+    // From here on older programs must not open the directory, because they cannot read the records that follow.
     if (damage_report_.format < kFormat)
       LOCUS_CHECK(
           batch
@@ -243,13 +243,13 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   MutexLock lock(catalogue_mutex_);
   DurableMarker durable_marker;
   {
-    // The marker is filled before the copy is made, so it never names more than the copy holds. The sync before it
-    // keeps the difference small.
+    // Fill the marker before making the copy, so that it never names more than the copy holds. Sync before filling it,
+    // so that it does not name much less.
     const auto written = scenes_.written();
     RETURN_IF_ERROR(database_->sync());
     scenes_.mark_synced(written);
     scenes_.fill_marker(0, durable_marker);
-    // The scenes continue in this directory, so new records in the copy belong to another history.
+    // The original scenes continue in this directory, so new records in the copy belong to another history.
     for (SceneMarker& scene_marker : durable_marker.scene_markers) scene_marker.copied = true;
   }
   {
@@ -342,10 +342,10 @@ void RocksdbLog::run_background() {
 void RocksdbLog::poll_disk() {
   poll_free_space();
   if (!database_->needs_recovery()) return;
-  // Recovery flushes all memory tables, which needs this much disk space.
+  // Recovery flushes all memory tables, so it needs disk space for them.
   if (free_bytes_ < database_->buffered_bytes() + kRecoveryBytes) return;
   const auto written = scenes_.written();
-  if (!database_->recover().ok()) return;  // every write fails with this error
+  if (!database_->recover().ok()) return;  // every write still fails with this error
   scenes_.mark_synced(written);
   write_durable_marker(false);
 }

@@ -83,20 +83,20 @@ class RocksdbLog final : public UpdateLog {
   absl::StatusOr<ChunkList> put_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending,
                                        const std::string& prefix, ChunkSource source);
   void drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending, const std::string& prefix);
-  // Adds the change to `batch` and writes the batch, synced.
+  // Adds the change of the catalogue to `batch` and writes the batch, synced.
   absl::Status commit(const CatalogueChange& change, rocksdb::WriteBatch& batch) LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<SceneRow> row_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   uint64_t row_checksum_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<uint64_t> running_checksum_at(const SceneRow& row, uint64_t sequence) const;
-  // Replaces the snapshot `replaced_id` and the records up to `sequence` by `snapshot`. ABORTED if another snapshot was
-  // written since.
+  // Commits `snapshot` and deletes the snapshot `replaced_id` and the records up to `sequence`, which it replaces.
+  // ABORTED if another snapshot was committed meanwhile.
   absl::Status put_snapshot(const SceneLogStatePtr& log_state, uint64_t replaced_id, uint64_t sequence,
                             const ContentRow& snapshot) LOCUS_EXCLUDES(catalogue_mutex_);
-  // Returns whether the chunks of a pending key belong to a committed snapshot or mesh.
+  // Returns whether the chunks that the row `pending` marks as unfinished belong to a committed snapshot or mesh.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
-  // Returns the row of a mesh's name, or nothing.
+  // Returns the row of the mesh's name; nothing if there is none.
   std::optional<MeshRow> mesh_row(absl::string_view name) const LOCUS_REQUIRES(catalogue_mutex_);
-  // Returns whether `number` is that of the parts of any name of that content.
+  // Returns whether a mesh name whose content has the hash `sha256` has parts with the content id `number`.
   bool parts_in_use(absl::string_view sha256, uint64_t number) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::Status read_mesh_chunks(const Sha256& sha256, const ContentRow& row, ChunkSink sink) const;
   std::set<Sha256> content_hashes() const LOCUS_REQUIRES(catalogue_mutex_);
@@ -126,7 +126,7 @@ class RocksdbLog final : public UpdateLog {
   mutable Mutex catalogue_mutex_;  // held while the catalogue is changed; locked before marker_mutex_
   Catalogue catalogue_ LOCUS_GUARDED_BY(catalogue_mutex_);
   SceneKey next_scene_ LOCUS_GUARDED_BY(catalogue_mutex_) = 1;
-  Mutex adding_mesh_;  // serializes meshes, so that content is written once; locked before catalogue_mutex_
+  Mutex adding_mesh_;  // serializes changes of meshes, so that content is written once; locked before catalogue_mutex_
 
   Mutex marker_mutex_;
   std::unique_ptr<DurableMarkerFile> durable_marker_file_ LOCUS_GUARDED_BY(marker_mutex_);

@@ -15,9 +15,11 @@
 namespace locus::server {
 namespace {
 
-// Maximum bytes of chunks in one write: small enough that a concurrent append waits little for the disk.
+// Maximum size in bytes of the chunks in one write: small enough that a concurrent append waits only briefly for the
+// disk.
 constexpr size_t kChunkBatchBytes = size_t{2} << 20;
-// Bytes in memory tables after a snapshot from which a flush is worthwhile: it frees the log files.
+// Minimum size in bytes of the memory tables for which a flush after a snapshot is worthwhile. The flush lets log files
+// be deleted.
 constexpr uint64_t kBufferedWorthFlushing = uint64_t{8} << 20;
 
 absl::Status already_stored(absl::string_view field, absl::string_view what) {
@@ -33,7 +35,7 @@ absl::Status not_stored(absl::string_view what) {
   return refuse(absl::StatusCode::kNotFound, what, refusal);
 }
 
-// Returns a random id for the chunks of a snapshot or mesh. Never reused.
+// Returns a random id for the chunks of a snapshot or mesh. Ids are never reused.
 uint64_t new_content_id() {
   std::random_device random;
   return uint64_t{random()} << 32 | random();
@@ -101,7 +103,7 @@ void RocksdbLog::drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::str
   rocksdb::WriteBatch batch;
   LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
   LOCUS_CHECK(batch.DeleteRange(family, prefix, end_of(prefix)).ok());
-  // If this fails, the next opening deletes them.
+  // If this write fails, the next opening deletes the chunks.
   database_->write(batch, false).IgnoreError();
 }
 

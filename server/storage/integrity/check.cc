@@ -11,8 +11,8 @@
 namespace locus::server {
 namespace {
 
-// Locks the directory, so that no process writes during the check. A backup that was never opened has no lock file, and
-// on a read-only disk the lock cannot be taken; both are checked without it.
+// Locks the directory, so that no process writes during the check. Two kinds of directories are checked without a lock:
+// a backup that was never opened has no lock file, and on a read-only disk the lock cannot be acquired.
 absl::Status acquire_lock(const StorageOptions& options, std::unique_ptr<DirectoryLock>& lock) {
   if (!options.env->FileExists(absl::StrCat(options.path, "/", DirectoryLock::kName)).ok()) return absl::OkStatus();
   auto taken = DirectoryLock::acquire(*options.env, options.path);

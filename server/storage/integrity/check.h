@@ -19,12 +19,12 @@ struct SceneReport {
   std::string name;
   uint64_t epoch = 0;
   uint64_t snapshot_sequence = 0;
-  uint64_t last_sequence = 0;      // last record before the first gap
+  uint64_t last_sequence = 0;      // last record before the first missing one
   uint64_t expected_sequence = 0;  // last record that must exist
   uint64_t snapshot_chunks = 0;
   uint64_t snapshot_bytes = 0;
   uint64_t log_bytes = 0;
-  std::string damage;  // empty if it is intact
+  std::string damage;  // description of the damage; empty if the scene is intact
 };
 
 struct MeshReport {
@@ -36,10 +36,10 @@ struct MeshReport {
 
 struct DirectoryReport {
   std::string damage;            // reason why nothing is readable
-  std::string catalogue_damage;  // reason why scenes or meshes may be missing below, or may have been deleted before
+  std::string catalogue_damage;  // reason why scenes or meshes may be missing below, or deleted ones present
   bool closed_in_order = false;
-  std::vector<SceneReport> scenes;  // by name
-  std::vector<MeshReport> meshes;   // by name
+  std::vector<SceneReport> scenes;  // sorted by name
+  std::vector<MeshReport> meshes;   // sorted by name
 
   bool intact() const;
 };
@@ -48,7 +48,7 @@ struct DirectoryReport {
 // FAILED_PRECONDITION if a process has it open or another version wrote it, UNAVAILABLE if the disk fails.
 absl::StatusOr<DirectoryReport> check(const StorageOptions& options);
 
-// Converts the result of verify() for people.
+// Converts the result of verify() to the report that is shown to people.
 DirectoryReport report_of(const DamageReport& damage_report);
 
 }  // namespace locus::server

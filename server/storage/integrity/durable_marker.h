@@ -6,7 +6,7 @@
 // in place; each carries an increasing write number and a checksum, so that a torn write leaves the other slot valid.
 // When a slot is too small, the whole file is replaced.
 //
-// Threads: one at a time.
+// Threads: one thread at a time.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
 
@@ -23,27 +23,27 @@
 
 namespace locus::server {
 
-// The state that a scene must have at least.
+// The minimum state of a scene that the database must contain.
 struct SceneMarker {
   SceneKey scene = 0;
   std::string name;
   uint64_t sequence = 0;          // last synced record
-  uint64_t running_checksum = 0;  // checksum of that record
+  uint64_t running_checksum = 0;  // running checksum of record `sequence`
   uint64_t row_checksum = 0;      // checksum of the scene's row in the catalogue
-  bool copied = false;            // copied by back_up() and not restarted since
-  std::string damage;             // damage found before; kept until the scene is deleted or repaired
+  bool copied = false;            // the directory is a copy made by back_up(), and the scene has no new epoch since
+  std::string damage;             // damage found by an earlier opening; kept until the scene is deleted or repaired
 };
 
 struct DurableMarker {
-  uint64_t write_number = 0;      // of this write
-  bool closed = false;            // closed in order: no write followed this marker
+  uint64_t write_number = 0;      // incremented by each write: the slot with the higher number is newer
+  bool closed = false;            // the log was closed in order: no write followed this marker
   uint64_t catalogue = 0;         // generation of the catalogue; 0 until the database is created
   SceneKey next_scene = 1;        // next free scene key
   uint64_t mesh_sum = 0;          // sum of the checksums of the catalogue's mesh rows
   uint64_t flushed_sequence = 0;  // RocksDB sequence number up to which every write is covered by this marker
-  std::string manifest;           // name of RocksDB's list of its files
-  uint64_t manifest_bytes = 0;    // minimum length of that file
-  std::string catalogue_damage;   // damage of the catalogue found before
+  std::string manifest;           // name of RocksDB's list of its files, the MANIFEST
+  uint64_t manifest_bytes = 0;    // minimum length of the MANIFEST
+  std::string catalogue_damage;   // damage of the catalogue found by an earlier opening
   std::vector<SceneMarker> scene_markers;
 };
 
@@ -54,14 +54,14 @@ class DurableMarkerFile {
  public:
   static constexpr absl::string_view kName = "HIGH_WATER";
 
-  // Reads the newer valid slot of the file in `folder`. NOT_FOUND if there is no file, DATA_LOSS if neither slot is
-  // valid, UNAVAILABLE for an error of the disk.
+  // Reads both slots of the file in `folder` and returns the newer valid one. NOT_FOUND if there is no file, DATA_LOSS
+  // if neither slot is valid, UNAVAILABLE for an error of the disk.
   static absl::StatusOr<DurableMarker> read(rocksdb::Env& env, const std::string& folder);
 
   DurableMarkerFile(rocksdb::Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
 
-  // Increments the write number, writes one slot and syncs it. The first call, a call after an error, and a call whose
-  // slot would be too large replace the file.
+  // Increments the write number, writes one slot and syncs it. Replaces the file instead on the first call, after an
+  // error, and if the marker does not fit into a slot.
   absl::Status write(DurableMarker& durable_marker);
   // Writes both slots of a new file and renames it into place, synced: no damage to a single slot can undo this write.
   absl::Status replace(DurableMarker& durable_marker);

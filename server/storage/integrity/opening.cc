@@ -72,7 +72,8 @@ absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<
 }
 
 absl::Status create_database(const StorageOptions& options, OpenedDirectory& opened) {
-  // First a marker of generation 0: it tells the next opening that the creation of the database may be incomplete.
+  // Write a marker of generation 0 first. If creating the database is interrupted, the next opening then creates it
+  // again.
   RETURN_IF_ERROR(opened.durable_marker_file->replace(opened.durable_marker));
   const DatabaseOptions wanted = database_options_of(options);
   rocksdb::Status status = Database::open(wanted, OpenMode::kCreate, opened.database);
@@ -90,7 +91,7 @@ absl::Status create_database(const StorageOptions& options, OpenedDirectory& ope
   return opened.durable_marker_file->replace(opened.durable_marker);
 }
 
-// Copies the damage found into the durable marker, so that the next opening reports it too.
+// Copies `damage_report` into the durable marker, so that the next opening reports the damage too.
 void record_damage(const DamageReport& damage_report, DurableMarker& durable_marker) {
   std::vector<SceneMarker> scene_markers;
   for (const SceneHealth& scene : damage_report.scenes) {
@@ -155,7 +156,7 @@ absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::acquire(rocksdb::E
   const rocksdb::Status status = env.LockFile(absl::StrCat(path, "/", kName), &lock);
   if (status.ok()) return std::unique_ptr<DirectoryLock>(new DirectoryLock(env, lock));
   const std::string message = status.ToString();
-  // RocksDB's messages for a lock held by another process, and by this one.
+  // These are RocksDB's messages for a lock held by another process and for one held by this process.
   if (absl::StrContains(message, "Resource temporarily unavailable") || absl::StrContains(message, "lock hold")) {
     Refusal refusal;
     refusal.reason = Reason::kInUse;

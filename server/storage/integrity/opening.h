@@ -21,7 +21,7 @@ class DirectoryLock {
  public:
   static constexpr absl::string_view kName = "IN_USE";
 
-  // Acquires the lock. FAILED_PRECONDITION if another process, or this one, holds it.
+  // Acquires the lock. FAILED_PRECONDITION if another process, or this one, already holds it.
   static absl::StatusOr<std::unique_ptr<DirectoryLock>> acquire(rocksdb::Env& env, const std::string& path);
   ~DirectoryLock();
   DirectoryLock(const DirectoryLock&) = delete;
@@ -38,11 +38,12 @@ struct OpenedDirectory {
   std::unique_ptr<DirectoryLock> lock;
   std::unique_ptr<Database> database;
   std::unique_ptr<DurableMarkerFile> durable_marker_file;
-  DurableMarker durable_marker;  // marker as read, plus the damage found by this opening
+  DurableMarker durable_marker;  // marker as read from the disk, plus the damage found by this opening
   DamageReport damage_report;
 };
 
-// Fills in the defaults: the file system, and a reserve and a buffer that fit the size of the disk.
+// Returns `options` with defaults filled in: the file system, and a disk reserve and a log buffer that fit the size of
+// the disk.
 StorageOptions with_defaults(StorageOptions options);
 DatabaseOptions database_options_of(const StorageOptions& options);
 
@@ -50,14 +51,15 @@ DatabaseOptions database_options_of(const StorageOptions& options);
 // RocksdbLog::open().
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options);
 
-// Compares RocksDB's list of its files (MANIFEST) with the durable marker. DATA_LOSS if the database is missing, or if
-// the list is missing or shorter than the marker says.
+// Compares RocksDB's list of its files (the MANIFEST) with the durable marker. DATA_LOSS if the database is missing, or
+// if the MANIFEST is missing or shorter than the marker says.
 absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder,
                              const DurableMarker& durable_marker);
-// Stores the current name and length of that list in the durable marker.
+// Stores the current name and length of the MANIFEST in the durable marker.
 void describe_file_list(const Database& database, DurableMarker& durable_marker);
 
-// Folder in the data directory that exists only during a repair; an interrupted repair leaves it.
+// Folder in the data directory that exists only during a repair. An interrupted repair leaves it, so that it blocks
+// opening until the repair is run again.
 inline constexpr absl::string_view kRepairedFolder = "repaired";
 
 }  // namespace locus::server

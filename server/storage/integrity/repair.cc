@@ -30,7 +30,7 @@ absl::Status move_if_exists(const fs::path& from, const fs::path& to) {
                 : absl::OkStatus();
 }
 
-// Writes rows, records and chunks into the new database, in batches of kBatchBytes.
+// Writer of rows, records and chunks into the new database, in batches of kBatchBytes.
 class Copier {
  public:
   explicit Copier(Database& target) : target_(target) {}
@@ -62,7 +62,8 @@ absl::Status copy_chunks(const Database& source, rocksdb::ColumnFamilyHandle* fr
   });
 }
 
-// Copies the records up to the first damaged or missing one; stores the position of the last copied record in `last`.
+// Copies the scene's records up to the first damaged or missing one. Stores the position of the last copied record in
+// `last`.
 absl::Status copy_records(const Database& source, const SceneRow& row, Position& last, Copier& copier) {
   absl::Status failed;
   last = {row.snapshot_sequence, row.running_checksum};
@@ -80,7 +81,7 @@ absl::Status copy_records(const Database& source, const SceneRow& row, Position&
   return absl::IsDataLoss(read) ? absl::OkStatus() : read;
 }
 
-// Catalogue rows and durable marker of the new directory.
+// Catalogue rows and durable marker of the new data directory.
 struct Result {
   Catalogue::Rows rows;
   DurableMarker durable_marker;
@@ -189,8 +190,8 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
 }
 
 // Moves the old database and marker into before-repair-N and the repaired ones into their place. Called once
-// repaired/READY exists, which is the commit point of a repair: from then on a restart only repeats these moves, each
-// of which is skipped if it was done before.
+// repaired/READY exists, which is the commit point of a repair: from then on a restart only repeats these moves, and
+// skips those that were done before.
 absl::Status install_repaired(const StorageOptions& options, std::string& kept_at) {
   rocksdb::Env& env = *options.env;
   const fs::path here = options.path;
@@ -201,7 +202,7 @@ absl::Status install_repaired(const StorageOptions& options, std::string& kept_a
   if (!status.ok()) return disk_error("finishing the repair", status);
   for (const absl::string_view name : {kDatabaseFolder, DurableMarkerFile::kName}) {
     const std::string part(name);
-    if (!fs::exists(repaired / part)) continue;  // moved before a restart
+    if (!fs::exists(repaired / part)) continue;  // moved by an earlier, interrupted call
     absl::Status done = move_if_exists(here / part, fs::path(kept_at) / part);
     if (done.ok()) done = move_if_exists(repaired / part, here / part);
     if (!done.ok()) return done;
@@ -221,7 +222,7 @@ std::string next_backup_folder(const std::string& path) {
   }
 }
 
-// Salvages a database that opens in no mode: copies it and runs rocksdb::RepairDB() on the copy.
+// Salvages a database that cannot be opened in any mode: copies it and runs rocksdb::RepairDB() on the copy.
 absl::Status open_salvage(const StorageOptions& options, const std::string& folder,
                           std::unique_ptr<Database>& database) {
   DatabaseOptions wanted = database_options_of(options);

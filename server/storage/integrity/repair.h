@@ -13,13 +13,13 @@
 
 namespace locus::server {
 
-// Outcome for a damaged scene.
+// Outcome of the repair for a damaged scene.
 struct SceneRepair {
   SceneKey key = 0;
   std::string name;
   std::string damage;
-  bool dropped = false;    // no part of it could be kept
-  bool deleted = false;    // it had been deleted, reappeared, and is deleted again: nothing is lost
+  bool dropped = false;    // no part of the scene could be kept
+  bool deleted = false;    // the scene had been deleted, reappeared, and is deleted again: nothing is lost
   uint64_t kept_to = 0;    // last record that was kept
   uint64_t lost_from = 0;  // first lost record; 0 = no lost record is known
   uint64_t lost_to = 0;
@@ -33,11 +33,11 @@ struct MeshRepair {
 };
 
 struct RepairReport {
-  DirectoryReport found;            // state before the repair
+  DirectoryReport found;            // state found before the repair
   bool changed = false;             // false: everything was intact, no file was changed
   std::vector<SceneRepair> scenes;  // damaged scenes only
   std::vector<MeshRepair> meshes;   // damaged meshes only
-  std::string kept_at;              // folder with the old database
+  std::string kept_at;              // folder to which the old database was moved
 };
 
 // Repairs the directory, which no process may have open. Needs disk space for a copy of the intact part. After an error

@@ -1,4 +1,4 @@
-// Text of the reports of check() and repair(), one line for each scene and mesh, for people. Free functions; any
+// Texts of the reports of check() and repair() for people, with one line for each scene and mesh. Free functions; any
 // thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_REPORT_TEXT_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_REPORT_TEXT_H_

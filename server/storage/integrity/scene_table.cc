@@ -116,7 +116,7 @@ void SceneTable::set_row(SceneLogState& scene, const SceneRow& row, uint64_t row
   if (scene.epoch != row.epoch) scene.copied = false;
   scene.epoch = row.epoch;
   scene.row_checksum = row_checksum;
-  // The snapshot contains these records and is synced.
+  // The snapshot is synced and contains all records up to snapshot_sequence.
   if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.running_checksum};
   check_invariants(scene);
   totals_ = totals;
@@ -140,7 +140,7 @@ void SceneTable::fill_marker(uint64_t database_sequence, DurableMarker& durable_
   durable_marker.scene_markers.clear();
   bool all_synced = true;
   for (const auto& [key, scene] : scenes_) {
-    // The writes of an append in progress come after append_began_at and are not in the marker yet.
+    // The marker must not cover the writes of an append in progress, which come after append_began_at.
     if (scene->append_began_at) database_sequence = std::min(database_sequence, *scene->append_began_at);
     all_synced = all_synced && scene->synced.sequence == scene->written.sequence;
     SceneMarker& scene_marker = durable_marker.scene_markers.emplace_back();

@@ -18,9 +18,9 @@ constexpr absl::string_view kNoMarker = "HIGH_WATER is missing or unreadable, so
 
 // Result of comparing the catalogue in the database with the durable marker.
 struct CatalogueState {
-  bool intact = false;         // not older than the marker, and its rows match its sums
+  bool intact = false;         // not older than the marker, and its rows match its own sums
   bool newer = false;          // changed after the marker was written
-  bool meshes_intact = false;  // its mesh rows match their expected sum
+  bool meshes_intact = false;  // its mesh rows match the sum that the newer of catalogue and marker has
 };
 
 std::string count_of(uint64_t count, absl::string_view thing) {
@@ -49,7 +49,7 @@ absl::Status read_meta(const Database& database, DamageReport& found) {
       found.rows.emplace(key, view_of(at->value()));
     }
   }
-  // Rows after an unreadable block count as lost; the checks of the sums and of the marker report them.
+  // Rows after an unreadable block count as lost. They are reported because sums and durable marker no longer match.
   if (at->status().ok() || is_damage(at->status())) return absl::OkStatus();
   return read_error("reading the catalogue", at->status());
 }
@@ -66,7 +66,7 @@ CatalogueState compare(const DamageReport& found, const DurableMarker& expected)
   return catalogue;
 }
 
-// Returns the damage of the scene's row, empty if it is intact.
+// Returns a description of the damage of the scene's row; empty if the row is intact.
 std::string row_damage(const SceneHealth& scene, const SceneMarker* scene_marker, const CatalogueState& catalogue) {
   if (catalogue.intact && catalogue.newer) return "";
   if (scene_marker == nullptr)
@@ -77,7 +77,8 @@ std::string row_damage(const SceneHealth& scene, const SceneMarker* scene_marker
   return "";
 }
 
-// Returns the message of `status` if it is damage; stores an error of the disk in `disk`.
+// Returns the message of `status`, which is empty for OK. If `status` is an error of the disk rather than damage, also
+// stores it in `disk`.
 std::string damage_of(const absl::Status& status, absl::Status& disk) {
   if (!status.ok() && !absl::IsDataLoss(status)) disk.Update(status);
   return std::string(status.message());
@@ -108,7 +109,7 @@ std::string log_damage(SceneHealth& scene, const SceneMarker* scene_marker, cons
   return "";
 }
 
-// Reads every byte of the scene's snapshot and records; returns the damage.
+// Reads every byte of the scene's snapshot and records. Returns a description of the damage, empty if there is none.
 std::string deep_damage(const SceneHealth& scene, const Database& database, absl::Status& disk) {
   const SceneRow& row = *scene.row;
   const auto discard = [](absl::string_view) { return absl::OkStatus(); };
@@ -127,7 +128,7 @@ absl::Status verify_scene(SceneHealth& scene, const SceneMarker* scene_marker, c
   scene.copied = scene_marker != nullptr && scene_marker->copied;
   scene.damage = scene_marker != nullptr ? scene_marker->damage : "";
   std::string damage = expected == nullptr ? std::string(kNoMarker) : row_damage(scene, scene_marker, catalogue);
-  // A damaged scene is scanned too, for the sequence numbers in the report.
+  // Scan the log of a damaged scene too, because the report contains its sequence numbers.
   if (scene.row) {
     std::string log =
         log_damage(scene, scene_marker, expected == nullptr ? DurableMarker() : *expected, database, disk);
@@ -156,7 +157,7 @@ absl::Status find_scenes(const DurableMarker* expected, const CatalogueState& ca
     for (const SceneMarker& scene_marker : expected->scene_markers) {
       scene_markers[scene_marker.scene] = &scene_marker;
       if (scenes.contains(scene_marker.scene)) continue;
-      // The scene was deleted after the marker was written.
+      // Skip a scene that was deleted after the marker was written.
       if (catalogue.intact && catalogue.newer && scene_marker.damage.empty()) continue;
       SceneHealth& scene = scenes[scene_marker.scene];
       scene.key = scene_marker.scene;

@@ -1,11 +1,11 @@
-// The catalogue: the rows of all scenes and meshes. They stand in the column family meta; this class keeps a copy in
-// memory, with the sums of the rows' checksums, which reveal a row that was lost, changed or restored from an earlier
-// time. A change is one write batch and increments the generation.
+// The catalogue: the rows of all scenes and meshes. They are stored in the column family meta. This class keeps a copy
+// in memory, with the sums of the rows' checksums; the sums reveal a row that was lost, changed or restored from an
+// earlier time. A change is one write batch and increments the catalogue's generation.
 //
 // A batch that failed may still be in RocksDB's log and reappear after a restart. Therefore the next change rewrites
 // every row that a failed change touched.
 //
-// Threads: one at a time.
+// Threads: one thread at a time.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_CATALOGUE_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_CATALOGUE_H_
 
@@ -21,7 +21,7 @@
 
 namespace locus::server {
 
-// Rows to put or, without a value, to delete. Values come without their checksum.
+// Change of the catalogue: rows to put or, without a value, to delete. Values have no checksum yet.
 struct CatalogueChange {
   struct Row {
     std::string key;
@@ -33,11 +33,11 @@ struct CatalogueChange {
 
 class Catalogue {
  public:
-  // Rows by key; values end with their checksum.
+  // Rows by key. Each value ends with its checksum.
   using Rows = std::map<std::string, std::string, std::less<>>;
 
   Catalogue() = default;
-  // Takes the rows that were read from the disk.
+  // Constructs the catalogue from the rows that were read from the disk.
   Catalogue(Rows rows, uint64_t generation, SceneKey next_scene);
 
   const CatalogueRow& totals() const { return totals_; }
@@ -45,18 +45,18 @@ class Catalogue {
   // Returns the value of a row without its checksum, nothing if there is no such row.
   std::optional<absl::string_view> find(absl::string_view key) const;
 
-  // Adds the change, the rows of failed changes and the new totals to `batch`. The caller writes the batch and then
-  // calls apply() if that succeeded, else fail().
+  // Adds to `batch` the rows of `change`, the current state of every row that a failed change touched, and the new
+  // totals. The caller writes the batch and then calls apply(change) if that succeeded, otherwise fail(change).
   void add_to(rocksdb::WriteBatch& batch, rocksdb::ColumnFamilyHandle* meta, const CatalogueChange& change) const;
   void apply(const CatalogueChange& change);
   void fail(const CatalogueChange& change);
 
-  // Adds the checksums of `rows` to the sums in `totals`.
+  // Adds the checksums of `rows` to the two sums in `totals`.
   static void add_sums(const Rows& rows, CatalogueRow& totals);
 
  private:
   static uint64_t& sum_of(absl::string_view key, CatalogueRow& totals);
-  // Returns the totals after the change.
+  // Returns the totals that the catalogue has after `change`.
   CatalogueRow after(const CatalogueChange& change) const;
 
   Rows rows_;

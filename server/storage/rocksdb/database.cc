@@ -19,8 +19,8 @@ constexpr uint64_t kMetaBytes = uint64_t{4} << 20;    // memory table of meta
 constexpr size_t kBlockBytes = size_t{64} << 10;
 constexpr size_t kCacheBytes = size_t{8} << 20;
 constexpr int kBuffers = 4;
-// Tables in level 0 before RocksDB merges them. RocksDB must never stall writers for having more of them, since waiting
-// does not help here: the limit is out of reach.
+// Number of tables in level 0 from which on RocksDB merges them, and the number at which it would stall writers. The
+// latter is never reached, because stalling does not help here.
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
@@ -28,7 +28,7 @@ constexpr size_t kInfoLogBytes = size_t{1} << 20;
 constexpr uint64_t kLogBuffersOnDisk = 4;
 constexpr auto kBufferPoll = std::chrono::milliseconds(1);
 
-// Logger that drops every message, for the read-only modes.
+// Logger that drops every message. For the read-only modes.
 class NoLogger final : public rocksdb::Logger {
  public:
   using rocksdb::Logger::Logv;
@@ -48,7 +48,7 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
   options.level0_stop_writes_trigger = kUnlimitedTables;
   options.soft_pending_compaction_bytes_limit = 0;
   options.hard_pending_compaction_bytes_limit = 0;
-  // A compaction that meets an unreadable block would stop all writes.
+  // A compaction that meets an unreadable block would stop all writes, so the lenient modes do not compact.
   options.disable_auto_compactions = lenient(mode);
   rocksdb::BlockBasedTableOptions table;
   table.block_size = kBlockBytes;
@@ -60,8 +60,8 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
 
 }  // namespace
 
-// Makes all errors of the disk recoverable, by recover() only. Without it RocksDB would refuse writes for the life of
-// the process after some errors, and retry after the others on its own every five seconds.
+// Listener that makes every error of the disk recoverable, but only by recover(). Without it RocksDB would refuse
+// writes for the life of the process after some errors, and retry by itself every five seconds after the others.
 class Database::ErrorWatch final : public rocksdb::EventListener {
  public:
   std::atomic<bool> seen = false;
@@ -81,13 +81,14 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   found.create_if_missing = mode == OpenMode::kCreate;
   found.create_missing_column_families = mode == OpenMode::kCreate;
   found.paranoid_checks = !lenient(mode);
-  // RocksDB's default, point-in-time recovery, silently drops everything after the first unreadable record.
+  // Replace RocksDB's default, point-in-time recovery, which silently drops everything after the first unreadable
+  // record.
   found.wal_recovery_mode = lenient(mode) ? rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords
                                           : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
-  // The log is kept after reading it, because flushing it into tables would double the time to the first query
-  // (open_directory() has synced it). Only a damaged log is flushed, so that its unreadable rest can be deleted.
+  // Keep the log after reading it, because flushing it into tables would double the time to the first query
+  // (open_directory() has synced it). Flush only a damaged log, so that its unreadable rest can be deleted.
   found.avoid_flush_during_recovery = mode != OpenMode::kLenient;
-  // A second net: RocksDB's own list of files says how far each log was synced.
+  // Additional check: RocksDB's own list of files records how far each log was synced.
   found.track_and_verify_wals_in_manifest = !lenient(mode);
   found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
   found.max_manifest_file_size = kManifestBytes;
@@ -181,7 +182,7 @@ bool Database::needs_recovery() const { return broken_ || errors_->seen; }
 absl::Status Database::recover() {
   if (!broken_) fail_writes(rocksdb::Status::IOError("a table could not be written")).IgnoreError();
   // RocksDB aborts the process on a write to a log file that failed before. Resume() accepts writes again before
-  // flush_to_new_log() replaces that file, so all writers must have left.
+  // flush_to_new_log() replaces that file, so wait until all calls of write_now() have returned.
   while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
   errors_->seen = false;
   rocksdb::Status status = db_->Resume();

@@ -58,20 +58,21 @@ class Database {
   rocksdb::ColumnFamilyHandle* mesh() const { return families_[3]; }
   const WalWatch& wal_watch() const { return wal_watch_; }
 
-  // Writes the batch, all or nothing. After an error every write fails with that error until recover() succeeds.
+  // Writes the batch completely or not at all. After an error every write fails with that error until recover()
+  // succeeds.
   absl::Status write(rocksdb::WriteBatch& batch, bool sync) LOCUS_EXCLUDES(mutex_);
   // Syncs every earlier write.
   absl::Status sync();
 
   bool needs_recovery() const;
-  // Resumes writing after an error, in a new log file, so that no record follows a torn one. Waits for writers to
-  // leave; they fail meanwhile.
+  // Resumes writing after an error, in a new log file, so that no record follows a torn one. Waits until calls of
+  // write() in progress have returned; calls made meanwhile fail.
   absl::Status recover() LOCUS_EXCLUDES(mutex_);
-  // Starts flushing all memory tables, so that log files can be deleted. Returns at once; the next write reports an
-  // error.
+  // Starts flushing all memory tables, so that log files can be deleted. Returns at once; if flushing fails, the next
+  // write reports the error.
   void flush_soon();
-  // Waits until fewer than two full memory tables of the family wait for the disk. RocksDB stalls all writers when the
-  // last one fills up.
+  // Waits until fewer than two full memory tables of the family wait to be flushed. RocksDB would stall all writers if
+  // all memory tables of the family were full.
   void wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const;
   // Returns the bytes in memory tables that are not flushed.
   uint64_t buffered_bytes() const;
@@ -81,9 +82,10 @@ class Database {
 
   Database(OpenMode mode);
   absl::Status write_now(rocksdb::WriteBatch& batch, bool sync) LOCUS_EXCLUDES(mutex_);
-  // Makes every write fail from now on; returns the error they fail with.
+  // Makes every write fail from now on. Returns the error with which they fail.
   absl::Status fail_writes(const rocksdb::Status& status) LOCUS_EXCLUDES(mutex_);
-  // Puts kFamilyMark into every family without the log and flushes all families: no earlier log file is needed then.
+  // Puts kFamilyMark into every family, without the write-ahead log, and flushes all families. After that no earlier
+  // log file is needed.
   rocksdb::Status flush_to_new_log();
 
   const OpenMode mode_;
@@ -93,7 +95,7 @@ class Database {
   std::unique_ptr<rocksdb::DB> db_;
   std::vector<rocksdb::ColumnFamilyHandle*> families_;
   std::atomic<bool> broken_ = false;
-  std::atomic<int> writers_ = 0;  // calls of write_now() in progress
+  std::atomic<int> writers_ = 0;  // number of calls of write_now() in progress
   Mutex lenient_;  // serializes writes in the lenient modes, in which RocksDB would accept writes after a failed one
   mutable Mutex mutex_;
   absl::Status error_ LOCUS_GUARDED_BY(mutex_);  // error of the write that set broken_

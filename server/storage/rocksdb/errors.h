@@ -1,5 +1,4 @@
-// Conversion of RocksDB's statuses into the errors that UpdateLog documents, and syncing of folders. Free functions;
-// any thread.
+// Converts RocksDB's statuses to the errors that UpdateLog documents, and syncs folders. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_ERRORS_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_ERRORS_H_
 
@@ -19,8 +18,8 @@ absl::Status disk_error(absl::string_view doing, const rocksdb::Status& status);
 // Converts an error of reading RocksDB's own files as disk_error() does, but a missing file is DATA_LOSS.
 absl::Status read_error(absl::string_view doing, const rocksdb::Status& status);
 
-// Returns RESOURCE_EXHAUSTED: of the `free_bytes` of the disk, the last `reserve_bytes` are kept for snapshots.
-// `what` names the refused operation in the message.
+// Returns RESOURCE_EXHAUSTED for an operation that would leave less than `reserve_bytes` of the disk's `free_bytes`,
+// which are reserved for snapshots. `what` names the refused operation in the message.
 absl::Status refuse_full_disk(absl::string_view what, uint64_t reserve_bytes, uint64_t free_bytes);
 
 // Returns whether `status` reports damaged or missing files, as opposed to a failing, full or busy disk.

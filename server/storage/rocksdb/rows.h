@@ -42,7 +42,8 @@ using Sha256 = std::array<uint8_t, 32>;
 // Returns XXH3 (64 bits) of `bytes`.
 uint64_t checksum(absl::string_view bytes, uint64_t seed = 0);
 
-// Summary of a list of chunks: their count, their bytes without checksums, and a hash over their checksums in order.
+// Summary of a list of chunks: their number, their size in bytes without checksums, and a hash over their checksums in
+// order.
 struct ChunkList {
   uint64_t chunks = 0;
   uint64_t bytes = 0;
@@ -52,16 +53,16 @@ struct ChunkList {
   bool operator==(const ChunkList&) const = default;
 };
 
-// Chunks of a mesh's content, or of the parts of one name.
+// Id and chunks of a mesh's content, or of the parts of one mesh name.
 struct ContentRow {
   uint64_t content_id = 0;
   ChunkList chunks;
 };
 
-// A mesh's name.
+// Row of a mesh's name: the hash of the mesh's content, and the parts.
 struct MeshRow {
   Sha256 sha256 = {};
-  std::optional<ContentRow> parts;  // none in format 1
+  std::optional<ContentRow> parts;  // nothing in format 1
 };
 
 struct SceneRow {
@@ -90,19 +91,19 @@ std::string content_key(const Sha256& sha256);
 std::string pending_snapshot_key(SceneKey scene, uint64_t content_id);
 std::string pending_mesh_key(const Sha256& sha256, uint64_t content_id);
 std::string log_key(SceneKey scene, uint64_t sequence);
-// Returns the first key after all keys that begin with `prefix`: the end of their range.
+// Returns the first key after all keys that begin with `prefix`, which is the exclusive end of their range.
 std::string end_of(std::string prefix);
 std::string scene_prefix(SceneKey scene);
 std::string snapshot_prefix(SceneKey scene, uint64_t content_id);
 std::string mesh_prefix(const Sha256& sha256, uint64_t content_id);
-// Returns the key of a chunk of the snapshot or mesh whose keys begin with `prefix`.
+// Returns the key of a chunk. `prefix` is that of all chunks of the snapshot or mesh.
 std::string chunk_key(absl::string_view prefix, uint32_t index);
 
 // Returns the value of a row of meta or of a chunk: `bytes`, then the checksum over key and bytes.
 std::string with_checksum(absl::string_view key, absl::string_view bytes);
-// Returns the value without its checksum; nothing if the checksum is wrong.
+// Returns `value` without its checksum; nothing if the checksum is wrong.
 std::optional<absl::string_view> verified(absl::string_view key, absl::string_view value);
-// Returns the last eight bytes of a value, its checksum; 0 if it is shorter.
+// Returns the checksum at the end of `value`, which is its last eight bytes; 0 if the value is shorter.
 uint64_t stored_checksum(absl::string_view value);
 
 std::string encode(const SceneRow& row);
@@ -114,7 +115,8 @@ std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes);
 std::optional<ContentRow> decode_content(absl::string_view bytes);
 std::optional<MeshRow> decode_mesh(absl::string_view bytes);
 
-// The value of a record is head, bytes, checksum. They are built separately, so that the bytes are copied once.
+// The value of a record is its head, its bytes and a checksum. They are built separately, so that the bytes are copied
+// once.
 inline constexpr size_t kRecordHeadBytes = 1 + 8 + 8 + 8 + 4;
 inline constexpr size_t kRecordOverhead = kRecordHeadBytes + 8;
 std::string record_head(const LogEntry& entry);

@@ -24,8 +24,8 @@ struct StorageOptions {
   // still be written. Default: 64 MiB or 5 % of the disk, whichever is less.
   std::optional<uint64_t> reserve_bytes;
 
-  // Size of RocksDB's memory table for log records. With a larger one, more records are dropped by a snapshot before
-  // they are written a second time, into a table; but a killed daemon reads more of the log when it starts again.
+  // Size in bytes of RocksDB's memory table for log records. If it is larger, snapshots drop more records before these
+  // are written a second time, into a table; but after a kill the daemon must read more of the log when it starts.
   uint64_t log_buffer_bytes = uint64_t{64} << 20;
 
   // Maximum delay between the append of an AckLevel::kMemory record and its sync.
@@ -35,7 +35,7 @@ struct StorageOptions {
   // the lost records were synced within this time before a crash.
   std::chrono::milliseconds durable_marker_delay{10};
 
-  // False acknowledges records without syncing them. For tests that prove that they detect a loss.
+  // If false, records are acknowledged without being synced. For tests that check that they detect lost records.
   bool sync = true;
 };
 

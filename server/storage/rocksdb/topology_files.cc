@@ -18,7 +18,7 @@ std::string name_of(const Sha256& sha256) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
 }
 
-// Returns whether `name` is that of a topology file or of a leftover temporary file.
+// Returns whether `name` is the name of a topology file or of a leftover temporary file.
 bool is_outline_name(absl::string_view name) {
   name = absl::StripSuffix(name, kUnfinished);
   return name.size() == 2 * Sha256().size() && name.find_first_not_of("0123456789abcdef") == name.npos;

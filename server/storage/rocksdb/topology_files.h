@@ -1,9 +1,9 @@
 // The folder outlines/ of a data directory: a cache of the tree topologies of meshes, one file each, named by the
-// mesh's SHA-256. Any file may be deleted at any time. No function fails: a file that cannot be written is not kept,
-// and a file with a wrong checksum reads as missing. Therefore files are not synced. Files with other names are never
-// touched.
+// mesh's SHA-256. Any file may be deleted at any time. No function returns an error: a file that cannot be written is
+// omitted, and a file with a wrong checksum reads as missing. Therefore files need no sync. Files with other names are
+// never changed.
 //
-// Threads: any; one at a time for each SHA-256.
+// Threads: any thread; calls for the same SHA-256 must not overlap.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
 
@@ -21,7 +21,7 @@ class TopologyFiles {
  public:
   static constexpr absl::string_view kFolder = "outlines";
 
-  // Takes the path of the data directory.
+  // Uses the folder outlines/ in the data directory `path`.
   TopologyFiles(rocksdb::Env& env, absl::string_view path);
 
   void keep(const Sha256& sha256, absl::string_view bytes);

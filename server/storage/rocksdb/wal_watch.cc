@@ -6,7 +6,7 @@
 namespace locus::server {
 namespace {
 
-// Collects the scenes that have records in a batch; ignores all other entries.
+// Collects the scenes that have log records in a batch; ignores all other writes.
 class SceneCollector final : public rocksdb::WriteBatch::Handler {
  public:
   SceneCollector(uint32_t log_family, absl::flat_hash_set<SceneKey>& scenes)

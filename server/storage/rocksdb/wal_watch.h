@@ -1,7 +1,7 @@
 // Detects gaps in RocksDB's write-ahead log (WAL) while the database opens. Each batch in it carries the RocksDB
 // sequence number of its first write, so a lost batch leaves a gap in these numbers even if RocksDB skipped it
-// silently. Also collects the scenes that have records after the last gap: for them, dense record numbers prove that no
-// record is missing; for the other scenes that is unknown.
+// silently. Also collects the scenes that have records after the last gap. If the record numbers of such a scene are
+// dense, no record of it is missing; for all other scenes that is unknown.
 //
 // Threads: RocksDB calls it from the opening thread; read the results after that.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_WAL_WATCH_H_
@@ -17,7 +17,7 @@
 
 namespace locus::server {
 
-// Reaction to a gap.
+// Reaction to a gap in the log.
 enum class AtGap : uint8_t {
   kRefuse,  // the database does not open
   kContinue,
@@ -41,7 +41,7 @@ class WalWatch final : public rocksdb::WalFilter {
  private:
   const AtGap at_gap_;
   uint32_t log_family_ = 0;
-  uint64_t next_write_ = 0;  // expected RocksDB sequence number of the next batch, 0 before the first
+  uint64_t next_write_ = 0;  // expected RocksDB sequence number of the next batch; 0 before the first batch
   uint64_t gap_end_ = 0;
   absl::flat_hash_set<SceneKey> after_gap_;
 };
