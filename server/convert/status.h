@@ -25,10 +25,10 @@ absl::Status not_served(absl::string_view field);
 // Returns INVALID_ARGUMENT, REASON_MALFORMED for a number that is not a value of the schema's enum.
 absl::Status unknown_enum(absl::string_view field, int number);
 
-// Returns UNAVAILABLE, REASON_DRAINING, with a time to retry.
+// Returns UNAVAILABLE, REASON_DRAINING, with the delay after which the caller may retry.
 absl::Status draining();
 
-// Returns UNAVAILABLE, REASON_RECOVERING, with a time to retry.
+// Returns UNAVAILABLE, REASON_RECOVERING, with the delay after which the caller may retry.
 absl::Status recovering();
 
 }  // namespace locus::server

@@ -81,15 +81,15 @@ struct MetricCounts {
 
 class CallMetrics {
  public:
-  // Records a call or message. `nanoseconds` are from its arrival to its answer.
+  // Records a call or message. `nanoseconds` is the time from its arrival to its answer.
   void record_call(Rpc rpc, absl::StatusCode code, uint64_t nanoseconds);
-  // Records a block of queries. `nanoseconds` are processor time of all threads together.
+  // Records a block of queries. `nanoseconds` is the processor time of all threads together.
   void record_block(BlockKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work);
-  // Records a batch of updates. `nanoseconds` are from its arrival to the publication of its revision.
+  // Records a batch of updates. `nanoseconds` is the time from its arrival to the publication of its revision.
   void record_update(uint64_t items, uint64_t nanoseconds);
   // Records how long building a mesh's tree took.
   void record_mesh_build(uint64_t nanoseconds);
-  // Records a change of instances. `nanoseconds` are from the request to the publication of its revision.
+  // Records a change of instances. `nanoseconds` is the time from the request to the publication of its revision.
   void record_instance_change(uint64_t nanoseconds);
   // Records a status that is not OK, under its reason, or under the name of its code if it has no reason. At most
   // kMaxRefusalNames names are counted separately, the rest as "_other". Takes a lock briefly.

@@ -1,6 +1,6 @@
-// One call as the services see it: its metadata, its deadline, and whether it still wants an answer. serve() is the
-// frame around every call on gRPC's synchronous threads: it admits the call, checks that the server is serving, maps
-// the error, counts and logs.
+// One call as the services see it: its metadata, its deadline, and whether its caller still waits for an answer.
+// serve() is the frame around every call on gRPC's synchronous threads: it admits the call, checks that the server is
+// serving, converts the error, counts and logs.
 //
 // Threads: a Caller may be used from any thread while the call lasts, except trace().
 #ifndef LOCUS_SERVER_RPC_CALL_H_

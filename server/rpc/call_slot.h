@@ -31,7 +31,7 @@ class CallSlot {
   // Returns whether the call is a stream.
   virtual bool stream() const = 0;
 
-  // Stops the call from reading further messages until this one is answered. Call it on the IO loop.
+  // Stops the call from reading further messages until this message is answered. Call it on the IO loop.
   virtual void hold() = 0;
 
   // Ends the work on the message. Call it on the IO loop only, exactly once for each message. If `status` is OK, the

@@ -4,8 +4,8 @@
 // gains no share by being absent. A client that received more than that is remembered while it is idle, and returns
 // with its own amount. Source: Goyal, Vin, Cheng, Start-time Fair Queueing, 1996.
 //
-// Threads: one at a time. Every operation costs O(log clients), remove() also O(entries of the client). Memory: one
-// record for each waiting client and up to kMaxIdleClients more. Invariants: every client is in exactly one of two
+// Threads: one thread at a time. Every operation costs O(log clients), remove() also O(entries of the client). Memory:
+// one record for each waiting client and up to kMaxIdleClients more. Invariants: every client is in exactly one of two
 // sets, `waiting_` if it has entries, else `idle_`, both ordered by the work served to the client; virtual_time_ never
 // decreases.
 #ifndef LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_

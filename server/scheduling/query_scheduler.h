@@ -55,7 +55,7 @@ struct SchedulerOptions {
   // Limits of each class, by JobClass, and of both together. The work limits are multiplied by the number of threads.
   QueueLimit limits[kJobClasses] = {{1024, 500'000'000}, {1024, 2'000'000'000}};
   QueueLimit limit = {1536, 2'000'000'000};
-  // Returns the current time, in nanoseconds since an arbitrary start, for the calling thread. Default:
+  // Returns nanoseconds since an arbitrary start, for measuring the work of the calling thread. Default:
   // steady_nanoseconds().
   std::function<uint64_t()> clock;
 };

@@ -13,7 +13,8 @@ namespace locus::server {
 absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
                               v1::ChangeInstancesResponse* response);
 
-// Returns the description of a scene, with the number of its pending changes. O(objects), for their bounds.
+// Returns the description of a scene, with the number of its pending changes. O(objects), because it computes the
+// bounds of all objects.
 v1::Scene describe(const Host& host, const Scene& scene);
 
 }  // namespace locus::server

@@ -74,7 +74,7 @@ class QueryWork final : private QueryJob, private DeferredTask {
   absl::Status no_longer() const;
 
   void run();
-  // Works on the batch within the inline budget, without the loop's lock.
+  // Works on the batch for about the inline budget of the scheduler, without the loop's lock.
   void run_deferred() override;
   void on_deferred_done() override;
   // Queues the batch, or the rest of it, at the query scheduler; `nanoseconds` is the estimate of its work.

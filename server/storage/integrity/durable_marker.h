@@ -6,7 +6,7 @@
 // in place; each carries an increasing write number and a checksum, so that a torn write leaves the other slot valid.
 // When a slot is too small, the whole file is replaced.
 //
-// Threads: one at a time.
+// Threads: one thread at a time.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
 

@@ -1,7 +1,7 @@
 // Binary encoding of integers and strings in the data directory: little endian in values, big endian in keys, so that
 // keys sort numerically. A reader never reads past the end: on short input it returns zeros and ok() becomes false.
 //
-// Threads: one at a time for each object.
+// Threads: one thread at a time for each object.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_BYTES_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_BYTES_H_
 

@@ -5,7 +5,7 @@
 // A batch that failed may still be in RocksDB's log and reappear after a restart. Therefore the next change rewrites
 // every row that a failed change touched.
 //
-// Threads: one at a time.
+// Threads: one thread at a time.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_CATALOGUE_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_CATALOGUE_H_
 

@@ -3,7 +3,7 @@
 // omitted, and a file with a wrong checksum reads as missing. Therefore files need no sync. Files with other names are
 // never changed.
 //
-// Threads: any; one at a time for each SHA-256.
+// Threads: any thread; calls for the same SHA-256 must not overlap.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
 
