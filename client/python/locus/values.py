@@ -1,7 +1,6 @@
 """Plain result types: scenes, meshes, acks and so on. Immutable. Each is converted from the message of the same name in
 the protocol.
 """
-"""
 from __future__ import annotations
 
 import dataclasses
