@@ -3,9 +3,9 @@
     make_schema.py DESCRIPTOR_SET SCHEMA ENUMS
 
 DESCRIPTOR_SET is the output of `protoc --include_imports --include_source_info --descriptor_set_out=` for the real
-files. SCHEMA gets the same files with every packed fixed-width column declared `bytes`: on the wire both are a length
-and little-endian numbers, so that Python reads and writes a column as one buffer instead of number by number. ENUMS
-gets a Python module with the protocol's enums and their comments. Run by the build; its output is not kept in the
+files. SCHEMA receives the same files, but with every packed fixed-width column declared `bytes`: on the wire both are a
+length and little-endian numbers, so that Python reads and writes a column as one buffer instead of number by number.
+ENUMS gets a Python module with the protocol's enums and their comments. Run by the build; its output is not kept in the
 repository.
 """
 from __future__ import annotations
@@ -68,7 +68,7 @@ def health() -> descriptor_pb2.FileDescriptorProto:
 
 
 def comments(file: descriptor_pb2.FileDescriptorProto) -> Dict[Tuple[int, ...], str]:
-    """Returns the comment of each element of a file, by path."""
+    """Returns the comment of each element of a file, keyed by the element's path (descriptor.proto, SourceCodeInfo)."""
     return {tuple(location.path): location.leading_comments for location in file.source_code_info.location}
 
 

@@ -47,7 +47,7 @@ def shifted(column: "array.array[float]") -> "array.array[float]":
 
 
 def difference(a: Iterable[float], b: Iterable[float]) -> "array.array[float]":
-    """Returns the vectors from each of `b` to its counterpart in `a`."""
+    """Returns a - b: the vector from each point of `b` to the point of the same index in `a`."""
     return array.array("f", (x - y for x, y in zip(a, b)))
 
 

@@ -44,7 +44,7 @@ def directions(rays: int) -> "array.array[float]":
 
 
 def position(sweep: int) -> Tuple[float, float, float]:
-    """Returns the position of the sensor."""
+    """Returns the position of the sensor in the given sweep."""
     return (STEP * sweep, 0.0, HEIGHT)
 
 
@@ -62,7 +62,9 @@ def build_street(client: locus.Client, scene: str) -> locus.Revision:
 
 def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, directed: Any,
                    built: locus.Revision) -> Tuple[locus.BlockResult, Cost]:
-    """Runs one sweep. All rays start in the frame's origin, so only the frame moves."""
+    """Runs one sweep and returns its hits and its times. All rays start at the origin of the frame, so only the frame
+    changes.
+    """
     begin = time.perf_counter_ns()
     batch = locus.QueryBatch(at_least=built)
     batch.rays(zeros, directed, t_max=RANGE, block=locus.Block(frame=position(sweep)))
@@ -76,7 +78,7 @@ def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, dir
 
 
 def report(costs: Sequence[Cost], rays: int, hits: int) -> List[str]:
-    """Returns lines of name and value; times are medians over the sweeps, in nanoseconds a ray."""
+    """Returns lines of a name and a value: medians over the sweeps, in nanoseconds per ray."""
     encode, wait, decode = (statistics.median(column) / rays for column in zip(*costs))
     own = statistics.median(cost.encode + cost.decode for cost in costs) / rays
     return [f"rays a sweep            {rays}", f"sweeps                  {len(costs)}", f"hits                    {hits}",

@@ -8,7 +8,7 @@
 
 Calls block. Errors are LocusError (locus/errors.py); wrong arguments are TypeError and ValueError. While the server
 cannot be reached, calls that change nothing are retried within their timeout. An update is retried only if it carries
-`writer` and `number`; other calls never are.
+`writer` and `number`. Other calls are never retried.
 """
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeo
             retry: Retry = Retry()) -> "Client":
     """Connects to a locusd at `host:port` (the port may be left out: 7575) or `unix:/path`.
 
-    `timeout`: seconds a call may take, including retries; `long_timeout`: likewise for mesh uploads and changes of
-    instances. With `wait_for_server` it retries until `timeout`; without it a refused connection fails at once with
-    LocusError UNAVAILABLE naming the address. `max_send_bytes`, `max_receive_bytes`: maximum message sizes; the server
-    accepts 32 MiB by default, and an answer may have up to the batch's `max_reply_bytes`.
+    `timeout`: maximum duration of a call in seconds, including retries; `long_timeout`: likewise for mesh uploads and
+    changes of instances. With `wait_for_server` connect() retries until `timeout`; without it, a refused connection
+    fails at once with LocusError UNAVAILABLE, which names the address. `max_send_bytes`, `max_receive_bytes`: maximum
+    message sizes; the server accepts 32 MiB by default, and an answer may have up to the batch's `max_reply_bytes`.
     """
     client = Client(Connection(address, timeout=timeout, long_timeout=long_timeout, max_send_bytes=max_send_bytes,
                                max_receive_bytes=max_receive_bytes, retry=retry))
@@ -208,7 +208,9 @@ class Client:
             request.page_token = page.next_page_token
 
     def _greet(self, wait_for_server: bool) -> None:
-        """Makes a first call, so that a wrong address fails in connect() with a clear message."""
+        """Makes a first call to the server, so that connect() itself fails, with a clear message, if the address is
+        wrong.
+        """
         rpc = _rpc("Server", "GetServer")
         call = self._connection.channel.unary_unary(rpc.path)
         try:

@@ -2,11 +2,12 @@
 
 A column is packed little-endian numbers. An entry that is a vector has several numbers: N positions are 3N float32.
 
-As arguments: a buffer of the right type (numpy array of any shape, array.array, memoryview) is read in C order and need
+Arguments: a buffer of the right type (numpy array of any shape, array.array, memoryview) is read in C order and need
 not be contiguous; `bytes` and `bytearray` are used unchanged; numbers and (nested) lists are converted. A buffer of
-another type is never converted silently: float64 given for float32 would round, int64 for ids would wrap.
+another type is refused, not converted: float64 given for float32 would be rounded, negative int64 given for ids would
+wrap around.
 
-As results: a column is a numpy array of shape (R,) or (R, width) over the received bytes, not copied and therefore
+Results: a column is a numpy array of shape (R,) or (R, width) over the received bytes, not copied and therefore
 read-only. If numpy is not installed it is a flat array.array, copied once.
 """
 from __future__ import annotations
@@ -41,7 +42,8 @@ class Values(Protocol):
 
 
 class Kind(NamedTuple):
-    """Number type: its name, its code in array.array, its size in bytes, its format codes in buffers."""
+    """Number type of a column: its name, its type code in array.array, its size in bytes, its format codes in buffers.
+    """
 
     name: str
     code: str
@@ -70,7 +72,7 @@ def _name_of(view: memoryview) -> str:
 
 
 def _from_buffer(path: str, view: memoryview, kind: Kind) -> Raw:
-    """Returns the view's bytes in C order, borrowed if the view is contiguous, else copied."""
+    """Returns the numbers' bytes in C order: borrowed from `view` if it is contiguous, else copied."""
     format = view.format
     if view.itemsize != kind.size or (format not in kind.formats and format.lstrip("@=<") not in kind.formats):
         raise TypeError(f"{path}: holds {_name_of(view)}, but {kind.name} is wanted: convert it, "
@@ -96,7 +98,8 @@ def _from_numbers(path: str, value: Any, kind: Kind) -> bytes:
 
 
 def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
-    """Returns the encoded column, empty for None. A contiguous buffer is borrowed, not copied: it is read when sent.
+    """Returns the encoded column, empty for None. A contiguous buffer is borrowed, not copied, so it must not change
+    until the request was sent.
 
     `path` names the column in errors. TypeError for numbers of another type, ValueError if the count of numbers is not
     a multiple of `width`. Cost: linear for lists and for arrays that are not contiguous, else constant.
@@ -127,7 +130,7 @@ def entries(raw: Raw, kind: Kind, width: int = 1) -> int:
 
 
 def borrow_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> Raw:
-    """Like borrow(), for a column that holds `count` entries, one for all, or none; ValueError otherwise."""
+    """Returns the column like borrow(). ValueError unless it has `count` entries, one entry for all, or none."""
     raw = borrow(path, value, kind, width)
     found = entries(raw, kind, width)
     if found not in (0, 1, count):
@@ -136,18 +139,18 @@ def borrow_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int 
 
 
 def encode(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> bytes:
-    """Like borrow(), but copied."""
+    """Returns a copy of the encoded column; arguments and errors as borrow()."""
     return bytes(borrow(path, value, kind, width))
 
 
 def encode_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> bytes:
-    """Like borrow_for(), but copied."""
+    """Returns a copy of the encoded column; arguments and errors as borrow_for()."""
     return bytes(borrow_for(path, value, kind, count, width))
 
 
 def decode(raw: Raw, kind: Kind, width: int = 1) -> Values:
-    """Returns a received column as an array, as described at the top. The size of `raw` must be a multiple of an
-    entry's.
+    """Returns a received column as an array, as described in the module's docstring. The size of `raw` must be a
+    multiple of the size of an entry.
     """
     if numpy is None:
         column = array.array(kind.code)
@@ -158,7 +161,7 @@ def decode(raw: Raw, kind: Kind, width: int = 1) -> Values:
 
 
 def vector(path: str, value: ColumnLike) -> List[float]:
-    """Returns three Python floats from any iterable of three numbers, for frames."""
+    """Returns a frame's three coordinates as Python floats, from any iterable of three numbers."""
     items = [float(item) for item in value]
     if len(items) != 3:
         raise ValueError(f"{path}: has {len(items)} numbers: give x, y and z")

@@ -22,9 +22,9 @@ _Answer = TypeVar("_Answer")
 class Retry:
     """Policy of retries with exponential backoff.
 
-    `attempts` counts the first attempt too; 1 = no retry. The wait starts at `first_wait` seconds and doubles up to
-    `max_wait`, with a random variation of 20 % so that many clients do not retry simultaneously. If the server's error
-    carries a longer retry hint, that is the wait.
+    `attempts` is the maximum number of attempts, including the first one; 1 = no retry. The wait starts at `first_wait`
+    seconds and doubles up to `max_wait`, with a random variation of 20 % so that many clients do not retry
+    simultaneously. If the server's error asks for a longer wait (`retry_after`), that wait is used.
     """
 
     attempts: int = 5
@@ -40,7 +40,7 @@ class Retry:
 
 
 def target_of(address: str) -> str:
-    """Returns the target for gRPC: `address`, with the default port if it has none."""
+    """Returns `address` as a target for gRPC: with the default port if it has no port."""
     if not address:
         raise ValueError("the address is empty: give host:port or unix:/path")
     has_port = not address.endswith("]") if address.startswith("[") else ":" in address
@@ -48,8 +48,8 @@ def target_of(address: str) -> str:
 
 
 def scene_metadata(scene: str) -> List[Tuple[str, str]]:
-    """Returns the `x-scene` header, which routers use. A name that is not a legal header value is left out; the server
-    refuses such a name in the request.
+    """Returns the `x-scene` header, by which routers choose a server. A name that is not a legal header value is left
+    out; the server refuses such a name in the request.
     """
     return [("x-scene", scene)] if _LEGAL_SCENE.fullmatch(scene) else []
 
@@ -85,7 +85,7 @@ class Connection:
 
     def unary_bytes(self, path: str, request: bytes, *, scene: str = "", repeat: bool = False,
                     timeout: Optional[float] = None) -> bytes:
-        """Like unary(), with encoded messages."""
+        """Calls a unary rpc with an encoded request and returns the encoded response; otherwise like unary()."""
         call = self.channel.unary_unary(path)
         deadline = time.monotonic() + (self.timeout if timeout is None else timeout)
 

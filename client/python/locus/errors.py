@@ -12,7 +12,8 @@ _Status, _Error = schema.message("Status"), schema.message("Error")
 _CODES = {code.value[0]: code for code in grpc.StatusCode}
 _ERROR_TYPE = "type.googleapis.com/locus.v1.Error"
 
-# Hints for errors that did not come from the server. The server's own messages already suggest a remedy.
+# Hints for errors that did not come from the server. Messages of the server need none, since they already suggest a
+# remedy.
 _HINTS = {
     grpc.StatusCode.UNAVAILABLE: "try again when the server answers",
     grpc.StatusCode.DEADLINE_EXCEEDED: "give it more time (timeout); a change may have been made all the same",
@@ -28,9 +29,9 @@ class LocusError(Exception):
     """Failure of a call, a batch or a stream.
 
     `code` is the gRPC status code. If the server refused the request, `reason` is its reason, `field` the path of the
-    wrong field (`blocks[2].rays.directions`) and `index` the wrong entry, from 0. `limit`, `limit_value` and `asked`
-    are the name of an exceeded limit, its value and the requested value. `retry_after` is the time in seconds after
-    which the same request may succeed, 0 = it cannot succeed unchanged. If the error did not come from the server,
+    wrong field (`blocks[2].rays.directions`) and `index` the wrong entry, from 0. If a limit was exceeded, `limit` is
+    its name, `limit_value` its value and `asked` the requested value. `retry_after` is the time in seconds after which
+    the same request may succeed; 0 = it fails again unless it is changed. If the error did not come from the server,
     `reason` is UNSPECIFIED and `hint` suggests a remedy.
     """
 
@@ -50,7 +51,7 @@ class LocusError(Exception):
 
     @property
     def hint(self) -> str:
-        """Suggested remedy if the message has none; may be empty."""
+        """Suggested remedy; empty if the message already contains one or none is known."""
         if self.refused or "nothing answers" in self.message:
             return ""
         return _HINTS.get(self.code, "")
@@ -77,7 +78,7 @@ def reason_of(number: int) -> Reason:
 
 
 def from_error(error: Any) -> LocusError:
-    """Converts the protocol's Error, as streams report it. OK and unknown codes become UNKNOWN."""
+    """Returns the LocusError for the protocol's Error of a stream. OK and unknown status codes become UNKNOWN."""
     code = _CODES.get(error.code, grpc.StatusCode.UNKNOWN)
     return LocusError(code if code != grpc.StatusCode.OK else grpc.StatusCode.UNKNOWN, error.message,
                       reason=reason_of(error.reason), field=error.field,
@@ -86,7 +87,9 @@ def from_error(error: Any) -> LocusError:
 
 
 def from_call(call: Any) -> LocusError:
-    """Converts a failed gRPC call. Details that cannot be decoded are left out; code and message are kept."""
+    """Returns the LocusError for a failed gRPC call. Details that cannot be decoded are ignored; code and message are
+    kept.
+    """
     for key, value in call.trailing_metadata() or ():
         if key == "grpc-status-details-bin":
             error = _error_in(value)

@@ -14,14 +14,16 @@ from .values import Mesh, MeshPart
 
 _Change = schema.message("ChangeInstancesRequest")
 _Upload = schema.message("UploadMeshRequest")
-_BYTES_A_MESSAGE = 12 * 87_040  # a little under 1 MiB; messages end between triples
+_BYTES_A_MESSAGE = 12 * 87_040  # a little under 1 MiB, in whole vertices or triangles of 12 bytes
 
-# Callback that is called after each message of an upload with the bytes sent so far and the total.
+# Callback that is called after each message of an upload, with the number of bytes sent so far and the total number.
 Progress = Callable[[int, int], None]
 
 
 class InstanceChange:
-    """Instances to remove and to place, as one atomic revision; removes come first. Methods return the change."""
+    """Instances to remove and to place, as one atomic revision; removes come first. Methods return the change, so that
+    calls chain.
+    """
 
     def __init__(self) -> None:
         self.message = _Change()
@@ -72,7 +74,8 @@ class InstanceChange:
 class PlacedInstances:
     """Result of a change of instances: visible at `revision`, or, with `no_wait`, only accepted (`revision` is None).
 
-    `ids`: uint64, one for each placed instance in the order of the request. `change` counts changes within the epoch.
+    `ids`: uint64, one for each placed instance in the order of the request. `change` is the sequence number of the
+    change within the epoch, from 1.
     """
 
     ids: Values
@@ -82,7 +85,7 @@ class PlacedInstances:
 
     @classmethod
     def of(cls, message: Any) -> "PlacedInstances":
-        """From the protocol's ChangeInstancesResponse."""
+        """Converts the protocol's ChangeInstancesResponse."""
         revision = message.revision if message.HasField("revision") else None
         return cls(columns.decode(message.ids, UINT64), message.change, message.epoch, revision)
 

@@ -18,17 +18,17 @@ from .connection import Connection, Retry, scene_metadata
 from .errors import LocusError, from_call
 
 Result = TypeVar("Result")
-# Codes of a broken call after which a new call may succeed.
+# Status codes, besides those worth repeating, of a broken call after which a new call may succeed.
 _AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)
 
 
 class Item(Generic[Result]):
-    """Message that was accepted and not answered."""
+    """Message that was accepted and is not yet answered."""
 
     def __init__(self, batch: bytes) -> None:
         self.batch = batch
         self.sequence = 0
-        self.number = 0  # batch number within the writer
+        self.number = 0  # batch number of the stream's writer; only in update streams
         self.future: "Future[Result]" = Future()
         self.written = False  # True if sent on the current call
         self.future.set_running_or_notify_cancel()
@@ -77,7 +77,9 @@ class PipelinedStream(Generic[Result]):
         raise NotImplementedError
 
     def _answered(self, outcome: Any, position: int) -> None:
-        """Called after the item at `position` was answered, by a result or a LocusError, and removed from `_items`."""
+        """Handles `outcome`, a result or a LocusError. Called after the answered item was removed from `_items` at
+        `position`.
+        """
 
     def _send(self, batch: bytes) -> "Future[Result]":
         item: Item[Result] = Item(batch)
@@ -96,7 +98,7 @@ class PipelinedStream(Generic[Result]):
         return item.future
 
     def sync(self, timeout: Optional[float] = None) -> None:
-        """Blocks until every sent batch has been answered. Errors of single batches are in their futures.
+        """Blocks until every sent batch has been answered. Does not raise errors of single batches: their futures do.
 
         LocusError if the stream ended with an error; TimeoutError after `timeout` seconds.
         """
@@ -141,8 +143,8 @@ class PipelinedStream(Generic[Result]):
         self._abandon()
 
     def _another_call(self, end: Optional[LocusError]) -> bool:
-        """Waits, after a call that ended with `end`, until there is a message to send, and returns True; returns False
-        if the stream has ended.
+        """Waits until a new call may be opened and there is a message to send, then returns True. Returns False if the
+        stream has ended instead. `end` is the error of the previous call, if any.
         """
         with self._changed:
             wait = self._wait_before_next(end) if end is not None else 0.0
@@ -185,7 +187,7 @@ class PipelinedStream(Generic[Result]):
                 self._changed.notify_all()
 
     def _requests(self, over: threading.Event) -> Iterator[bytes]:
-        """Yields the messages of one call; iterated by gRPC's thread."""
+        """Yields the messages to send on one call, until `over` is set. Iterated by gRPC's thread."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: over.is_set() or self._unwritten() is not None
@@ -202,7 +204,7 @@ class PipelinedStream(Generic[Result]):
 
     def _receive(self, response: bytes) -> None:
         """Resolves the item that a response answers. A response with an unknown sequence number is ignored: its item
-        has got a new number since.
+        was renumbered and is sent again.
         """
         sequence, outcome = self._answer_in(response)
         with self._changed:
@@ -228,8 +230,8 @@ class PipelinedStream(Generic[Result]):
             return LocusError(grpc.StatusCode.UNAVAILABLE, "the server ended the stream before it had answered everything")
 
     def _wait_before_next(self, end: LocusError) -> Optional[float]:
-        """Returns the seconds to wait before the next call, or None if the stream has ended. Failures of an idle stream
-        are not counted.
+        """Returns the seconds to wait before the next call, or None if the stream has ended. Failures while no message
+        is unanswered are not counted.
         """
         if self._broken_off or self._fatal is not None:
             return None

@@ -18,14 +18,13 @@ class Block(NamedTuple):
 
     - `frame`: three floats, added to every position of the block; positions in its result are relative to it.
     - `source`: search static instances, moving objects or both; `precision`: exact shapes or their bounds.
-    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays and nearest queries, ID for
-    balls
+    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays and nearest queries, ID for balls
       and boxes (TRIANGLE too if their detail is triangles), ID and POSE for lookups.
     - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
     - `ignore_groups`: N uint64 or one; objects and instances of that group are ignored.
     - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
     - `max_results`: maximum number of rows a query, 0 = 1,024.
-    - `after_id`: only rows with a higher id, to continue after a truncated result.
+    - `after_id`: return only rows with a higher id, to continue after a truncated result.
     - `as_of_ticks`: N uint64 or one; the queries see objects as they were at the end of that tick. `as_of_fractions`: N
       float32 or one, 0 <= f < 1, only with `as_of_ticks`: fraction of the way to the next tick. `outside_history`:
       handling of times that are not in the history; they are refused by default.
@@ -81,9 +80,9 @@ class QueryBatch:
     for their default. Positions and lengths are float32 in the caller's unit, relative to the block's frame.
 
     `at_least`: the minimum revision, for example an Ack ("read your own writes"); `exactly`: exactly this revision, if
-    the server still keeps it. The default is the latest revision. Both check the epoch: LocusError with
-    Reason.SCENE_RESTARTED if the scene has another one. `max_work`: a budget in nodes, cells and tests; `explain`:
-    report the work done; `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
+    the server still keeps it. The default is the latest revision. Both raise LocusError with Reason.SCENE_RESTARTED if
+    the scene's epoch differs from the revision's. `max_work`: maximum number of nodes, cells and tests for the batch;
+    `explain`: report the work done; `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
 
     Columns are checked for type and length here (TypeError and ValueError name the column), values by the server. Buffers
     are borrowed: leave them unchanged until the batch was sent. A batch may be sent several times. Methods return the
@@ -126,8 +125,8 @@ class QueryBatch:
 
     def balls(self, centers: ColumnLike, radii: ColumnLike, *, detail: StaticDetail = StaticDetail.INSTANCES,
               block: Block = Block()) -> "QueryBatch":
-        """Adds a block of N balls, to find all that overlaps them. `centers`: 3N float32; `radii`: N float32 or one, 0
-        .. 1e9.
+        """Adds a block of N balls, to find the objects and instances that overlap them. `centers`: 3N float32; `radii`:
+        N float32 or one, 0 .. 1e9.
         """
         new = _NewBlock(self._blocks, "balls")
         new.first("centers", centers, FLOAT32, 3)
@@ -137,9 +136,9 @@ class QueryBatch:
 
     def boxes(self, centers: ColumnLike, half_extents: ColumnLike, *, rotations: ColumnLike = None,
               detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
-        """Adds a block of N boxes, to find all that overlaps them. `centers`: 3N float32; `half_extents`: 3N float32 or
-        three, along the box's own axes; `rotations`: 4N float32 or four, unit quaternions x, y, z, w, none =
-        axis-aligned.
+        """Adds a block of N boxes, to find the objects and instances that overlap them. `centers`: 3N float32;
+        `half_extents`: 3N float32 or three, along the box's own axes; `rotations`: 4N float32 or four, unit quaternions
+        x, y, z, w, none = axis-aligned.
         """
         new = _NewBlock(self._blocks, "boxes")
         new.first("centers", centers, FLOAT32, 3)
@@ -151,9 +150,9 @@ class QueryBatch:
     def nearest(self, points: ColumnLike, *, k: int = 1, max_distances: ColumnLike = None,
                 detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
         """Adds a block of N points, to find the nearest objects and instances. `points`: 3N float32; `k`: maximum
-        number of rows a point, by ascending distance. The distance is in column T: 0 inside an object, to the surface
-        for meshes. `max_distances`: N float32 or one, inclusive, +infinity by default; `detail`: INSTANCES returns an
-        instance once, by its nearest triangle.
+        number of rows a point, by ascending distance. Column T contains the distance: 0 inside an object; for a mesh
+        always the distance to its surface. `max_distances`: N float32 or one, inclusive, +infinity by default;
+        `detail`: INSTANCES returns an instance once, by its nearest triangle.
         """
         new = _NewBlock(self._blocks, "nearest")
         new.first("points", points, FLOAT32, 3)
@@ -174,14 +173,14 @@ class QueryBatch:
         return self._add(new, block)
 
     def request_bytes(self, scene: str) -> bytes:
-        """Returns the encoded request for Query. Columns are read now."""
+        """Returns the encoded request for Query. Borrowed columns are read now, and may be changed afterwards."""
         request = wire.Parts()
         request.add(_REQUEST["scene"], scene.encode())
         request.add_parts(_REQUEST["batch"], self._parts)
         return b"".join(request.pieces)
 
     def batch_bytes(self) -> bytes:
-        """Returns the encoded QueryBatch. Columns are read now."""
+        """Returns the encoded QueryBatch. Borrowed columns are read now, and may be changed afterwards."""
         return b"".join(self._parts.pieces)
 
     def _add(self, new: _NewBlock, settings: Block) -> QueryBatch:
@@ -195,7 +194,7 @@ class QueryBatch:
 
 
 class _NewBlock:
-    """Part of a block that depends on its kind, while the block is being built."""
+    """Builder of the part of a block that depends on its kind."""
 
     def __init__(self, blocks_before: int, name: str) -> None:
         self.path = f"blocks[{blocks_before}]."
@@ -215,7 +214,7 @@ class _NewBlock:
             self.kind.add(_KINDS[self.name][name], columns.borrow_for(path, value, number_type, self.count, width))
 
     def options(self, **fields: int) -> None:
-        """Adds the fields of the kind that are not columns."""
+        """Adds the kind's fields that are not columns. Fields that are 0 are omitted."""
         for name, value in fields.items():
             if value:
                 self.kind.add_varint(_KINDS[self.name][name], value)

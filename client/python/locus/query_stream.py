@@ -31,7 +31,8 @@ class QueryStream(PipelinedStream[QueryResult]):
         """Sends a batch. Blocks while `max_in_flight` batches are unanswered.
 
         The future gets the result, or the LocusError of this batch. The batch is read now and may be used again.
-        LocusError if the stream has ended. 8 batches of 1,024 queries, or 2 of 8,192, keep a local server busy.
+        LocusError if the stream has ended. To keep a local server busy, 8 batches of 1,024 queries in flight are
+        enough, or 2 of 8,192.
         """
         return self._send(batch.batch_bytes())
 

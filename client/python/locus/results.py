@@ -1,4 +1,4 @@
-"""Results of query batches: columns over the received bytes, by query and row."""
+"""Results of query batches: columns that are views of the received bytes, by query and row."""
 from __future__ import annotations
 
 import dataclasses
@@ -18,7 +18,8 @@ NO_TRIANGLE = 0xFFFFFFFF
 _RESULT = schema.numbers("QueryResult")
 _BLOCK = schema.numbers("BlockResult")
 _IN_RESPONSE = schema.numbers("QueryResponse")["result"]
-# Bytes a row of each column from which the number of rows can be computed; the two most frequent columns are first.
+# Size of a row, in bytes, of each column from whose length the number of rows can be computed. The two most frequent
+# columns are first, since they are tried in this order.
 _COUNTS = _BLOCK["counts"]
 _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
     ("ids", 8), ("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
@@ -101,7 +102,8 @@ class BlockResult:
         return _work_in(self._fields, _BLOCK["work"])
 
     def rows_of(self, query: int) -> slice:
-        """Returns the rows of one query, as an index for columns with one number a row. The first call is linear in N.
+        """Returns the rows of one query as a slice, to index columns with one number per row. The first call is linear
+        in N.
         """
         if not len(self.counts):
             return slice(query, query + 1)
@@ -145,7 +147,8 @@ class QueryResult(Revision):
         """Decodes the protocol's QueryResult. Columns are views, so the bytes are kept as long as any column."""
         found = wire.fields(message)
         result = cls.__new__(cls)
-        # One update() of the dictionary is measurably faster than a frozen class's setting of each attribute.
+        # Set all attributes by one update() of the dictionary: it is measurably faster than object.__setattr__() for
+        # each one.
         result.__dict__.update(
             epoch=wire.fixed64(found, _RESULT["epoch"]), revision=wire.fixed64(found, _RESULT["revision"]),
             tick=wire.fixed64(found, _RESULT["tick"]), work=_work_in(found, _RESULT["work"]),

@@ -1,8 +1,8 @@
 """Message classes of the protocol, with columns declared `bytes`; internal to the package.
 
 The mirrored schema (schema.binpb, made by make_schema.py) is loaded into its own descriptor pool, so that it does not
-conflict with classes that protoc generated from the real files in the same process. Classes are accessed by protocol
-name: `message("QueryBatch")`.
+conflict with classes that protoc generated from the real files in the same process. Classes are looked up by their name
+in the protocol: `message("QueryBatch")`.
 """
 from __future__ import annotations
 

@@ -22,11 +22,12 @@ _BATCH = _METHOD.request.DESCRIPTOR.fields_by_name["batch"].number
 class UpdateStream(PipelinedStream[Ack]):
     """Stream returned by Client.update_stream(). Thread-safe.
 
-    Each batch carries the stream's random `writer` and a dense batch number. After a broken connection every batch
-    without an ack is sent again, in order; the ack of a batch that the server had already applied has `duplicate` set.
-    A refused batch does not consume its number: the batches after it are renumbered and sent again. The stream ends if
-    the server refuses it, if the server no longer knows the writer (the scene has a new epoch), or if reconnecting
-    fails too often: then every unanswered batch gets that LocusError, and their outcome is unknown.
+    Each batch carries the stream's random `writer` and a batch number that counts up from 1 without gaps. After a
+    broken connection every batch without an ack is sent again, in order; the ack of a batch that the server had already
+    applied has `duplicate` set. A refused batch does not consume its number: the batches after it are renumbered and
+    sent again. The stream ends if the server refuses it, if the server no longer knows the writer (the scene has a new
+    epoch), or if reconnecting fails too often: then every unanswered batch gets that LocusError, and their outcome is
+    unknown.
     """
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
@@ -36,7 +37,8 @@ class UpdateStream(PipelinedStream[Ack]):
         self._last_ack: Optional[Ack] = None
 
     def send(self, batch: UpdateBatch) -> "Future[Ack]":
-        """Sends a batch. Blocks while `max_in_flight` batches are unanswered, which is the back pressure of the server.
+        """Sends a batch. Blocks while `max_in_flight` batches are unanswered, so a caller that is faster than the
+        server is slowed down.
 
         The future gets the Ack, or the LocusError of this batch. The batch is copied and may be used again; its own
         writer and number are ignored. LocusError if the stream has ended.
@@ -45,7 +47,9 @@ class UpdateStream(PipelinedStream[Ack]):
 
     @property
     def last_ack(self) -> Optional[Revision]:
-        """Revision of the latest ack, or None: a query with `at_least` this revision sees every batch acked so far."""
+        """Revision of the latest ack, None before the first: a query with `at_least` this revision sees every batch
+        acked so far.
+        """
         with self._changed:
             return self._last_ack
 
@@ -55,7 +59,8 @@ class UpdateStream(PipelinedStream[Ack]):
         self._next_batch += 1
 
     def _request_of(self, item: Item[Ack]) -> bytes:
-        # The field `batch` is written twice, and protobuf merges both: first the columns, then writer and batch number.
+        # Write the field `batch` twice: first with the columns, then with writer and batch number. Parsers of protobuf
+        # merge both.
         numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
         numbers.batch.writer, numbers.batch.batch = self.writer, item.number
         return b"".join((wire.head(_BATCH, len(item.batch)), item.batch, numbers.SerializeToString()))
@@ -71,8 +76,8 @@ class UpdateStream(PipelinedStream[Ack]):
         if not isinstance(outcome, LocusError):
             self._last_ack = outcome
         elif not outcome.refused or outcome.reason == Reason.BATCH_GAP:
-            # Either it is unknown whether the number was consumed, or the server does not know the writer. To continue
-            # could lose a batch.
+            # End the stream: either it is unknown whether the number was consumed, or the server does not know the
+            # writer, so continuing could lose a batch.
             self._fatal = outcome
         else:
             self._next_batch -= len(self._items) - position + 1

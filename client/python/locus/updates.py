@@ -15,9 +15,9 @@ class UpdateBatch:
 
     N is the number of ids of a call. Another column holds N entries, one for all, or none for its default. `positions`
     are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64` are 3N float64, absolute;
-    exactly one of them is given. `rotations` are 4N float32, unit quaternions x, y, z, w; none = identity in inserts,
-    kept in moves. `layers` are N uint32 (none = bit 0; 0 hides), `groups` and `tags` N uint64 (none = 0). Ids are
-    uint64, chosen by the caller, never 0. Lengths and angles are in the caller's units.
+    give exactly one of them. `rotations` are 4N float32, unit quaternions x, y, z, w; none = identity in inserts, kept
+    in moves. `layers` are N uint32 (none = bit 0; 0 hides), `groups` and `tags` N uint64 (none = 0). Ids are uint64,
+    chosen by the caller, never 0. Lengths and angles are in the caller's units.
 
     Columns are checked for type and length here (TypeError and ValueError name the column), values by the server: it
     refuses wrong items individually and lists them in Ack.errors, or refuses the whole batch with `all_or_nothing`.
@@ -32,7 +32,7 @@ class UpdateBatch:
     def __init__(self, *, frame: Optional[ColumnLike] = None, tick: Optional[int] = None, clear: bool = False,
                  upsert: bool = False, all_or_nothing: bool = False, restart_ticks: bool = False, writer: int = 0,
                  number: int = 0) -> None:
-        # The batch is part of a request from the start: adding it to one later would copy it.
+        # Create the batch as a part of its request, since adding it to a request later would copy it.
         self._request = _Request()
         self.message = self._request.batch
         self.message.clear, self.message.upsert, self.message.all_or_nothing = clear, upsert, all_or_nothing
@@ -101,7 +101,9 @@ class UpdateBatch:
 
     def move(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
              rotations: ColumnLike = None, teleport: bool = False) -> "UpdateBatch":
-        """Sets new centres and rotations of N objects. `teleport`: past queries do not interpolate this movement."""
+        """Moves N objects: sets their centres and, if `rotations` is given, their rotations. With `teleport`, queries
+        of a time between this tick and the one before do not interpolate the movement.
+        """
         with _new_entry(self.message.moves, "moves", ids) as entry:
             entry.pose(positions, positions_f64, rotations)
             entry.message.teleport = teleport
@@ -109,7 +111,7 @@ class UpdateBatch:
 
     def relabel(self, ids: ColumnLike, *, layers: ColumnLike = None, groups: ColumnLike = None,
                 tags: ColumnLike = None) -> "UpdateBatch":
-        """Sets new labels of N objects. A label whose column is not given is kept."""
+        """Sets labels (layers, groups, tags) of N objects. A label whose column is not given is kept."""
         with _new_entry(self.message.relabels, "relabels", ids) as entry:
             entry.labels(layers, groups, tags)
         return self
@@ -121,7 +123,9 @@ class UpdateBatch:
 
 
 class _Entry:
-    """New entry of one of the batch's lists. Errors name its columns, for example `moves[1].positions`."""
+    """New entry of one of the batch's lists (inserts, moves, relabels). Errors name its columns, for example
+    `moves[1].positions`.
+    """
 
     def __init__(self, message: Any, path: str, ids: ColumnLike) -> None:
         self.message = message
@@ -145,7 +149,7 @@ class _Entry:
 
 @contextlib.contextmanager
 def _new_entry(entries: Any, name: str, ids: ColumnLike) -> Iterator[_Entry]:
-    """Adds an entry to be filled by the caller, and removes it again if a column is refused."""
+    """Adds an entry to `entries` and yields it to be filled by the caller; removes it again if that raises an error."""
     path = f"{name}[{len(entries)}]."
     message = entries.add()
     try:

@@ -1,5 +1,5 @@
-"""Plain result types: scenes, meshes, acks and so on. Immutable; each is converted from the protocol's message of its
-name.
+"""Plain result types: scenes, meshes, acks and so on. Immutable. Each is converted from the message of the same name in
+the protocol.
 """
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from .errors import reason_of
 
 @dataclasses.dataclass(frozen=True)
 class Revision:
-    """Version of a scene. Revisions count within an epoch, which names one unbroken sequence of revisions."""
+    """Version of a scene. Revision numbers count within `epoch`, which identifies one unbroken sequence of revisions.
+    """
 
     epoch: int
     revision: int
@@ -44,7 +45,7 @@ class Ack(Revision):
 
     @classmethod
     def of(cls, message: Any) -> "Ack":
-        """From the protocol's UpdateAck."""
+        """Converts the protocol's UpdateAck."""
         errors = tuple(ItemError(error.field, error.index, error.id, reason_of(error.reason)) for error in message.errors)
         return cls(message.epoch, message.revision, message.tick, message.applied, message.refused, errors,
                    message.duplicate)
@@ -80,7 +81,7 @@ class Scene(Revision):
 
     @classmethod
     def of(cls, message: Any) -> "Scene":
-        """From the protocol's Scene."""
+        """Converts the protocol's Scene."""
         low, high = message.min, message.max
         bounds = ((low.x, low.y, low.z), (high.x, high.y, high.z)) if message.HasField("min") else None
         state = message.state if message.state in SceneState._value2member_map_ else 0
@@ -114,7 +115,7 @@ class Mesh:
 
     @classmethod
     def of(cls, message: Any) -> "Mesh":
-        """From the protocol's Mesh."""
+        """Converts the protocol's Mesh."""
         parts = tuple(MeshPart(part.name, part.first_triangle) for part in message.parts)
         return cls(message.name, message.sha256, message.triangles, message.zero_area_triangles, message.bytes,
                    message.uses, parts)
@@ -130,7 +131,7 @@ class Limit:
 
 @dataclasses.dataclass(frozen=True)
 class Server:
-    """Description of the server; `limits` by name."""
+    """Description of the server; `limits` maps names to limits."""
 
     version: str
     instruction_set: str
@@ -139,7 +140,7 @@ class Server:
 
     @classmethod
     def of(cls, message: Any) -> "Server":
-        """From the protocol's GetServerResponse."""
+        """Converts the protocol's GetServerResponse."""
         limits = {limit.name: Limit(limit.value, limit.used) for limit in message.limits}
         return cls(message.version, message.instruction_set, tuple(message.features), limits)
 
@@ -155,5 +156,5 @@ class Work:
 
     @classmethod
     def of(cls, message: Any) -> "Work":
-        """From the protocol's Work."""
+        """Converts the protocol's Work."""
         return cls(message.nodes, message.cells, message.tests, message.nanoseconds)

@@ -1,8 +1,9 @@
 """Part of protobuf's wire format that columns need: decoding of answers without copies, and framing of encoded batches;
 internal to the package.
 
-Parsing an answer with protobuf would copy each column twice (into the message and out of it), which is most of the
-client's cost of an answer. Here a column is a view of the received bytes. All other messages use the mirrored schema.
+Parsing an answer with protobuf would copy each column twice (into the message and out of it), and these copies would be
+most of the client's cost of an answer. In this module a decoded column is a view of the received bytes. All other
+messages use the mirrored schema.
 """
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ def _varint(data: memoryview, position: int) -> Tuple[int, int]:
 
 
 def fields(data: memoryview) -> Fields:
-    """Returns a message's fields by number, each with its occurrences: ints for varints, views for all other types.
+    """Returns the fields of a message by number. A field is the list of its occurrences: ints for varints, views for
+    other types.
 
     Linear in the number of fields, independent of their size. LocusError DATA_LOSS if the bytes are not a message.
     """
