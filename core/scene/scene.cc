@@ -248,7 +248,8 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
   RETURN_IF_ERROR(wait_for_readers(ReaderTracker::kNever));
-  // Hold only the instances of the revision while the tree is built, which takes long, and not its objects.
+  // Building the tree takes long. Meanwhile keep only the instances of this revision alive, not its objects;
+  // is_object() therefore asks the latest revision each time.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
   const std::shared_ptr<const StaticSet> statics = latest()->statics;
   ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, latest()->revision << 24));

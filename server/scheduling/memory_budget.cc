@@ -56,7 +56,7 @@ absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field,
 
 MemoryBudget::Claim MemoryBudget::claim_anyway(uint64_t bytes) {
   MutexLock lock(mutex_);
-  // Work of this kind is never refused, so it is enough to measure now and then.
+  // A claim of this kind is never refused, so memory is measured only after work of 1 / kStepShare of the limit ended.
   if (ended_since_ > limit_ / kStepShare) make_room(bytes);
   claimed_ += bytes;
   return Claim(this, bytes);

@@ -18,7 +18,7 @@ namespace locus {
 
 class WideChoice {
  public:
-  // Makes the choice of a leaf, whose cost is 0 with any number of slots.
+  // Constructs the choice for a leaf. It costs 0, however many child slots of a wide node it may use.
   WideChoice() = default;
 
   // Makes the choice of an inner node from the choices of its children. `cost` is the cost of the wide node that it can

@@ -117,8 +117,8 @@ class CullRay {
       line_.point[axis] = static_cast<float>(point[axis]);
       line_.direction[axis] = static_cast<float>(toward[axis]);
     }
-    // Within the brick, the errors of the line's direction and point displace it by a few 2^-24 of the lengths
-    // involved, plus 2^-50 of the distance to the origin of the ray.
+    // Rounding of its direction and point moves the line, within the brick, by a few times 2^-24 of the coordinates of
+    // the point and of the brick's edge, plus 2^-50 of the distance to the origin of the ray. The radius covers this.
     line_.radius =
         static_cast<float>((cull_epsilon(brick) + ray_radius + 0x1p-46 * far +
                             4 * double{kCullEpsilon} * (max_component(abs(point)) + 2 * brick.geometry.edge)) *

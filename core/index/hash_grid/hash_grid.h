@@ -158,7 +158,7 @@ class HashGrid {
   std::vector<internal::BrickChange> grouped_;  // changes in the order of touched_
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
-  // Values that stay in a brick, collected by gather_all().
+  // Values of a brick that the current update neither removes nor moves to another brick, collected by gather_all().
   struct GatheredBrick {
     bool is_gathered = false;  // false: the next version of the brick follows from its changes alone
     absl::Span<const internal::BrickSource> sources;

@@ -15,7 +15,7 @@ namespace {
 // that may have more hits is traced triangle by triangle instead.
 constexpr uint32_t kMaxRows = 128;
 
-// Ray that has reached an instance and waits for the kernels to trace it there.
+// Pair of a ray and an instance that the ray has reached: the kernels have yet to test the ray against it.
 struct Stop {
   uint32_t ray;   // index in Rounds::rays_
   float nearest;  // t at which the ray enters the bounds of the instance
@@ -171,7 +171,7 @@ class Rounds {
     }
   }
 
-  // Traces the ray of `stop` at its instance triangle by triangle, without the kernels.
+  // Tests the ray of `stop` against the triangles of the instance of `stop` one at a time, without the kernels.
   void trace_triangles(const Stop& stop) {
     PendingRay& ray = rays_[stop.ray];
     trace_instance(task_, ray.request, slabs_[stop.ray], *stop.instance, stop.nearest, ray.collector);

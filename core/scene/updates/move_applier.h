@@ -20,7 +20,8 @@ class MoveApplier {
   // Returns true if the batch only moves objects.
   static bool serves(const UpdateBatch& batch);
 
-  // Reads one batch. Preconditions: it has passed check_form(), and serves(batch). O(items).
+  // Reads one batch. Preconditions: the batch has passed check_form(), and serves(batch) is true.
+  // O(items).
   void run(const ObjectStore& objects, const UpdateBatch& batch) {
     begin(objects);
     add(objects, batch);

@@ -11,8 +11,8 @@
 namespace locus {
 namespace {
 
-// Relative pad of the slabs of nodes: twice SlabRay's pad of a triangle's own box, so that no box is culled because of
-// rounding in float if SlabRay would not cull it.
+// Relative amount by which the slab test of a node is widened. It is twice the amount by which SlabRay widens the box
+// of a triangle. So rounding in float never culls a node that contains a triangle whose box SlabRay accepts.
 constexpr float kTreePad = 0x1p-20f;
 
 // Columns of PreparedRays: the constants computed for each ray. t is in units of the direction's length. x, y and z are
