@@ -50,7 +50,6 @@ struct Given {
 Given read_flags(const std::vector<std::string>& arguments, const Environment& environment) {
   ServerConfig ignored;
   Given given;
-  LOCUS_DCHECK(read_invocation(arguments, environment).config.has_value());
   CLI::App app;
   build_parser(app, ignored);
   app.set_config();  // do not read the file
@@ -130,13 +129,16 @@ absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::s
 
 std::string print_config(const std::vector<ConfigValue>& values, bool json) {
   if (json) {
-    nlohmann::ordered_json options = nlohmann::ordered_json::array();
-    for (const ConfigValue& value : values)
-      options.push_back({{"option", value.name},
-                         {"value", value.value},
-                         {"origin", origin_name(value.origin)},
-                         {"place", value.place}});
-    return nlohmann::ordered_json{{"options", std::move(options)}}.dump() + "\n";
+    nlohmann::ordered_json all;
+    nlohmann::ordered_json& options = all["options"] = nlohmann::ordered_json::array();
+    for (const ConfigValue& value : values) {
+      nlohmann::ordered_json& option = options.emplace_back();
+      option["option"] = value.name;
+      option["value"] = value.value;
+      option["origin"] = origin_name(value.origin);
+      option["place"] = value.place;
+    }
+    return all.dump() + "\n";
   }
   size_t name_width = 0, value_width = 0;
   for (const ConfigValue& value : values) {
