@@ -11,7 +11,6 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
-#include "core/base/check.h"
 #include "server/config/server_parser.h"
 
 namespace locus::server {
