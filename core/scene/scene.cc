@@ -147,7 +147,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
     RETURN_IF_ERROR(check_open());
     if (pins_->over_budget()) continue;  // another batch exceeded the budget meanwhile
     RETURN_IF_ERROR(log_each(good));
-    // From here on there is no error return: logged batches must be applied.
+    // Logged batches must be applied, so there is no error return after this point.
     auto next = good.begin();
     for (absl::StatusOr<UpdateAck>& ack : acks) {
       if (!ack.ok()) continue;

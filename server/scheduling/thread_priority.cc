@@ -35,7 +35,7 @@ void take_batch_priority(BatchPriority priority) {
     sched_setscheduler(0, SCHED_IDLE, &parameter);
     return;
   }
-  // On Linux niceness belongs to a thread, not to the process.
+  // Niceness belongs to a thread on Linux, not to the process.
   const auto self = static_cast<id_t>(gettid());
   setpriority(PRIO_PROCESS, self, std::min(getpriority(PRIO_PROCESS, self) + kSteps, kLowest));
   take_short_slices();

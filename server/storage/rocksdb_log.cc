@@ -122,7 +122,7 @@ absl::Status RocksdbLog::finish_opening() {
         next_scene_ = std::max(next_scene_, ByteReader(absl::string_view(key).substr(1)).big_u64() + 1);
       LOCUS_CHECK(batch.Delete(database_->meta(), key).ok());
     }
-    // From here on older programs must not open the directory, because they cannot read the records that follow.
+    // Older programs must not open the directory after this, because they cannot read the records that follow.
     if (damage_report_.format < kFormat)
       LOCUS_CHECK(
           batch

@@ -172,7 +172,7 @@ TEST_F(MeshRpcTest, NamesOfEqualBytesKeepTheirOwnPartsAndUses) {
   for (const v1::Placement& run : pieces[0].instances()) placed.push_back(run.mesh());
   EXPECT_EQ(placed, (std::vector<std::string>{"b", "c", "b"})) << "one run for each neighbour of another name";
 
-  // From x = 0 each cube's near side is hit, in the part of its own name that has the triangle.
+  // A ray from x = 0 hits the near side of each cube, in the part of the cube's own mesh name that has the triangle.
   v1::QueryBatch ray = ray_along_x();
   fill(ray.mutable_blocks(0)->mutable_rays()->mutable_origins(), {0.f, 0.25f, 0.f});
   ray.mutable_blocks(0)->mutable_rays()->set_mode(v1::RAY_MODE_ALL);

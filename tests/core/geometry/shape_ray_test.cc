@@ -140,7 +140,7 @@ TEST_P(ShapeRayTest, RandomRaysAgreeWithTheReference) {
   EXPECT_GT(inside, 500);
 }
 
-// On the lattice a distance within 1e-9 of touching is exactly touching, so the grown reference is exact.
+// A distance within 1e-9 of touching is exactly touching on the lattice, so the grown reference is exact.
 TEST_P(ShapeRayTest, LatticeVerdictsAreExact) {
   constexpr uint64_t kSeed = 202;
   constexpr Real kGrown = 1e-9L;
