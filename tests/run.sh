@@ -39,6 +39,7 @@ passed=0
 failed=0
 skipped=0
 problems=()
+skips=()
 started=$SECONDS
 
 say() { printf '\n== [%4d s] %s\n' $((SECONDS - started)) "$*"; }
@@ -50,6 +51,7 @@ fail() {
 
 finish() {
   say "summary"
+  for skip in ${skips[@]+"${skips[@]}"}; do echo "skipped: $skip"; done
   for problem in ${problems[@]+"${problems[@]}"}; do echo "FAILED: $problem"; done
   echo "$passed passed, $failed failed, $skipped skipped"
   [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
@@ -62,7 +64,7 @@ count_lines() {
   while read -r kind name; do
     case "$kind" in
       passed) passed=$((passed + 1)) ;;
-      skipped) skipped=$((skipped + 1)) ;;
+      skipped) skipped=$((skipped + 1)); skips+=("$suite: $name") ;;
       failed) fail "$suite: $name" ;;
     esac
   done
