@@ -9,57 +9,48 @@
 namespace locus::test {
 namespace {
 
-void expect_superset(const QueryScene& scene, uint64_t seed) {
-  ASSERT_EQ(superset_fault(scene), "") << scene.world.name << ", seed " << seed;
+// Draws `count` scenes, one for each seed, and expects CONSERVATIVE to find all that EXACT finds in each of them.
+template <class Draw>
+void expect_supersets(uint64_t count, const Draw& draw) {
+  for (uint64_t seed = 0; seed < scaled_count(count); ++seed) {
+    Random random(seed);
+    const QueryScene scene = draw(random, seed);
+    ASSERT_EQ(superset_fault(scene), "") << scene.world.name << ", seed " << seed;
+  }
+}
+
+// Returns a function that draws scenes by `draw`, whatever the seed.
+auto drawn_by(QueryScene (*draw)(Random&)) {
+  return [draw](Random& random, uint64_t) { return draw(random); };
 }
 
 TEST(QueryConservativeTest, FindsAllThatExactFindsInRandomScenes) {
-  for (uint64_t seed = 0; seed < scaled_count(1'500); ++seed) {
-    Random random(seed);
-    expect_superset(query_scene(random_scene(random), random), seed);
-  }
+  expect_supersets(1'500, [](Random& random, uint64_t) { return query_scene(random_scene(random), random); });
 }
 
 TEST(QueryConservativeTest, FindsAllThatExactFindsInAdversarialScenes) {
-  for (uint64_t seed = 0; seed < scaled_count(800); ++seed) {
-    Random random(seed);
-    expect_superset(query_scene(troublesome_sketch(seed, random), random), seed);
-  }
+  expect_supersets(800,
+                   [](Random& random, uint64_t seed) { return query_scene(troublesome_sketch(seed, random), random); });
 }
 
 TEST(QueryConservativeTest, FindsAllThatExactFindsInMeshesFarFromTheirOwnOrigin) {
-  for (uint64_t seed = 0; seed < scaled_count(400); ++seed) {
-    Random random(seed);
-    expect_superset(brought_back_scene(random), seed);
-  }
+  expect_supersets(400, drawn_by(brought_back_scene));
 }
 
 TEST(QueryConservativeTest, FindsAllThatExactFindsInThePlaneOfRotatedTriangles) {
-  for (uint64_t seed = 0; seed < scaled_count(1'000); ++seed) {
-    Random random(seed);
-    expect_superset(turned_floor_scene(random), seed);
-  }
+  expect_supersets(1'000, drawn_by(turned_floor_scene));
 }
 
 TEST(QueryConservativeTest, FindsAllThatExactFindsWhereRoundingToMeshAxesMakesShapesTouch) {
-  for (uint64_t seed = 0; seed < scaled_count(1'000); ++seed) {
-    Random random(seed);
-    expect_superset(touching_scene(random), seed);
-  }
+  expect_supersets(1'000, drawn_by(touching_scene));
 }
 
 TEST(QueryConservativeTest, FindsAllThatExactFindsWhereRaysGrazeTheCornersOfTriangles) {
-  for (uint64_t seed = 0; seed < scaled_count(1'000); ++seed) {
-    Random random(seed);
-    expect_superset(grazing_scene(random), seed);
-  }
+  expect_supersets(1'000, drawn_by(grazing_scene));
 }
 
 TEST(QueryConservativeTest, FindsAllThatExactFindsFarFromTheWorldsOrigin) {
-  for (uint64_t seed = 0; seed < scaled_count(2'000); ++seed) {
-    Random random(seed);
-    expect_superset(far_scene(random), seed);
-  }
+  expect_supersets(2'000, drawn_by(far_scene));
 }
 
 TEST(QueryConservativeTest, BoundsOfPlacedTrianglesAreTightFarFromTheWorldsOrigin) {
